@@ -1,0 +1,1 @@
+"""Warp device code of warpjld: kernels and functions only, nothing from the host side."""

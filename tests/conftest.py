@@ -1,0 +1,23 @@
+"""Shared fixtures. Real assets are optional: tests that want them are skipped where the folder is missing."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+
+import pytest
+
+_DATA = Path(__file__).resolve().parents[2] / "shared" / "data"
+
+# pytest-xdist workers must not compile into one another's kernel cache
+if worker := os.environ.get("PYTEST_XDIST_WORKER"):
+    base = os.environ.get("WARP_CACHE_PATH", str(Path.home() / ".cache" / "warpjld-tests"))
+    os.environ["WARP_CACHE_PATH"] = str(Path(base) / worker)
+
+
+@pytest.fixture(scope="session")
+def data() -> Path:
+    """Folder of third-party assets."""
+    if not _DATA.is_dir():
+        pytest.skip("third-party assets (../shared/data) are not here")
+    return _DATA

@@ -1,0 +1,5 @@
+"""``python -m warpjld``: the command line."""
+
+from warpjld.cli import main
+
+main()

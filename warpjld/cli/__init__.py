@@ -1,0 +1,63 @@
+"""The command line: one file per command, loaded when it is called."""
+
+from __future__ import annotations
+
+import importlib
+import sys
+
+import click
+
+from warpjld import __version__
+from warpjld.errors import WarpjldError
+
+__all__ = ["main"]
+
+_COMMANDS = {
+    "run": "Run a command script: animation, pictures, film, exports.",
+    "deform": "Deform a rig by a motion file.",
+    "inspect": "Report what was recognised in a rig.",
+    "calibrate": "Fit the covering's parameters to a rig.",
+    "shell": "Type commands of the language and look at the result.",
+}
+
+
+class _Lazy(click.Group):
+    """Loads ``warpjld.cli.NAME.command`` only for the command that is called: start-up stays short."""
+
+    def list_commands(self, ctx: click.Context) -> list[str]:
+        return list(_COMMANDS)
+
+    def get_command(self, ctx: click.Context, name: str) -> click.Command | None:
+        if name not in _COMMANDS:
+            return None
+        command: click.Command = importlib.import_module(f"warpjld.cli.{name}").command
+        return command
+
+    def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
+        with formatter.section("Commands"):
+            formatter.write_dl(list(_COMMANDS.items()))
+
+
+@click.group(cls=_Lazy, context_settings={"help_option_names": ["-h", "--help"]})
+@click.version_option(__version__, prog_name="warpjld")
+def _group() -> None:
+    """Hands and bodies deformed by Joint-dependent Local Deformations, without painted weights."""
+
+
+def main(arguments: list[str] | None = None) -> None:
+    """Run the command line. Exit codes: 0 done, 1 bad input or a failed job, 2 wrong usage, 130 interrupted."""
+    try:
+        code = _group.main(arguments, prog_name="warpjld", standalone_mode=False)
+    except click.exceptions.Abort:
+        click.echo("interrupted", err=True)
+        sys.exit(130)
+    except click.ClickException as error:
+        error.show()
+        sys.exit(error.exit_code)
+    except KeyboardInterrupt:
+        click.echo("interrupted", err=True)
+        sys.exit(130)
+    except WarpjldError as error:
+        click.echo(f"error: {error}", err=True)
+        sys.exit(1)
+    sys.exit(code if isinstance(code, int) else 0)

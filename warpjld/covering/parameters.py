@@ -1,0 +1,113 @@
+"""The animator's parameters of every joint (A §3, R22–R24), and the files that carry them."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import dataclass, fields
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from warpjld.errors import InputError
+from warpjld.skeleton.tree import Skeleton
+
+__all__ = ["Parameters", "default_parameters", "load_parameters", "save_parameters"]
+
+
+@dataclass(frozen=True, eq=False)
+class Parameters:
+    """Parameters of J joints. A segment is governed by the joints at its two ends.
+
+    Attributes:
+        inflation: Amplitude of the rounding of a joint at full flexion, shape (J,) (R22a, R58–R62).
+        proximity: Portion of a segment to round: of the segment that begins at the joint, and of the one that ends
+            there, shape (J, 2) (R22b; A Fig. 6 has 0.3 and 0.2). Both portions of a segment sum to 1 at most (C21).
+        muscle: Amplitude of the internal muscle of the segment that begins at the joint, shape (J,) (R22c, R63).
+        peak: Ratio along that segment where the muscle is fullest, in (0, 1), shape (J,) (R22d, R64).
+        exponents: Exponent b of the two functions a^b, before and beyond the peak, shape (J, 2) (R65).
+        palm: Exponent k of the palm's scale factor where neighbouring segments approach, shape (J,) (R44, C3).
+    """
+
+    inflation: NDArray[np.float64]
+    proximity: NDArray[np.float64]
+    muscle: NDArray[np.float64]
+    peak: NDArray[np.float64]
+    exponents: NDArray[np.float64]
+    palm: NDArray[np.float64]
+
+    def check(self, skeleton: Skeleton) -> None:
+        """Raise InputError where a value is out of its range for this skeleton."""
+        count = len(skeleton)
+        for field in fields(self):
+            array = getattr(self, field.name)
+            if array.shape[0] != count:
+                raise InputError(f"parameters.{field.name}: want {count} rows, got {array.shape[0]}")
+            bad = np.argwhere(~np.isfinite(array) | (array < 0.0))
+            if len(bad):
+                raise InputError(f"parameters.{field.name} of '{skeleton.names[bad[0][0]]}' must be finite and ≥ 0")
+        outside = np.flatnonzero((self.peak <= 0.0) | (self.peak >= 1.0))
+        if outside.size:
+            raise InputError(f"peak of '{skeleton.names[outside[0]]}' must lie between 0 and 1")
+        for segment in skeleton.segments:
+            total = self.proximity[segment.proximal, 0] + self.proximity[segment.distal, 1]
+            if total > 1.0 + 1e-9:
+                ends = f"'{skeleton.names[segment.proximal]}' → '{skeleton.names[segment.distal]}'"
+                raise InputError(f"proximities of segment {ends} sum to {total:.3g}; at most 1 (C21)")
+
+
+def default_parameters(skeleton: Skeleton) -> Parameters:
+    """Defaults that keep the volume of a bent tube (proximities from A Fig. 6)."""
+    ones = np.ones(len(skeleton))
+    return Parameters(
+        inflation=0.25 * ones,
+        proximity=np.column_stack([0.3 * ones, 0.2 * ones]),
+        muscle=0.20 * ones,
+        peak=0.5 * ones,
+        exponents=np.column_stack([0.6 * ones, 0.6 * ones]),
+        palm=0.2 * ones,
+    )
+
+
+def save_parameters(path: str | Path, skeleton: Skeleton, parameters: Parameters) -> None:
+    """Write a parameter file (JSON: joint → values)."""
+    joints = {
+        name: {f.name: np.round(getattr(parameters, f.name)[j], 6).tolist() for f in fields(parameters)}
+        for j, name in enumerate(skeleton.names)
+    }
+    target = Path(path)
+    beside = target.with_name(target.name + ".part")
+    beside.write_text(json.dumps({"warpjld": "parameters", "version": 1, "joints": joints}, indent=1) + "\n")
+    beside.replace(target)
+
+
+def load_parameters(path: str | Path, skeleton: Skeleton) -> Parameters:
+    """Read a parameter file; joints it does not name keep the defaults.
+
+    Raises:
+        InputError: Unreadable file, unknown joint or field, or a value of the wrong shape or range.
+    """
+    try:
+        content = json.loads(Path(path).read_text(encoding="utf-8"))
+        joints = content["joints"]
+    except OSError as error:
+        raise InputError(f"cannot read parameters: {error.strerror}", path=path) from error
+    except json.JSONDecodeError as error:
+        raise InputError(f"not JSON: {error.msg}", path=path, line=error.lineno, column=error.colno) from error
+    except (KeyError, TypeError) as error:
+        raise InputError("want a JSON object with a 'joints' object", path=path) from error
+    defaults = default_parameters(skeleton)
+    known = {f.name: getattr(defaults, f.name) for f in fields(defaults)}
+    for name, values in joints.items():
+        joint = skeleton.index(name)
+        for key, value in values.items():
+            if key not in known:
+                raise InputError(f"joint '{name}': unknown parameter '{key}'; known: {', '.join(known)}", path=path)
+            try:
+                known[key][joint] = value
+            except (TypeError, ValueError) as error:
+                want = "two numbers" if known[key].ndim == 2 else "a number"
+                raise InputError(f"joint '{name}': '{key}' wants {want}, got {value!r}", path=path) from error
+    parameters = Parameters(**known)
+    parameters.check(skeleton)
+    return parameters

@@ -1,0 +1,44 @@
+"""Everything warpjld raises on purpose. The command line prints these as one line, without a traceback."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+__all__ = ["InputError", "MissingExtraError", "WarpjldError"]
+
+
+class WarpjldError(Exception):
+    """Base of all errors raised on purpose."""
+
+
+class InputError(WarpjldError):
+    """Something given by the user cannot be used: names the place and what was expected.
+
+    Args:
+        message: What is wrong and what was expected.
+        path: The file concerned, if any.
+        line: 1-based line in that file.
+        column: 1-based column in that line.
+    """
+
+    def __init__(
+        self,
+        message: str,
+        *,
+        path: str | Path | None = None,
+        line: int | None = None,
+        column: int | None = None,
+    ) -> None:
+        self.message = message
+        self.path = None if path is None else Path(path)
+        self.line = line
+        self.column = column
+        place = ":".join(str(part) for part in (path, line, column) if part is not None)
+        super().__init__(f"{place}: {message}" if place else message)
+
+
+class MissingExtraError(WarpjldError):
+    """An optional dependency is not installed: names the extra that brings it."""
+
+    def __init__(self, purpose: str, extra: str) -> None:
+        super().__init__(f"{purpose} needs an optional dependency: pip install 'warpjld[{extra}]'")

@@ -1,0 +1,162 @@
+"""Forward kinematics: joint angles of many frames → joint positions, bone rotations and vertical flexions."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial.transform import Rotation
+
+from warpjld.errors import InputError
+from warpjld.skeleton.tree import CHANNELS, Skeleton
+
+__all__ = ["Poses", "poses_from_angles", "poses_from_rotations", "rest_poses", "vertical_flexion"]
+
+
+@dataclass(frozen=True, eq=False)
+class Poses:
+    """Final positions of a skeleton over F frames: what the covering needs and nothing else.
+
+    Attributes:
+        positions: Joint positions [m], shape (F, J, 3).
+        rotations: Rotation of each joint's bone from the rest pose, unit quaternions x, y, z, w, shape (F, J, 4).
+            Signs are aligned along the tree, so that any two neighbours blend the short way.
+        flexion: Vertical component of each joint's flexion [rad], shape (F, J) (R28, R29).
+    """
+
+    positions: NDArray[np.float64]
+    rotations: NDArray[np.float64]
+    flexion: NDArray[np.float64]
+
+    def __len__(self) -> int:
+        return len(self.positions)
+
+    def __getitem__(self, frames: slice) -> Poses:
+        return Poses(self.positions[frames], self.rotations[frames], self.flexion[frames])
+
+
+def poses_from_angles(
+    skeleton: Skeleton,
+    angles: NDArray[np.float64],
+    *,
+    root_position: NDArray[np.float64] | None = None,
+    root_rotation: NDArray[np.float64] | None = None,
+) -> Poses:
+    """Poses of joint angles.
+
+    A joint turns its bone by twisting about the segment, then flexion about the pivoted axis (R27), then abduction
+    about the normal; pivot, twisting and abduction are mirrored on the left side, so that equal angles give mirrored
+    hands: positive pivot and abduction lean to the thumb's side, positive twisting is inward rotation.
+
+    Args:
+        skeleton: The rest skeleton.
+        angles: Joint angles [rad], shape (F, J, 4), channels as in ``CHANNELS``.
+        root_position: Displacement of the root from rest [m], shape (F, 3).
+        root_rotation: Rotation of the root about its rest position, quaternions x, y, z, w, shape (F, 4).
+    """
+    count = len(skeleton)
+    if angles.ndim != 3 or angles.shape[1:] != (count, len(CHANNELS)):
+        raise InputError(f"angles: want shape (frames, {count}, {len(CHANNELS)}), got {angles.shape}")
+    if not np.isfinite(angles).all():
+        frame, joint, channel = np.argwhere(~np.isfinite(angles))[0]
+        raise InputError(f"angles: {skeleton.names[joint]}.{CHANNELS[channel]} is not finite at frame {frame}")
+    frames = len(angles)
+    local = np.empty((frames, count, 4))
+    directions, mirror = skeleton.directions, skeleton.mirror
+    for j in range(count):
+        axis, direction = skeleton.axes[j], directions[j]
+        normal = np.cross(direction, axis)
+        flexion, pivot, twisting, abduction = angles[:, j].T
+        pivoted = Rotation.from_rotvec(np.outer(mirror[j] * pivot, direction)).apply(axis)
+        turn = (
+            Rotation.from_rotvec(np.outer(mirror[j] * abduction, normal))
+            * Rotation.from_rotvec(pivoted * flexion[:, None])
+            * Rotation.from_rotvec(np.outer(-mirror[j] * twisting, direction))
+        )
+        local[:, j] = turn.as_quat()
+    return _compose(skeleton, local, root_position, root_rotation)
+
+
+def poses_from_rotations(
+    skeleton: Skeleton,
+    local: NDArray[np.float64],
+    *,
+    root_position: NDArray[np.float64] | None = None,
+) -> Poses:
+    """Poses of free joint rotations, such as a motion file gives (BVH, glTF).
+
+    Args:
+        skeleton: The rest skeleton.
+        local: Rotation of each joint relative to its parent's bone, measured from rest in the axes of the rest pose,
+            quaternions x, y, z, w, shape (F, J, 4).
+        root_position: Displacement of the root from rest [m], shape (F, 3).
+    """
+    if local.ndim != 3 or local.shape[1:] != (len(skeleton), 4):
+        raise InputError(f"local: want shape (frames, {len(skeleton)}, 4), got {local.shape}")
+    return _compose(skeleton, local, root_position, None)
+
+
+def rest_poses(skeleton: Skeleton, frames: int = 1) -> Poses:
+    """The rest pose, ``frames`` times."""
+    return poses_from_angles(skeleton, np.zeros((frames, len(skeleton), len(CHANNELS))))
+
+
+def _compose(
+    skeleton: Skeleton,
+    local: NDArray[np.float64],
+    root_position: NDArray[np.float64] | None,
+    root_rotation: NDArray[np.float64] | None,
+) -> Poses:
+    frames, count = local.shape[:2]
+    local = local * np.where(local[..., 3:] < 0.0, -1.0, 1.0)
+    rotations = np.empty((frames, count, 4))
+    positions = np.empty((frames, count, 3))
+    for j in range(count):
+        parent = int(skeleton.parents[j])
+        if parent < 0:
+            turn = local[:, j] if root_rotation is None else _multiply(root_rotation, local[:, j])
+            rotations[:, j] = turn
+            positions[:, j] = skeleton.rest[j] + (0.0 if root_position is None else root_position)
+        else:
+            rotations[:, j] = _multiply(rotations[:, parent], local[:, j])
+            offset = Rotation.from_quat(rotations[:, parent]).apply(skeleton.rest[j] - skeleton.rest[parent])
+            positions[:, j] = positions[:, parent] + offset
+    return Poses(positions, rotations, vertical_flexion(skeleton, local))
+
+
+def vertical_flexion(skeleton: Skeleton, local: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Angle [rad] between a joint's rest segment and the projection of its final segment on the plane normal to the
+    unpivoted flexion axis, shape (F, J) (A §3, R28, R29).
+
+    Args:
+        skeleton: The rest skeleton.
+        local: Joint rotations relative to the parent's bone, quaternions x, y, z, w, shape (F, J, 4).
+    """
+    out = np.empty(local.shape[:2])
+    for j in range(len(skeleton)):
+        axis, direction = skeleton.axes[j], skeleton.directions[j]
+        moved = Rotation.from_quat(local[:, j]).apply(direction)
+        initial = direction - axis * (axis @ direction)
+        length = np.linalg.norm(initial)
+        if length < 1e-6:  # the axis lies along the segment: nothing bends
+            out[:, j] = 0.0
+            continue
+        initial = initial / length
+        out[:, j] = np.arctan2(moved @ np.cross(axis, initial), moved @ initial)
+    return out
+
+
+def _multiply(a: NDArray[np.float64], b: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Hamilton product without the sign changes a rotation library may make."""
+    ax, ay, az, aw = np.moveaxis(a, -1, 0)
+    bx, by, bz, bw = np.moveaxis(b, -1, 0)
+    return np.stack(
+        [
+            aw * bx + ax * bw + ay * bz - az * by,
+            aw * by - ax * bz + ay * bw + az * bx,
+            aw * bz + ax * by - ay * bx + az * bw,
+            aw * bw - ax * bx - ay * by - az * bz,
+        ],
+        axis=-1,
+    )

@@ -1,0 +1,147 @@
+"""The joint tree: who hangs on whom, where joints rest, about which axes they bend and how far."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from warpjld.errors import InputError
+
+__all__ = ["CHANNELS", "Segment", "Skeleton"]
+
+CHANNELS = ("flexion", "pivot", "twisting", "abduction")
+"""Angles of a joint, in the order of their last array axis. Abduction is this project's addition: the paper's
+pivot turns the flexion axis about the segment (R27) and so moves nothing while the joint is straight."""
+
+
+@dataclass(frozen=True)
+class Segment:
+    """A bone between two joints; it moves with the rotation of its proximal joint.
+
+    Attributes:
+        proximal: Joint nearer to the root.
+        distal: Joint at the other end; a segment is known by it.
+        palm: Whether the two-segment covering of the palm applies (R19).
+    """
+
+    proximal: int
+    distal: int
+    palm: bool
+
+
+@dataclass(frozen=True, eq=False)
+class Skeleton:
+    """A rest skeleton of J joints, parents before children (R1, R6, R24).
+
+    Every joint carries one rigid bone, whose rotation is measured from the rest pose; so at rest all rotations
+    are the identity whatever frames the source file gave its bones.
+
+    Attributes:
+        names: Canonical joint names, e.g. ``left.index.base``; those not recognised keep the file's name.
+        parents: Parent joint, -1 for the root, shape (J,).
+        rest: Joint positions at rest [m], shape (J, 3).
+        axes: Unit flexion axes at rest, shape (J, 3). Positive flexion bends towards the palm: the normal
+            segment × axis points to the external side (R20).
+        limits: Smallest and largest angle [rad] of each channel, shape (J, 4, 2), channels as in ``CHANNELS``.
+        palms: Per hand its palm segments as (proximal, distal) pairs, ulnar to radial; neighbours are adjacent.
+    """
+
+    names: tuple[str, ...]
+    parents: NDArray[np.int32]
+    rest: NDArray[np.float64]
+    axes: NDArray[np.float64]
+    limits: NDArray[np.float64]
+    palms: tuple[tuple[tuple[int, int], ...], ...] = ()
+
+    def __post_init__(self) -> None:
+        count = len(self.names)
+        wants = {
+            "parents": (count,),
+            "rest": (count, 3),
+            "axes": (count, 3),
+            "limits": (count, len(CHANNELS), 2),
+        }
+        for field, shape in wants.items():
+            array = getattr(self, field)
+            if array.shape != shape:
+                raise InputError(f"skeleton {field}: want shape {shape}, got {array.shape}")
+            if not np.isfinite(array).all():
+                bad = int(np.argwhere(~np.isfinite(array))[0][0])
+                raise InputError(f"skeleton {field}: joint '{self.names[bad]}' is not finite")
+        if len(set(self.names)) != count:
+            twice = next(name for name in self.names if self.names.count(name) > 1)
+            raise InputError(f"skeleton: two joints are called '{twice}'")
+        late = np.flatnonzero(self.parents >= np.arange(count))
+        if late.size:
+            raise InputError(f"skeleton: parent of '{self.names[late[0]]}' does not come before it")
+
+    def __len__(self) -> int:
+        return len(self.names)
+
+    def index(self, name: str) -> int:
+        """Joint number of a canonical name; the side may be left out where only one hand or limb has it."""
+        wanted = name.lower()
+        matches = [
+            i for i, n in enumerate(self.names) if n == wanted or (n.partition(".")[2] == wanted and n[:5] in _SIDED)
+        ]
+        exact = [i for i in matches if self.names[i] == wanted]
+        if len(exact or matches) == 1:
+            return (exact or matches)[0]
+        if matches:
+            raise InputError(f"joint '{name}' is ambiguous: {', '.join(self.names[i] for i in matches)}")
+        raise InputError(f"no joint '{name}' in this skeleton{_did_you_mean(wanted, self.names)}")
+
+    @cached_property
+    def segments(self) -> tuple[Segment, ...]:
+        """One segment per joint that has a parent, in joint order; palm segments are marked."""
+        palm = {distal: proximal for pairs in self.palms for proximal, distal in pairs}
+        return tuple(
+            Segment(palm.get(j, int(self.parents[j])), j, j in palm) for j in range(len(self)) if self.parents[j] >= 0
+        )
+
+    @cached_property
+    def children(self) -> tuple[tuple[int, ...], ...]:
+        """Children of every joint."""
+        return tuple(tuple(int(c) for c in np.flatnonzero(self.parents == j)) for j in range(len(self)))
+
+    @cached_property
+    def directions(self) -> NDArray[np.float64]:
+        """Unit rest direction of the bone each joint carries, shape (J, 3): towards the child, or the mean of the
+        children; at an extremity the direction of the segment that ends there."""
+        out = np.zeros((len(self), 3))
+        for j in range(len(self)):
+            kids = [c for c in self.children[j] if np.linalg.norm(self.rest[c] - self.rest[j]) > 1e-9]
+            if kids:
+                towards = sum(self.rest[c] - self.rest[j] for c in kids)
+                if np.linalg.norm(towards) < 1e-9:
+                    towards = self.rest[kids[0]] - self.rest[j]
+            elif self.parents[j] >= 0:
+                towards = self.rest[j] - self.rest[self.parents[j]]
+            else:
+                towards = np.array([0.0, 1.0, 0.0])
+            length = np.linalg.norm(towards)
+            out[j] = towards / length if length > 1e-9 else out[max(self.parents[j], 0)]
+        return out
+
+    @cached_property
+    def mirror(self) -> NDArray[np.float64]:
+        """-1 for joints of the left side, +1 elsewhere, shape (J,): the sign of turns that mirror images share."""
+        return np.array([-1.0 if name.startswith("left.") else 1.0 for name in self.names])
+
+    def with_axes(self, axes: NDArray[np.float64]) -> Skeleton:
+        """The same skeleton with other flexion axes (R21)."""
+        return replace(self, axes=axes / np.linalg.norm(axes, axis=1, keepdims=True))
+
+
+_SIDED = ("left.", "right")
+
+
+def _did_you_mean(word: str, names: tuple[str, ...]) -> str:
+    from difflib import get_close_matches
+
+    pool = {n: n for n in names} | {n.partition(".")[2]: n for n in names if n[:5] in _SIDED}
+    close = get_close_matches(word, list(pool), n=1)
+    return f"; did you mean '{close[0]}'?" if close else ""

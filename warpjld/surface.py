@@ -1,0 +1,111 @@
+"""A triangulated surface: welded geometry to compute on, and the source's own vertex order to export."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from scipy.spatial import cKDTree
+
+from warpjld.errors import InputError
+
+__all__ = ["Part", "Surface", "weld_surface"]
+
+
+@dataclass(frozen=True)
+class Part:
+    """One mesh of the source file: a range of source vertices and source faces."""
+
+    name: str
+    vertices: slice
+    faces: slice
+
+
+@dataclass(frozen=True, eq=False)
+class Surface:
+    """V welded vertices and T triangles, made from W source vertices (W > V where UV seams split the source).
+
+    Attributes:
+        vertices: Welded positions at rest [m], shape (V, 3).
+        faces: Triangles over the welded vertices, shape (T, 3), anticlockwise seen from outside.
+        weld: Welded vertex of every source vertex, shape (W,).
+        source_faces: Triangles over the source vertices, shape (S, 3), in the source's order.
+        uv: Texture coordinates of the source vertices, shape (W, 2), or None.
+        parts: The source's meshes.
+    """
+
+    vertices: NDArray[np.float64]
+    faces: NDArray[np.int32]
+    weld: NDArray[np.int32]
+    source_faces: NDArray[np.int32]
+    uv: NDArray[np.float32] | None = None
+    parts: tuple[Part, ...] = ()
+
+    @property
+    def size(self) -> float:
+        """Diagonal of the bounding box [m]: what tolerances are relative to."""
+        return float(np.linalg.norm(np.ptp(self.vertices, axis=0)))
+
+    def to_source(self, vertices: NDArray[np.float32]) -> NDArray[np.float32]:
+        """Welded positions (…, V, 3) in the source's vertex order (…, W, 3)."""
+        return vertices[..., self.weld, :]
+
+
+def weld_surface(
+    vertices: ArrayLike,
+    faces: ArrayLike,
+    *,
+    uv: NDArray[np.float32] | None = None,
+    parts: tuple[Part, ...] = (),
+    tolerance: float = 1e-7,
+) -> Surface:
+    """Weld source vertices that lie at the same place, within a part.
+
+    Args:
+        vertices: Source positions [m], shape (W, 3).
+        faces: Source triangles, shape (S, 3).
+        uv: Texture coordinates, shape (W, 2).
+        parts: Source meshes; vertices of different parts are never welded.
+        tolerance: Distance below which two vertices are one, relative to the bounding box diagonal.
+
+    Raises:
+        InputError: Wrong shapes, not finite, no faces, or an index out of range.
+    """
+    points = np.asarray(vertices, dtype=np.float64)
+    triangles = np.asarray(faces, dtype=np.int64)
+    if points.ndim != 2 or points.shape[1] != 3 or len(points) == 0:
+        raise InputError(f"vertices: want shape (n, 3) with n > 0, got {points.shape}")
+    if triangles.ndim != 2 or triangles.shape[1] != 3 or len(triangles) == 0:
+        raise InputError(f"faces: want shape (n, 3) with n > 0, got {triangles.shape}")
+    if not np.isfinite(points).all():
+        raise InputError(f"vertices: vertex {int(np.argwhere(~np.isfinite(points))[0][0])} is not finite")
+    if triangles.min() < 0 or triangles.max() >= len(points):
+        raise InputError(f"faces: indices must lie in 0…{len(points) - 1}, got {triangles.min()}…{triangles.max()}")
+    if not parts:
+        parts = (Part("surface", slice(0, len(points)), slice(0, len(triangles))),)
+    size = float(np.linalg.norm(np.ptp(points, axis=0)))
+    owner = np.arange(len(points))
+    for part in parts:
+        inside = points[part.vertices]
+        pairs = cKDTree(inside).query_pairs(max(tolerance * size, 1e-12), output_type="ndarray")
+        if len(pairs):
+            from scipy.sparse import coo_array
+            from scipy.sparse.csgraph import connected_components
+
+            links = coo_array((np.ones(len(pairs)), (pairs[:, 0], pairs[:, 1])), shape=(len(inside),) * 2)
+            label = connected_components(links, directed=False)[1]
+            first = np.full(label.max() + 1, len(inside))
+            np.minimum.at(first, label, np.arange(len(inside)))
+            owner[part.vertices] = part.vertices.start + first[label]
+    kept, weld = np.unique(owner, return_inverse=True)
+    welded = weld[triangles]
+    solid = (welded[:, 0] != welded[:, 1]) & (welded[:, 1] != welded[:, 2]) & (welded[:, 2] != welded[:, 0])
+    return Surface(
+        vertices=np.ascontiguousarray(points[kept]),
+        faces=welded[solid].astype(np.int32),
+        weld=weld.astype(np.int32),
+        source_faces=triangles.astype(np.int32),
+        uv=uv,
+        parts=parts,
+    )
