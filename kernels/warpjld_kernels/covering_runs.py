@@ -96,21 +96,18 @@ RUN_FIELDS = 8
         z[i] += dz[i] + twice * (qx[i] * ty - qy[i] * tx);
     }}
 
+    float xyz[3 * N];
     float* out = (float*)points.data + 3 * size_t(frame) * points.shape[1];
+    float* packed = scatter ? xyz : out + 3 * (r[0] + lane);
+    for (int i = 0; i < N; ++i) {{
+        packed[3 * i] = x[i];
+        packed[3 * i + 1] = y[i];
+        packed[3 * i + 2] = z[i];
+    }}
     if (scatter) {{
         const int* target = order.data + r[0] + lane;
         for (int i = 0; i < N; ++i) {{
-            float* p = out + 3 * target[i];
-            p[0] = x[i];
-            p[1] = y[i];
-            p[2] = z[i];
-        }}
-    }} else {{
-        float* p = out + 3 * (r[0] + lane);
-        for (int i = 0; i < N; ++i) {{
-            p[3 * i] = x[i];
-            p[3 * i + 1] = y[i];
-            p[3 * i + 2] = z[i];
+            memcpy(out + 3 * target[i], xyz + 3 * i, 12);
         }}
     }}
 """
