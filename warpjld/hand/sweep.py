@@ -31,6 +31,7 @@ class Sweep:
         ends: Axial coordinate of the closed ends.
         caps: Axial coordinate where the rounding of either end begins.
         squareness: 0 for elliptic sections, towards 1 for rectangular ones.
+        nail: Axial coordinate of the nail's middle, its half-length and half-width, if the digit has one.
         table: Per row along the axis: centre (lateral, dorsal), half-width, dorsal and palmar half-height, (n, 5).
     """
 
@@ -40,6 +41,7 @@ class Sweep:
     caps: tuple[float, float]
     squareness: float
     table: Array
+    nail: tuple[float, float, float] | None = None
 
     @classmethod
     def through(
@@ -51,6 +53,7 @@ class Sweep:
         squareness: float,
         centres: Sequence[tuple[float, float, float]],
         profile: Sequence[tuple[float, float, float, float]],
+        nail: tuple[float, float, float] | None = None,
     ) -> Sweep:
         """Sweep whose sections have their centroids on a spline.
 
@@ -64,10 +67,10 @@ class Sweep:
         inside = np.clip(along, sizes[0, 0], sizes[-1, 0])
         half = CubicSpline(sizes[:, 0], sizes[:, 1:], bc_type="natural")(inside)
         line[:, 1] -= _CENTROID * (half[:, 1] - half[:, 2])  # unequal halves: keep the centroid, move their border
-        return cls(origin, frame, ends, caps, squareness, np.column_stack([line, half]))
+        return cls(origin, frame, ends, caps, squareness, np.column_stack([line, half]), nail)
 
-    def __call__(self, points: Array) -> Array:
-        """Signed distance of points (n, 3), negative inside, shape (n,)."""
+    def __call__(self, points: Array, detail: float = 0.0) -> Array:
+        """Signed distance of points (n, 3), negative inside, shape (n,); ``detail`` 0…1 engraves the nail."""
         local = (points - self.origin) @ self.frame.T
         s = local[:, 2]
         low, high = self.ends
@@ -79,9 +82,23 @@ class Sweep:
         start, end = self.caps
         beyond = np.maximum(s - end, 0.0) / (high - end) + np.maximum(start - s, 0.0) / (start - low)
         length = np.where(s > end, high - end, start - low)
-        return section_distance(
-            local[:, 0] - cu, v, beyond, width, np.where(v > 0.0, dorsal, palmar), length, self.squareness
-        )
+        u = local[:, 0] - cu
+        out = section_distance(u, v, beyond, width, np.where(v > 0.0, dorsal, palmar), length, self.squareness)
+        if self.nail and detail > 0.0:
+            out += detail * self._fold(u, v / dorsal, s)
+        return out
+
+    def _fold(self, u: Array, height: Array, s: Array) -> Array:
+        """Depth of the fold around the nail, and the nail standing a little above it."""
+        assert self.nail is not None
+        middle, half_length, half_width = self.nail
+        along = (s - middle) / half_length
+        rim = np.sqrt(np.sqrt((u / half_width) ** 4 + along**4))
+        away = (rim - 1.0) * half_width
+        upper = np.clip(2.5 * height, 0.0, 1.0)
+        fold = 0.045 * half_width * np.exp(-((away / (0.10 * half_width)) ** 2))
+        plate = 0.02 * half_width / (1.0 + np.exp(np.clip(away / (0.05 * half_width), -30.0, 30.0)))
+        return upper * upper * (3.0 - 2.0 * upper) * (fold - plate)
 
 
 def section_distance(

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from warpjld.errors import WarpjldError
@@ -34,6 +36,8 @@ def triangulate(flesh: Flesh, resolution: int) -> tuple[Array, Faces]:
     vertices, faces, size = remesh(vertices, faces, size, flesh, rounds=3)
     for _ in range(3):
         vertices = settle(vertices, faces, size, flesh)
+    # details finer than the triangles would only be noise
+    flesh = replace(flesh, detail=float(np.clip((resolution - 8_000) / 24_000, 0.0, 1.0)))
     vertices = flesh.project(vertices, steps=2)
     for _ in range(halvings):
         vertices, faces = subdivide(vertices, faces)
