@@ -14,6 +14,7 @@ __all__ = ["Flesh"]
 
 Array = NDArray[np.float64]
 
+_BLOCK = 16_384
 _BETWEEN_FINGERS = 1.6  # blending radii [mm of the design hand]
 _FINGER_ROOT = 9.0
 _THUMB_ROOT = 16.0
@@ -33,6 +34,9 @@ class Flesh:
 
     def __call__(self, points: Array) -> Array:
         """Signed distance of points (n, 3) [mm], negative inside, shape (n,)."""
+        if len(points) > _BLOCK:  # blocks whose intermediate arrays stay in the cache
+            parts = [self(points[i : i + _BLOCK]) for i in range(0, len(points), _BLOCK)]
+            return np.concatenate(parts)
         scale = float(self.plan.stretch[0])
         fingers = None
         for name in ("pinky", "ring", "middle", "index"):

@@ -1,23 +1,25 @@
 """A digit as a swept section: a straight axis, a curved centre line beside it, and half-widths along it.
 
-Sections are cut square to one straight axis and shifted to the centre line. So the nearest section of a point is a dot
-product, smooth everywhere, and a bent digit has none of the creases that projecting on a polyline makes.
+Sections are cut square to one straight axis and shifted to the centre line. So the section of a point is a dot product,
+smooth everywhere, and a bent digit has none of the creases that projecting on a polyline makes.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline
 
-__all__ = ["Sweep", "section_distance"]
+__all__ = ["FAR", "Sweep", "section_distance"]
 
 Array = NDArray[np.float64]
 
 _ROWS = 512  # of the tables along the axis: errors of the interpolation stay below a micrometre
+FAR = 25.0  # millimetres: beyond every blending radius
 _CENTROID = 4.0 / (3.0 * np.pi)  # of a half ellipse, in half-heights
 
 
@@ -70,19 +72,40 @@ class Sweep:
         return cls(origin, frame, ends, caps, squareness, np.column_stack([line, half]), nail)
 
     def __call__(self, points: Array, detail: float = 0.0) -> Array:
-        """Signed distance of points (n, 3), negative inside, shape (n,); ``detail`` 0…1 engraves the nail."""
+        """Signed distance of points (n, 3), negative inside, shape (n,).
+
+        Points farther than ``FAR`` get just that: they do not pay for what nobody will read.
+
+        Args:
+            points: Positions, shape (n, 3).
+            detail: 0…1, how deep the nail is engraved.
+        """
         local = (points - self.origin) @ self.frame.T
+        low, high = self._box
+        near = np.flatnonzero(((local > low) & (local < high)).all(axis=1))
+        out = np.full(len(points), FAR)
+        if len(near):
+            out[near] = self._distance(local[near], detail)
+        return out
+
+    @cached_property
+    def _box(self) -> tuple[Array, Array]:
+        cu, cv, width, dorsal, palmar = self.table.T
+        low = np.array([(cu - width).min(), (cv - palmar).min(), self.ends[0]])
+        high = np.array([(cu + width).max(), (cv + dorsal).max(), self.ends[1]])
+        return low - FAR, high + FAR
+
+    def _distance(self, local: Array, detail: float) -> Array:
         s = local[:, 2]
         low, high = self.ends
         place = np.clip((s - low) * ((_ROWS - 1) / (high - low)), 0.0, _ROWS - 1.001)
         row = place.astype(np.int64)
         part = (place - row)[:, None]
         cu, cv, width, dorsal, palmar = ((1.0 - part) * self.table[row] + part * self.table[row + 1]).T
-        v = local[:, 1] - cv
+        u, v = local[:, 0] - cu, local[:, 1] - cv
         start, end = self.caps
         beyond = np.maximum(s - end, 0.0) / (high - end) + np.maximum(start - s, 0.0) / (start - low)
         length = np.where(s > end, high - end, start - low)
-        u = local[:, 0] - cu
         out = section_distance(u, v, beyond, width, np.where(v > 0.0, dorsal, palmar), length, self.squareness)
         if self.nail and detail > 0.0:
             out += detail * self._fold(u, v / dorsal, s)
