@@ -31,7 +31,8 @@ def read_accessor(gltf: Any, buffers: list[bytes], index: int) -> NDArray[Any]:
     what = f"accessor {index}"
     if accessor.componentType not in _COMPONENTS or accessor.type not in _SHAPES:
         raise InputError(f"{what}: unknown type {accessor.type} of {accessor.componentType}")
-    dtype, shape = np.dtype(_COMPONENTS[accessor.componentType]).newbyteorder("<"), _SHAPES[accessor.type]
+    dtype: np.dtype[Any] = np.dtype(_COMPONENTS[accessor.componentType]).newbyteorder("<")
+    shape = _SHAPES[accessor.type]
     if accessor.bufferView is None:
         out = np.zeros((accessor.count, *shape), dtype)
     else:
@@ -52,7 +53,7 @@ def read_accessor(gltf: Any, buffers: list[bytes], index: int) -> NDArray[Any]:
     if len(shape) == 2:
         out = out.swapaxes(1, 2)  # stored by columns
     if accessor.normalized and dtype.kind != "f":
-        return np.maximum(out / np.iinfo(dtype).max, -1.0)
+        return np.maximum(out / (256**dtype.itemsize // (2 if dtype.kind == "i" else 1) - 1), -1.0)
     return out
 
 

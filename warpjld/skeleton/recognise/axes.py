@@ -68,8 +68,8 @@ def _common_hinge(
     """
     bones = np.diff(np.array(chain), axis=0)
     bones /= np.linalg.norm(bones, axis=1, keepdims=True)
-    axis: NDArray[np.float64] = np.linalg.solve(bones.T @ bones + prior * np.eye(3), prior * expected)
-    return axis / np.linalg.norm(axis)
+    axis = np.linalg.solve(bones.T @ bones + prior * np.eye(3), prior * expected)
+    return np.asarray(axis / np.linalg.norm(axis), dtype=np.float64)
 
 
 def _along(

@@ -30,7 +30,7 @@ def roles_by_name(tree: SourceTree) -> Roles:
     for j in sorted(range(len(tree)), key=lambda j: (tree.depth(j), meanings[j].number or 0, j)):
         if meanings[j].kind:
             kinds[meanings[j].side, str(meanings[j].kind)].append(j)
-    sides = sorted({side for side, _ in kinds if side}) or [None]
+    sides: list[str | None] = [*sorted({side for side, _ in kinds if side})] or [None]
     if sides != [None] and any(meanings[j].kind == "digit" and meanings[j].side is None for j in range(len(tree))):
         sides.append(None)
     for side in sides:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
@@ -90,10 +91,11 @@ def _side(hand: HandRoles, points: Mapping[str, NDArray[np.float64]], given: str
 
 def _last_bones(tree: SourceTree, hand: HandRoles) -> dict[str, NDArray[np.float64]]:
     """Directions of the bones beyond the last joints of digits without tips, where frames tell."""
-    pairs, last = [], []
+    pairs: list[tuple[int, int]] = []
+    last: list[str] = []
     for digit in ("pinky", "ring", "middle", "index", "thumb"):
         chain = [f"{digit}.{j}" for j in FINGER_JOINTS if f"{digit}.{j}" in hand.joints]
-        pairs.extend((hand.joints[a], hand.joints[b]) for a, b in zip(chain, chain[1:], strict=False))
+        pairs.extend((hand.joints[a], hand.joints[b]) for a, b in pairwise(chain))
         last.extend(chain[-1:])
     axis = bone_axis(tree, pairs)
     if axis is None:

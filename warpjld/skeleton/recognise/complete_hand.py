@@ -45,7 +45,8 @@ def complete_hand(
     reach = max(float(np.linalg.norm(p - points["wrist"])) for p in points.values())
     faces = nearby(vertices, faces, points["wrist"], 1.6 * reach)
     _carpal_ends(points, fingers, notes, label)
-    derived, moved = [], []
+    derived: list[str] = []
+    moved: list[str] = []
     for digit in (*fingers, *(("thumb",) if "thumb.base" in points else ())):
         tip = f"{digit}.tip"
         had = points.get(tip)

@@ -48,8 +48,8 @@ class Layout:
 def lay_out(tree: SourceTree, roles: Roles, hand_points: Mapping[str, Mapping[str, NDArray[np.float64]]]) -> Layout:
     """Arrange recognised and remaining joints.
 
-    Limbs are single segments: twist bones, and joints that divide a limb or lie between two recognised ones, belong to
-    the recognised joint above them, with their weights. JLD spreads a twist along a segment by itself, and a bisector
+    Limbs are single segments: twist bones, and joints that divide a limb or lie between two recognised ones, belong
+    to the recognised joint above them, with their weights. JLD spreads a twist along a segment by itself, and a bisector
     plane in the middle of a limb would only add a crease. Face bones belong to the head. What else was not
     recognised keeps its name, in lower case.
 
