@@ -82,7 +82,8 @@ class Sweep:
         """
         local = (points - self.origin) @ self.frame.T
         low, high = self._box
-        near = np.flatnonzero(((local > low) & (local < high)).all(axis=1))
+        inside = (local > low) & (local < high)
+        near = np.flatnonzero(inside[:, 0] & inside[:, 1] & inside[:, 2])
         out = np.full(len(points), FAR)
         if len(near):
             out[near] = self._distance(local[near], detail)
