@@ -186,7 +186,7 @@ def _digit(
         squareness,
         [(p[2], p[0], p[1]) for p in (before, *local)],
         sizes,
-        (stops[3] + 0.66 * (stops[4] - stops[3]), 0.27 * (stops[4] - stops[3]), 0.62 * half),
+        (stops[3] + 0.61 * (stops[4] - stops[3]), 0.26 * (stops[4] - stops[3]), 0.58 * half),
     )
     per_joint = np.vstack([_square(dorsal, d) for d in (*steps, steps[2])])
     return Digit(joints, per_joint, flesh)
