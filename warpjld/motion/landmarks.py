@@ -54,7 +54,7 @@ class Landmarks:
         return tuple(reversed(out)) if joint == start else ()
 
     def bone(self, name: str) -> NDArray[np.float64] | None:
-        """Vector at rest from a limb's joint to the next one: to the fingers from a wrist, to the toes from an ankle."""
+        """Vector at rest from a joint to the next of its limb: a wrist to fingers, an ankle to toes."""
         joint = self.joints[name]
         side, _, part = name.partition(".")
         if part == "wrist":
