@@ -1,15 +1,10 @@
 """Small skeletons for the tests of motions."""
 
-import json
-from pathlib import Path
-
 import numpy as np
 
 from warpjld.rig import Rig
 from warpjld.skeleton import DIGITS, Skeleton, default_limits, hand_joint_names
 from warpjld.skeleton.hand import HAND_PARENTS
-from warpjld.skeleton.recognise.by_name import roles_by_name
-from warpjld.skeleton.recognise.tree import SourceTree
 from warpjld.surface import weld_surface
 
 
@@ -76,24 +71,3 @@ def body() -> Skeleton:
     parents = np.array([-1 if p is None else names.index(p) for p, _ in BODY.values()], dtype=np.int32)
     rest = np.array([place for _, place in BODY.values()])
     return Skeleton(names, parents, rest, np.tile([1.0, 0.0, 0.0], (len(names), 1)), default_limits(names))
-
-
-def anny_body(data: Path) -> Skeleton:
-    """The skeleton of a real body, 104 joints."""
-    bones = json.loads((data / "body_anny" / "body_104joints_bones.json").read_text())["bones"]
-    names = [bone["name"] for bone in bones]
-    parents = np.array(
-        [-1 if bone["parent"] is None else names.index(bone["parent"]) for bone in bones], dtype=np.int32
-    )
-    rest = np.array([bone["head"] for bone in bones])
-    frames = np.tile(np.eye(4), (len(names), 1, 1))
-    frames[:, :3, 3] = rest
-    roles = roles_by_name(SourceTree(tuple(names), parents, frames))
-    canonical = [name.lower() for name in names]
-    for name, joint in roles.body.items():
-        canonical[joint] = name
-    for hand_roles in roles.hands:
-        for name, joint in hand_roles.joints.items():
-            canonical[joint] = f"{hand_roles.side}.{name}"
-    axes = np.tile([1.0, 0.0, 0.0], (len(names), 1))
-    return Skeleton(tuple(canonical), parents, rest, axes, default_limits(canonical))

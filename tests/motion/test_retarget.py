@@ -6,8 +6,9 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from tests.motion.skeletons import anny_body, body, hand
+from tests.motion.skeletons import body, hand
 from warpjld.errors import InputError
+from warpjld.io import load_rig
 from warpjld.motion.bvh import read_bvh
 from warpjld.motion.clip import Clip
 from warpjld.motion.retarget import correspondence, retarget
@@ -192,7 +193,7 @@ def test_a_motion_without_any_known_joint_is_refused() -> None:
 
 def test_real_walk_on_a_real_body(data: Path) -> None:
     clip = read_bvh(data / "motion_cmu_walk_bvh" / "cmu_12_01_walk.bvh")
-    skeleton = anny_body(data)
+    skeleton = load_rig(data / "body_anny" / "body_104joints.glb").skeleton
     assert correspondence(clip, skeleton)["left.elbow"] == "LeftForeArm"
     poses = retarget(clip, skeleton)
     for side in ("left", "right"):

@@ -184,7 +184,8 @@ def _own_joints(document: Document, rig: Rig, worlds: NDArray[np.float64]) -> ND
     """
     if rig.source_frames is None or not any(rig.source_joints):
         return None
-    nodes = {document.name(n): n for n in range(len(document.gltf.nodes))}
+    joints_last = [*range(len(document.gltf.nodes)), *(n for skin in document.gltf.skins or () for n in skin.joints)]
+    nodes = {document.name(n): n for n in joints_last}  # of nodes with one name the last counts: a skin's joint
     own = [(j, nodes[name]) for j, name in enumerate(rig.source_joints) if name and name in nodes]
     if len(own) < sum(bool(name) for name in rig.source_joints):
         return None
@@ -220,7 +221,8 @@ def _clip(document: Document, worlds: NDArray[np.float64], rate: float) -> Clip:
             above = int(document.parents[above])
         parents[b] = number.get(above, -1)
     rest = document.worlds[nodes]
-    turned = worlds[:, nodes, :3, :3] @ np.linalg.inv(rest[:, :3, :3])
+    joints = worlds[:, nodes]
+    turned = joints[..., :3, :3] @ np.linalg.inv(rest[:, :3, :3])
     rotations = Rotation.from_matrix(turned.reshape(-1, 3, 3)).as_quat().reshape(len(worlds), len(nodes), 4)
     names = tuple(document.name(n) for n in nodes)
-    return Clip(names, parents, rest[:, :3, 3], worlds[:, nodes, :3, 3], rotations, rate)
+    return Clip(names, parents, rest[:, :3, 3], joints[..., :3, 3], rotations, rate)

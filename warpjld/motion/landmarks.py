@@ -97,8 +97,13 @@ def landmarks_of_skeleton(skeleton: Skeleton) -> Landmarks:
     return Landmarks({name: j for j, name in enumerate(skeleton.names)}, skeleton.parents, skeleton.rest)
 
 
-def landmarks_of_clip(clip: Clip) -> Landmarks:
-    """Landmarks of a recording, recognised by its joints' names in any of the common conventions."""
+def landmarks_of_clip(clip: Clip, *, side: str | None = None) -> Landmarks:
+    """Landmarks of a recording, recognised by its joints' names in any of the common conventions.
+
+    Args:
+        clip: The recording.
+        side: Side of a hand whose joints' names do not say it.
+    """
     from warpjld.skeleton.recognise.by_name import roles_by_name
     from warpjld.skeleton.recognise.tree import SourceTree
 
@@ -107,5 +112,5 @@ def landmarks_of_clip(clip: Clip) -> Landmarks:
     roles = roles_by_name(SourceTree(clip.names, clip.parents, frames))
     joints = dict(roles.body)
     for hand in roles.hands:
-        joints |= {f"{hand.side}.{name}" if hand.side else name: joint for name, joint in hand.joints.items()}
+        joints |= {f"{hand.side or side}.{name}": joint for name, joint in hand.joints.items()}
     return Landmarks(joints, clip.parents, clip.rest)

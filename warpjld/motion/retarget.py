@@ -85,7 +85,9 @@ def retarget(clip: Clip, skeleton: Skeleton) -> Poses:
 
 def _pairs(clip: Clip, skeleton: Skeleton) -> tuple[Landmarks, Landmarks, dict[str, tuple[int, int]]]:
     """Landmarks of both, and per canonical name its joint in the rig and in the recording."""
-    source, target = landmarks_of_clip(clip), landmarks_of_skeleton(skeleton)
+    sides = {name.partition(".")[0] for name in skeleton.names if name.endswith(".wrist")}
+    source = landmarks_of_clip(clip, side=sides.pop() if len(sides) == 1 else None)
+    target = landmarks_of_skeleton(skeleton)
     both = source.joints.keys() & target.joints.keys()
     names = [f"{side}.{limb}" for side in ("left", "right") for limb in _LIMBS]
     for side in ("left", "right"):
