@@ -56,6 +56,7 @@ BODY = {
         ("index.knuckle2", "index.base", (0.57, 0.89, 0.1)),
         ("index.knuckle3", "index.knuckle2", (0.58, 0.87, 0.1)),
         ("index.tip", "index.knuckle3", (0.585, 0.85, 0.1)),
+        ("pinky.base", "wrist", (0.57, 0.93, 0.03)),
         ("hip", "pelvis", (0.1, 0.95, 0.0)),
         ("knee", "hip", (0.13, 0.52, 0.01)),
         ("ankle", "knee", (0.15, 0.08, -0.02)),
