@@ -11,11 +11,25 @@ from warpjld.errors import InputError
 from warpjld.script.arguments import Arguments
 from warpjld.script.scene import Actor, SplineConstants
 from warpjld.script.suggest import did_you_mean
-from warpjld.skeleton import CHANNELS
+from warpjld.skeleton import CHANNELS, PAPER_NUMBERS, Skeleton
 
-__all__ = ["read_joint", "set_keys"]
+__all__ = ["joint_numbers", "read_joint", "set_keys"]
 
 _SLACK = 1e-6  # degrees: limits come out of radians
+
+
+def joint_numbers(skeleton: Skeleton) -> dict[int, int]:
+    """Number a script may call a joint by → joint: the paper's numbers (A Fig. 2, R7) where the skeleton is a single
+    hand; its own order elsewhere."""
+    sides = [side for side in ("left", "right") if f"{side}.index.base" in skeleton.names]
+    if len(sides) != 1 or f"{sides[0]}.shoulder" in skeleton.names:
+        return {joint: joint for joint in range(len(skeleton))}
+    places = {name: joint for joint, name in enumerate(skeleton.names)}
+    return {
+        number: places[f"{sides[0]}.{name}"]
+        for number, name in PAPER_NUMBERS.items()
+        if f"{sides[0]}.{name}" in places
+    }
 
 
 def read_joint(actor: Actor, arguments: Arguments, side: str | None = None) -> int:
@@ -25,7 +39,11 @@ def read_joint(actor: Actor, arguments: Arguments, side: str | None = None) -> i
         InputError: The actor has no such joint.
     """
     if arguments.has_number():
-        return arguments.integer("the joint's number", minimum=0, maximum=len(actor.skeleton) - 1)
+        numbers = joint_numbers(actor.skeleton)
+        number = arguments.integer("the joint's number", minimum=0, maximum=max(numbers))
+        if number not in numbers:
+            raise arguments.error(f"actor {actor.name} has no joint {number}")
+        return numbers[number]
     name = arguments.name("a joint's name or number")
     if side and f"{side}.{name}".lower() in actor.skeleton.names:
         name = f"{side}.{name}"
@@ -66,4 +84,4 @@ def set_keys(
                 f"{channel.lower()} of {name} goes from {low:.4g}° to {high:.4g}°, got {degrees:g}°; {change}"
             )
     for name in names:
-        actor.set_keys(name, channel.lower(), keys, math.radians(degrees), constants)
+        actor.set_keys(f"{name}.{channel.lower()}", keys, math.radians(degrees), constants)

@@ -23,7 +23,7 @@ from warpjld.script.statements import (
 )
 
 if TYPE_CHECKING:
-    from lark import Lark, Token, Tree
+    from lark import Lark
     from lark.exceptions import UnexpectedInput
 
 __all__ = ["UnfinishedError", "parse", "parse_file"]
@@ -87,7 +87,7 @@ class _Builder:
     def __init__(self, path: str) -> None:
         self.path = path
 
-    def node(self, tree: Tree[Token]) -> Node:
+    def node(self, tree: Any) -> Node:
         if tree.data == "statement":
             return self._statement(tree)
         words = [self._word(token) for token in tree.children if not _is_tree(token)]

@@ -24,7 +24,7 @@ class Placement:
 
     def set_key(self, channel: str, key: Key) -> None:
         """Set a key of a channel; it replaces one at the same frame."""
-        self.tracks[channel] = self.tracks.get(channel, Track(channel, ())).with_key(key)
+        self.tracks.setdefault(channel, Track(channel)).set(key)
 
     def values(self, kind: str, frames: NDArray[np.float64]) -> NDArray[np.float64]:
         """``move`` [m] or ``turn`` [rad] at F frames, shape (F, 3); 0 where nothing is keyed."""

@@ -111,10 +111,10 @@ class Actor:
         """Whether any joint has a key."""
         return bool(self.motion.tracks)
 
-    def set_keys(self, joint: str, channel: str, keys: Sequence[float], value: float, spline: SplineConstants) -> None:
-        """Set one value [rad] at several frames of a joint's channel."""
+    def set_keys(self, channel: str, keys: Sequence[float], value: float, spline: SplineConstants) -> None:
+        """Set one value [rad] at several frames of a channel such as ``left.index.base.flexion``."""
         for key in keys:
-            self.motion.set_key(f"{joint}.{channel}", key, value, **asdict(spline))
+            self.motion.set_key(channel, key, value, **asdict(spline))
 
     @property
     def key_frames(self) -> list[float]:

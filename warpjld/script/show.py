@@ -7,6 +7,7 @@ from dataclasses import fields
 
 import numpy as np
 
+from warpjld.script.keys import joint_numbers
 from warpjld.script.registry import Command
 from warpjld.script.scene import Actor, Scene
 from warpjld.skeleton import CHANNELS
@@ -51,12 +52,14 @@ def actors(scene: Scene) -> str:
 
 
 def joints(actor: Actor) -> str:
-    """An actor's joints with their limits [degrees]; closed channels are left out."""
+    """An actor's joints with the number JOINT understands, and limits [degrees]; closed channels are left
+    out."""
     lines = []
-    for number, name in enumerate(actor.skeleton.names):
-        limits = np.degrees(actor.skeleton.limits[number])
+    numbers = {joint: str(number) for number, joint in joint_numbers(actor.skeleton).items()}
+    for joint, name in enumerate(actor.skeleton.names):
+        limits = np.degrees(actor.skeleton.limits[joint])
         open_ = [f"{c} {low:.4g}…{high:.4g}" for c, (low, high) in zip(CHANNELS, limits, strict=True) if low < high]
-        lines.append(f"{number:>4}  {name:<36} {', '.join(open_) or 'fixed'}")
+        lines.append(f"{numbers.get(joint, ''):>4}  {name:<36} {', '.join(open_) or 'fixed'}")
     return "\n".join(lines)
 
 

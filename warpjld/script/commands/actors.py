@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 @command(
     "HAND",
     syntax=(
-        "HAND <LEFT/RIGHT> BUILTIN [LENGTH <metres>] [BREADTH <metres>] [RESOLUTION <metres>] [NAME <actor>]"
+        "HAND <LEFT/RIGHT> BUILTIN [LENGTH <metres>] [BREADTH <metres>] [RESOLUTION <vertices>] [NAME <actor>]"
         ' or HAND <LEFT/RIGHT> "<rig file>" [NAME <actor>]'
     ),
     help="Bring on a hand: the built-in one, or a rig from a file. The actor is called LEFT or RIGHT unless named.",
@@ -37,7 +37,7 @@ def hand(scene: Scene, arguments: Arguments) -> None:
         options = arguments.options(
             length=lambda: arguments.number("the hand's length in metres", minimum=0.01, maximum=10),
             breadth=lambda: arguments.number("the hand's breadth in metres", minimum=0.005, maximum=10),
-            resolution=lambda: arguments.number("the size of a facet in metres", above=0, maximum=1),
+            resolution=lambda: arguments.integer("the number of vertices, about", minimum=100, maximum=10_000_000),
             name=lambda: arguments.name("the actor's name"),
         )
         name = options.pop("name", side)
