@@ -1,0 +1,46 @@
+"""Coefficients of the JLD operators at a vertex: what depends on parameters but not on the pose.
+
+Shared by the kernel that packs them for the tiled deformation and by the one that deforms points directly.
+"""
+
+import warp as wp
+
+# The functions a^b are steep at a = 0 for b < 1; starting them this far in keeps the slope finite.
+POWER_OFFSET = wp.constant(0.05)
+
+
+@wp.func
+def rotation_weights(ratio: float, side: float, proximal: float, distal: float) -> wp.vec3:
+    """Weights of the proximal joint's, the segment's and the distal joint's rotation (A §5.3 Figs 8 and 9, Fig. 10)."""
+    t = wp.clamp(ratio, 0.0, 1.0)
+    at_proximal = wp.max(1.0 - t / wp.max(proximal, 1.0e-6), 0.0)
+    at_distal = wp.max(1.0 - (1.0 - t) / wp.max(distal, 1.0e-6), 0.0)
+    external = wp.vec3(at_proximal, 1.0 - at_proximal - at_distal, at_distal)
+    internal = wp.vec3(1.0 - t, 0.0, t)
+    return side * external + (1.0 - side) * internal
+
+
+@wp.func
+def rounding(ratio: float, side: float, proximal: float, distal: float) -> wp.vec2:
+    """How far the roundings of the proximal and the distal joint reach (A §6.1, R58–R62)."""
+    t = wp.clamp(ratio, 0.0, 1.0)
+    at_proximal = wp.max(1.0 - t / wp.max(proximal, 1.0e-6), 0.0)
+    at_distal = wp.max(1.0 - (1.0 - t) / wp.max(distal, 1.0e-6), 0.0)
+    return side * wp.vec2(at_proximal, at_distal)
+
+
+@wp.func
+def muscle_profile(ratio: float, peak: float, before: float, beyond: float) -> float:
+    """Two functions a^b joined at the peak, 0 at both joints and 1 at the peak (A §6.2 Fig. 11, R64, R65).
+
+    a is rounded to a (2 − a), which takes the cusp at the peak away.
+    """
+    t = wp.clamp(ratio, 0.0, 1.0)
+    a = t / peak
+    b = before
+    if t > peak:
+        a = (1.0 - t) / (1.0 - peak)
+        b = beyond
+    a = a * (2.0 - a)
+    start = wp.pow(POWER_OFFSET, b)
+    return (wp.pow(a + POWER_OFFSET, b) - start) / (wp.pow(1.0 + POWER_OFFSET, b) - start)

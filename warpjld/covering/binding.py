@@ -1,0 +1,238 @@
+"""Binding: where every vertex lies relative to the segments that carry it (A §4, R34–R48).
+
+Nothing here depends on the pose, and only the placing inside the palm depends on the parameters.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from warpjld.covering.operators import Fan, segment_ends
+from warpjld.covering.parameters import Parameters
+from warpjld.skeleton.tree import Skeleton
+
+__all__ = ["OPERATORS", "STATIONS", "Anchors", "anchor"]
+
+OPERATORS = 4
+"""Segment operators a vertex may hold (the paper has one; the rest make borders soft)."""
+
+STATIONS = 5
+"""Places along a pair of neighbouring palm segments where the scale factor λ is evaluated; linear in between."""
+
+_SIDE_BAND = 0.5  # |cosine| below which a vertex is partly external and partly internal
+_FLOOR = 2e-3  # weight below which an operator is dropped, faded so that nothing jumps
+
+
+@dataclass(frozen=True, eq=False)
+class Anchors:
+    """Places of V vertices on up to ``OPERATORS`` segments each.
+
+    Attributes:
+        ends: Proximal and distal joint of every segment, shape (S, 2).
+        muscle: Whether a segment's internal muscle inflates, shape (S,).
+        rest: Vertices at rest [m], shape (V, 3).
+        segment: Segments of a vertex, shape (V, 4).
+        weight: Their weights, rows summing to one; unused ones are zero, shape (V, 4).
+        ratio: Projection on the segment, 0 at the proximal joint, 1 at the distal one, clamped except beyond
+            extremities, shape (V, 4) (R37, C1).
+        side: 1 on the external side, 0 on the internal, between over a band of R45's cosine, shape (V, 4).
+        lift: y part of the vertex's offset from its segment: (offset · normal) normal [m], shape (V, 4, 3) (R63).
+        pairs: Segments of every pair of palm neighbours, shape (N, 2).
+        pair: Palm pairs between which a vertex lies, shape (V, 2), and
+        between: how much it lies in between, 0 on either segment, 1 in the middle, shape (V, 2) (R44, R49);
+        station: where along the pair, 0 … STATIONS − 1, shape (V, 2).
+    """
+
+    ends: NDArray[np.int32]
+    muscle: NDArray[np.bool_]
+    rest: NDArray[np.float64]
+    segment: NDArray[np.int32]
+    weight: NDArray[np.float64]
+    ratio: NDArray[np.float64]
+    side: NDArray[np.float64]
+    lift: NDArray[np.float64]
+    pairs: NDArray[np.int32]
+    pair: NDArray[np.int32]
+    between: NDArray[np.float64]
+    station: NDArray[np.float64]
+
+    def __len__(self) -> int:
+        return len(self.rest)
+
+
+def anchor(
+    vertices: NDArray[np.float64],
+    skeleton: Skeleton,
+    groups: tuple[Fan, ...],
+    domains: NDArray[np.float64],
+    parameters: Parameters,
+    *,
+    chunk: int = 100_000,
+) -> Anchors:
+    """Place vertices on the segments of their domains.
+
+    Args:
+        vertices: Rest positions [m], shape (V, 3).
+        skeleton: The rest skeleton.
+        groups: Operators, from :func:`~warpjld.covering.operators.fans`.
+        domains: Weight of every fan, shape (V, fans).
+        parameters: Their proximities set how wide the palm's in-between areas are (A Fig. 7).
+        chunk: Vertices placed at a time, which bounds memory.
+    """
+    ends = segment_ends(skeleton, groups)
+    table = _SegmentTable.build(skeleton, ends)
+    pairs, pair_of_fan = _neighbour_pairs(groups)
+    rows = [
+        _anchor_some(vertices[i : i + chunk], table, groups, domains[i : i + chunk], parameters, pair_of_fan)
+        for i in range(0, len(vertices), chunk)
+    ]
+    joined = [np.concatenate(column) for column in zip(*rows, strict=True)]
+    segment, weight, ratio, side, lift, pair, between, station = joined
+    muscle = np.array([fan.muscle for fan in groups for _ in fan.segments])
+    return Anchors(ends, muscle, vertices, segment, weight, ratio, side, lift, pairs, pair, between, station)
+
+
+@dataclass(frozen=True, eq=False)
+class _SegmentTable:
+    ends: NDArray[np.int32]
+    start: NDArray[np.float64]  # (S, 3)
+    along: NDArray[np.float64]  # (S, 3)
+    normals: NDArray[np.float64]  # (S, 2, 3): y axes at the proximal and distal joint (R20)
+    open_end: NDArray[np.bool_]  # extremity: the ratio may exceed 1
+    open_start: NDArray[np.bool_]  # root: the ratio may fall below 0
+
+    @staticmethod
+    def build(skeleton: Skeleton, ends: NDArray[np.int32]) -> _SegmentTable:
+        start = skeleton.rest[ends[:, 0]]
+        along = skeleton.rest[ends[:, 1]] - start
+        direction = along / np.linalg.norm(along, axis=1, keepdims=True)
+        normals = np.stack([np.cross(direction, skeleton.axes[ends[:, k]]) for k in (0, 1)], axis=1)
+        lengths = np.linalg.norm(normals, axis=2, keepdims=True)
+        # an axis along the segment says nothing of its sides: take the other end's, or any normal
+        normals = np.where(lengths > 1e-3, normals / np.maximum(lengths, 1e-30), normals[:, ::-1])
+        fallback = np.cross(direction, np.eye(3)[np.abs(direction).argmin(axis=1)])
+        lengths = np.linalg.norm(normals, axis=2, keepdims=True)
+        normals = np.where(lengths > 1e-3, normals / np.maximum(lengths, 1e-30), fallback[:, None, :])
+        leaf = np.array([not skeleton.children[d] for d in ends[:, 1]])
+        root = np.array([skeleton.parents[p] < 0 for p in ends[:, 0]])
+        return _SegmentTable(ends, start, along, normals, leaf, root)
+
+
+def _neighbour_pairs(groups: tuple[Fan, ...]) -> tuple[NDArray[np.int32], dict[int, int]]:
+    """All pairs of neighbours, and the number of each fan's first pair."""
+    pairs: list[tuple[int, int]] = []
+    first: dict[int, int] = {}
+    segment = 0
+    for f, fan in enumerate(groups):
+        first[f] = len(pairs)
+        pairs.extend((segment + k, segment + k + 1) for k in range(len(fan.segments) - 1))
+        segment += len(fan.segments)
+    return np.array(pairs, dtype=np.int32).reshape(-1, 2), first
+
+
+def _anchor_some(
+    points: NDArray[np.float64],
+    table: _SegmentTable,
+    groups: tuple[Fan, ...],
+    domains: NDArray[np.float64],
+    parameters: Parameters,
+    pair_of_fan: dict[int, int],
+) -> tuple[NDArray, ...]:
+    count, segments = len(points), len(table.ends)
+    t = np.einsum("vsk,sk->vs", points[:, None] - table.start, table.along) / (table.along**2).sum(axis=1)
+    t = np.where((t < 0.0) & ~table.open_start, 0.0, t)
+    t = np.where((t > 1.0) & ~table.open_end, 1.0, t)
+    weight = np.zeros((count, segments))
+    pair_count = sum(len(fan.segments) - 1 for fan in groups)
+    between = np.zeros((count, max(pair_count, 2)))
+    along_pair = np.zeros_like(between)
+    segment = 0
+    for f, fan in enumerate(groups):
+        size = len(fan.segments)
+        if size == 1:
+            weight[:, segment] = domains[:, f]
+        else:
+            inside = slice(segment, segment + size)
+            share = _share_in_fan(points, table, t, inside, parameters)
+            weight[:, inside] = domains[:, f, None] * share
+            where = slice(pair_of_fan[f], pair_of_fan[f] + size - 1)
+            # weights of both neighbours make the product vanish wherever the pair is not the vertex's own
+            between[:, where] = domains[:, f, None] * 4.0 * share[:, :-1] * share[:, 1:]
+            place = np.clip((t[:, inside][:, :-1] + t[:, inside][:, 1:]) / 2.0, 0.0, 1.0)
+            along_pair[:, where] = place * (STATIONS - 1)
+        segment += size
+    best, kept = _strongest(weight)
+    pair, pair_kept = _strongest_pairs(between)
+    ratio = np.take_along_axis(t, best, axis=1)
+    offset = points[:, None] - (table.start[best] + ratio[..., None] * table.along[best])
+    blend = np.clip(ratio, 0.0, 1.0)[..., None]
+    normal = (1.0 - blend) * table.normals[best, 0] + blend * table.normals[best, 1]
+    normal /= np.maximum(np.linalg.norm(normal, axis=2, keepdims=True), 1e-12)
+    height = (offset * normal).sum(axis=2)
+    cosine = height / np.maximum(np.linalg.norm(offset, axis=2), 1e-12)
+    side = _smoothstep((cosine + _SIDE_BAND) / (2.0 * _SIDE_BAND))
+    station = np.take_along_axis(along_pair, pair, axis=1)
+    return best.astype(np.int32), kept, ratio, side, height[..., None] * normal, pair, pair_kept, station
+
+
+def _share_in_fan(
+    points: NDArray[np.float64],
+    table: _SegmentTable,
+    t: NDArray[np.float64],
+    inside: slice,
+    parameters: Parameters,
+) -> NDArray[np.float64]:
+    """Weights of side-by-side segments: each holds a vertex as far as both of its virtual segments say so.
+
+    R_k, the ratio on the virtual segment from segment k to k + 1, is remapped to 0 within the first's proximity and to
+    1 within the second's (areas 1-4-7, 2-5-8 and 3-6-9 of A Fig. 7). Segment k then gets min(R_{k-1}, 1 − R_k): between
+    two neighbours that is the paper's 1 − R and R; it stays continuous where the nearest segment changes, and never
+    vanishes for all segments at once.
+    """
+    start, along, ends = table.start[inside], table.along[inside], table.ends[inside]
+    ratio = t[:, inside]
+    feet = start + ratio[..., None] * along
+    virtual = feet[:, 1:] - feet[:, :-1]
+    across = ((points[:, None] - feet[:, :-1]) * virtual).sum(axis=2) / np.maximum((virtual**2).sum(axis=2), 1e-18)
+    place = np.clip(ratio, 0.0, 1.0)
+    proximal, distal = parameters.proximity[ends[:, 0], 0], parameters.proximity[ends[:, 1], 1]
+    width = (1.0 - place) * proximal + place * distal
+    margins = width[:, :-1] + width[:, 1:]
+    width = width * 0.9  # an in-between area is left even where the proximities sum to one
+    lateral = np.clip((across - width[:, :-1]) / np.maximum(1.0 - 0.9 * margins, 0.1), 0.0, 1.0)
+    before = np.concatenate([np.ones((len(points), 1)), lateral], axis=1)
+    after = np.concatenate([1.0 - lateral, np.ones((len(points), 1))], axis=1)
+    share = np.minimum(before, after)
+    out: NDArray[np.float64] = share / share.sum(axis=1, keepdims=True)
+    return out
+
+
+def _strongest(weight: NDArray[np.float64]) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
+    """The ``OPERATORS`` largest weights of every row, faded to zero where another would take their place."""
+    keep = min(OPERATORS, weight.shape[1])
+    order = np.argpartition(-weight, keep - 1, axis=1)[:, :keep]
+    order = np.take_along_axis(order, np.argsort(-np.take_along_axis(weight, order, axis=1), axis=1), axis=1)
+    largest = np.take_along_axis(weight, order, axis=1)
+    rest = np.partition(weight, -keep - 1, axis=1)[:, -keep - 1] if weight.shape[1] > keep else 0.0
+    threshold = np.maximum(rest, _FLOOR)
+    faded = np.maximum(largest - np.reshape(threshold, (-1, 1)), 0.0)
+    faded /= faded.sum(axis=1, keepdims=True)
+    if keep < OPERATORS:
+        pad = ((0, 0), (0, OPERATORS - keep))
+        order, faded = np.pad(order, pad, mode="edge"), np.pad(faded, pad)
+    return order, faded
+
+
+def _strongest_pairs(between: NDArray[np.float64]) -> tuple[NDArray[np.int32], NDArray[np.float64]]:
+    order = np.argsort(-between, axis=1)[:, :2]
+    kept = np.take_along_axis(between, order, axis=1)
+    third = np.sort(between, axis=1)[:, -3] if between.shape[1] > 2 else np.zeros(len(between))
+    return order.astype(np.int32), np.maximum(kept - third[:, None], 0.0)
+
+
+def _smoothstep(x: NDArray[np.float64]) -> NDArray[np.float64]:
+    x = np.clip(x, 0.0, 1.0)
+    return x * x * (3.0 - 2.0 * x)

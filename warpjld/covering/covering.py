@@ -1,0 +1,243 @@
+"""A surface bound to a skeleton, and its deformation over batches of frames."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from concurrent.futures import ThreadPoolExecutor
+from functools import cached_property
+from typing import Any, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from warpjld.covering.binding import Anchors, anchor
+from warpjld.covering.device import anchors_on, checked_device, drivers_on, parameters_on
+from warpjld.covering.domains import domains_from_geometry, domains_from_skin
+from warpjld.covering.drivers import drive
+from warpjld.covering.operators import Fan, fans
+from warpjld.covering.parameters import Parameters, default_parameters
+from warpjld.covering.runs import Runs, pack_runs, palette
+from warpjld.errors import InputError
+from warpjld.rig import Skin
+from warpjld.skeleton.kinematics import Poses
+from warpjld.skeleton.tree import Skeleton
+from warpjld.surface import Surface
+
+__all__ = ["Covering", "bind"]
+
+_SPLIT_BELOW = 200_000  # vertex-frames a thread must have before splitting pays
+
+
+class Covering:
+    """The operators of one surface on one skeleton; made by :func:`bind`, then only read.
+
+    Attributes:
+        skeleton: The rest skeleton.
+        surface: The rest surface.
+        parameters: The animator's parameters in use.
+        fans: The operators.
+        domains: Weight of every operator at every vertex, shape (V, fans).
+        anchors: Places of the vertices on their segments.
+    """
+
+    def __init__(
+        self,
+        skeleton: Skeleton,
+        surface: Surface,
+        parameters: Parameters,
+        groups: tuple[Fan, ...],
+        domains: NDArray[np.float64],
+        anchors: Anchors,
+    ) -> None:
+        self.skeleton = skeleton
+        self.surface = surface
+        self.parameters = parameters
+        self.fans = groups
+        self.domains = domains
+        self.anchors = anchors
+        self._resident: dict[str, list[Any]] = {}
+
+    def with_parameters(self, parameters: Parameters) -> Covering:
+        """The same binding with other parameters; domains are not computed again."""
+        parameters.check(self.skeleton)
+        anchors = anchor(self.surface.vertices, self.skeleton, self.fans, self.domains, parameters)
+        return Covering(self.skeleton, self.surface, parameters, self.fans, self.domains, anchors)
+
+    @cached_property
+    def runs(self) -> Runs:
+        """The packed operators."""
+        import warp as wp
+        from warpjld_kernels.anchored import pack_coefficients
+        from warpjld_kernels.covering_tiles import LANES
+
+        device = checked_device("cpu")
+        shape = self.anchors.weight.shape
+        out = [
+            wp.empty(shape[0], dtype=wp.vec3, device=device),
+            wp.empty(shape, dtype=wp.vec3, device=device),
+            wp.empty(shape, dtype=wp.vec2, device=device),
+            wp.empty(shape, dtype=wp.vec3, device=device),
+        ]
+        model = [anchors_on(device, self.anchors, self.skeleton.rest), parameters_on(device, self.parameters)]
+        wp.launch(pack_coefficients, dim=shape[0], inputs=model, outputs=out, device=device)
+        offset, rotation, rounding, muscle = (a.numpy() for a in out)
+        return pack_runs(self.anchors, offset, rotation, rounding, muscle, len(self.skeleton), LANES)
+
+    def deform(
+        self, poses: Poses, *, device: str = "cpu", threads: int | None = None, out: NDArray[np.float32] | None = None
+    ) -> NDArray[np.float32]:
+        """Final positions of all vertices [m], shape (F, V, 3).
+
+        Args:
+            poses: F poses of the skeleton.
+            device: Warp device.
+            threads: CPU threads to split the frames over; by default two where the batch is worth it.
+            out: Array to fill instead of a new one: a fresh one costs more than the deformation.
+
+        Raises:
+            InputError: Poses of another skeleton, not finite poses, an unknown device, or ``out`` of a wrong shape.
+        """
+        import warp as wp
+
+        where = checked_device(device)
+        rows = self._palette(poses)
+        shape = (len(poses), len(self.surface.vertices), 3)
+        if out is None:
+            out = np.empty(shape, dtype=np.float32)
+        elif out.shape != shape or out.dtype != np.float32 or not out.flags.c_contiguous:
+            raise InputError(f"out: want contiguous float32 of shape {shape}, got {out.dtype} {out.shape}")
+        if where.is_cpu:
+            if threads is None:
+                threads = 2 if shape[0] * shape[1] > 2 * _SPLIT_BELOW else 1
+            self._launch(rows, wp.array(out, dtype=wp.vec3, device=where, copy=False), where, threads)
+        else:
+            points = wp.empty(shape[:2], dtype=wp.vec3, device=where)
+            self._launch(rows, points, where, 1)
+            out[...] = points.numpy()
+        return out
+
+    def blocks(
+        self, poses: Poses, *, frames: int = 16, device: str = "cpu", threads: int | None = None
+    ) -> Iterator[tuple[int, NDArray[np.float32]]]:
+        """Deform a sequence block by block: first frame and vertices (n, V, 3) of each.
+
+        Every block is a view of one buffer that the next block overwrites, so memory does not grow with the sequence.
+        """
+        buffer = np.empty((min(frames, len(poses)), len(self.surface.vertices), 3), dtype=np.float32)
+        for start in range(0, len(poses), frames):
+            some = poses[start : start + frames]
+            yield start, self.deform(some, device=device, threads=threads, out=buffer[: len(some)])
+
+    def points(
+        self, poses: Poses, vertices: NDArray[np.int32] | list[int], *, device: str = "cpu"
+    ) -> NDArray[np.float32]:
+        """Final positions of chosen vertices only [m], shape (F, n, 3) (R74)."""
+        import warp as wp
+        from warpjld_kernels.anchored import deform_points
+
+        where = checked_device(device)
+        chosen = np.asarray(vertices, dtype=np.int32)
+        if chosen.size and (chosen.min() < 0 or chosen.max() >= len(self.surface.vertices)):
+            raise InputError(f"vertices: indices must lie in 0…{len(self.surface.vertices) - 1}")
+        self._check(poses)
+        out = wp.empty((len(poses), len(chosen)), dtype=wp.vec3, device=where)
+        model = self._on(where, "anchored", self._anchored)
+        pose = drivers_on(where, drive(self.skeleton, self.anchors, poses))
+        picked = wp.array(chosen, dtype=wp.int32, device=where)
+        wp.launch(deform_points, dim=out.shape, inputs=[*model, picked, *pose], outputs=[out], device=where)
+        result: NDArray[np.float32] = out.numpy()
+        return result
+
+    def _palette(self, poses: Poses) -> NDArray[np.float32]:
+        self._check(poses)
+        drivers = drive(self.skeleton, self.anchors, poses)
+        return palette(self.runs.columns, self.anchors, self.parameters, drivers)
+
+    def _check(self, poses: Poses) -> None:
+        if poses.positions.shape[1:] != (len(self.skeleton), 3):
+            raise InputError(f"poses: want {len(self.skeleton)} joints, got {poses.positions.shape[1]}")
+        finite = np.isfinite(poses.positions).all(axis=2) & np.isfinite(poses.rotations).all(axis=2)
+        if not finite.all():
+            frame, joint = np.argwhere(~finite)[0]
+            raise InputError(f"poses: joint '{self.skeleton.names[joint]}' is not finite at frame {frame}")
+
+    def _launch(self, rows: NDArray[np.float32], points: Any, device: Any, threads: int) -> None:
+        import warp as wp
+        from warpjld_kernels.covering_tiles import LANES, deform_runs
+
+        model = self._on(device, "runs", self._packed)
+        pose = wp.array(rows, dtype=float, device=device, copy=False)
+
+        def span(begin: int, end: int) -> None:
+            wp.launch_tiled(
+                deform_runs,
+                dim=(end - begin, len(self.runs.tiles)),
+                inputs=[*model, pose[begin:end]],
+                outputs=[points[begin:end]],
+                block_dim=LANES,
+                device=device,
+            )
+
+        cuts = np.linspace(0, len(rows), min(threads, max(len(rows), 1)) + 1).astype(int)
+        if len(cuts) == 2:
+            span(0, len(rows))
+            return
+        wp.load_module(deform_runs.module, device=device)  # compiling is not safe from several threads
+        with ThreadPoolExecutor(len(cuts) - 1) as pool:
+            list(pool.map(span, cuts[:-1].tolist(), cuts[1:].tolist()))
+
+    def _on(self, device: Any, name: str, make: Any) -> list[Any]:
+        """Arguments that stay on a device between calls."""
+        key = f"{device}/{name}"
+        if key not in self._resident:
+            self._resident[key] = make(device)
+        return self._resident[key]
+
+    def _packed(self, device: Any) -> list[Any]:
+        import warp as wp
+
+        r = self.runs
+        kinds = ((r.tiles, wp.int32), (r.runs, wp.int32), (r.slots, wp.int32), (r.coefficients, float))
+        return [wp.array(a, dtype=k, device=device) for a, k in (*kinds, (r.order, wp.int32))]
+
+    def _anchored(self, device: Any) -> list[Any]:
+        return [anchors_on(device, self.anchors, self.skeleton.rest), parameters_on(device, self.parameters)]
+
+
+def bind(
+    skeleton: Skeleton,
+    surface: Surface,
+    *,
+    parameters: Parameters | None = None,
+    skin: Skin | None = None,
+    domains: Literal["geometry", "skin"] | NDArray[np.float64] = "geometry",
+) -> Covering:
+    """Bind a surface to a skeleton (A §4): find domains and place every vertex on its segments.
+
+    Args:
+        skeleton: The rest skeleton.
+        surface: The rest surface, in the skeleton's frame.
+        parameters: The animator's parameters; by default those that keep volume.
+        skin: Painted weights, wanted by ``domains="skin"``.
+        domains: "geometry" (bone heat), "skin" (painted weights), or weights of every operator, shape (V, fans).
+
+    Raises:
+        InputError: A skeleton without segments, missing painted weights, or parameters out of range.
+    """
+    groups = fans(skeleton)
+    if not groups:
+        raise InputError("skeleton: it has no segment to cover")
+    chosen = default_parameters(skeleton) if parameters is None else parameters
+    chosen.check(skeleton)
+    if isinstance(domains, np.ndarray):
+        weights = domains
+    elif domains == "geometry":
+        weights = domains_from_geometry(surface.vertices, surface.faces, skeleton, groups)
+    elif domains == "skin":
+        if skin is None:
+            raise InputError("domains 'skin': this rig has no painted weights")
+        weights = domains_from_skin(surface.vertices, skeleton, groups, skin)
+    else:
+        raise InputError(f"domains: want 'geometry' or 'skin', got {domains!r}")
+    anchors = anchor(surface.vertices, skeleton, groups, weights, chosen)
+    return Covering(skeleton, surface, chosen, groups, weights, anchors)

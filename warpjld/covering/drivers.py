@@ -1,0 +1,77 @@
+"""What a pose gives the operators: joint positions, rotations, and the scalars that drive inflation."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from warpjld.covering.binding import STATIONS, Anchors
+from warpjld.skeleton.kinematics import Poses
+from warpjld.skeleton.tree import CHANNELS, Skeleton
+
+__all__ = ["Drivers", "closing_logarithm", "drive", "flexion_ratio", "halfway_rotations"]
+
+
+@dataclass(frozen=True, eq=False)
+class Drivers:
+    """Inputs of the operators over F frames.
+
+    Attributes:
+        positions: Joint positions [m], shape (F, J, 3).
+        halfway: Rotation halfway between the two bones that meet at a joint, x y z w, shape (F, J, 4) (C22).
+        rotations: Rotation of the bone that begins at a joint, shape (F, J, 4).
+        flexion_ratio: FR of every joint, 0 … 1, shape (F, J) (R59, C18).
+        closing: log λ of every palm pair at its stations, 0 where the neighbours move apart, shape (F, N, stations).
+    """
+
+    positions: NDArray[np.float64]
+    halfway: NDArray[np.float64]
+    rotations: NDArray[np.float64]
+    flexion_ratio: NDArray[np.float64]
+    closing: NDArray[np.float64]
+
+
+def drive(skeleton: Skeleton, anchors: Anchors, poses: Poses) -> Drivers:
+    """Everything the operators take from poses."""
+    return Drivers(
+        poses.positions,
+        halfway_rotations(skeleton, poses.rotations),
+        poses.rotations,
+        flexion_ratio(skeleton, poses.flexion),
+        closing_logarithm(anchors, skeleton.rest, poses.positions),
+    )
+
+
+def halfway_rotations(skeleton: Skeleton, rotations: NDArray[np.float64]) -> NDArray[np.float64]:
+    """normalise(q_parent + q_joint): the bisector both segments share (C22, C23). Signs are aligned in the poses."""
+    before = np.where(skeleton.parents < 0, np.arange(len(skeleton)), skeleton.parents)
+    total = rotations[:, before] + rotations
+    return total / np.linalg.norm(total, axis=-1, keepdims=True)
+
+
+def flexion_ratio(skeleton: Skeleton, flexion: NDArray[np.float64]) -> NDArray[np.float64]:
+    """FR = vertical flexion / maximal flexion, clamped to 0 … 1, shape (F, J) (A §6.1, C18)."""
+    largest = skeleton.limits[:, CHANNELS.index("flexion"), 1]
+    moves = largest > 1e-6
+    return np.where(moves, np.clip(flexion / np.where(moves, largest, 1.0), 0.0, 1.0), 0.0)
+
+
+def closing_logarithm(
+    anchors: Anchors, rest: NDArray[np.float64], positions: NDArray[np.float64]
+) -> NDArray[np.float64]:
+    """log of λ = final / initial length of the virtual segment where it is below 1, else 0 (A §4, C3, R44)."""
+    if not len(anchors.pairs):
+        return np.zeros((len(positions), 1, STATIONS))
+    return np.minimum(np.log(_virtual_lengths(anchors, positions) / _virtual_lengths(anchors, rest[None])), 0.0)
+
+
+def _virtual_lengths(anchors: Anchors, positions: NDArray[np.float64]) -> NDArray[np.float64]:
+    place = np.linspace(0.0, 1.0, STATIONS)[:, None]
+    first, second = (anchors.ends[anchors.pairs[:, k]] for k in (0, 1))
+    starts = positions[:, second[:, 0]] - positions[:, first[:, 0]]
+    ends = positions[:, second[:, 1]] - positions[:, first[:, 1]]
+    across = (1.0 - place) * starts[:, :, None] + place * ends[:, :, None]
+    lengths: NDArray[np.float64] = np.maximum(np.linalg.norm(across, axis=-1), 1e-9)
+    return lengths
