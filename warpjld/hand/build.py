@@ -8,10 +8,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from warpjld.errors import InputError
-from warpjld.hand.contour import contour
 from warpjld.hand.fit import fit_plan
 from warpjld.hand.flesh import Flesh
 from warpjld.hand.plan import Plan
+from warpjld.hand.triangulate import triangulate
 from warpjld.rig import Rig
 from warpjld.skeleton import DIGITS, PALM_SEGMENTS, Skeleton, default_limits, hand_joint_names
 from warpjld.skeleton.hand import FINGER_JOINTS, HAND_PARENTS
@@ -53,7 +53,7 @@ def build_hand(
     if side not in ("left", "right"):
         raise InputError(f"side: want 'left' or 'right', got {side!r}")
     flesh = Flesh(fit_plan(length / _MILLIMETRE, breadth / _MILLIMETRE, _scales(proportions)))
-    vertices, faces = _triangulate(flesh, resolution)
+    vertices, faces = triangulate(flesh, resolution)
     skeleton = _skeleton(flesh.plan)
     if side == "right":
         vertices, faces, skeleton = vertices * (-1.0, 1.0, 1.0), faces[:, ::-1], _mirrored(skeleton)
@@ -72,14 +72,6 @@ def _scales(proportions: Mapping[str, float | tuple[float, float]] | None) -> di
             raise InputError(f"proportions: no digit '{digit}'; want one of {', '.join(DIGITS)}")
         out[digit] = (float(scale), 1.0) if np.isscalar(scale) else (float(scale[0]), float(scale[1]))
     return out
-
-
-def _triangulate(flesh: Flesh, resolution: int) -> tuple[Array, NDArray[np.int64]]:
-    stretch = flesh.plan.stretch
-    low, high = np.array([-75.0, -75.0, -205.0]) * stretch, np.array([110.0, 45.0, 60.0]) * stretch
-    spacing = float(np.sqrt(62000.0 / resolution))
-    vertices, faces = contour(flesh, low, high, spacing)
-    return flesh.project(vertices), faces
 
 
 def _skeleton(plan: Plan) -> Skeleton:

@@ -15,7 +15,7 @@ __all__ = ["Flesh"]
 Array = NDArray[np.float64]
 
 _BETWEEN_FINGERS = 1.6  # blending radii [mm of the design hand]
-_FINGER_ROOT = 7.0
+_FINGER_ROOT = 9.0
 _THUMB_ROOT = 16.0
 
 
@@ -32,8 +32,11 @@ class Flesh:
         for name in ("pinky", "ring", "middle", "index"):
             one = self.plan.digits[name].flesh(points)
             fingers = one if fingers is None else _join(fingers, one, _BETWEEN_FINGERS * scale)
+        assert fingers is not None
         hand = _join(Palm(self.plan.stretch)(points), fingers, _FINGER_ROOT * scale)
-        return _join(hand, self.plan.digits["thumb"].flesh(points), _THUMB_ROOT * scale)
+        for part in (self.plan.digits["thumb"].flesh, *self.plan.thenar):
+            hand = _join(hand, part(points), _THUMB_ROOT * scale)
+        return hand
 
     def slope(self, points: Array) -> tuple[Array, Array]:
         """Distance (n,) and its gradient (n, 3), by differences over four corners of a tetrahedron."""

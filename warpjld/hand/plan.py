@@ -25,7 +25,7 @@ CARPOMETACARPAL = {
     "index": (12.0, 2.0, 29.0),
     "middle": (2.0, 3.0, 29.5),
     "ring": (-8.0, 2.0, 29.0),
-    "pinky": (-17.0, -0.5, 27.0),
+    "pinky": (-17.5, -0.5, 27.0),
 }
 
 
@@ -39,45 +39,51 @@ class _Finger:
 
 
 _FINGERS = {
-    "index": _Finger((24.0, 0.5, 85.0), (43.0, 25.5, 24.5), 9.6, 5.0, 5.0),
-    "middle": _Finger((3.0, 2.0, 87.0), (46.5, 30.0, 26.5), 9.8, 0.5, 0.0),
-    "ring": _Finger((-16.5, 0.5, 80.5), (43.5, 28.5, 25.5), 9.2, -4.5, -5.0),
-    "pinky": _Finger((-33.5, -3.0, 71.5), (34.0, 20.5, 22.0), 8.0, -11.0, -11.0),
+    "index": _Finger((25.0, 0.0, 85.0), (43.0, 25.5, 24.0), 9.4, 6.0, 6.0),
+    "middle": _Finger((3.5, 1.5, 87.0), (46.5, 30.0, 26.5), 9.5, 0.5, 0.0),
+    "ring": _Finger((-17.0, 0.0, 80.5), (43.5, 28.5, 25.0), 8.9, -5.5, -6.0),
+    "pinky": _Finger((-35.0, -3.5, 71.5), (34.0, 20.5, 21.5), 7.8, -13.0, -13.0),
 }
 _CURL = (5.0, 8.0, 5.0)  # degrees of flexion at base, knuckle 2, knuckle 3
 
 # axial place as (joint it counts from, fraction of the segment that follows): half-width, dorsal, palmar half-height,
 # in units of the half-width at knuckle 2
 _FINGER_PROFILE = (
-    (-1, 0.0, 0.70, 0.75, 0.80),
-    (0, 0.0, 1.06, 1.10, 1.12),
-    (0, 0.30, 1.05, 0.98, 1.10),
-    (0, 0.65, 0.97, 0.86, 1.00),
+    (-1, 0.0, 0.80, 0.72, 0.80),
+    (0, 0.0, 1.02, 0.98, 1.05),
+    (0, 0.30, 1.06, 0.93, 1.08),
+    (0, 0.65, 0.98, 0.86, 1.00),
     (1, 0.0, 1.00, 0.90, 0.90),
     (1, 0.5, 0.91, 0.79, 0.90),
-    (2, 0.0, 0.87, 0.72, 0.80),
-    (2, 0.35, 0.84, 0.62, 0.84),
-    (2, 0.7, 0.76, 0.50, 0.76),
-    (2, 1.0, 0.60, 0.36, 0.55),
+    (2, 0.0, 0.88, 0.73, 0.80),
+    (2, 0.35, 0.87, 0.64, 0.84),
+    (2, 0.7, 0.82, 0.54, 0.80),
+    (2, 1.0, 0.72, 0.46, 0.66),
 )
 
-_THUMB_BASE = (21.0, -8.0, 24.0)
-_THUMB_LENGTHS = (44.0, 34.0, 29.0)
-_THUMB_HALF_WIDTH = 10.8  # at knuckle 3
-_THUMB_ABDUCTION = (40.0, 36.0, 33.0)  # of the three segments, from the hand's axis, in the dorsal view
-_THUMB_DEPTH = (22.0, 18.0, 15.0)  # towards the palm
+_THUMB_BASE = (22.0, -8.0, 22.0)
+_THUMB_LENGTHS = (43.0, 32.0, 28.0)
+_THUMB_HALF_WIDTH = 10.6  # at knuckle 3
+_THUMB_ABDUCTION = (42.0, 42.0, 44.0)  # of the three segments, from the hand's axis, in the dorsal view
+_THUMB_DEPTH = (24.0, 18.0, 14.0)  # towards the palm
 _THUMB_ROLL = 65.0
 _THUMB_PROFILE = (
     (-1, 0.0, 0.9, 0.9, 0.9),
-    (0, 0.0, 1.25, 1.15, 1.25),
-    (0, 0.5, 1.30, 1.12, 1.35),
-    (1, 0.0, 1.10, 1.00, 1.10),
-    (1, 0.5, 0.95, 0.86, 0.95),
+    (0, 0.0, 1.20, 1.10, 1.25),
+    (0, 0.5, 1.25, 1.08, 1.35),
+    (1, 0.0, 1.12, 1.02, 1.10),
+    (1, 0.5, 0.96, 0.87, 0.95),
     (2, 0.0, 1.00, 0.86, 0.88),
-    (2, 0.35, 0.98, 0.72, 0.88),
-    (2, 0.7, 0.88, 0.56, 0.78),
-    (2, 1.0, 0.66, 0.38, 0.55),
+    (2, 0.35, 1.00, 0.74, 0.90),
+    (2, 0.7, 0.94, 0.60, 0.84),
+    (2, 1.0, 0.80, 0.48, 0.64),
 )
+
+# flesh beside the bones, from one place to another: axial fraction, half-width, outer and inner half-height
+_THENAR = ((10.0, -9.0, 8.0), (48.0, -24.0, 54.0))
+_THENAR_PROFILE = ((0.0, 9.0, 8.0, 8.0), (0.35, 14.0, 12.5, 10.0), (0.7, 13.0, 11.0, 10.0), (1.0, 9.0, 8.0, 8.0))
+_WEB = ((24.0, -2.0, 62.0), (46.0, -20.0, 48.0))
+_WEB_PROFILE = ((0.0, 14.0, 6.0, 6.0), (0.5, 12.0, 6.0, 6.0), (1.0, 14.0, 8.0, 8.0))
 
 
 @dataclass(frozen=True, eq=False)
@@ -97,6 +103,7 @@ class Plan:
     wrist: Array
     carpometacarpal: dict[str, Array]
     digits: dict[str, Digit]
+    thenar: tuple[Sweep, ...]
     stretch: Array
 
 
@@ -124,7 +131,7 @@ def plan_hand(along: float, across: float, proportions: Mapping[str, tuple[float
         steps = np.cos(bend)[:, None] * heading - np.sin(bend)[:, None] * up
         digits[name] = _digit(
             place(finger.base), steps, np.array(finger.lengths) * along * long, up,
-            finger.half_width * across * thick, _FINGER_PROFILE, 16.0 * along, 0.12,
+            finger.half_width * across * thick, _FINGER_PROFILE, 30.0 * along, 0.12,
         )  # fmt: skip
     long, thick = proportions.get("thumb", (1.0, 1.0))
     side, down = np.radians(_THUMB_ABDUCTION), np.radians(_THUMB_DEPTH)
@@ -142,6 +149,10 @@ def plan_hand(along: float, across: float, proportions: Mapping[str, tuple[float
         wrist=place(WRIST),
         carpometacarpal={name: place(point) for name, point in CARPOMETACARPAL.items()},
         digits=digits,
+        thenar=(
+            _spindle(place(_THENAR[0]), place(_THENAR[1]), _THENAR_PROFILE, across),
+            _spindle(place(_WEB[0]), place(_WEB[1]), _WEB_PROFILE, across),
+        ),
         stretch=stretch,
     )
 
@@ -168,13 +179,28 @@ def _digit(
         base,
         frame,
         (-root, local[3, 2]),
-        (-0.15 * root, stops[3] + 0.5 * (stops[4] - stops[3])),
+        (-0.1 * root, stops[3] + 0.62 * (stops[4] - stops[3])),
         squareness,
         [(p[2], p[0], p[1]) for p in (before, *local)],
         sizes,
     )
     per_joint = np.vstack([_square(dorsal, d) for d in (*steps, steps[2])])
     return Digit(joints, per_joint, flesh)
+
+
+def _spindle(start: Array, end: Array, profile: tuple[tuple[float, ...], ...], across: float) -> Sweep:
+    length = float(np.linalg.norm(end - start))
+    axis = (end - start) / length
+    palmar = _square(np.array([0.0, -1.0, 0.0]), axis)
+    return Sweep.through(
+        start,
+        np.vstack([np.cross(palmar, axis), palmar, axis]),
+        (0.0, length),
+        (0.3 * length, 0.7 * length),
+        0.0,
+        [(0.0, 0.0, 0.0), (length, 0.0, 0.0)],
+        [(f * length, w * across, a * across, b * across) for f, w, a, b in profile],
+    )
 
 
 def _square(vector: Array, axis: Array) -> Array:
