@@ -37,6 +37,7 @@ def test_nothing_is_a_script(text: str) -> None:
     "text",
     [
         "SHOULDER LEFT FLEXION\n0 10 5 30",  # as the paper prints it
+        "SHOULDER\n LEFT\nFlexion 0 10 5 30",
         "SHOULDER LEFT FLEXION  # first line\n  0 10 5 30",
         "SHOULDER LEFT FLEXION 0 \\\n 10 5 30",
         "SHOULDER LEFT \\  # because\n FLEXION 0 10 5 30",
@@ -44,7 +45,11 @@ def test_nothing_is_a_script(text: str) -> None:
     ],
 )
 def test_a_command_may_go_on_in_the_next_line(text: str) -> None:
-    assert [str(a) for a in one(text).arguments] == ["LEFT", "FLEXION", "0", "10", "5", "30"]
+    assert [str(a).upper() for a in one(text).arguments] == ["LEFT", "FLEXION", "0", "10", "5", "30"]
+
+
+def test_other_words_begin_a_command() -> None:
+    assert len(parse("PRINT\nleft.index\nLEFTOVER\nEND")) == 4
 
 
 def test_a_number_after_a_blank_line_belongs_to_nothing() -> None:

@@ -51,7 +51,7 @@ def test_a_bug_in_a_user_command_is_named_with_its_line(run, added) -> None:
 def test_names_are_not_taken_twice() -> None:
     with pytest.raises(InputError, match="there is a command WRIST already"):
         command("wrist", syntax="", help="")(lambda scene, arguments: None)
-    with pytest.raises(InputError, match="there is a command END already"):
+    with pytest.raises(InputError, match="END is a word of the language"):
         command("end", syntax="", help="")(lambda scene, arguments: None)
     with pytest.raises(InputError, match="want one word"):
         command("TWO WORDS", syntax="", help="")(lambda scene, arguments: None)

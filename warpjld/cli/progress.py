@@ -6,7 +6,7 @@ import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 
-__all__ = ["Report", "progress"]
+__all__ = ["Report", "progress", "silence_warp"]
 
 Report = Callable[[str, int, int], None]
 """What long work calls: what is being done, how much of it is done, and how much there is."""
@@ -25,3 +25,10 @@ def progress(quiet: bool = False) -> Iterator[Report]:
     with Progress(*columns, console=Console(stderr=True), transient=True) as bar:
         task = bar.add_task("")
         yield lambda what, done, total: bar.update(task, description=what, completed=done, total=total)
+
+
+def silence_warp() -> None:
+    """Keep Warp's greeting off stdout, which belongs to what the command prints."""
+    import warp
+
+    warp.config.quiet = True

@@ -24,11 +24,12 @@ def command(
 ) -> None:
     """Run SCRIPT and make the pictures, films and exports it asks for; if it asks for none, an animated surface (NPZ),
     a film and a contact sheet. A summary goes to summary.json in the output folder."""
-    from warpjld.cli.progress import progress
+    from warpjld.cli.progress import progress, silence_warp
     from warpjld.script import Interpreter, Scene
     from warpjld.script.runner import run_scene
     from warpjld.script.summary import table
 
+    silence_warp()
     # a polite kill cleans up as Ctrl-C does
     signal.signal(signal.SIGTERM, signal.default_int_handler)
 
@@ -43,4 +44,4 @@ def command(
     if as_json:
         click.echo(json.dumps(summary, indent=1))
     elif not quiet:
-        table(summary)
+        table(summary, click.echo)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import TYPE_CHECKING, Literal
 
@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from warpjld.script.scene import Actor, Camera
+from warpjld.script.staging import stage
 from warpjld.skeleton import Poses, Skeleton
 
 if TYPE_CHECKING:
@@ -33,9 +34,16 @@ class Role:
 
 @dataclass(frozen=True, eq=False)
 class Crowd:
-    """The roles of a scene, their vertices, faces, joints and segments put one after another."""
+    """The roles of a scene, their vertices, faces, joints and segments put one after another.
+
+    Attributes:
+        roles: In the order of the scene's actors.
+        frames: Frame numbers of their poses, shape (F,).
+        device: Warp device of the covering.
+    """
 
     roles: Sequence[Role]
+    frames: NDArray[np.float64]
     device: str = "cpu"
 
     @cached_property
@@ -55,6 +63,11 @@ class Crowd:
             for segment in role.covering.skeleton.segments
         ]
         return np.array(pairs, dtype=np.int32).reshape(-1, 2)
+
+    def at(self, frame: float, rate: float) -> Crowd:
+        """The same roles at one frame, whole or not, of a scene with that rate [1/s]."""
+        moment = np.array([frame])
+        return Crowd([replace(role, poses=stage(role.actor, moment, rate)) for role in self.roles], moment, self.device)
 
     def joints(self, frame: int) -> NDArray[np.float64]:
         """Joint positions of all at the frame of that place in the sequence [m], shape (J, 3)."""
@@ -88,8 +101,8 @@ class Crowd:
     @cached_property
     def _framing(self) -> NDArray[np.float64]:
         """Points that must be in every picture [m], shape (n, 3)."""
-        frames = len(self.roles[0].poses)
-        chosen = np.unique(np.linspace(0, frames - 1, min(frames, _SAMPLES)).astype(int))
+        count = len(self.frames)
+        chosen = np.unique(np.linspace(0, count - 1, min(count, _SAMPLES)).astype(int))
         surfaces = [self.surface(int(frame)) for frame in chosen]
         joints = [role.poses.positions.reshape(-1, 3) for role in self.roles]
         return np.concatenate([*surfaces, *joints])

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 from warpjld.errors import InputError, WarpjldError
 from warpjld.script.arguments import Arguments
 from warpjld.script.parser import parse, parse_file
-from warpjld.script.registry import Command, Registry, commands
+from warpjld.script.registry import RESERVED, Command, Registry, commands
 from warpjld.script.statements import (
     Argument,
     MacroDefinition,
@@ -120,8 +120,8 @@ class Interpreter:
 
     def _define(self, macro: MacroDefinition) -> None:
         name = macro.name.text.upper()
-        if name in self._registry:
-            raise macro.name.position.error(f"{name} is a command; choose another name for the macro")
+        if name in self._registry or name in RESERVED:
+            raise macro.name.position.error(f"{name} is a word of the language; choose another name for the macro")
         parameters = [word.text.upper() for word in macro.parameters]
         for k, word in enumerate(macro.parameters):
             if parameters[k] in parameters[:k]:

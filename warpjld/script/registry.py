@@ -31,7 +31,13 @@ ENTRY_POINTS = "warpjld.commands"
 GROUPS = ("Actors", "Animation", "Covering", "Output", "Flow")
 """Headings of our own commands, in the order in which the table of commands prints them."""
 
-_RESERVED = ("MACRO", "END")
+RESERVED = (
+    *("MACRO", "END"),
+    # a line that begins with one of these goes on with the command above it
+    *("LEFT", "RIGHT", "FLEXION", "PIVOT", "TWISTING", "ABDUCTION", "KNUCKLES2", "KNUCKLES3"),
+)
+"""Words that no command and no macro may be called by."""
+
 _BUILT_IN = ("actors", "animation", "covering", "output", "flow")
 
 Function = Callable[["Scene", "Arguments"], None]
@@ -90,7 +96,9 @@ class Registry:
             raise InputError(f"command name '{new.name}': want one word of letters, digits and underscores")
         old = self._commands.get(new.name)
         same = old and (old.run.__module__, old.run.__qualname__) == (new.run.__module__, new.run.__qualname__)
-        if new.name in _RESERVED or (old and not same):
+        if new.name in RESERVED:
+            raise InputError(f"{new.name} is a word of the language: no command can be called so")
+        if old and not same:
             raise InputError(f"there is a command {new.name} already")
         self._commands[new.name] = new
 

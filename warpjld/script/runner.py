@@ -10,9 +10,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from warpjld.script.binding import cover
 from warpjld.script.crowd import Crowd, Role
 from warpjld.script.folder import OutputFolder
-from warpjld.script.formats import check_available, film_is_available
+from warpjld.script.formats import check_available, video_is_available
 from warpjld.script.pictures import draw_contact_sheet, draw_picture, film_studio
 from warpjld.script.scene import Actor, ContactSheet, Export, Film, Output, Picture, Scene
 from warpjld.script.staging import frame_numbers, notes, stage
@@ -60,10 +61,10 @@ def run_scene(
     outputs = list(scene.outputs)
     if not outputs:
         outputs = [Export("surface.npz", None), ContactSheet("contact.png", (), scene.camera)]
-        if film_is_available():
-            outputs.insert(1, Film("film.mp4", "shaded", scene.camera))
-        else:
-            summary.notes.append("no film: it needs an optional dependency: pip install 'warpjld[film]'")
+        video = video_is_available()
+        outputs.insert(1, Film("film.mp4" if video else "film.gif", "shaded", scene.camera))
+        if not video:
+            summary.notes.append("the film is a GIF; for MP4: pip install 'warpjld[film]'")
     check_available([output.name for output in outputs])
     for actor in scene.actors.values():
         stage(actor, frames[:1], scene.rate)  # keys beyond limits are found here
@@ -76,7 +77,7 @@ def run_scene(
         with summary.timed("frames"):
             _make_sequences(scene, crowd, frames, outputs, out, threads, progress)
         with summary.timed("pictures"):
-            _make_pictures(scene, crowd, outputs, out, progress)
+            _make_pictures(scene, crowd, outputs, out, progress, "" if script is None else script.stem)
         return summary.write(out)
 
 
@@ -92,7 +93,7 @@ def cast(
     for number, actor in enumerate(scene.actors.values()):
         progress(f"binding {actor.name.lower()}", number, len(scene.actors))
         roles.append(Role(actor, cover(actor), stage(actor, frames, scene.rate)))
-    return Crowd(roles, device)
+    return Crowd(roles, frames, device)
 
 
 def _names(scene: Scene, outputs: Sequence[Output]) -> list[str]:
@@ -169,13 +170,13 @@ def _make_sequences(
 
 
 def _make_pictures(
-    scene: Scene, crowd: Crowd, outputs: Sequence[Output], out: OutputFolder, progress: Report
+    scene: Scene, crowd: Crowd, outputs: Sequence[Output], out: OutputFolder, progress: Report, title: str
 ) -> None:
     wanted = [output for output in outputs if isinstance(output, Picture | ContactSheet)]
     for number, output in enumerate(wanted):
         progress("pictures", number, len(wanted))
         path = out.place(output.name)
         if isinstance(output, Picture):
-            draw_picture(scene, crowd, output, path)
+            draw_picture(crowd, output, path, scene.rate)
         else:
-            draw_contact_sheet(scene, crowd, output, path)
+            draw_contact_sheet(crowd, output, path, scene, title)

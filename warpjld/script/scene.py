@@ -12,12 +12,23 @@ from warpjld.script.placement import Placement
 from warpjld.script.suggest import did_you_mean
 
 if TYPE_CHECKING:
-    from warpjld.covering.parameters import Parameters
+    from warpjld.covering import Covering, Parameters
     from warpjld.motion import Motion
     from warpjld.rig import Rig
     from warpjld.skeleton import Poses, Skeleton
 
-__all__ = ["Actor", "Camera", "ContactSheet", "Export", "Film", "Output", "Picture", "Scene", "SplineConstants", "Style"]
+__all__ = [
+    "Actor",
+    "Camera",
+    "ContactSheet",
+    "Export",
+    "Film",
+    "Output",
+    "Picture",
+    "Scene",
+    "SplineConstants",
+    "Style",
+]
 
 Style = Literal["shaded", "wireframe"]
 
@@ -94,6 +105,7 @@ class Actor:
         domains: Whether domains come from the geometry or from the rig's painted weights.
         recorded: Poses of a motion file and their rate [1/s], which the keys then do not override.
         placement: Keys of the actor as a whole.
+        covering: The surface as bound last; ``covered`` is the method and the domains it was bound with.
     """
 
     name: str
@@ -105,6 +117,8 @@ class Actor:
     domains: Literal["geometry", "skin"] = "geometry"
     recorded: tuple[Poses, float] | None = None
     placement: Placement = field(default_factory=Placement)
+    covering: Covering | None = None
+    covered: tuple[str, str] = ("", "")
 
     @property
     def keyed(self) -> bool:

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import json
 import platform
+import re
 import time
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -85,28 +86,40 @@ class Summary:
         }
 
 
-def table(content: dict[str, Any]) -> None:
-    """Print a summary for people on stdout."""
+def table(content: dict[str, Any], say: Callable[[str], None] = print) -> None:
+    """Say a summary to people."""
     from rich.console import Console
     from rich.table import Table
 
-    console = Console(highlight=False)
+    console = Console(highlight=False, markup=False, soft_wrap=True)
     frames = content["frames"]
-    for actor in content["actors"]:
-        drive = "motion file" if actor["recorded"] else f"{actor['keys']} keys"
-        console.print(f"{actor['name']}: {actor['rig']}, {actor['vertices']:,} vertices, {drive}", markup=False)
-    spent = ", ".join(f"{stage} {value:.2f} s" for stage, value in content["seconds"].items())
-    console.print(
-        f"{frames['count']} frames ({frames['first']} to {frames['last']}) at {content['rate']:g}/s"
-        + (f": {spent}" if spent else "")
-    )
-    files = Table(box=None, padding=(0, 2, 0, 0), show_header=False)
-    for file in content["files"]:
-        size = file.get("bytes")
-        files.add_row(f"{content['folder']}/{file['name']}", "to be made" if size is None else _readable(size))
-    console.print(files)
-    for note in content["notes"]:
-        console.print(f"note: {note}", markup=False)
+    with console.capture() as lines:
+        for actor in content["actors"]:
+            drive = "a motion file" if actor["recorded"] else f"{actor['keys']} keys"
+            console.print(f"{actor['name']}: {actor['rig']}, {actor['vertices']:,} vertices, {drive}")
+        spent = ", ".join(f"{stage} {value:.2f} s" for stage, value in content["seconds"].items())
+        count = f"{frames['count']} frames ({frames['first']} to {frames['last']}) at {content['rate']:g}/s"
+        console.print(f"{count}: {spent}" if spent else count)
+        files = Table(box=None, padding=(0, 2, 0, 0), show_header=False)
+        for name, size in _grouped(content["files"]):
+            files.add_row(f"{content['folder']}/{name}", "to be made" if size is None else _readable(size))
+        console.print(files)
+        for note in content["notes"]:
+            console.print(f"note: {note}")
+    say(lines.get().rstrip())
+
+
+def _grouped(files: list[dict[str, Any]]) -> list[tuple[str, float | None]]:
+    """Files by name and size; the many files of a sequence as one line."""
+    groups: dict[str, list[dict[str, Any]]] = {}
+    for file in files:
+        groups.setdefault(re.sub(r"\d{4,}(?=\.\w+$)", "####", file["name"]), []).append(file)
+    rows: list[tuple[str, float | None]] = []
+    for pattern, members in groups.items():
+        name = members[0]["name"] if len(members) == 1 else f"{pattern} ({len(members)} files)"
+        sizes = [member.get("bytes") for member in members]
+        rows.append((name, None if None in sizes else sum(sizes)))
+    return rows
 
 
 def _readable(size: float) -> str:
