@@ -159,8 +159,7 @@ def test_spine_is_spread_over_other_numbers_of_vertebrae() -> None:
 def test_root_travels_in_the_size_of_the_rig() -> None:
     clip = recording(frames=3)
     still = (
-        np.broadcast_to(clip.positions[:1], clip.positions.shape)
-        + np.array([0, 0, 50.0]) * np.arange(3)[:, None, None]
+        np.broadcast_to(clip.positions[:1], clip.positions.shape) + np.array([0, 0, 50.0]) * np.arange(3)[:, None, None]
     )
     unmoved = np.broadcast_to(clip.rotations[:1], clip.rotations.shape)
     walk = Clip(clip.names, clip.parents, clip.rest, still, unmoved, 30.0)

@@ -75,6 +75,10 @@ def retarget(clip: Clip, skeleton: Skeleton) -> Poses:
             world[:, j] = multiply(recorded[:, bone], align[j])
         else:
             world[:, j] = _IDENTITY if parent < 0 else world[:, parent]
+    above = -1 if trunk else int(skeleton.parents[min(j for j, _ in pairs.values())])
+    while above >= 0:  # the stub of forearm that carries a recorded hand goes with it
+        world[:, above] = world[:, min(driven)]
+        above = int(skeleton.parents[above])
     local = world.copy()
     for j in range(len(skeleton)):
         if skeleton.parents[j] >= 0:
@@ -161,9 +165,7 @@ def _alignment(
     return aligned
 
 
-def _turn_about(
-    axis: NDArray[np.float64], start: NDArray[np.float64], end: NDArray[np.float64]
-) -> NDArray[np.float64]:
+def _turn_about(axis: NDArray[np.float64], start: NDArray[np.float64], end: NDArray[np.float64]) -> NDArray[np.float64]:
     """Rotation about an axis that brings ``start`` as close to ``end`` as it can."""
     a = unit(axis)
     u, v = start - a * (a @ start), end - a * (a @ end)
