@@ -1,7 +1,19 @@
 """Keys and Kochanek–Bartels in-betweens of joint angles (R2–R5), and motions of other programs."""
 
 from warpjld.motion.csv_file import read_csv, write_csv
+from warpjld.motion.load import MOTION_FORMATS, load_motion
 from warpjld.motion.spline import Spline
 from warpjld.motion.tracks import Clamped, Key, Limits, Motion, Track
 
-__all__ = ["Clamped", "Key", "Limits", "Motion", "Spline", "Track", "read_csv", "write_csv"]
+__all__ = [
+    "MOTION_FORMATS",
+    "Clamped",
+    "Key",
+    "Limits",
+    "Motion",
+    "Spline",
+    "Track",
+    "load_motion",
+    "read_csv",
+    "write_csv",
+]
