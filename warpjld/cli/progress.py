@@ -31,4 +31,4 @@ def silence_warp() -> None:
     """Keep Warp's greeting off stdout, which belongs to what the command prints."""
     import warp
 
-    warp.config.quiet = True
+    warp.config.log_level = warp.LOG_ERROR

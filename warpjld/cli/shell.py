@@ -22,14 +22,20 @@ _WELCOME = "HELP lists the commands, RUN makes the files, SAVE keeps what was ty
 @click.option("-o", "--out", type=click.Path(path_type=Path), default="out", show_default=True, help="Output folder.")
 @click.option("--device", default="cpu", show_default=True, help="Where to compute: cpu, cuda:0, …")
 @click.option("--threads", type=click.IntRange(min=1), help="CPU threads; all by default.")
-def command(script: Path | None, out: Path, device: str, threads: int | None) -> None:
+@click.option(
+    "--commands", multiple=True, type=click.Path(path_type=Path), help="Python file that adds commands; repeatable."
+)
+def command(script: Path | None, out: Path, device: str, threads: int | None, commands: tuple[Path, ...]) -> None:
     """Type commands of the language, after running SCRIPT if one is given. Commands may also be piped in; then the
     first error ends the shell."""
     from warpjld.cli.progress import silence_warp
+    from warpjld.script.plugin import load_commands
     from warpjld.script.session import Session
 
     silence_warp()
     at_terminal = sys.stdin.isatty()
+    for path in commands:
+        load_commands(path)
     session = Session(out, device=device, threads=threads, say=click.echo)
     if script is not None:
         session.run_file(script)

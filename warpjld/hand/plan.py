@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from warpjld.hand.sweep import Sweep
 
-__all__ = ["LENGTH", "BREADTH", "Digit", "Plan", "plan_hand"]
+__all__ = ["BREADTH", "LENGTH", "Digit", "Plan", "plan_hand"]
 
 Array = NDArray[np.float64]
 

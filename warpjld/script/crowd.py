@@ -85,13 +85,11 @@ class Crowd:
         if camera.position is not None and camera.target is not None:
             sight = np.subtract(camera.target, camera.position)
             steep = abs(sight[1]) > 0.99 * np.linalg.norm(sight)
-            up = (0.0, 0.0, -1.0) if steep else (0.0, 1.0, 0.0)
-            return RenderCamera(camera.position, camera.target, up, zoom=camera.zoom)
+            above = (0.0, 0.0, -1.0) if steep else (0.0, 1.0, 0.0)
+            return RenderCamera(camera.position, camera.target, above, zoom=camera.zoom)
         view = camera.view or self.default_view
         forward, up, side = self._facing
-        return RenderCamera.view(
-            view, self._framing, forward=forward, up=up, side=side, size=size, zoom=camera.zoom
-        )
+        return RenderCamera.view(view, self._framing, forward=forward, up=up, side=side, size=size, zoom=camera.zoom)
 
     @property
     def default_view(self) -> str:
@@ -109,9 +107,9 @@ class Crowd:
 
     @cached_property
     def _facing(self) -> tuple[NDArray[np.float64], NDArray[np.float64], Literal["left", "right"] | None]:
-        """Where the first actor's palm or face looks, what is up for it, and the hand's side."""
+        """Where a lone hand's palm looks, what is up for it, and its side; the stage's own axes for anything else."""
         skeleton = self.roles[0].covering.skeleton
-        side = hand_side(skeleton)
+        side = hand_side(skeleton) if len(self.roles) == 1 else None
         if side is None:
             return np.array([0.0, 0.0, 1.0]), np.array([0.0, 1.0, 0.0]), None
         base, wrist = skeleton.index(f"{side}.middle.base"), skeleton.index(f"{side}.wrist")
@@ -123,8 +121,7 @@ class Crowd:
 
 def hand_side(skeleton: Skeleton) -> Literal["left", "right"] | None:
     """The side of a skeleton that is a single hand."""
-    found: list[Literal["left", "right"]] = [
-        side for side in ("left", "right") if f"{side}.middle.base" in skeleton.names  # type: ignore[misc]
-    ]
+    sides: tuple[Literal["left", "right"], ...] = ("left", "right")
+    found = [side for side in sides if f"{side}.middle.base" in skeleton.names]
     alone = len(found) == 1 and f"{found[0]}.wrist" in skeleton.names and len(skeleton) <= 40
     return found[0] if alone else None

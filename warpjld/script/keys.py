@@ -9,7 +9,7 @@ import numpy as np
 
 from warpjld.errors import InputError
 from warpjld.script.arguments import Arguments
-from warpjld.script.scene import Actor, SplineConstants
+from warpjld.script.scene import Actor, Scene, SplineConstants
 from warpjld.script.suggest import did_you_mean
 from warpjld.skeleton import CHANNELS, PAPER_NUMBERS, Skeleton
 
@@ -26,29 +26,35 @@ def joint_numbers(skeleton: Skeleton) -> dict[int, int]:
         return {joint: joint for joint in range(len(skeleton))}
     places = {name: joint for joint, name in enumerate(skeleton.names)}
     return {
-        number: places[f"{sides[0]}.{name}"]
-        for number, name in PAPER_NUMBERS.items()
-        if f"{sides[0]}.{name}" in places
+        number: places[f"{sides[0]}.{name}"] for number, name in PAPER_NUMBERS.items() if f"{sides[0]}.{name}" in places
     }
 
 
-def read_joint(actor: Actor, arguments: Arguments, side: str | None = None) -> int:
-    """Read a joint of an actor, by name or by number; ``side`` may stand for the beginning of its name.
+def read_joint(scene: Scene, arguments: Arguments, side: str | None = None) -> tuple[Actor, int]:
+    """Read a joint, by name or by number: of the current actor, or of the one whose side the name begins with.
+
+    Args:
+        scene: The stage.
+        arguments: Where to read.
+        side: A side read before, which then need not be in the name.
 
     Raises:
-        InputError: The actor has no such joint.
+        InputError: There is no such joint.
     """
     if arguments.has_number():
+        actor = scene.actor_with(side) if side else scene.actor()
         numbers = joint_numbers(actor.skeleton)
         number = arguments.integer("the joint's number", minimum=0, maximum=max(numbers))
         if number not in numbers:
             raise arguments.error(f"actor {actor.name} has no joint {number}")
-        return numbers[number]
-    name = arguments.name("a joint's name or number")
-    if side and f"{side}.{name}".lower() in actor.skeleton.names:
-        name = f"{side}.{name}"
+        return actor, numbers[number]
+    name = arguments.name("a joint's name or number").lower()
+    if side and not name.startswith(f"{side.lower()}."):
+        name = f"{side.lower()}.{name}"
     try:
-        return actor.skeleton.index(name)
+        first = name.partition(".")[0]
+        actor = scene.actor_with(first) if first in ("left", "right") else scene.actor()
+        return actor, actor.skeleton.index(name)
     except InputError as error:
         raise arguments.error(error.message) from None
 

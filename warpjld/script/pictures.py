@@ -18,8 +18,7 @@ from warpjld.script.staging import stage
 
 __all__ = ["FilmStudio", "draw_contact_sheet", "draw_picture", "film_studio", "preview", "sheet_frames"]
 
-_SIZE = (960, 720)
-_CELL = (300, 380)
+_CELL = (5 / 12, 19 / 36)  # of the height of a picture: a contact sheet's cell, upright as a hand is
 _CELLS = 6  # on a contact sheet whose frames nobody listed
 
 
@@ -35,47 +34,48 @@ class FilmStudio:
 
 
 @contextmanager
-def film_studio(crowd: Crowd, film: Film, path: Path, rate: float) -> Iterator[FilmStudio]:
+def film_studio(scene: Scene, crowd: Crowd, film: Film, path: Path) -> Iterator[FilmStudio]:
     """A ``FILM`` being taken."""
     with (
         render.Scene(
             crowd.faces,
-            crowd.camera(film.camera, _SIZE),
+            crowd.camera(film.camera, scene.size),
             look=film.style,
-            size=_SIZE,
+            size=scene.size,
             segments=_bones(crowd, film.style),
             quality=render.Quality.film(),
         ) as stage_,
-        render.Film(path, rate=rate) as writer,
+        render.Film(path, rate=scene.rate) as writer,
     ):
         yield FilmStudio(stage_, writer)
 
 
-def draw_picture(crowd: Crowd, picture: Picture, path: Path, rate: float) -> None:
+def draw_picture(scene: Scene, crowd: Crowd, picture: Picture, path: Path) -> None:
     """A ``PICTURE``; the camera shows the whole sequence, so that pictures of one scene fit together."""
-    now = crowd.at(picture.frame, rate)
+    now = crowd.at(picture.frame, scene.rate)
     with render.Scene(
         crowd.faces,
-        crowd.camera(picture.camera, _SIZE),
+        crowd.camera(picture.camera, scene.size),
         look=picture.style,
-        size=_SIZE,
+        size=scene.size,
         segments=_bones(crowd, picture.style),
     ) as stage_:
         render.save_picture(path, stage_.draw(now.surface(0), joints=now.joints(0)))
 
 
-def draw_contact_sheet(crowd: Crowd, sheet: ContactSheet, path: Path, scene: Scene, title: str) -> None:
+def draw_contact_sheet(scene: Scene, crowd: Crowd, sheet: ContactSheet, path: Path, title: str) -> None:
     """A ``CONTACT`` sheet: A Figs 14 and 15 on one page."""
     frames = sheet.frames or sheet_frames(scene, crowd.frames)
+    cell = max(16, round(_CELL[0] * scene.size[1])), max(16, round(_CELL[1] * scene.size[1]))
     moments = [crowd.at(frame, scene.rate) for frame in frames]
     picture = render.contact_sheet(
         np.stack([moment.surface(0) for moment in moments]),
         crowd.faces,
-        crowd.camera(sheet.camera, _CELL),
+        crowd.camera(sheet.camera, cell),
         joints=np.stack([moment.joints(0) for moment in moments]),
         segments=crowd.segments,
         numbers=[round(frame, 3) if frame % 1 else int(frame) for frame in frames],  # type: ignore[misc]
-        size=_CELL,
+        size=cell,
         title=title,
     )
     render.save_picture(path, picture)
@@ -96,7 +96,7 @@ def preview(scene: Scene, frame: float, style: Style) -> Path:
     crowd = Crowd(roles, np.array([frame]))
     name = f"{style}-{frame:g}.png"
     with OutputFolder(scene.folder) as out:
-        draw_picture(crowd, Picture(name, frame, style, scene.camera), out.place(name), scene.rate)
+        draw_picture(scene, crowd, Picture(name, frame, style, scene.camera), out.place(name))
     return scene.folder / name
 
 

@@ -152,7 +152,7 @@ def _make_sequences(
             ]
             for role in crowd.roles
         ]
-        studios = [stack.enter_context(film_studio(crowd, film, out.place(film.name), scene.rate)) for film in films]
+        studios = [stack.enter_context(film_studio(scene, crowd, film, out.place(film.name))) for film in films]
         blocks = [
             role.covering.blocks(role.poses, frames=_BLOCK, device=crowd.device, threads=threads)
             for role in crowd.roles
@@ -177,6 +177,6 @@ def _make_pictures(
         progress("pictures", number, len(wanted))
         path = out.place(output.name)
         if isinstance(output, Picture):
-            draw_picture(crowd, output, path, scene.rate)
+            draw_picture(scene, crowd, output, path)
         else:
-            draw_contact_sheet(crowd, output, path, scene, title)
+            draw_contact_sheet(scene, crowd, output, path, title)

@@ -156,6 +156,7 @@ class Scene:
         rate: Frames a second.
         spline: Constants for the keys that follow.
         camera: For the outputs that follow.
+        size: Width and height of pictures and films [pixels].
         outputs: Files to make, relative to the output folder.
         folder: The output folder.
         say: Where PRINT and SHOW write.
@@ -168,6 +169,7 @@ class Scene:
     rate: float = 30.0
     spline: SplineConstants = SplineConstants()
     camera: Camera = Camera()
+    size: tuple[int, int] = (960, 720)
     outputs: list[Output] = field(default_factory=list)
     folder: Path = Path("out")
     say: Callable[[str], None] = print

@@ -8,6 +8,7 @@ from pathlib import Path
 from warpjld.errors import InputError
 from warpjld.script.interpreter import Interpreter
 from warpjld.script.parser import UnfinishedError, parse, parse_file
+from warpjld.script.registry import RESERVED
 from warpjld.script.scene import Scene
 from warpjld.script.statements import Node, Statement, Text
 from warpjld.skeleton import CHANNELS, DIGITS
@@ -51,7 +52,18 @@ class Session:
 
     def names(self) -> list[str]:
         """Words worth completing."""
-        keywords = {"LEFT", "RIGHT", "KNUCKLES2", "KNUCKLES3", "VALUES", "WIREFRAME", "SHADED", "BUILTIN", "MACRO", "END"}
+        keywords = {
+            "LEFT",
+            "RIGHT",
+            "KNUCKLES2",
+            "KNUCKLES3",
+            "VALUES",
+            "WIREFRAME",
+            "SHADED",
+            "BUILTIN",
+            "MACRO",
+            "END",
+        }
         keywords |= {word.upper() for word in (*DIGITS, *CHANNELS)}
         commands = {command.name for command in self._interpreter.registry}
         joints = {name for actor in self.scene.actors.values() for name in actor.skeleton.names}
@@ -121,9 +133,7 @@ class Session:
         from warpjld.script.runner import run_scene
         from warpjld.script.summary import table
 
-        content = run_scene(
-            self.scene, self._folder, script=self._script, device=self._device, threads=self._threads
-        )
+        content = run_scene(self.scene, self._folder, script=self._script, device=self._device, threads=self._threads)
         table(content, self._say)
 
     def _save(self, name: Text) -> None:

@@ -117,8 +117,8 @@ def _grouped(files: list[dict[str, Any]]) -> list[tuple[str, float | None]]:
     rows: list[tuple[str, float | None]] = []
     for pattern, members in groups.items():
         name = members[0]["name"] if len(members) == 1 else f"{pattern} ({len(members)} files)"
-        sizes = [member.get("bytes") for member in members]
-        rows.append((name, None if None in sizes else sum(sizes)))
+        made = all("bytes" in member for member in members)
+        rows.append((name, sum(member["bytes"] for member in members) if made else None))
     return rows
 
 

@@ -110,13 +110,12 @@ def motion(scene: Scene, arguments: Arguments) -> None:
 @command(
     "AXIS",
     syntax="AXIS <joint> <x> <y> <z>",
-    help="Flexion axis of a joint of the current actor at rest.",
+    help="Flexion axis of a joint at rest.",
     group="Actors",
 )
 def axis(scene: Scene, arguments: Arguments) -> None:
     """R21."""
-    chosen = scene.actor()
-    joint = read_joint(chosen, arguments)
+    chosen, joint = read_joint(scene, arguments)
     vector = np.array(arguments.vector("the axis"))
     if np.linalg.norm(vector) < 1e-9:
         raise arguments.error("an axis cannot be 0 0 0")
@@ -128,13 +127,12 @@ def axis(scene: Scene, arguments: Arguments) -> None:
 @command(
     "LIMIT",
     syntax="LIMIT <joint> <FLEXION/PIVOT/TWISTING/ABDUCTION> <smallest> <largest>",
-    help="How far a joint of the current actor may go, in degrees; the largest flexion also scales inflation.",
+    help="How far a joint may go, in degrees; the largest flexion also scales inflation.",
     group="Actors",
 )
 def limit(scene: Scene, arguments: Arguments) -> None:
     """R24, R59."""
-    chosen = scene.actor()
-    joint = read_joint(chosen, arguments)
+    chosen, joint = read_joint(scene, arguments)
     channel = arguments.choice("the angle", [c.upper() for c in CHANNELS])
     low = arguments.number("the smallest angle", minimum=-360, maximum=360)
     high = arguments.number("the largest angle", minimum=-360, maximum=360)

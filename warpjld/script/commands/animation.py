@@ -97,15 +97,14 @@ def finger23(scene: Scene, arguments: Arguments) -> None:
 @command(
     "JOINT",
     syntax=f"JOINT <joint> <FLEXION/PIVOT/TWISTING/ABDUCTION> {_KEYS}",
-    help="Angle of any joint of the current actor, by name (left.index.base) or by number.",
+    help="Angle of any joint, by name (left.index.base) or, for the current actor, by number.",
     group="Animation",
 )
-def joint(scene: Scene, arguments: Arguments) -> None:
+def joint_(scene: Scene, arguments: Arguments) -> None:
     """R10–R12: joints the printed commands do not reach."""
-    actor = scene.actor()
-    name = actor.skeleton.names[read_joint(actor, arguments)]
+    actor, joint = read_joint(scene, arguments)
     channel = arguments.choice("the angle", [c.upper() for c in CHANNELS])
-    set_keys(actor, [name], channel, scene.spline, arguments)
+    set_keys(actor, [actor.skeleton.names[joint]], channel, scene.spline, arguments)
 
 
 @command(

@@ -14,23 +14,25 @@ from warpjld.script.scene import Scene
 
 @command(
     "PARAMETER",
-    syntax=(
-        "PARAMETER [LEFT/RIGHT] <joint or ALL> <INFLATION/PROXIMITY/MUSCLE/PEAK/EXPONENTS/PALM> <value> [<value>]"
-    ),
+    syntax=("PARAMETER [LEFT/RIGHT] <joint or ALL> <INFLATION/PROXIMITY/MUSCLE/PEAK/EXPONENTS/PALM> <value> [<value>]"),
     help="A parameter of a joint; PROXIMITY and EXPONENTS take two values.",
     group="Covering",
 )
 def parameter(scene: Scene, arguments: Arguments) -> None:
     """R22, R65."""
     side = arguments.keyword(*SIDES)
-    actor = scene.actor_with(side) if side else scene.actor()
-    joints = range(len(actor.skeleton)) if arguments.keyword("ALL") else [read_joint(actor, arguments, side)]
+    if arguments.keyword("ALL"):
+        actor = scene.actor_with(side) if side else scene.actor()
+        joints = list(range(len(actor.skeleton)))
+    else:
+        actor, joint = read_joint(scene, arguments, side)
+        joints = [joint]
     field = arguments.choice("the parameter", [f.name.upper() for f in fields(actor.parameters)]).lower()
     where = arguments.last
     array = getattr(actor.parameters, field).copy()
     wanted = 1 if array.ndim == 1 else array.shape[1]
     values = [arguments.number(f"value {k + 1} of {wanted} for {field.upper()}", minimum=0) for k in range(wanted)]
-    array[list(joints)] = values[0] if array.ndim == 1 else values
+    array[joints] = values[0] if array.ndim == 1 else values
     changed = replace(actor.parameters, **{field: array})
     try:
         changed.check(actor.skeleton)

@@ -34,6 +34,18 @@ def camera(scene: Scene, arguments: Arguments) -> None:
 
 
 @command(
+    "SIZE",
+    syntax="SIZE <width> <height>",
+    help="Pixels of the pictures and films; 960 by 720 at first.",
+    group="Output",
+)
+def size(scene: Scene, arguments: Arguments) -> None:
+    """R67."""
+    width = arguments.integer("the width in pixels", minimum=16, maximum=4096)
+    scene.size = width, arguments.integer("the height in pixels", minimum=16, maximum=4096)
+
+
+@command(
     "PICTURE",
     syntax='PICTURE <frame> "<name>.png" [SHADED/WIREFRAME]',
     help="A picture of a frame.",
