@@ -39,7 +39,7 @@ _GROUND_PERCENTILE = 10.0
 
 def correspondence(clip: Clip, skeleton: Skeleton) -> dict[str, str]:
     """Which joint of a recording drives which joint of a rig, besides the trunk: rig's name → recording's name."""
-    return {name: clip.names[joint] for name, (_, joint) in _pairs(clip, skeleton)[2].items()}
+    return {skeleton.names[own]: clip.names[joint] for own, joint in _pairs(clip, skeleton)[2].values()}
 
 
 def retarget(clip: Clip, skeleton: Skeleton) -> Poses:
