@@ -43,7 +43,7 @@ def finger() -> Rig:
 
 @pytest.fixture
 def place(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    monkeypatch.setattr("warpjld.cli.rig_argument.open_rig", lambda text: finger())
+    monkeypatch.setattr("warpjld.cli.rig_argument.open_rig", lambda text, **options: finger())
     monkeypatch.chdir(tmp_path)
     (tmp_path / "curl.csv").write_text(MOTION)
     return tmp_path
@@ -129,7 +129,7 @@ def test_rig_argument_names_files_and_built_in_hands(monkeypatch: pytest.MonkeyP
     from warpjld.cli.rig_argument import open_rig
 
     monkeypatch.setattr("warpjld.hand.build_hand", lambda side: side)
-    monkeypatch.setattr("warpjld.io.load_rig", lambda path: f"rig of {path}")
+    monkeypatch.setattr("warpjld.io.load_rig", lambda path, **options: f"rig of {path}")
     assert [open_rig(text) for text in ("builtin:right", "a/b.glb", "C:/b.glb")] == [
         "right",
         "rig of a/b.glb",
@@ -137,6 +137,8 @@ def test_rig_argument_names_files_and_built_in_hands(monkeypatch: pytest.MonkeyP
     ]
     with pytest.raises(InputError, match="builtin:left or builtin:right"):
         open_rig("builtin:foot")
+    with pytest.raises(InputError, match="are for files"):
+        open_rig("builtin:left", unit="cm")
 
 
 @pytest.mark.slow

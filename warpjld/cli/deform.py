@@ -20,6 +20,10 @@ _BLOCK = 16  # frames deformed at once: memory does not grow with the length of 
 @click.argument("rig")
 @click.option("--motion", required=True, type=click.Path(path_type=Path), help="Motion: CSV, BVH, glTF/GLB, JSON.")
 @click.option("-o", "--out", required=True, type=click.Path(path_type=Path), help="Cache to write; its suffix counts.")
+@click.option("--skeleton", type=click.Path(path_type=Path), help="Skeleton file for a RIG without joints.")
+@click.option("--side", type=click.Choice(["left", "right"]), help="Which hand RIG is, if the file leaves it open.")
+@click.option("--unit", type=click.Choice(["m", "cm", "mm"]), help="RIG's unit; guessed by default.")
+@click.option("--up", type=click.Choice(["y", "z"]), help="RIG's up axis.")
 @click.option("--frames", "span", metavar="A:B", help="Only frames A to B, both included, the motion's first being 0.")
 @click.option("--rate", type=float, help="Frames a second; the motion's own by default, 25 for CSV.")
 @click.option(
@@ -45,6 +49,10 @@ def command(
     rig: str,
     motion: Path,
     out: Path,
+    skeleton: Path | None,
+    side: str | None,
+    unit: str | None,
+    up: str | None,
     span: str | None,
     rate: float | None,
     limits: str,
@@ -69,7 +77,7 @@ def command(
     # a polite kill cleans up as Ctrl-C does
     signal.signal(signal.SIGTERM, signal.default_int_handler)
     began = time.perf_counter()
-    driven = open_rig(rig)
+    driven = open_rig(rig, skeleton=skeleton, side=side, unit=unit, up=up)
     moved = open_motion(motion, driven, rate=rate, limits=limits)  # type: ignore[arg-type]
     first, last = _span(span, len(moved.poses))
     poses = moved.poses[slice(first, last + 1)]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 from warpjld.errors import InputError
@@ -12,19 +13,32 @@ if TYPE_CHECKING:
 __all__ = ["open_rig"]
 
 
-def open_rig(text: str) -> Rig:
+def open_rig(
+    text: str,
+    *,
+    skeleton: Path | None = None,
+    side: str | None = None,
+    unit: str | None = None,
+    up: str | None = None,
+) -> Rig:
     """The rig a user named: a path, ``builtin:left`` or ``builtin:right``.
 
+    Args:
+        text: What stands on the command line.
+        skeleton: Skeleton file for a surface without joints; likewise ``side``, ``unit`` and ``up`` as in ``load_rig``.
+
     Raises:
-        InputError: No such side, or a file that is no rig.
+        InputError: No such side, a file that is no rig, or options that only files take.
     """
-    kind, colon, side = text.partition(":")
-    if kind == "builtin" and colon:
-        from warpjld.hand import build_hand
+    kind, colon, which = text.partition(":")
+    if kind != "builtin" or not colon:
+        from warpjld.io import load_rig
 
-        if side not in ("left", "right"):
-            raise InputError(f"no built-in hand '{side}': want builtin:left or builtin:right")
-        return build_hand(side)
-    from warpjld.io import load_rig
+        return load_rig(text, skeleton=skeleton, side=side, unit=unit, up=up)
+    if which not in ("left", "right"):
+        raise InputError(f"no built-in hand '{which}': want builtin:left or builtin:right")
+    if any(option is not None for option in (skeleton, side, unit, up)):
+        raise InputError(f"{text}: --skeleton, --side, --unit and --up are for files")
+    from warpjld.hand import build_hand
 
-    return load_rig(text)
+    return build_hand(which)
