@@ -11,6 +11,7 @@ from scipy.spatial.transform import Rotation
 
 from warpjld.errors import InputError
 from warpjld.motion.clip import Clip
+from warpjld.motion.frame_times import frame_times
 from warpjld.motion.retarget import retarget
 from warpjld.motion.rotations import slerp, unit
 from warpjld.rig import Rig
@@ -53,7 +54,7 @@ def poses_of_gltf(path: str | Path, rig: Rig, *, rate: float | None = None) -> t
         raise InputError("its animation moves no joint", path=path)
     times = np.unique(np.concatenate([key.times for key in keys]))
     rate = _spacing(times) if rate is None else rate
-    at = times[0] + np.arange(int(np.floor((times[-1] - times[0]) * rate + 1e-6)) + 1) / rate
+    at = frame_times(times[0], times[-1], rate)
     worlds = _worlds(document, keys, at)
     moved = _own_joints(document, rig, worlds)
     if moved is None:
