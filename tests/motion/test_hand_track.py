@@ -222,7 +222,7 @@ def test_mistakes_in_recordings_are_named(tmp_path: Path) -> None:
     with pytest.raises(InputError, match="frame 3: its timestamp"):
         read_hand_track(save(tmp_path, broken))
     broken = leap(skeleton, poses, packed=False)
-    broken["frames"][2]["pointables"][1]["tipPosition"] = [1, 2]
+    broken["frames"][1]["pointables"][1]["tipPosition"] = [1, 2]
     with pytest.raises(InputError, match=r"'index.tip' wants three finite coordinates"):
         read_hand_track(save(tmp_path, broken))
     broken = leap(skeleton, poses, packed=True)
