@@ -24,7 +24,7 @@ class Gradients:
 
     Attributes:
         parameters: With respect to the parameters of the joints.
-        pose: With respect to the inputs of the operators, frame by frame. Positions, rotations and the halfway rotations
+        pose: With respect to the inputs of the operators, frame by frame. Positions, rotations and halfway rotations
             count as independent of one another; quaternion entries, as four free numbers.
     """
 
