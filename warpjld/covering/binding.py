@@ -23,7 +23,7 @@ STATIONS = 5
 """Places along a pair of neighbouring palm segments where the scale factor λ is evaluated; linear in between."""
 
 _SIDE_BAND = 0.5  # |cosine| below which a vertex is partly external and partly internal
-_FLOOR = 2e-3  # weight below which an operator is dropped, faded so that nothing jumps
+_FLOOR = 2e-2  # weight below which an operator is dropped, faded so that nothing jumps
 
 
 @dataclass(frozen=True, eq=False)
