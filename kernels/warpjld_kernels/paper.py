@@ -8,6 +8,8 @@ and the rest pose is exact (C24).
 
 import warp as wp
 
+from warpjld_kernels.anchored import Parameters
+
 wp.set_module_options({"enable_backward": False, "max_unroll": 1})
 
 
@@ -22,18 +24,6 @@ class Places:
     across: wp.array(dtype=float)
     between: wp.array(dtype=wp.int32)
     external: wp.array(dtype=wp.int32)
-
-
-@wp.struct
-class Parameters:
-    """Parameters of the joints; see ``warpjld.covering.parameters.Parameters``."""
-
-    inflation: wp.array(dtype=float)
-    proximity: wp.array2d(dtype=float)
-    muscle: wp.array(dtype=float)
-    peak: wp.array(dtype=float)
-    exponents: wp.array2d(dtype=float)
-    palm: wp.array(dtype=float)
 
 
 @wp.func
@@ -70,9 +60,7 @@ def internal_normal(s: int, ratio: float, places: Places, modified: wp.array2d(d
 
 
 @wp.func
-def foot(
-    v: int, k: int, places: Places, positions: wp.array2d(dtype=wp.vec3), f: int
-) -> wp.vec3:
+def foot(v: int, k: int, places: Places, positions: wp.array2d(dtype=wp.vec3), f: int) -> wp.vec3:
     """Projection of a vertex on the k-th of its segments: P + R (D − P) (C2, R40)."""
     s = places.segment[v, k]
     start = positions[f, places.ends[s, 0]]

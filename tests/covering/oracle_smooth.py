@@ -6,6 +6,7 @@ soon as they are blended. Which column of the domains is which operator is the o
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 
@@ -13,6 +14,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from warpjld.covering import Covering, Parameters
+from warpjld.covering.binding import FLOOR, SIDE_BAND
 from warpjld.skeleton import CHANNELS, Poses, Skeleton
 
 STATIONS = np.linspace(0.0, 1.0, 5)  # where along a palm pair its scale factor is evaluated
@@ -89,33 +91,36 @@ def palm_pairs(covering: Covering) -> list[tuple[tuple[int, int], tuple[int, int
 
 def frames(covering: Covering, poses: Poses) -> list[Frame]:
     """What each pose gives the operators."""
-    skeleton = covering.skeleton
-    out = []
-    for f in range(len(poses)):
-        q = poses.rotations[f]
-        halfway = q.copy()
-        for j, parent in enumerate(skeleton.parents):
-            if parent >= 0:
-                start = Rotation.from_quat(q[parent])
-                turn = (start.inv() * Rotation.from_quat(q[j])).as_rotvec()
-                half = (start * Rotation.from_rotvec(turn / 2.0)).as_quat()
-                halfway[j] = half if half @ q[parent] > 0.0 else -half
-        ratio = np.zeros(len(skeleton))
-        for j in range(len(skeleton)):
-            largest = skeleton.limits[j, CHANNELS.index("flexion"), 1]
-            if largest > 1e-6:
-                ratio[j] = min(max(poses.flexion[f, j] / largest, 0.0), 1.0)
-        closing = np.zeros((max(len(palm_pairs(covering)), 1), len(STATIONS)))
-        for n, ((pa, da), (pb, db)) in enumerate(palm_pairs(covering)):
-            for i, t in enumerate(STATIONS):
-                lengths = [
-                    np.linalg.norm((1 - t) * (x[pb] - x[pa]) + t * (x[db] - x[da]))
-                    for x in (skeleton.rest, poses.positions[f])
-                ]
-                if lengths[0] > 1e-9:
-                    closing[n, i] = min(np.log(lengths[1] / lengths[0]), 0.0)
-        out.append(Frame(poses.positions[f], halfway, q, ratio, closing))
-    return out
+    return [pose_frame(covering.skeleton, poses, f, palm_pairs(covering)) for f in range(len(poses))]
+
+
+def pose_frame(
+    skeleton: Skeleton, poses: Poses, f: int, pairs: Sequence[tuple[tuple[int, int], tuple[int, int]]] = ()
+) -> Frame:
+    """What pose f gives them."""
+    q = poses.rotations[f]
+    halfway = q.copy()
+    for j, parent in enumerate(skeleton.parents):
+        if parent >= 0:
+            start = Rotation.from_quat(q[parent])
+            turn = (start.inv() * Rotation.from_quat(q[j])).as_rotvec()
+            half = (start * Rotation.from_rotvec(turn / 2.0)).as_quat()
+            halfway[j] = half if half @ q[parent] > 0.0 else -half
+    ratio = np.zeros(len(skeleton))
+    for j in range(len(skeleton)):
+        largest = skeleton.limits[j, CHANNELS.index("flexion"), 1]
+        if largest > 1e-6:
+            ratio[j] = min(max(poses.flexion[f, j] / largest, 0.0), 1.0)
+    closing = np.zeros((max(len(pairs), 1), len(STATIONS)))
+    for n, ((pa, da), (pb, db)) in enumerate(pairs):
+        for i, t in enumerate(STATIONS):
+            lengths = [
+                np.linalg.norm((1 - t) * (x[pb] - x[pa]) + t * (x[db] - x[da]))
+                for x in (skeleton.rest, poses.positions[f])
+            ]
+            if lengths[0] > 1e-9:
+                closing[n, i] = min(np.log(lengths[1] / lengths[0]), 0.0)
+    return Frame(poses.positions[f], halfway, q, ratio, closing)
 
 
 def evaluate(place: Place, frame: Frame, parameters: Parameters, rest_joints: np.ndarray) -> np.ndarray:
@@ -176,7 +181,7 @@ def _place(
             pair += 1
     # the strongest four, faded by what the fifth has, so that an exchange is not seen
     candidates.sort(key=lambda c: -c[0])
-    threshold = max(candidates[4][0] if len(candidates) > 4 else 0.0, 2e-3)
+    threshold = max(candidates[4][0] if len(candidates) > 4 else 0.0, FLOOR)
     total = sum(max(c[0] - threshold, 0.0) for c in candidates[:4])
     operators = [
         _operator(skeleton, p, d, muscle, (weight - threshold) / total, vertex)
@@ -197,7 +202,8 @@ def _operator(skeleton: Skeleton, p: int, d: int, muscle: bool, weight: float, v
     normal = (1 - t) * _normal(skeleton, p, d, p, d) + t * _normal(skeleton, p, d, d, p)
     normal /= np.linalg.norm(normal)
     height = offset @ normal
-    x = min(max(height / np.linalg.norm(offset) + 0.5, 0.0), 1.0)  # cosine from −½ to ½
+    cosine = height / np.linalg.norm(offset)
+    x = min(max((cosine + SIDE_BAND) / (2 * SIDE_BAND), 0.0), 1.0)
     return Operator(p, d, muscle, weight, ratio, 3 * x**2 - 2 * x**3, height * normal)
 
 

@@ -14,7 +14,7 @@ from warpjld.covering.operators import Fan, segment_ends
 from warpjld.covering.parameters import Parameters
 from warpjld.skeleton.tree import Skeleton
 
-__all__ = ["OPERATORS", "STATIONS", "Anchors", "SegmentTable", "anchor"]
+__all__ = ["FLOOR", "OPERATORS", "SIDE_BAND", "STATIONS", "Anchors", "SegmentTable", "anchor"]
 
 OPERATORS = 4
 """Segment operators a vertex may hold (the paper has one; the rest make borders soft)."""
@@ -22,8 +22,8 @@ OPERATORS = 4
 STATIONS = 5
 """Places along a pair of neighbouring palm segments where the scale factor λ is evaluated; linear in between."""
 
-_SIDE_BAND = 0.5  # |cosine| below which a vertex is partly external and partly internal
-_FLOOR = 2e-2  # weight below which an operator is dropped, faded so that nothing jumps
+SIDE_BAND = 0.5  # |cosine| below which a vertex is partly external and partly internal
+FLOOR = 2e-2  # weight below which an operator is dropped, faded so that nothing jumps
 
 
 @dataclass(frozen=True, eq=False)
@@ -124,7 +124,7 @@ class SegmentTable:
 
     def project(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
         """Ratio of every point on every segment, shape (V, S), clamped except beyond extremities (R37, C1)."""
-        t = np.einsum("vsk,sk->vs", points[:, None] - self.start, self.along) / (self.along**2).sum(axis=1)
+        t = (points @ self.along.T - (self.start * self.along).sum(axis=1)) / (self.along**2).sum(axis=1)
         t = np.where((t < 0.0) & ~self.open_start, 0.0, t)
         return np.where((t > 1.0) & ~self.open_end, 1.0, t)
 
@@ -179,7 +179,7 @@ def _anchor_some(
     normal /= np.maximum(np.linalg.norm(normal, axis=2, keepdims=True), 1e-12)
     height = (offset * normal).sum(axis=2)
     cosine = height / np.maximum(np.linalg.norm(offset, axis=2), 1e-12)
-    side = _smoothstep((cosine + _SIDE_BAND) / (2.0 * _SIDE_BAND))
+    side = _smoothstep((cosine + SIDE_BAND) / (2.0 * SIDE_BAND))
     station = np.take_along_axis(along_pair, pair, axis=1)
     return best.astype(np.int32), kept, ratio, side, height[..., None] * normal, pair, pair_kept, station
 
@@ -223,7 +223,7 @@ def _strongest(weight: NDArray[np.float64]) -> tuple[NDArray[np.int64], NDArray[
     order = np.take_along_axis(order, np.argsort(-np.take_along_axis(weight, order, axis=1), axis=1), axis=1)
     largest = np.take_along_axis(weight, order, axis=1)
     rest = np.partition(weight, -keep - 1, axis=1)[:, -keep - 1] if weight.shape[1] > keep else 0.0
-    threshold = np.maximum(rest, _FLOOR)
+    threshold = np.maximum(rest, FLOOR)
     faded = np.maximum(largest - np.reshape(threshold, (-1, 1)), 0.0)
     faded /= faded.sum(axis=1, keepdims=True)
     if keep < OPERATORS:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from typing import Any
 
 import numpy as np
@@ -12,7 +12,7 @@ from scipy.spatial.transform import Rotation
 
 from warpjld.covering.binding import Anchors, SegmentTable
 from warpjld.covering.covering import Covering
-from warpjld.covering.device import checked_device, struct_on
+from warpjld.covering.device import array_on, checked_device, parameters_on
 from warpjld.covering.drivers import flexion_ratio
 from warpjld.covering.operators import Fan
 from warpjld.covering.paper_places import paper_places
@@ -38,9 +38,7 @@ class Normals:
     modified: NDArray[np.float64]
 
 
-def paper_normals(
-    skeleton: Skeleton, ends: NDArray[np.int32], rotations: NDArray[np.float64]
-) -> Normals:
+def paper_normals(skeleton: Skeleton, ends: NDArray[np.int32], rotations: NDArray[np.float64]) -> Normals:
     """Normals of every joint and segment: the rest ones, turned by the bones that carry them (A §4 Fig. 3, R31, R32).
 
     Args:
@@ -87,7 +85,7 @@ class PaperCovering(Covering):
         import warp as wp
 
         where = checked_device(device)
-        chosen = self._chosen(vertices)
+        chosen = self.chosen(vertices)
         out = wp.empty((len(poses), len(chosen)), dtype=wp.vec3, device=where)
         self._emit(self._palette(poses), chosen, out, where, 1)
         result: NDArray[np.float32] = out.numpy()
@@ -100,7 +98,12 @@ class PaperCovering(Covering):
             poses.positions, normals.original, normals.modified, flexion_ratio(self.skeleton, poses.flexion)
         )
 
-    def _launch(self, rows: Any, points: Any, device: Any, threads: int) -> None:
+    @property
+    def run_surface(self) -> Surface:
+        """The surface itself: these operators are not packed into runs."""
+        return self.surface
+
+    def _launch(self, rows: Any, points: Any, device: Any, threads: int, order: str) -> None:
         self._emit(rows, np.arange(len(self.surface.vertices), dtype=np.int32), points, device, threads)
 
     def _emit(self, pose: PaperPose, chosen: NDArray[np.int32], points: Any, device: Any, threads: int) -> None:
@@ -120,6 +123,7 @@ class PaperCovering(Covering):
                 device=device,
             )
 
+        wp.load_module(deform_paper.module, device=device)  # compiling is not safe from several threads
         cuts = np.linspace(0, points.shape[0], min(threads, max(points.shape[0], 1)) + 1).astype(int).tolist()
         with ThreadPoolExecutor(len(cuts) - 1) as pool:
             list(pool.map(span, cuts[:-1], cuts[1:]))
@@ -129,16 +133,22 @@ class PaperCovering(Covering):
         import warp as wp
         from warpjld_kernels import paper
 
-        places = struct_on(device, paper.Places(), self.places)
-        parameters = struct_on(device, paper.Parameters(), self.parameters)
+        places = paper.Places()
+        for field in fields(self.places):
+            kind = float if field.name in ("muscle", "ratio", "across") else wp.int32
+            setattr(places, field.name, array_on(device, getattr(self.places, field.name), kind))
+        parameters = parameters_on(device, self.parameters)
         still = np.tile([0.0, 0.0, 0.0, 1.0], (1, len(self.skeleton), 1))
         normals = paper_normals(self.skeleton, self.places.ends, still)
         count = len(self.surface.vertices)
         outputs = [wp.empty(count, dtype=wp.vec3, device=device), wp.empty(count, dtype=float, device=device)]
         pose = PaperPose(self.skeleton.rest[None], normals.original, normals.modified, np.zeros((1, 1)))
-        rest = wp.array(self.surface.vertices.astype(np.float32), dtype=wp.vec3, device=device)
+        rest = array_on(device, self.surface.vertices, wp.vec3)
         wp.launch(
-            paper.express, dim=count, inputs=[places, parameters, rest, *pose.on(device)[:3]], outputs=outputs,
+            paper.express,
+            dim=count,
+            inputs=[places, parameters, rest, *pose.on(device)[:3]],
+            outputs=outputs,
             device=device,
         )
         return [places, parameters, *outputs]
@@ -161,8 +171,7 @@ class PaperPose:
         import warp as wp
 
         vectors = (self.positions, self.original, self.modified)
-        out = [wp.array(a.astype(np.float32), dtype=wp.vec3, device=device) for a in vectors]
-        return [*out, wp.array(self.flexion_ratio.astype(np.float32), dtype=float, device=device)]
+        return [*(array_on(device, a, wp.vec3) for a in vectors), array_on(device, self.flexion_ratio, float)]
 
 
 def _unit(vectors: NDArray[np.float64]) -> NDArray[np.float64]:
