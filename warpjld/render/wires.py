@@ -1,0 +1,40 @@
+"""The edges of a surface inside a window: those facing the camera stronger than those behind."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from warpjld.render.edges import Edges
+
+__all__ = ["Wires"]
+
+
+class Wires:
+    """Two sets of lines over the same vertices; every frame decides anew which edge faces the camera."""
+
+    def __init__(self, vertices: NDArray[np.floating], faces: NDArray[np.integer]) -> None:
+        import pyvista
+
+        self._edges = Edges(faces)
+        cells = _cells(self._edges.ends)
+        points = vertices.astype(np.float32)
+        self._front, self._hidden = (pyvista.PolyData(points, lines=cells) for _ in range(2))
+
+    def show(self, plotter: Any, front: str, hidden: str, *, width: float) -> None:
+        """Add the lines; ``width`` in pixels is that of the front ones."""
+        plotter.add_mesh(self._hidden, color=hidden, line_width=0.6 * width, lighting=False)
+        plotter.add_mesh(self._front, color=front, line_width=width, lighting=False)
+
+    def place(self, vertices: NDArray[np.floating], eye: tuple[float, float, float]) -> None:
+        """Move the vertices, shape (n, 3)."""
+        facing = self._edges.facing(vertices, eye)
+        for lines, chosen in ((self._front, facing), (self._hidden, ~facing)):
+            lines.points = vertices.astype(np.float32)
+            lines.lines = _cells(self._edges.ends[chosen])
+
+
+def _cells(ends: NDArray[np.integer]) -> NDArray[np.int64]:
+    return np.insert(ends, 0, 2, axis=1).ravel().astype(np.int64)
