@@ -10,6 +10,9 @@ from warpjld.cli import main
 from warpjld.script import Interpreter, Scene, all_commands
 from warpjld.script.plugin import load_commands
 from warpjld.script.runner import run_scene
+from warpjld.skeleton import DIGITS
+
+pytestmark = pytest.mark.usefixtures("quick_hands")
 
 EXAMPLES = Path(__file__).resolve().parents[1] / "examples"
 SCRIPTS = sorted(path.name for path in EXAMPLES.glob("*.jld"))
@@ -48,11 +51,9 @@ def test_the_fist_closes_thumb_last_and_opens_again() -> None:
     assert len(frames) == 60
     assert scene.rate == 30
     poses = actor.motion.poses(actor.skeleton, frames)
-    tip = {
-        f: poses.positions[:, actor.skeleton.index(f"{f}.tip")] for f in ("index", "middle", "ring", "pinky", "thumb")
-    }
-    palm = poses.positions[:, actor.skeleton.index("middle.base")]
-    reach = {f: np.linalg.norm(t - palm, axis=1) for f, t in tip.items() if f != "thumb"}
+    tip = {f: poses.positions[:, actor.skeleton.index(f"{f}.tip")] for f in DIGITS}
+    base = {f: poses.positions[:, actor.skeleton.index(f"{f}.base")] for f in DIGITS}
+    reach = {f: np.linalg.norm(tip[f] - base[f], axis=1) for f in DIGITS if f != "thumb"}
     for finger, distance in reach.items():
         assert distance[30] < 0.6 * distance[0], f"{finger} is folded in the fist"
         assert distance[59] == pytest.approx(distance[0], abs=0.004), f"{finger} ends as it began"

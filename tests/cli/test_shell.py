@@ -9,7 +9,9 @@ import pytest
 from warpjld.errors import InputError
 from warpjld.script.session import Session
 
-HAND = "HAND LEFT BUILTIN RESOLUTION 300"
+pytestmark = pytest.mark.usefixtures("quick_hands")
+
+HAND = "HAND LEFT BUILTIN RESOLUTION 1500"
 
 
 @pytest.fixture
@@ -35,7 +37,8 @@ def pipe(text: str, folder, *arguments: str) -> subprocess.CompletedProcess:
 def test_commands_through_a_pipe(tmp_path) -> None:
     (tmp_path / "start.jld").write_text(HAND)
     done = pipe(
-        "WRIST LEFT FLEXION AT 0 0\nWRIST LEFT FLEXION AT 4 40\nSHOW VALUES 2\n\nSIZE 80 60\nSHOW WIREFRAME 2\nQUIT\nNO",
+        "WRIST LEFT FLEXION AT 0 0\nWRIST LEFT FLEXION AT 4 40\nSHOW VALUES 2\n\n"
+        "SIZE 80 60\nSHOW WIREFRAME 2\nQUIT\nNO",
         tmp_path,
         "start.jld",
     )

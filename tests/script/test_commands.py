@@ -11,14 +11,16 @@ from warpjld.script import Interpreter, Scene
 from warpjld.script.scene import Camera, ContactSheet, Export, Film, Picture
 from warpjld.script.staging import frame_numbers, stage
 
+pytestmark = pytest.mark.usefixtures("quick_hands")
+
 
 def test_hands_are_built_and_named(run) -> None:
-    scene = run("HAND RIGHT BUILTIN RESOLUTION 300 LENGTH 0.2 NAME ruth\nACTOR left")
+    scene = run("HAND RIGHT BUILTIN RESOLUTION 1500 LENGTH 0.2 NAME ruth\nACTOR left")
     assert list(scene.actors) == ["LEFT", "RUTH"]
     assert scene.current == "LEFT"
     assert "right.index.base" in scene.actors["RUTH"].skeleton.names
     with pytest.raises(InputError, match=r"1:1: there is an actor RUTH already; give this one another with NAME"):
-        run("HAND RIGHT BUILTIN RESOLUTION 300 NAME Ruth")
+        run("HAND RIGHT BUILTIN RESOLUTION 1500 NAME Ruth")
 
 
 def test_rigs_come_from_files(data) -> None:
@@ -36,7 +38,7 @@ def test_rigs_come_from_files(data) -> None:
         ("HAND LEFT", "1:10", "expected BUILTIN or a rig file in quotes"),
         ("HAND LEFT 'none.glb'", "1:11", "there is no file 'none.glb'"),
         ("HAND LEFT BUILTIN LENGHT 0.2", "1:19", "did you mean LENGTH?"),
-        ("HAND LEFT BUILTIN LENGTH -1", "1:26", "must be 0.01 or more"),
+        ("HAND LEFT BUILTIN LENGTH -1", "1:1", "length: want metres, between 0.05 and 0.30, got -1"),
         ("BODY body.glb", "1:6", "expected a rig file in quotes, found body.glb"),
         ("ACTOR lft", "1:1", "there is no actor lft; did you mean LEFT?"),
         ("AXIS index.base 0 0 0", "1:21", "an axis cannot be 0 0 0"),

@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     from warpjld.script.arguments import Arguments
     from warpjld.script.scene import Scene
 
-__all__ = ["GROUPS", "Command", "Registry", "command", "all_commands", "commands_table"]
+__all__ = ["GROUPS", "Command", "Registry", "all_commands", "command", "commands_table"]
 
 ENTRY_POINTS = "warpjld.commands"
 GROUPS = ("Actors", "Animation", "Covering", "Output", "Flow")

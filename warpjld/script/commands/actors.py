@@ -35,9 +35,9 @@ def hand(scene: Scene, arguments: Arguments) -> None:
         from warpjld.hand import build_hand
 
         options = arguments.options(
-            length=lambda: arguments.number("the hand's length in metres", minimum=0.01, maximum=10),
-            breadth=lambda: arguments.number("the hand's breadth in metres", minimum=0.005, maximum=10),
-            resolution=lambda: arguments.integer("the number of vertices, about", minimum=100, maximum=10_000_000),
+            length=lambda: arguments.number("the hand's length in metres"),
+            breadth=lambda: arguments.number("the hand's breadth in metres"),
+            resolution=lambda: arguments.integer("the number of vertices, about"),
             name=lambda: arguments.name("the actor's name"),
         )
         name = options.pop("name", side)
