@@ -112,9 +112,7 @@ def _skeleton(plan: Plan) -> Skeleton:
             bone = parts.joints[min(k + 1, 3)] - parts.joints[min(k, 2)]
             axes[j] = _unit(np.cross(parts.dorsal[k], bone))
     palms = tuple((place[f"left.{a}"], place[f"left.{b}"]) for a, b in PALM_SEGMENTS)
-    return Skeleton(
-        names, np.array(parents, dtype=np.int32), rest * _MILLIMETRE, axes, default_limits(names), (palms,)
-    )
+    return Skeleton(names, np.array(parents, dtype=np.int32), rest * _MILLIMETRE, axes, default_limits(names), (palms,))
 
 
 def _mirrored(left: Skeleton) -> Skeleton:

@@ -125,9 +125,12 @@ def _kept(tree: SourceTree, of_source: Mapping[int, str], notes: list[str]) -> d
             merged.setdefault(into, []).append(tree.names[j])
         else:
             kept[j] = _own_name(tree, j, of_source)
-    for into, names in merged.items():
-        shown = ", ".join(names[:4]) + (f" and {len(names) - 4} more" if len(names) > 4 else "")
-        notes.append(f"{shown}: part of {into}")
+    if merged:
+        shown = (
+            f"{', '.join(names[:4])}{f' and {len(names) - 4} more' if len(names) > 4 else ''} → {into}"
+            for into, names in merged.items()
+        )
+        notes.append(f"merged into recognised joints: {'; '.join(shown)}")
     if kept:
         notes.append(f"not recognised, kept as joints: {', '.join(kept.values())}")
     return kept
