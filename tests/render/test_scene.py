@@ -159,3 +159,14 @@ assert "VTK_DEFAULT_OPENGL_WINDOW" not in os.environ
     environment = {k: v for k, v in os.environ.items() if k not in ("DISPLAY", "VTK_DEFAULT_OPENGL_WINDOW")}
     done = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, env=environment)
     assert (done.returncode, done.stdout, done.stderr) == (0, "", "")
+
+
+def test_dense_lines_do_not_hide_the_bones(finger, camera: Camera) -> None:  # type: ignore[no-untyped-def]
+    vertices, faces = finger.frames[0], finger.faces
+    shares = []
+    for _ in range(3):
+        given = {"joints": finger.joints[0], "segments": finger.segments, "size": SIZE}
+        boned, plain = wireframe(vertices, faces, camera, **given), wireframe(vertices, faces, camera, size=SIZE)
+        shares.append((np.abs(boned.astype(int) - plain).max(axis=2) > 20).sum())
+        vertices, faces = trimesh.remesh.subdivide(vertices, faces)
+    assert shares[2] > 0.6 * shares[0]

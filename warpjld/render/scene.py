@@ -93,6 +93,8 @@ class Scene:
         self._pairs = np.zeros((0, 2), int) if segments is None else np.asarray(segments, int).reshape(-1, 2)
         self._solids, self._scale = tuple(solids), scale
         self._style, self._quality = style or Style(), quality or Quality()
+        # distance of the picture plane [pixels]
+        self._focal = 0.5 * size[1] * camera.zoom / float(np.tan(camera.angle / 2))
         self._plotter: Any = None
 
     def draw(
@@ -193,8 +195,10 @@ class Scene:
                 **(MATTE if self._wire or self._scale else SKIN),
             )
         if self._wire:
+            distance = float(np.linalg.norm(np.subtract(self._camera.target, self._camera.position)))
+            width, unit = times * self._size[1] / 720, self._focal / distance
             self._wires = Wires(points, self._faces)
-            self._wires.show(self._plotter, style.line, style.hidden_line, width=times * self._size[1] / 720)
+            self._wires.show(self._plotter, style.line, style.hidden_line, width=width, unit=unit)
         if joints is not None:
             self._thickness = 0.016 * extent
             self._jointed = np.unique(self._pairs)
@@ -232,8 +236,7 @@ class Scene:
             picture = np.asarray(Pictures.fromarray(picture).reduce(times))
         if self._occluded:
             depth = -self._plotter.get_image_depth(fill_value=np.nan, reset_camera_clipping_range=False)
-            focal = 0.5 * self._size[1] * self._camera.zoom / np.tan(self._camera.angle / 2)
-            picture = shade(picture, occlusion(depth[::times, ::times], focal, _REACH * self._extent))
+            picture = shade(picture, occlusion(depth[::times, ::times], self._focal, _REACH * self._extent))
         if self._scale is not None:
             picture = self._scale.drawn_on(picture, self._style.ink)
         return np.ascontiguousarray(picture, np.uint8)
