@@ -28,6 +28,18 @@ def hand(side: str = "left") -> Skeleton:
     return Skeleton(names, parents, np.array(rest), axes, default_limits(names))
 
 
+def with_forearm(bare: Skeleton) -> Skeleton:
+    """A hand on a stub of forearm, as the built-in hand is."""
+    names = (bare.names[0].replace("wrist", "forearm"), *bare.names)
+    return Skeleton(
+        names,
+        np.array([-1, *(bare.parents + 1)], dtype=np.int32),
+        np.vstack([[0.0, 0.0, 0.05], bare.rest]),
+        np.vstack([bare.axes[:1], bare.axes]),
+        default_limits(names),
+    )
+
+
 def rig(skeleton: Skeleton, **fields: object) -> Rig:
     """A rig whose surface is a tetrahedron: what motions do not look at."""
     surface = weld_surface(np.vstack([np.zeros(3), np.eye(3)]), [[0, 2, 1], [0, 1, 3], [1, 2, 3], [0, 3, 2]])

@@ -86,6 +86,4 @@ def test_writing_and_reading_give_the_same_motion(tmp_path: Path, keys: dict, te
     again = read_csv(tmp_path / "out.csv")
     assert list(tmp_path.iterdir()) == [tmp_path / "out.csv"]
     for channel in motion.tracks:
-        np.testing.assert_allclose(
-            again.value(channel, motion.frames), motion.value(channel, motion.frames), atol=1e-9
-        )
+        np.testing.assert_allclose(again.value(channel, motion.frames), motion.value(channel, motion.frames), atol=1e-9)

@@ -171,9 +171,7 @@ def animated_copy(source: Path, driven: Rig, poses: Poses, target: Path) -> Path
     return file.save(target)
 
 
-@pytest.mark.parametrize(
-    "name", ["hand_webxr_generic/left.glb", "hand_webxr_generic/right.glb", "hand_anny/left.glb"]
-)
+@pytest.mark.parametrize("name", ["hand_webxr_generic/left.glb", "hand_webxr_generic/right.glb", "hand_anny/left.glb"])
 def test_real_rigs_play_animations_of_their_own(data: Path, tmp_path: Path, name: str) -> None:
     driven = load_rig(data / name)
     wanted = bent(driven.skeleton)
@@ -187,9 +185,7 @@ def test_real_rigs_play_animations_of_their_own(data: Path, tmp_path: Path, name
 
 def test_another_skeleton_is_retargeted(data: Path, tmp_path: Path) -> None:
     source = load_rig(data / "hand_webxr_generic" / "left.glb")
-    copy = animated_copy(
-        data / "hand_webxr_generic" / "left.glb", source, bent(source.skeleton), tmp_path / "copy.glb"
-    )
+    copy = animated_copy(data / "hand_webxr_generic" / "left.glb", source, bent(source.skeleton), tmp_path / "copy.glb")
     driven = rig(hand("left"))
     poses, rate = poses_of_gltf(copy, driven)
     assert (len(poses), rate) == (5, 25)

@@ -9,7 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
-from tests.motion.skeletons import body, hand, rig
+from tests.motion.skeletons import body, hand, rig, with_forearm
 from warpjld.errors import InputError
 from warpjld.io import load_rig
 from warpjld.motion import load_motion
@@ -104,6 +104,15 @@ def test_fingers_only_leave_the_wrist_where_it_rests() -> None:
     got = poses_of_hand(recorded(skeleton, gesture(skeleton), moves=False), skeleton, 10.0)
     np.testing.assert_allclose(got.positions[:, 0], np.zeros((4, 3)), atol=1e-12)
     np.testing.assert_allclose(got.rotations[:, 0], np.tile([0, 0, 0, 1.0], (4, 1)), atol=1e-12)
+
+
+def test_a_stub_of_forearm_moves_with_the_whole_hand() -> None:
+    bare = hand()
+    skeleton = with_forearm(bare)
+    wanted = gesture(bare)
+    got = poses_of_hand(recorded(bare, wanted), skeleton, 10.0)
+    np.testing.assert_allclose(got.positions[:, 1:], wanted.positions, atol=1e-9)
+    np.testing.assert_allclose(got.rotations[:, 0], got.rotations[:, 1], atol=1e-12)
 
 
 def test_other_rates_interpolate() -> None:

@@ -1,12 +1,14 @@
 """Recorded bodies drive rigs with other rest poses, sizes and axes."""
 
+from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from tests.motion.skeletons import body, hand
+from tests.motion.skeletons import body, hand, with_forearm
 from warpjld.errors import InputError
 from warpjld.io import load_rig
 from warpjld.motion.bvh import read_bvh
@@ -159,8 +161,7 @@ def test_spine_is_spread_over_other_numbers_of_vertebrae() -> None:
 def test_root_travels_in_the_size_of_the_rig() -> None:
     clip = recording(frames=3)
     still = (
-        np.broadcast_to(clip.positions[:1], clip.positions.shape)
-        + np.array([0, 0, 50.0]) * np.arange(3)[:, None, None]
+        np.broadcast_to(clip.positions[:1], clip.positions.shape) + np.array([0, 0, 50.0]) * np.arange(3)[:, None, None]
     )
     unmoved = np.broadcast_to(clip.rotations[:1], clip.rotations.shape)
     walk = Clip(clip.names, clip.parents, clip.rest, still, unmoved, 30.0)
@@ -181,6 +182,62 @@ def test_a_hand_is_driven_by_a_body() -> None:
     b, c = clip.names.index("LeftHandIndex2"), clip.names.index("LeftHandIndex3")
     turns = angles_between(poses.positions[:, k] - poses.positions[:, j], clip.positions[:, c] - clip.positions[:, b])
     assert turns.max() < DIRECTIONS
+
+
+STYLES = {
+    "mixamo": lambda name: f"mixamorig:{name}",
+    "poser": lambda name: (
+        name.replace("Shoulder", "Collar")
+        .replace("ForeArm", "Elbow")
+        .replace("Arm", "Shoulder")
+        .replace("UpLeg", "Hip")
+        .replace("Leg", "Knee")
+        .replace("Foot", "Ankle")
+        .replace("ToeBase", "Toe")
+    ),
+    "suffixed": lambda name: (
+        f"{name.removeprefix('Left')}_L"
+        if name.startswith("Left")
+        else f"{name.removeprefix('Right')}_R"
+        if name.startswith("Right")
+        else name
+    ),
+}
+
+
+@pytest.mark.parametrize("style", STYLES.values(), ids=STYLES.keys())
+def test_common_ways_of_naming_joints_are_understood(style: Callable[[str], str]) -> None:
+    clip, skeleton = recording(), body()
+    renamed = replace(clip, names=tuple(style(name) for name in clip.names))
+    matched = correspondence(renamed, skeleton)
+    assert matched == {own: style(theirs) for own, theirs in correspondence(clip, skeleton).items()}
+    assert len(matched) == 26
+    np.testing.assert_allclose(retarget(renamed, skeleton).positions, retarget(clip, skeleton).positions, atol=1e-12)
+
+
+def test_a_stub_of_forearm_goes_with_a_recorded_arm() -> None:
+    clip, skeleton = recording(), with_forearm(hand("left"))
+    poses = retarget(clip, skeleton)
+    elbow, wrist = clip.names.index("LeftForeArm"), clip.names.index("LeftHand")
+    wanted = clip.positions[:, wrist] - clip.positions[:, elbow]
+    assert angles_between(poses.positions[:, 1] - poses.positions[:, 0], wanted).max() < DIRECTIONS
+
+
+def test_a_recorded_hand_carries_the_stub_of_forearm() -> None:
+    clip, skeleton = recording(), with_forearm(hand("left"))
+    inside = [b for b, name in enumerate(clip.names) if name.startswith("LeftHand")]
+    parents = np.array([inside.index(clip.parents[b]) if clip.parents[b] in inside else -1 for b in inside])
+    alone = Clip(
+        tuple(clip.names[b] for b in inside),
+        parents,
+        clip.rest[inside],
+        clip.positions[:, inside],
+        clip.rotations[:, inside],
+        clip.rate,
+    )
+    poses = retarget(alone, skeleton)
+    np.testing.assert_allclose(poses.rotations[:, 0], poses.rotations[:, 1], atol=1e-12)
+    np.testing.assert_allclose(poses.flexion[:, 1], 0, atol=1e-9)
 
 
 def test_a_motion_without_any_known_joint_is_refused() -> None:

@@ -31,8 +31,9 @@ def poses_of_gltf(path: str | Path, rig: Rig, *, rate: float | None = None) -> t
     """Poses of the first animation of a glTF file.
 
     Where the file's joints are the rig's own, names and rest, each joint takes its world transform relative to rest,
-    so that flat hierarchies and moving joints are followed; scale moves joints, but does not widen the flesh. Another
-    skeleton's animation drives the rig by ``retarget``.
+    so that flat hierarchies and moving joints are followed; scale moves joints, but does not widen the flesh, and
+    joints that recognition merged into another (twist bones, say) only count by where they carry the joints below
+    them. Another skeleton's animation drives the rig by ``retarget``.
 
     Args:
         path: A .gltf or .glb file with an animation.

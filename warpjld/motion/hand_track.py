@@ -52,8 +52,8 @@ def poses_of_hand(track: HandTrack, skeleton: Skeleton, rate: float) -> Poses:
     twist about itself, so that knuckles keep their flexion axes. Bone lengths are the rig's. Where a recording has
     metacarpals, the ring's and the pinky's flex within their limits; index and middle are fixed to the wrist.
 
-    A rig that is just a hand starts where it rests and from there moves with the tracked palm, seen from the palm's
-    first orientation; other skeletons move their fingers only.
+    A rig that is just a hand, with a forearm or without, starts where it rests and from there moves as a whole with
+    the tracked palm, seen from the palm's first orientation; other skeletons move their fingers only.
 
     Args:
         track: What was recorded.
@@ -80,7 +80,7 @@ def poses_of_hand(track: HandTrack, skeleton: Skeleton, rate: float) -> Poses:
     for digit in DIGITS:
         _drive_digit(digit, track, skeleton, own, conjugate(palm_turn), local)
     displacement = np.zeros((len(track.times), 3))
-    if track.moves and own["wrist"] == 0:
+    if track.moves and len(own) == len(skeleton) and "shoulder" not in own:
         turn = multiply(conjugate(palm_turn[0]), palm_turn)
         centre = rest.mean(axis=0) - skeleton.rest[0]
         moved = rotate(conjugate(palm_turn[0]), places.mean(axis=1) - places[0].mean(axis=0)) / scale

@@ -93,8 +93,12 @@ class Landmarks:
 
 
 def landmarks_of_skeleton(skeleton: Skeleton) -> Landmarks:
-    """Landmarks of a rig's skeleton: its names are canonical already."""
-    return Landmarks({name: j for j, name in enumerate(skeleton.names)}, skeleton.parents, skeleton.rest)
+    """Landmarks of a rig's skeleton: its names are canonical already. A stub of forearm ends in an elbow's place."""
+    joints = {name: j for j, name in enumerate(skeleton.names)}
+    for side in ("left", "right"):
+        if f"{side}.forearm" in joints:
+            joints.setdefault(f"{side}.elbow", joints[f"{side}.forearm"])
+    return Landmarks(joints, skeleton.parents, skeleton.rest)
 
 
 def landmarks_of_clip(clip: Clip, *, side: str | None = None) -> Landmarks:

@@ -39,7 +39,7 @@ _GROUND_PERCENTILE = 10.0
 
 def correspondence(clip: Clip, skeleton: Skeleton) -> dict[str, str]:
     """Which joint of a recording drives which joint of a rig, besides the trunk: rig's name → recording's name."""
-    return {name: clip.names[joint] for name, (_, joint) in _pairs(clip, skeleton)[2].items()}
+    return {skeleton.names[own]: clip.names[joint] for own, joint in _pairs(clip, skeleton)[2].values()}
 
 
 def retarget(clip: Clip, skeleton: Skeleton) -> Poses:
@@ -75,6 +75,10 @@ def retarget(clip: Clip, skeleton: Skeleton) -> Poses:
             world[:, j] = multiply(recorded[:, bone], align[j])
         else:
             world[:, j] = _IDENTITY if parent < 0 else world[:, parent]
+    above = -1 if trunk else int(skeleton.parents[min(j for j, _ in pairs.values())])
+    while above >= 0:  # the stub of forearm that carries a recorded hand goes with it
+        world[:, above] = world[:, min(driven)]
+        above = int(skeleton.parents[above])
     local = world.copy()
     for j in range(len(skeleton)):
         if skeleton.parents[j] >= 0:
@@ -161,9 +165,7 @@ def _alignment(
     return aligned
 
 
-def _turn_about(
-    axis: NDArray[np.float64], start: NDArray[np.float64], end: NDArray[np.float64]
-) -> NDArray[np.float64]:
+def _turn_about(axis: NDArray[np.float64], start: NDArray[np.float64], end: NDArray[np.float64]) -> NDArray[np.float64]:
     """Rotation about an axis that brings ``start`` as close to ``end`` as it can."""
     a = unit(axis)
     u, v = start - a * (a @ start), end - a * (a @ end)

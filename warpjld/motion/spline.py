@@ -5,7 +5,6 @@ from __future__ import annotations
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from scipy.interpolate import PPoly
 
 from warpjld.errors import InputError
 
@@ -71,12 +70,22 @@ class Spline:
         at = np.clip(np.asarray(times, dtype=np.float64), self.times[0], self.times[-1])
         if self._cubics is None:
             return np.full(at.shape, self.values[0])
-        return np.asarray(self._cubics(at))
+        (a, b, c, d), s = self._at(at)
+        return np.asarray(((a * s + b) * s + c) * s + d)
 
     def derivative(self, times: ArrayLike) -> NDArray[np.float64]:
         """Slopes inside the keys, in the shape of ``times``; at a key that of the interval after it."""
         at = np.asarray(times, dtype=np.float64)
-        return np.zeros(at.shape) if self._cubics is None else np.asarray(self._cubics(at, 1))
+        if self._cubics is None:
+            return np.zeros(at.shape)
+        (a, b, c, _), s = self._at(at)
+        return np.asarray((3.0 * a * s + 2.0 * b) * s + c)
+
+    def _at(self, times: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Coefficients of the cubics that hold at these times, cubes first, and the times since their keys."""
+        assert self._cubics is not None
+        k = np.clip(np.searchsorted(self.times, times, side="right") - 1, 0, len(self.times) - 2)
+        return self._cubics[:, k], times - self.times[k]
 
 
 def _per_key(name: str, constant: ArrayLike, count: int) -> NDArray[np.float64]:
@@ -93,7 +102,7 @@ def _cubics(
     c: NDArray[np.float64],
     b: NDArray[np.float64],
     hold: bool,
-) -> PPoly:
+) -> NDArray[np.float64]:
     lengths, chords = np.diff(x), np.diff(v)
     before, after = np.concatenate([chords[:1], chords]), np.concatenate([chords, chords[-1:]])
     mean = (np.concatenate([lengths[:1], lengths]) + np.concatenate([lengths, lengths[-1:]])) / 2.0
@@ -107,9 +116,5 @@ def _cubics(
         arriving, leaving = np.where(still, 0.0, arriving), np.where(still, 0.0, leaving)
     slope = chords / lengths
     start, end = leaving[:-1], arriving[1:]
-    return PPoly(
-        np.array(
-            [(start + end - 2.0 * slope) / lengths**2, (3.0 * slope - 2.0 * start - end) / lengths, start, v[:-1]]
-        ),
-        x,
-    )
+    square = (3.0 * slope - 2.0 * start - end) / lengths
+    return np.array([(start + end - 2.0 * slope) / lengths**2, square, start, v[:-1]])

@@ -228,9 +228,7 @@ class Motion:
                 continue
             place = resolve_channel(name, skeleton)
             if place in owners:
-                raise InputError(
-                    f"'{owners[place]}' and '{name}' are the same channel of this skeleton: use one name"
-                )
+                raise InputError(f"'{owners[place]}' and '{name}' are the same channel of this skeleton: use one name")
             owners[place] = name
             places[name] = place
         return places
