@@ -82,10 +82,10 @@ def test_axis_and_parameters(run, tmp_path, monkeypatch) -> None:
 
 def test_outputs_keep_the_camera_of_their_line(run) -> None:
     scene = run(
-        "CAMERA PALMAR ZOOM 1.5\nPICTURE 3 'a/one.png' wireframe\nCAMERA FROM 0 0 1 TO 0 0 0\n"
+        "CAMERA PALMAR FOLLOW ZOOM 1.5\nPICTURE 3 'a/one.png' wireframe\nCAMERA FROM 0 0 1 TO 0 0 0\n"
         "FILM 'a.mp4'\nCONTACT 'sheet.png' 1 2.5\nEXPORT 'a.usda' left\nSIZE 320 200"
     )
-    palmar, free = Camera("palmar", zoom=1.5), Camera(None, (0, 0, 1), (0, 0, 0))
+    palmar, free = Camera("palmar", zoom=1.5, follow=True), Camera(None, (0, 0, 1), (0, 0, 0))
     assert scene.outputs == [
         Picture("a/one.png", 3, "wireframe", palmar),
         Film("a.mp4", "shaded", free),

@@ -58,6 +58,15 @@ def test_pictures_show_something_and_have_the_size_asked_for(run, tmp_path) -> N
             assert np.asarray(picture.convert("L")).std() > 5
 
 
+def test_a_following_camera_sees_a_moving_actor_stand_still(run, tmp_path) -> None:
+    scene = run("SIZE 80 60\nMOVE left 0 0 0 0\nMOVE left 10 0.5 0.2 0\nCAMERA PALMAR FOLLOW\nPICTURE 0 'a.png'")
+    run("PICTURE 10 'b.png'\nCONTACT 'c.png' 0 10\nFILM 'd.gif'\nCAMERA PALMAR\nPICTURE 0 'e.png'\nPICTURE 10 'f.png'")
+    run_scene(scene, tmp_path)
+    a, b, e, f = (np.asarray(Image.open(tmp_path / f"{name}.png")).astype(int) for name in "abef")
+    assert np.abs(a - b).mean() < 0.2
+    assert np.abs(e - f).mean() > 1
+
+
 def test_several_actors_have_a_file_each(run, hands, tmp_path) -> None:
     scene = run("FRAMES 0 1\nEXPORT 'two.npz'\nEXPORT 'one.npz' left")
     scene.add("right", hands["right"])
