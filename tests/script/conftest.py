@@ -14,7 +14,7 @@ from warpjld.script import Interpreter, Scene
 @pytest.fixture(scope="session")
 def hands() -> dict[str, Rig]:
     """Coarse built-in hands by side."""
-    return {side: build_hand(side, resolution=400) for side in ("left", "right")}
+    return {side: build_hand(side, resolution=1500) for side in ("left", "right")}
 
 
 @pytest.fixture

@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from warpjld.errors import InputError
-from warpjld.script import command, commands, commands_table, registry
+from warpjld.script import all_commands, command, commands_table, registry
 
 README = Path(__file__).resolve().parents[2] / "README.md"
 
@@ -19,7 +19,7 @@ def added():
     names: list[str] = []
     yield names
     for name in names:
-        commands().remove(name)
+        all_commands().remove(name)
 
 
 def test_a_decorator_adds_a_command(run, added) -> None:
@@ -78,7 +78,7 @@ def test_an_installed_package_adds_commands(tmp_path, monkeypatch, run, added) -
         "@command('CLICK', syntax='CLICK', help='Click.', group='Sounds')\n"
         "def click(scene, arguments): scene.say('click')\n",
     )
-    assert "CLICK" in commands()
+    assert "CLICK" in all_commands()
     added.append("CLICK")
     assert run("Click").said == ["click"]
     assert "**Sounds**" in commands_table()
@@ -87,11 +87,11 @@ def test_an_installed_package_adds_commands(tmp_path, monkeypatch, run, added) -
 def test_a_broken_package_does_not_stop_the_others(tmp_path, monkeypatch) -> None:
     install(tmp_path, monkeypatch, "raise RuntimeError('no luck')")
     with pytest.warns(UserWarning, match=r"commands of 'snap' \(snapping\) left out: no luck"):
-        assert "WRIST" in commands()
+        assert "WRIST" in all_commands()
 
 
 def test_every_command_is_documented() -> None:
-    for c in commands():
+    for c in all_commands():
         assert re.match(rf"{c.name}\b", c.syntax), c.name
         assert c.help.endswith("."), c.name
         assert len(c.help) < 130, c.name

@@ -3,7 +3,7 @@
 from warpjld.script.arguments import Arguments
 from warpjld.script.interpreter import Interpreter
 from warpjld.script.parser import parse, parse_file
-from warpjld.script.registry import Command, Registry, command, commands, commands_table
+from warpjld.script.registry import Command, Registry, all_commands, command, commands_table
 from warpjld.script.scene import Actor, Camera, Scene
 
 __all__ = [
@@ -14,8 +14,8 @@ __all__ = [
     "Interpreter",
     "Registry",
     "Scene",
+    "all_commands",
     "command",
-    "commands",
     "commands_table",
     "parse",
     "parse_file",

@@ -2,14 +2,22 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+import inspect
+from typing import TYPE_CHECKING, Any
 
 from warpjld.script.scene import Actor
 
 if TYPE_CHECKING:
     from warpjld.covering import Covering
 
-__all__ = ["cover"]
+__all__ = ["cover", "has_paper_method"]
+
+
+def has_paper_method() -> bool:
+    """Whether the covering knows the method as published beside the smooth one."""
+    from warpjld.covering import bind
+
+    return "method" in inspect.signature(bind).parameters
 
 
 def cover(actor: Actor) -> Covering:
@@ -22,8 +30,9 @@ def cover(actor: Actor) -> Covering:
             actor.covering = old.with_parameters(actor.parameters)
     else:
         rig = actor.rig
+        method: dict[str, Any] = {} if actor.method == "smooth" else {"method": actor.method}
         actor.covering = bind(
-            actor.skeleton, rig.surface, parameters=actor.parameters, skin=rig.skin, domains=actor.domains
+            actor.skeleton, rig.surface, parameters=actor.parameters, skin=rig.skin, domains=actor.domains, **method
         )
         actor.covered = (actor.method, actor.domains)
     assert actor.covering is not None

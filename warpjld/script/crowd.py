@@ -78,6 +78,13 @@ class Crowd:
         some = slice(frame, frame + 1)
         return np.concatenate([r.covering.deform(r.poses[some], device=self.device)[0] for r in self.roles])
 
+    def shift(self, camera: Camera, frame: int) -> NDArray[np.float64]:
+        """What to take off all positions at the frame of that place so that the camera goes along [m], shape (3,)."""
+        if not camera.follow:
+            return np.zeros(3)
+        first = self.roles[0]
+        return first.poses.positions[frame, 0] - first.covering.skeleton.rest[0]
+
     def camera(self, camera: Camera, size: tuple[int, int]) -> RenderCamera:
         """A camera for all frames; a named view is framed so that nothing leaves the picture."""
         from warpjld.render import Camera as RenderCamera
@@ -89,21 +96,28 @@ class Crowd:
             return RenderCamera(camera.position, camera.target, above, zoom=camera.zoom)
         view = camera.view or self.default_view
         forward, up, side = self._facing
-        return RenderCamera.view(view, self._framing, forward=forward, up=up, side=side, size=size, zoom=camera.zoom)
+        return RenderCamera.view(
+            view, self._framing(camera), forward=forward, up=up, side=side, size=size, zoom=camera.zoom
+        )
 
     @property
     def default_view(self) -> str:
         """Where to look from where no CAMERA was chosen."""
         return "three-quarter" if self._facing[2] else "front"
 
-    @cached_property
-    def _framing(self) -> NDArray[np.float64]:
+    def _framing(self, camera: Camera) -> NDArray[np.float64]:
         """Points that must be in every picture [m], shape (n, 3)."""
         count = len(self.frames)
-        chosen = np.unique(np.linspace(0, count - 1, min(count, _SAMPLES)).astype(int))
-        surfaces = [self.surface(int(frame)) for frame in chosen]
-        joints = [role.poses.positions.reshape(-1, 3) for role in self.roles]
+        shifts = np.stack([self.shift(camera, frame) for frame in range(count)])
+        surfaces = [points - shifts[frame] for frame, points in self._samples.items()]
+        joints = [(role.poses.positions - shifts[:, None]).reshape(-1, 3) for role in self.roles]
         return np.concatenate([*surfaces, *joints])
+
+    @cached_property
+    def _samples(self) -> dict[int, NDArray[np.float32]]:
+        count = len(self.frames)
+        chosen = np.unique(np.linspace(0, count - 1, min(count, _SAMPLES)).astype(int))
+        return {int(frame): self.surface(int(frame)) for frame in chosen}
 
     @cached_property
     def _facing(self) -> tuple[NDArray[np.float64], NDArray[np.float64], Literal["left", "right"] | None]:

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 from warpjld.errors import InputError, WarpjldError
 from warpjld.script.arguments import Arguments
 from warpjld.script.parser import parse, parse_file
-from warpjld.script.registry import RESERVED, Command, Registry, commands
+from warpjld.script.registry import RESERVED, Command, Registry, all_commands
 from warpjld.script.statements import (
     Argument,
     MacroDefinition,
@@ -47,7 +47,7 @@ class Interpreter:
     def __init__(self, scene: Scene, registry: Registry | None = None) -> None:
         self.scene = scene
         self.macros: dict[str, MacroDefinition] = {}
-        self._registry = commands() if registry is None else registry
+        self._registry = all_commands() if registry is None else registry
         self._including: list[Path] = []
         self._depth = 0
 

@@ -13,7 +13,7 @@ from warpjld import render
 from warpjld.script.binding import cover
 from warpjld.script.crowd import Crowd, Role
 from warpjld.script.folder import OutputFolder
-from warpjld.script.scene import ContactSheet, Film, Picture, Scene, Style
+from warpjld.script.scene import Camera, ContactSheet, Film, Picture, Scene, Style
 from warpjld.script.staging import stage
 
 __all__ = ["FilmStudio", "draw_contact_sheet", "draw_picture", "film_studio", "preview", "sheet_frames"]
@@ -25,12 +25,14 @@ _CELLS = 6  # on a contact sheet whose frames nobody listed
 class FilmStudio:
     """Takes frame after frame of a film."""
 
-    def __init__(self, stage: render.Scene, film: render.Film) -> None:
+    def __init__(self, crowd: Crowd, camera: Camera, stage: render.Scene, film: render.Film) -> None:
+        self._crowd, self._camera = crowd, camera
         self._stage, self._film = stage, film
 
-    def take(self, vertices: NDArray[np.float32], joints: NDArray[np.float64]) -> None:
-        """The next frame: vertices (V, 3) and joints (J, 3) of all actors [m]."""
-        self._film.append(self._stage.draw(vertices, joints=joints))
+    def take(self, frame: int, vertices: NDArray[np.float32]) -> None:
+        """The frame of that place in the sequence, with the vertices of all actors [m], shape (V, 3)."""
+        shift = self._crowd.shift(self._camera, frame)
+        self._film.append(self._stage.draw(vertices - shift, joints=self._crowd.joints(frame) - shift))
 
 
 @contextmanager
@@ -47,7 +49,7 @@ def film_studio(scene: Scene, crowd: Crowd, film: Film, path: Path) -> Iterator[
         ) as stage_,
         render.Film(path, rate=scene.rate) as writer,
     ):
-        yield FilmStudio(stage_, writer)
+        yield FilmStudio(crowd, film.camera, stage_, writer)
 
 
 def draw_picture(scene: Scene, crowd: Crowd, picture: Picture, path: Path) -> None:
@@ -60,7 +62,8 @@ def draw_picture(scene: Scene, crowd: Crowd, picture: Picture, path: Path) -> No
         size=scene.size,
         segments=_bones(crowd, picture.style),
     ) as stage_:
-        render.save_picture(path, stage_.draw(now.surface(0), joints=now.joints(0)))
+        shift = now.shift(picture.camera, 0)
+        render.save_picture(path, stage_.draw(now.surface(0) - shift, joints=now.joints(0) - shift))
 
 
 def draw_contact_sheet(scene: Scene, crowd: Crowd, sheet: ContactSheet, path: Path, title: str) -> None:
@@ -69,10 +72,10 @@ def draw_contact_sheet(scene: Scene, crowd: Crowd, sheet: ContactSheet, path: Pa
     cell = max(16, round(_CELL[0] * scene.size[1])), max(16, round(_CELL[1] * scene.size[1]))
     moments = [crowd.at(frame, scene.rate) for frame in frames]
     picture = render.contact_sheet(
-        np.stack([moment.surface(0) for moment in moments]),
+        np.stack([m.surface(0) - m.shift(sheet.camera, 0) for m in moments]),
         crowd.faces,
         crowd.camera(sheet.camera, cell),
-        joints=np.stack([moment.joints(0) for moment in moments]),
+        joints=np.stack([m.joints(0) - m.shift(sheet.camera, 0) for m in moments]),
         segments=crowd.segments,
         numbers=[round(frame, 3) if frame % 1 else int(frame) for frame in frames],  # type: ignore[misc]
         size=cell,

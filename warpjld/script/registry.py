@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     from warpjld.script.arguments import Arguments
     from warpjld.script.scene import Scene
 
-__all__ = ["GROUPS", "Command", "Registry", "command", "commands", "commands_table"]
+__all__ = ["GROUPS", "Command", "Registry", "all_commands", "command", "commands_table"]
 
 ENTRY_POINTS = "warpjld.commands"
 GROUPS = ("Actors", "Animation", "Covering", "Output", "Flow")
@@ -131,7 +131,7 @@ def command(name: str, *, syntax: str, help: str, group: str = "User") -> Callab
     return register
 
 
-def commands() -> Registry:
+def all_commands() -> Registry:
     """All commands: ours, then those of installed packages. One that cannot be loaded is warned of and left out."""
     global _loaded
     for module in _BUILT_IN:
@@ -148,7 +148,7 @@ def commands() -> Registry:
 
 def commands_table(chosen: Iterable[Command] | None = None) -> str:
     """Markdown tables of commands, one per group."""
-    everything = list(commands() if chosen is None else chosen)
+    everything = list(all_commands() if chosen is None else chosen)
     rows: list[str] = []
     for group in dict.fromkeys((*GROUPS, *(c.group for c in everything))):
         members = [c for c in everything if c.group == group]

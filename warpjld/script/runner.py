@@ -166,7 +166,7 @@ def _make_sequences(
                 progress("frames", start + k, len(frames))
                 together = np.concatenate([vertices[k] for _, vertices in parts])
                 for studio in studios:
-                    studio.take(together, crowd.joints(start + k))
+                    studio.take(start + k, together)
 
 
 def _make_pictures(

@@ -44,12 +44,16 @@ class SplineConstants:
 
 @dataclass(frozen=True)
 class Camera:
-    """Where pictures are taken from: a named view, or a position and a target [m]."""
+    """Where pictures are taken from: a named view, or a position and a target [m].
+
+    With ``follow`` it goes along with the root of the first actor.
+    """
 
     view: str | None = None
     position: tuple[float, float, float] | None = None
     target: tuple[float, float, float] | None = None
     zoom: float = 1.0
+    follow: bool = False
 
 
 @dataclass(frozen=True)

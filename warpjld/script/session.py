@@ -8,7 +8,6 @@ from pathlib import Path
 from warpjld.errors import InputError
 from warpjld.script.interpreter import Interpreter
 from warpjld.script.parser import UnfinishedError, parse, parse_file
-from warpjld.script.registry import RESERVED
 from warpjld.script.scene import Scene
 from warpjld.script.statements import Node, Statement, Text
 from warpjld.skeleton import CHANNELS, DIGITS

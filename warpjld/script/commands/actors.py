@@ -35,9 +35,9 @@ def hand(scene: Scene, arguments: Arguments) -> None:
         from warpjld.hand import build_hand
 
         options = arguments.options(
-            length=lambda: arguments.number("the hand's length in metres", minimum=0.01, maximum=10),
-            breadth=lambda: arguments.number("the hand's breadth in metres", minimum=0.005, maximum=10),
-            resolution=lambda: arguments.integer("the number of vertices, about", minimum=100, maximum=10_000_000),
+            length=lambda: arguments.number("the hand's length in metres"),
+            breadth=lambda: arguments.number("the hand's breadth in metres"),
+            resolution=lambda: arguments.integer("the number of vertices, about"),
             name=lambda: arguments.name("the actor's name"),
         )
         name = options.pop("name", side)
@@ -93,7 +93,7 @@ def actor(scene: Scene, arguments: Arguments) -> None:
 @command(
     "MOTION",
     syntax='MOTION "<motion file>"',
-    help="Drive the current actor by a motion file (CSV, BVH, glTF) instead of keys.",
+    help="Drive the current actor by a motion file instead of keys, at the RATE set before.",
     group="Actors",
 )
 def motion(scene: Scene, arguments: Arguments) -> None:
@@ -104,7 +104,8 @@ def motion(scene: Scene, arguments: Arguments) -> None:
     path = arguments.input_file("a motion file")
     if chosen.keyed:
         raise arguments.error(f"actor {chosen.name} has keys already: it cannot be driven by a file as well")
-    chosen.recorded = load_motion(path, chosen.rig)
+    rig = replace(chosen.rig, skeleton=chosen.skeleton)  # with the script's axes and limits
+    chosen.recorded = load_motion(path, rig, rate=scene.rate)
 
 
 @command(

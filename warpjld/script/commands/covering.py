@@ -6,6 +6,7 @@ from dataclasses import fields, replace
 
 from warpjld.errors import InputError
 from warpjld.script.arguments import Arguments
+from warpjld.script.binding import has_paper_method
 from warpjld.script.commands.animation import SIDES
 from warpjld.script.keys import read_joint
 from warpjld.script.registry import command
@@ -63,7 +64,11 @@ def parameters(scene: Scene, arguments: Arguments) -> None:
 )
 def method(scene: Scene, arguments: Arguments) -> None:
     """R16."""
-    scene.actor().method = "paper" if arguments.choice("the method", ("SMOOTH", "PAPER")) == "PAPER" else "smooth"
+    actor = scene.actor()
+    chosen = arguments.choice("the method", ("SMOOTH", "PAPER"))
+    if chosen == "PAPER" and not has_paper_method():
+        raise arguments.error("this version covers by METHOD SMOOTH only")
+    actor.method = "paper" if chosen == "PAPER" else "smooth"
 
 
 @command(

@@ -5,7 +5,7 @@ from __future__ import annotations
 from warpjld.errors import InputError
 from warpjld.script import show
 from warpjld.script.arguments import Arguments
-from warpjld.script.registry import command, commands
+from warpjld.script.registry import all_commands, command
 from warpjld.script.scene import Scene
 from warpjld.script.statements import Word
 
@@ -68,13 +68,13 @@ def show_(scene: Scene, arguments: Arguments) -> None:
 def help_(scene: Scene, arguments: Arguments) -> None:
     """R88."""
     if not arguments:
-        scene.say(show.commands(commands()))
+        scene.say(show.commands(all_commands()))
         return
     value = arguments.anything()
     if not isinstance(value, Word):
         raise arguments.error("expected a command's name")
     try:
-        found = commands()[value.text]
+        found = all_commands()[value.text]
     except InputError as error:
         raise arguments.error(error.message) from None
     scene.say(f"{found.syntax}\n  {found.help}")

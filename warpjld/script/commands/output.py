@@ -14,8 +14,8 @@ _STYLES = ("SHADED", "WIREFRAME")
 
 @command(
     "CAMERA",
-    syntax=f"CAMERA <{'/'.join(VIEWS)}> [ZOOM <factor>] or CAMERA FROM <x> <y> <z> TO <x> <y> <z> [ZOOM <factor>]",
-    help="Where the pictures and films that follow are taken from; metres.",
+    syntax=f"CAMERA <{'/'.join(VIEWS)}> [ZOOM <factor>] [FOLLOW] or CAMERA FROM <x> <y> <z> TO <x> <y> <z> …",
+    help="Where the pictures and films after this line are taken from [m]; FOLLOW goes along with the first actor.",
     group="Output",
 )
 def camera(scene: Scene, arguments: Arguments) -> None:
@@ -29,8 +29,11 @@ def camera(scene: Scene, arguments: Arguments) -> None:
             raise arguments.error("the camera cannot look at its own place")
     else:
         view = arguments.choice("a view or FROM", VIEWS).lower()
-    options = arguments.options(zoom=lambda: arguments.number("the zoom factor", minimum=0.01, maximum=100))
-    scene.camera = Camera(view, position, target, cast(float, options.get("zoom", 1.0)))
+    options = arguments.options(
+        zoom=lambda: arguments.number("the zoom factor", minimum=0.01, maximum=100), follow=lambda: True
+    )
+    zoom = cast(float, options.get("zoom", 1.0))
+    scene.camera = Camera(view, position, target, zoom, follow="follow" in options)
 
 
 @command(
