@@ -139,7 +139,7 @@ class Covering:
         chosen = np.asarray(vertices, dtype=np.int32)
         if chosen.size and (chosen.min() < 0 or chosen.max() >= len(self.surface.vertices)):
             raise InputError(f"vertices: indices must lie in 0…{len(self.surface.vertices) - 1}")
-        self._check(poses)
+        self.check(poses)
         out = wp.empty((len(poses), len(chosen)), dtype=wp.vec3, device=where)
         model = self._on(where, "anchored", self._anchored)
         pose = drivers_on(where, drive(self.skeleton, self.anchors, poses))
@@ -149,11 +149,12 @@ class Covering:
         return result
 
     def _palette(self, poses: Poses) -> NDArray[np.float32]:
-        self._check(poses)
+        self.check(poses)
         drivers = drive(self.skeleton, self.anchors, poses)
         return palette(self.runs.columns, self.anchors, self.parameters, drivers)
 
-    def _check(self, poses: Poses) -> None:
+    def check(self, poses: Poses) -> None:
+        """Raise InputError where poses do not fit the skeleton or are not finite."""
         if poses.positions.shape[1:] != (len(self.skeleton), 3):
             raise InputError(f"poses: want {len(self.skeleton)} joints, got {poses.positions.shape[1]}")
         finite = np.isfinite(poses.positions).all(axis=2) & np.isfinite(poses.rotations).all(axis=2)

@@ -1,1 +1,5 @@
-"""."""
+"""The built-in hand, made by the program itself (R7, R13)."""
+
+from warpjld.hand.build import build_hand
+
+__all__ = ["build_hand"]

@@ -1,0 +1,71 @@
+"""The hand's flesh as even triangles, from about two thousand vertices to millions."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from warpjld.errors import WarpjldError
+from warpjld.hand.contour import contour
+from warpjld.hand.flesh import Flesh
+from warpjld.hand.mesh import Array, Edges, Faces, face_normals, mean_over_neighbours, subdivide
+from warpjld.hand.remesh import remesh, settle
+
+__all__ = ["triangulate"]
+
+_LARGEST_REMESHED = 24_000  # vertices; beyond, a remeshed surface is subdivided: far faster, and as even
+_COARSEST, _FINEST = 2.0, 1.0  # grid spacing [mm]: two millimetres still tell neighbouring fingers apart
+_LOW, _HIGH = np.array([-75.0, -75.0, -205.0]), np.array([112.0, 45.0, 60.0])
+
+
+def triangulate(flesh: Flesh, resolution: int) -> tuple[Array, Faces]:
+    """Vertices [mm] on the surface and its triangles, about ``resolution`` vertices; closed, of genus 0."""
+    base, halvings = resolution, 0
+    while base > _LARGEST_REMESHED:
+        base, halvings = base // 4, halvings + 1
+    vertices, faces = _closed_contour(flesh, base)
+    vertices = flesh.project(vertices, steps=1)
+    shape = _relative_size(flesh, vertices, faces)
+    areas = 0.5 * np.linalg.norm(face_normals(vertices, faces), axis=1)
+    density = (areas / (shape[faces] ** 2).mean(axis=1)).sum()
+    size = shape * np.sqrt(density * 2.0 / np.sqrt(3.0) / base)
+    vertices, faces, size = remesh(vertices, faces, size, flesh, rounds=6)
+    # what the rounds left over or under is corrected by scaling the wanted lengths
+    size = size * np.sqrt(len(vertices) / base)
+    vertices, faces, size = remesh(vertices, faces, size, flesh, rounds=3)
+    for _ in range(3):
+        vertices = settle(vertices, faces, size, flesh)
+    vertices = flesh.project(vertices, steps=2)
+    for _ in range(halvings):
+        vertices, faces = subdivide(vertices, faces)
+        vertices = flesh.project(vertices, steps=2)
+    return vertices, faces
+
+
+def _closed_contour(flesh: Flesh, base: int) -> tuple[Array, Faces]:
+    stretch = flesh.plan.stretch
+    spacing = float(np.clip(np.sqrt(40_000.0 / base), _FINEST, _COARSEST) * stretch.min())
+    for _ in range(3):
+        vertices, faces = contour(flesh, _LOW * stretch, _HIGH * stretch, spacing)
+        if len(vertices) - len(faces) // 2 == 2:  # Euler's number of a sphere: in one piece, without holes
+            return vertices, faces
+        spacing *= 0.7
+    raise WarpjldError("the hand's surface came out in pieces or with holes: are its proportions extreme?")
+
+
+def _relative_size(flesh: Flesh, vertices: Array, faces: Faces) -> Array:
+    """Wanted edge lengths up to a factor: shorter where the surface bends more, shape (V,)."""
+    normal = flesh.slope(vertices)[1]
+    normal /= np.linalg.norm(normal, axis=1, keepdims=True)
+    edges = Edges.of(faces, len(vertices))
+    a, b = edges.ends.T
+    lengths = np.linalg.norm(vertices[a] - vertices[b], axis=1)
+    turns = np.linalg.norm(normal[a] - normal[b], axis=1)
+    bend = np.zeros(len(vertices))
+    total = np.zeros(len(vertices))
+    for end in (a, b):
+        bend += np.bincount(end, turns, minlength=len(vertices))
+        total += np.bincount(end, lengths, minlength=len(vertices))
+    bend /= np.maximum(total, 1e-9)
+    for _ in range(12):
+        bend = 0.5 * (bend + mean_over_neighbours(edges, bend))
+    return 1.0 / np.sqrt(np.clip(bend, 0.02, 0.16) / 0.06)
