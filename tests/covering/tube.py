@@ -20,7 +20,9 @@ def tube(rings: int = 61, around: int = AROUND, radius: float = RADIUS, segment:
     points = [radius * circle + [0.0, 0.0, z] for z in along]
     k, following = np.arange(around), (np.arange(around) + 1) % around
     faces = [
-        np.concatenate([np.column_stack([a + k, b + k, b + following]), np.column_stack([a + k, b + following, a + following])])
+        np.concatenate(
+            [np.column_stack([a + k, b + k, b + following]), np.column_stack([a + k, b + following, a + following])]
+        )
         for a, b in zip(range(0, (rings - 1) * around, around), range(around, rings * around, around), strict=True)
     ]
     start, last = rings * around, (rings - 1) * around

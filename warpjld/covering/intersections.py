@@ -130,9 +130,7 @@ def _overlapping(points: NDArray[np.float64], faces: NDArray[np.int32]) -> NDArr
     return np.column_stack([np.repeat(np.arange(len(faces), dtype=np.int32), counts), others.numpy()])
 
 
-def _cross(
-    points: NDArray[np.float64], faces: NDArray[np.int32], pairs: NDArray[np.int32]
-) -> NDArray[np.bool_]:
+def _cross(points: NDArray[np.float64], faces: NDArray[np.int32], pairs: NDArray[np.int32]) -> NDArray[np.bool_]:
     out = np.zeros(len(pairs), dtype=bool)
     first, second = faces[pairs[:, 0]], faces[pairs[:, 1]]
     same = first[:, :, None] == second[:, None, :]
@@ -162,14 +160,10 @@ def _heights(a: NDArray[np.float64], b: NDArray[np.float64], tolerance: float) -
     return np.where(np.abs(height) > tolerance, height, 0.0)
 
 
-def _inside(
-    start: NDArray[np.float64], end: NDArray[np.float64], face: NDArray[np.float64]
-) -> NDArray[np.bool_]:
+def _inside(start: NDArray[np.float64], end: NDArray[np.float64], face: NDArray[np.float64]) -> NDArray[np.bool_]:
     """Whether lines through start and end pass through faces, borders included: three volumes of one sign."""
     along = end - start
     corner = face - start[:, None]
-    turns = [
-        (along * np.cross(corner[:, i], corner[:, j])).sum(axis=1) for i, j in ((0, 1), (1, 2), (2, 0))
-    ]
+    turns = [(along * np.cross(corner[:, i], corner[:, j])).sum(axis=1) for i, j in ((0, 1), (1, 2), (2, 0))]
     low, high = np.minimum.reduce(turns), np.maximum.reduce(turns)
     return np.asarray((low >= 0.0) | (high <= 0.0))
