@@ -18,16 +18,14 @@ def tube(rings: int = 61, around: int = AROUND, radius: float = RADIUS, segment:
     circle = np.column_stack([np.cos(angle), np.sin(angle), np.zeros(around)])
     along = np.linspace(0.0, -2.0 * segment, rings)
     points = [radius * circle + [0.0, 0.0, z] for z in along]
-    k, following = np.arange(around), (np.arange(around) + 1) % around
+    k, after = np.arange(around), (np.arange(around) + 1) % around
     faces = [
-        np.concatenate(
-            [np.column_stack([a + k, b + k, b + following]), np.column_stack([a + k, b + following, a + following])]
-        )
+        np.concatenate([np.column_stack([a + k, b + k, b + after]), np.column_stack([a + k, b + after, a + after])])
         for a, b in zip(range(0, (rings - 1) * around, around), range(around, rings * around, around), strict=True)
     ]
     start, last = rings * around, (rings - 1) * around
-    caps = [np.column_stack([np.full(around, start), k, following])]
-    caps += [np.column_stack([np.full(around, start + 1), last + following, last + k])]
+    caps = [np.column_stack([np.full(around, start), k, after])]
+    caps += [np.column_stack([np.full(around, start + 1), last + after, last + k])]
     points += [np.array([[0.0, 0.0, along[0]], [0.0, 0.0, along[-1]]])]
     return weld_surface(np.concatenate(points), np.concatenate([*faces, *caps]))
 

@@ -56,13 +56,12 @@ def dual_quaternion_skinning(
         blended_dual += weight * dual[:, joint]
     length = np.linalg.norm(blended, axis=2, keepdims=True)
     blended, blended_dual = blended / length, blended_dual / length
-    turned = (
-        Rotation.from_quat(blended.reshape(-1, 4)).apply(np.tile(rest, (len(poses), 1))).reshape(*pivot.shape[:2], 3)
-    )
+    turned = Rotation.from_quat(blended.reshape(-1, 4)).apply(np.tile(rest, (len(poses), 1)))
     real_vector, real_scalar = blended[..., :3], blended[..., 3:]
     dual_vector, dual_scalar = blended_dual[..., :3], blended_dual[..., 3:]
     return np.asarray(
-        turned + 2.0 * (real_scalar * dual_vector - dual_scalar * real_vector + np.cross(real_vector, dual_vector))
+        turned.reshape(len(poses), -1, 3)
+        + 2.0 * (real_scalar * dual_vector - dual_scalar * real_vector + np.cross(real_vector, dual_vector))
     )
 
 

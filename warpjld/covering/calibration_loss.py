@@ -73,9 +73,9 @@ class DeformationLoss:
         across = (np.cross(b, c), np.cross(c, a), np.cross(a, b))
         error = np.einsum("tpi,tpi->p", a, across[0]) / (6.0 * self._volume) - 1.0
         scale = (self._weights.volume * 2.0 / (6.0 * poses * self._volume)) * error
-        slope = sum(
-            m.T @ (scale[:, None] * n).reshape(-1, 3 * poses) for m, n in zip(self._corners, across, strict=True)
-        )
+        slope = np.zeros_like(columns)
+        for corner, normal in zip(self._corners, across, strict=True):
+            slope += corner.T @ (scale[:, None] * normal).reshape(-1, 3 * poses)
         return self._weights.volume * float((error**2).mean()), slope
 
     def _stretch_term(self, columns: NDArray[np.float64], poses: int) -> tuple[float, NDArray[np.float64]]:

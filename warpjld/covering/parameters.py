@@ -70,8 +70,9 @@ def default_parameters(skeleton: Skeleton) -> Parameters:
     (R59), so its amplitudes follow that loss at the maximal flexion: a 20° metacarpal joint gets a twentieth of a
     knuckle. Growing with θ where the loss grows with θ², they gain a little on the way and end near zero.
 
-    Where a finger meets the palm both amplitudes are three times as large: the palm loses volume at that joint too, but
-    has no internal inflation to make up for it (R50). A joint that cannot bend leaves its segment's muscle to the other.
+    Where a finger meets the palm both amplitudes are three times as large: the palm loses volume at that joint too,
+    but has no internal inflation to make up for it (R50). A joint that cannot bend leaves its segment's muscle to the
+    joint at the other end.
     """
     count = len(skeleton)
     largest = np.minimum(skeleton.limits[:, CHANNELS.index("flexion"), 1], _WIDEST)

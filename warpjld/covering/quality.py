@@ -150,7 +150,7 @@ def _normals(points: ArrayLike, faces: NDArray[np.int32]) -> NDArray[np.float64]
 
 def _carry(vectors: NDArray[np.float64], rotations: NDArray[np.float64], corners: NDArray) -> NDArray[np.float64]:
     """Vectors at rest (N, 3) turned by the mean rotation of their corners (N, k), shape (..., N, 3)."""
-    turn = sum(rotations[..., corners[:, k], :] for k in range(corners.shape[1]))
+    turn = rotations[..., corners, :].sum(axis=-2)
     shape = (*turn.shape[:-1], 3)
     flat = Rotation.from_quat(turn.reshape(-1, 4)).apply(np.broadcast_to(vectors, shape).reshape(-1, 3).copy())
     return np.asarray(flat.reshape(shape))
