@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -50,6 +50,12 @@ class Surface:
     def to_source(self, vertices: NDArray[np.float32]) -> NDArray[np.float32]:
         """Welded positions (…, V, 3) in the source's vertex order (…, W, 3)."""
         return vertices[..., self.weld, :]
+
+    def renumbered(self, order: NDArray[np.int32]) -> Surface:
+        """The same surface with vertex ``order[i]`` as its i-th; the source's order does not change."""
+        place = np.empty(len(order), dtype=np.int32)
+        place[order] = np.arange(len(order), dtype=np.int32)
+        return replace(self, vertices=self.vertices[order], faces=place[self.faces], weld=place[self.weld])
 
 
 def weld_surface(

@@ -25,7 +25,7 @@ STATIONS = 5
 # |cosine| below which a vertex is partly external and partly internal: sections near a joint stand upright outside and
 # lean inside, and a wider band shears the sides less
 _SIDE_BAND = 0.75
-_FLOOR = 2e-3  # weight below which an operator is dropped, faded so that nothing jumps
+_FLOOR = 2e-2  # weight below which an operator is dropped, faded so that nothing jumps
 
 
 @dataclass(frozen=True, eq=False)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
 from functools import cached_property
@@ -68,7 +69,7 @@ class Covering:
         """The packed operators."""
         import warp as wp
         from warpjld_kernels.anchored import pack_coefficients
-        from warpjld_kernels.covering_tiles import LANES
+        from warpjld_kernels.covering_runs import CPU_LANES
 
         device = checked_device("cpu")
         shape = self.anchors.weight.shape
@@ -81,18 +82,31 @@ class Covering:
         model = [anchors_on(device, self.anchors, self.skeleton.rest), parameters_on(device, self.parameters)]
         wp.launch(pack_coefficients, dim=shape[0], inputs=model, outputs=out, device=device)
         offset, rotation, rounding, muscle = (a.numpy() for a in out)
-        return pack_runs(self.anchors, offset, rotation, rounding, muscle, len(self.skeleton), LANES)
+        return pack_runs(self.anchors, offset, rotation, rounding, muscle, len(self.skeleton), CPU_LANES)
+
+    @cached_property
+    def run_surface(self) -> Surface:
+        """The rest surface with its vertices in the order of the runs: what ``order="runs"`` gives back."""
+        return self.surface.renumbered(self.runs.order[: len(self.surface.vertices)])
 
     def deform(
-        self, poses: Poses, *, device: str = "cpu", threads: int | None = None, out: NDArray[np.float32] | None = None
+        self,
+        poses: Poses,
+        *,
+        device: str = "cpu",
+        threads: int | None = None,
+        out: NDArray[np.float32] | None = None,
+        order: Literal["surface", "runs"] = "surface",
     ) -> NDArray[np.float32]:
         """Final positions of all vertices [m], shape (F, V, 3).
 
         Args:
             poses: F poses of the skeleton.
             device: Warp device.
-            threads: CPU threads to split the frames over; by default two where the batch is worth it.
+            threads: CPU threads to split the frames over; by default all cores where the batch is worth it.
             out: Array to fill instead of a new one: a fresh one costs more than the deformation.
+            order: "surface" numbers vertices as ``surface`` does; "runs" as ``run_surface`` does, which is quicker
+                since nothing is scattered.
 
         Raises:
             InputError: Poses of another skeleton, not finite poses, an unknown device, or ``out`` of a wrong shape.
@@ -108,16 +122,22 @@ class Covering:
             raise InputError(f"out: want contiguous float32 of shape {shape}, got {out.dtype} {out.shape}")
         if where.is_cpu:
             if threads is None:
-                threads = 2 if shape[0] * shape[1] > 2 * _SPLIT_BELOW else 1
-            self._launch(rows, wp.array(out, dtype=wp.vec3, device=where, copy=False), where, threads)
+                threads = min(os.cpu_count() or 1, max(1, shape[0] * shape[1] // _SPLIT_BELOW))
+            self._launch(rows, wp.array(out, dtype=wp.vec3, device=where, copy=False), where, threads, order)
         else:
             points = wp.empty(shape[:2], dtype=wp.vec3, device=where)
-            self._launch(rows, points, where, 1)
+            self._launch(rows, points, where, 1, order)
             out[...] = points.numpy()
         return out
 
     def blocks(
-        self, poses: Poses, *, frames: int = 16, device: str = "cpu", threads: int | None = None
+        self,
+        poses: Poses,
+        *,
+        frames: int = 16,
+        device: str = "cpu",
+        threads: int | None = None,
+        order: Literal["surface", "runs"] = "surface",
     ) -> Iterator[tuple[int, NDArray[np.float32]]]:
         """Deform a sequence block by block: first frame and vertices (n, V, 3) of each.
 
@@ -126,7 +146,7 @@ class Covering:
         buffer = np.empty((min(frames, len(poses)), len(self.surface.vertices), 3), dtype=np.float32)
         for start in range(0, len(poses), frames):
             some = poses[start : start + frames]
-            yield start, self.deform(some, device=device, threads=threads, out=buffer[: len(some)])
+            yield start, self.deform(some, device=device, threads=threads, out=buffer[: len(some)], order=order)
 
     def points(
         self, poses: Poses, vertices: NDArray[np.int32] | list[int], *, device: str = "cpu"
@@ -162,25 +182,27 @@ class Covering:
             frame, joint = np.argwhere(~finite)[0]
             raise InputError(f"poses: joint '{self.skeleton.names[joint]}' is not finite at frame {frame}")
 
-    def _launch(self, rows: NDArray[np.float32], points: Any, device: Any, threads: int) -> None:
+    def _launch(self, rows: NDArray[np.float32], points: Any, device: Any, threads: int, order: str) -> None:
         import warp as wp
-        from warpjld_kernels.covering_tiles import LANES, deform_runs
+        from warpjld_kernels.covering_runs import CPU_FRAMES, deform_runs
 
-        model = self._on(device, "runs", self._packed)
+        *model, targets = self._on(device, "runs", self._packed)
+        # a surface smaller than one tile has stand-ins at its end, which only scattering puts in their place
+        scatter = order == "surface" or len(self.runs.order) > len(self.surface.vertices)
         pose = wp.array(rows, dtype=float, device=device, copy=False)
+        together = CPU_FRAMES if device.is_cpu else 1
 
         def span(begin: int, end: int) -> None:
-            wp.launch_tiled(
+            wp.launch(
                 deform_runs,
-                dim=(end - begin, len(self.runs.tiles)),
-                inputs=[*model, pose[begin:end]],
+                dim=(-(-(end - begin) // together), len(model[0]), together),
+                inputs=[*model, targets, scatter, pose[begin:end], together],
                 outputs=[points[begin:end]],
-                block_dim=LANES,
                 device=device,
             )
 
-        cuts = np.linspace(0, len(rows), min(threads, max(len(rows), 1)) + 1).astype(int)
-        if len(cuts) == 2:
+        cuts = np.unique(np.linspace(0, len(rows), threads + 1).astype(int))
+        if len(cuts) <= 2:
             span(0, len(rows))
             return
         wp.load_module(deform_runs.module, device=device)  # compiling is not safe from several threads
@@ -198,7 +220,8 @@ class Covering:
         import warp as wp
 
         r = self.runs
-        kinds = ((r.tiles, wp.int32), (r.runs, wp.int32), (r.slots, wp.int32), (r.coefficients, float))
+        tiles = r.tiles if device.is_cpu else r.lanes()
+        kinds = ((tiles, wp.int32), (r.runs, wp.int32), (r.slots, wp.int32), (r.coefficients, float))
         return [wp.array(a, dtype=k, device=device) for a, k in (*kinds, (r.order, wp.int32))]
 
     def _anchored(self, device: Any) -> list[Any]:

@@ -27,7 +27,7 @@ def domains_from_geometry(
     skeleton: Skeleton,
     groups: tuple[Fan, ...],
     *,
-    contrast: float = 1.0,
+    contrast: float = 2.0,
 ) -> NDArray[np.float64]:
     """Weight of every fan at every vertex, rows summing to one, shape (V, fans).
 

@@ -1,13 +1,16 @@
-"""Packing anchors into runs: vertices sorted by the joints and rotations they use, so that tiles need no gathers."""
+"""Packing anchors into runs: vertices sorted by the joints and rotations they use, so that lanes need no gathers."""
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
+import scipy.sparse as sp
 from numpy.typing import NDArray
 
-from warpjld.covering.binding import OPERATORS, STATIONS, Anchors
+from warpjld.covering.binding import STATIONS, Anchors
 from warpjld.covering.drivers import Drivers
 from warpjld.covering.parameters import Parameters
 
@@ -49,7 +52,7 @@ class Columns:
 
 @dataclass(frozen=True, eq=False)
 class Runs:
-    """Arguments of ``warpjld_kernels.covering_tiles.deform_runs`` that do not depend on the pose."""
+    """Arguments of ``warpjld_kernels.covering_runs.deform_runs`` that do not depend on the pose."""
 
     columns: Columns
     tiles: NDArray[np.int32]
@@ -57,6 +60,13 @@ class Runs:
     slots: NDArray[np.int32]
     coefficients: NDArray[np.float32]
     order: NDArray[np.int32]
+
+    def lanes(self) -> NDArray[np.int32]:
+        """Tiles of a single vertex, for devices whose threads take one each."""
+        length = self.runs[:, 1]
+        run = np.repeat(np.arange(len(length)), length)
+        lane = np.arange(length.sum()) - np.repeat(np.cumsum(length) - length, length)
+        return np.column_stack([run, lane]).astype(np.int32)
 
 
 def palette(columns: Columns, anchors: Anchors, parameters: Parameters, drivers: Drivers) -> NDArray[np.float32]:
@@ -97,21 +107,26 @@ def pack_runs(
         lanes: Vertices in a tile.
     """
     columns = Columns(joints, len(anchors.ends), len(anchors.pairs))
-    members, segment_sets, pair_sets = _group(anchors, lanes)
+    scalar = _scalar_coefficients(anchors, columns, rotation, rounding)
+    swelling = [_muscle_coefficients(anchors, columns, muscle[..., axis]) for axis in range(3)]
+    members, masks = _group(scalar + abs(swelling[0]) + abs(swelling[1]) + abs(swelling[2]), columns, lanes)
+    starts = (0, columns.halfway, columns.flexion_ratio, columns.muscles, columns.width)
     tiles, runs, slots, coefficients = [], [], [], []
     first_lane = first_coefficient = first_slot = 0
-    for r, vertices in enumerate(members):
-        rows, run_slots, counts = _fill(
-            anchors, columns, vertices, segment_sets[r], pair_sets[r], offset, rotation, rounding, muscle
-        )
-        length = len(vertices)
-        runs.append((first_lane, length, first_coefficient, first_slot, *counts))
-        tiles += [(r, min(lane, length - lanes)) for lane in range(0, length, lanes)]
-        slots += run_slots
-        coefficients.append(rows.ravel())
-        first_lane += length
-        first_coefficient += rows.size
-        first_slot += len(run_slots)
+    for r, (vertices, mask) in enumerate(zip(members, masks, strict=True)):
+        kinds = [[c for c in mask if low <= c < high] for low, high in pairwise(starts)]
+        plain = [c for kind in kinds[:3] for c in kind]
+        rows = [scalar[vertices][:, plain].toarray().T, offset[vertices].T]
+        swell = np.stack([m[vertices][:, kinds[3]].toarray().T for m in swelling], axis=1)
+        rows.append(swell.reshape(-1, len(vertices)))
+        block = np.concatenate(rows)
+        runs.append((first_lane, len(vertices), first_coefficient, first_slot, *(len(kind) for kind in kinds)))
+        tiles += [(r, min(lane, len(vertices) - lanes)) for lane in range(0, len(vertices), lanes)]
+        slots += plain + kinds[3]
+        coefficients.append(block.ravel())
+        first_lane += len(vertices)
+        first_coefficient += block.size
+        first_slot += len(mask)
     return Runs(
         columns,
         np.array(tiles, dtype=np.int32),
@@ -122,99 +137,75 @@ def pack_runs(
     )
 
 
-def _group(anchors: Anchors, lanes: int) -> tuple[list[NDArray[np.int64]], list[frozenset[int]], list[frozenset[int]]]:
-    """Vertices by the set of segments and palm pairs they use; sets with too few vertices join a similar one."""
-    used = np.where(anchors.weight > 0.0, anchors.segment, -1)
-    between = np.where(anchors.between > 0.0, anchors.pair, -1)
-    key = np.concatenate([np.sort(used, axis=1), np.sort(between, axis=1)], axis=1)
-    distinct, member = np.unique(key, axis=0, return_inverse=True)
-    by_group = np.split(np.argsort(member, kind="stable"), np.cumsum(np.bincount(member))[:-1])
-    groups = [
-        (frozenset(row[:OPERATORS]) - {-1}, frozenset(row[OPERATORS:]) - {-1}, [vertices])
-        for row, vertices in zip(distinct.tolist(), by_group, strict=True)
+def _scalar_coefficients(
+    anchors: Anchors, columns: Columns, rotation: NDArray[np.float32], rounding: NDArray[np.float32]
+) -> sp.csr_array:
+    """Coefficients of joints, rotations and scales by palette column, shape (V, columns.width)."""
+    proximal, distal = anchors.ends[anchors.segment, 0], anchors.ends[anchors.segment, 1]
+    entries: list[tuple[NDArray, NDArray]] = [
+        (3 * proximal, anchors.weight * (1.0 - anchors.ratio)),
+        (3 * distal, anchors.weight * anchors.ratio),
+        (columns.halfway + 4 * proximal, rotation[..., 0]),
+        (columns.rotations + 4 * proximal, rotation[..., 1]),
+        (columns.halfway + 4 * distal, rotation[..., 2]),
+        (columns.flexion_ratio + proximal, rounding[..., 0]),
+        (columns.flexion_ratio + distal, rounding[..., 1]),
     ]
-    sizes = [len(g[2][0]) for g in groups]
-    while len(groups) > 1 and min(sizes) < lanes:
+    if columns.pairs:
+        low = np.minimum(anchors.station.astype(int), STATIONS - 2)
+        part = anchors.station - low
+        first = columns.palm + STATIONS * anchors.pair + low
+        entries += [(first, anchors.between * (1.0 - part)), (first + 1, anchors.between * part)]
+    return _sparse(entries, len(anchors), columns.width)
+
+
+def _muscle_coefficients(anchors: Anchors, columns: Columns, muscle: NDArray[np.float32]) -> sp.csr_array:
+    return _sparse([(columns.muscles + anchors.segment, muscle)], len(anchors), columns.width)
+
+
+def _sparse(entries: list[tuple[NDArray, NDArray]], rows: int, width: int) -> sp.csr_array:
+    row = np.concatenate([np.repeat(np.arange(rows), c.shape[1]) for c, _ in entries])
+    column = np.concatenate([c.ravel() for c, _ in entries])
+    value = np.concatenate([v.ravel() for _, v in entries]).astype(np.float64)
+    kept = value != 0.0
+    out = sp.coo_array((value[kept], (row[kept], column[kept])), shape=(rows, width)).tocsr()
+    out.sum_duplicates()
+    return out
+
+
+def _group(used: sp.csr_array, columns: Columns, lanes: int) -> tuple[list[NDArray[np.int64]], list[list[int]]]:
+    """Vertices by the palette columns they use; groups smaller than a tile join the one where that costs least."""
+    signature = np.random.default_rng(0).integers(1, 2**62, used.shape[1])
+    pattern = sp.csr_array((np.ones(used.nnz, dtype=np.int64), used.indices, used.indptr), shape=used.shape)
+    _, first, member = np.unique(pattern @ signature, return_index=True, return_inverse=True)
+    members = np.split(np.argsort(member, kind="stable"), np.cumsum(np.bincount(member))[:-1])
+    masks = [sum(1 << int(c) for c in used.indices[used.indptr[v] : used.indptr[v + 1]]) for v in first]
+    sizes = [len(m) for m in members]
+    cost = _column_cost(columns)
+    while len(masks) > 1 and min(sizes) < lanes:
         small = sizes.index(min(sizes))
-        segments, pairs, vertices = groups.pop(small)
-        size = sizes.pop(small)
-        grown = [
-            (len(segments | g[0]) - len(g[0])) * n + (len(segments | g[0]) - len(segments)) * size
-            for g, n in zip(groups, sizes, strict=True)
-        ]
-        near = grown.index(min(grown))
-        groups[near] = (groups[near][0] | segments, groups[near][1] | pairs, groups[near][2] + vertices)
+        mask, vertices, size = masks.pop(small), members.pop(small), sizes.pop(small)
+        added = [n * cost(mask & ~m) + size * cost(m & ~mask) for m, n in zip(masks, sizes, strict=True)]
+        near = added.index(min(added))
+        masks[near] |= mask
+        members[near] = np.concatenate([members[near], vertices])
         sizes[near] += size
-    members = [np.concatenate(g[2]) for g in groups]
-    if sizes[0] < lanes:  # a surface smaller than one tile: the last vertex stands in for the missing ones
+    if sizes[0] < lanes:  # a surface smaller than one tile: its last vertex stands in for the missing ones
         members[0] = np.concatenate([members[0], np.repeat(members[0][-1:], lanes - sizes[0])])
-    return members, [g[0] for g in groups], [g[1] for g in groups]
+    return members, [[c for c in range(m.bit_length()) if m >> c & 1] for m in masks]
 
 
-def _fill(
-    anchors: Anchors,
-    columns: Columns,
-    vertices: NDArray[np.int64],
-    segments: frozenset[int],
-    pairs: frozenset[int],
-    offset: NDArray[np.float32],
-    rotation: NDArray[np.float32],
-    rounding: NDArray[np.float32],
-    muscle: NDArray[np.float32],
-) -> tuple[NDArray[np.float64], list[int], tuple[int, int, int, int]]:
-    """Coefficient rows of one run, the palette columns they multiply, and how many there are of each kind."""
-    lanes = np.arange(len(vertices))
-    joint, turn, scale, swell = (_Rows(len(vertices)) for _ in range(4))
-    for k in range(OPERATORS):
-        for s in segments:
-            here = lanes[(anchors.segment[vertices, k] == s) & (anchors.weight[vertices, k] > 0.0)]
-            if not here.size:
-                continue
-            v = vertices[here]
-            p, d = (int(j) for j in anchors.ends[s])
-            weight, ratio = anchors.weight[v, k], anchors.ratio[v, k]
-            joint.add(3 * p, here, weight * (1.0 - ratio))
-            joint.add(3 * d, here, weight * ratio)
-            for column, c in (
-                (columns.halfway + 4 * p, 0),
-                (columns.rotations + 4 * p, 1),
-                (columns.halfway + 4 * d, 2),
-            ):
-                turn.add(column, here, rotation[v, k, c])
-            for j, end in ((p, 0), (d, 1)):
-                scale.add(columns.flexion_ratio + j, here, rounding[v, k, end])
-            swell.add(columns.muscles + s, here, muscle[v, k])
-    for k in range(2):
-        for n in pairs:
-            here = lanes[(anchors.pair[vertices, k] == n) & (anchors.between[vertices, k] > 0.0)]
-            v = vertices[here]
-            low = np.minimum(anchors.station[v, k].astype(int), STATIONS - 2)
-            part = anchors.station[v, k] - low
-            for station in range(STATIONS):
-                amount = np.where(low == station, 1.0 - part, 0.0) + np.where(low + 1 == station, part, 0.0)
-                scale.add(columns.palm + STATIONS * n + station, here, anchors.between[v, k] * amount)
-    kinds = [joint, turn, scale, swell]
-    rows = [r for kind in kinds[:3] for r in kind.rows()]
-    rows += list(offset[vertices].T.astype(np.float64))
-    rows += [r for block in swell.rows() for r in block.T]
-    counts = tuple(len(kind.columns()) for kind in kinds)
-    return np.array(rows), [c for kind in kinds for c in kind.columns()], counts  # type: ignore[return-value]
+def _column_cost(columns: Columns) -> Callable[[int], int]:
+    """Multiply-adds a vertex spends on a set of palette columns."""
+    joints, turns = (1 << columns.halfway) - 1, (1 << columns.flexion_ratio) - (1 << columns.halfway)
+    scales = (1 << columns.muscles) - (1 << columns.flexion_ratio)
 
+    def cost(mask: int) -> int:
+        return (
+            3 * (mask & joints).bit_count()
+            + 4 * (mask & turns).bit_count()
+            + (mask & scales).bit_count()
+            + 3 * (mask >> columns.muscles).bit_count()
+        )
 
-class _Rows:
-    """Rows of coefficients by palette column; a row that stays zero is dropped."""
-
-    def __init__(self, lanes: int) -> None:
-        self._lanes = lanes
-        self._rows: dict[int, NDArray[np.float64]] = {}
-
-    def add(self, column: int, lanes: NDArray[np.int64], values: NDArray) -> None:
-        if values.any():
-            row = self._rows.setdefault(column, np.zeros((self._lanes, *values.shape[1:])))
-            row[lanes] += values
-
-    def columns(self) -> list[int]:
-        return sorted(self._rows)
-
-    def rows(self) -> list[NDArray[np.float64]]:
-        return [self._rows[c] for c in self.columns()]
+    return cost

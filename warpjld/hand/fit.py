@@ -14,7 +14,7 @@ __all__ = ["fit_plan", "measure"]
 
 Array = NDArray[np.float64]
 
-_ROUNDS = 4
+_ROUNDS = 3
 _HEADS = 0.42  # distal place of the breadth, across the heads of the metacarpals, in hand lengths
 
 
@@ -33,11 +33,11 @@ def measure(flesh: Flesh, length: float) -> tuple[float, float]:
     plan = flesh.plan
     tip = plan.digits["middle"].joints[3]
     reach = 6.0 * float(plan.stretch[0])
-    grid = np.stack(np.meshgrid(*[np.linspace(-reach, reach, 25)] * 2, indexing="ij"), axis=-1).reshape(-1, 2)
+    grid = np.stack(np.meshgrid(*[np.linspace(-reach, reach, 17)] * 2, indexing="ij"), axis=-1).reshape(-1, 2)
     inside = np.column_stack([tip[0] + grid[:, 0], tip[1] + grid[:, 1], np.full(len(grid), tip[2])])
     inside = inside[flesh(inside) < 0.0]
     far = _cross(flesh, inside, np.array([0.0, 0.0, -1.0]), 30.0 * float(plan.stretch[2]))
-    heights = np.linspace(-14.0, 12.0, 53) * float(plan.stretch[1])
+    heights = np.linspace(-14.0, 12.0, 27) * float(plan.stretch[1])
     middle = np.column_stack([np.zeros((len(heights), 1)), heights, np.full(len(heights), -_HEADS * length)])
     middle = middle[flesh(middle) < 0.0]
     out = 60.0 * float(plan.stretch[0])
@@ -48,15 +48,13 @@ def measure(flesh: Flesh, length: float) -> tuple[float, float]:
 
 def _cross(flesh: Flesh, start: Array, direction: Array, reach: float) -> Array:
     """Distance from points inside along a direction to the first crossing of the surface, shape (n,)."""
-    low, high = np.zeros(len(start)), np.full(len(start), np.nan)
-    for t in np.arange(1.0, reach, 1.0):  # coarse march: the first outside sample bounds the crossing
-        outside = flesh(start + t * direction) > 0.0
-        high = np.where(np.isnan(high) & outside, t, high)
-        low = np.where(np.isnan(high), t, low)
-        if not np.isnan(high).any():
-            break
-    high = np.where(np.isnan(high), reach, high)
-    for _ in range(24):
+    steps = np.arange(1.0, reach, 1.5)
+    marched = start[:, None, :] + steps[:, None] * direction
+    outside = flesh(marched.reshape(-1, 3)).reshape(len(start), len(steps)) > 0.0
+    first = np.where(outside.any(axis=1), outside.argmax(axis=1), len(steps) - 1)
+    high = steps[first]
+    low = np.where(first > 0, steps[first - 1], 0.0)
+    for _ in range(20):
         middle = 0.5 * (low + high)
         outside = flesh(start + middle[:, None] * direction) > 0.0
         low, high = np.where(outside, low, middle), np.where(outside, middle, high)

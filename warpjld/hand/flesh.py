@@ -14,6 +14,7 @@ __all__ = ["Flesh"]
 
 Array = NDArray[np.float64]
 
+_BLOCK = 16_384
 _BETWEEN_FINGERS = 1.6  # blending radii [mm of the design hand]
 _FINGER_ROOT = 9.0
 _THUMB_ROOT = 16.0
@@ -21,21 +22,31 @@ _THUMB_ROOT = 16.0
 
 @dataclass(frozen=True, eq=False)
 class Flesh:
-    """Signed distance [mm], exact to first order at the surface, of a planned hand."""
+    """Signed distance [mm], exact to first order at the surface, of a planned hand.
+
+    Attributes:
+        plan: Where everything lies.
+        detail: 0…1, how much of the details that only fine triangles can show (nails).
+    """
 
     plan: Plan
+    detail: float = 0.0
 
     def __call__(self, points: Array) -> Array:
         """Signed distance of points (n, 3) [mm], negative inside, shape (n,)."""
+        if len(points) > _BLOCK:  # blocks whose intermediate arrays stay in the cache
+            parts = [self(points[i : i + _BLOCK]) for i in range(0, len(points), _BLOCK)]
+            return np.concatenate(parts)
         scale = float(self.plan.stretch[0])
         fingers = None
         for name in ("pinky", "ring", "middle", "index"):
-            one = self.plan.digits[name].flesh(points)
+            one = self.plan.digits[name].flesh(points, self.detail)
             fingers = one if fingers is None else _join(fingers, one, _BETWEEN_FINGERS * scale)
         assert fingers is not None
         hand = _join(Palm(self.plan.stretch)(points), fingers, _FINGER_ROOT * scale)
-        for part in (self.plan.digits["thumb"].flesh, *self.plan.thenar):
-            hand = _join(hand, part(points), _THUMB_ROOT * scale)
+        thumb = self.plan.digits["thumb"].flesh(points, self.detail)
+        for part in (thumb, *(muscle(points) for muscle in self.plan.thenar)):
+            hand = _join(hand, part, _THUMB_ROOT * scale)
         return hand
 
     def slope(self, points: Array) -> tuple[Array, Array]:

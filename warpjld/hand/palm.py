@@ -17,30 +17,38 @@ Array = NDArray[np.float64]
 # distal place: radial edge, ulnar edge, dorsal face, palmar face, squareness [mm of the design hand]
 _OUTLINE = np.array(
     [
-        (-56, 30.0, -29.5, 19.0, -18.5, 0.10),
-        (-40, 29.5, -29.0, 18.7, -18.2, 0.12),
-        (-20, 28.5, -28.0, 18.0, -17.0, 0.18),
-        (-5, 28.0, -28.0, 17.0, -16.0, 0.25),
-        (10, 28.5, -31.5, 16.0, -15.5, 0.35),
-        (25, 30.0, -37.5, 15.0, -14.0, 0.45),
-        (45, 33.5, -43.0, 13.5, -12.0, 0.50),
-        (65, 37.0, -45.5, 12.0, -11.5, 0.50),
-        (80, 38.0, -46.0, 10.0, -12.5, 0.50),
-        (92, 37.5, -45.5, 6.0, -12.5, 0.50),
-        (108, 36.0, -44.0, -1.5, -11.5, 0.50),
-        (125, 34.0, -42.0, -6.0, -10.0, 0.50),
+        (-56, 30.5, -30.0, 19.0, -18.5, 0.10),
+        (-40, 30.0, -29.5, 18.7, -18.0, 0.12),
+        (-20, 28.8, -28.5, 17.8, -16.5, 0.18),
+        (-5, 28.0, -28.0, 16.5, -15.0, 0.25),
+        (10, 28.5, -32.5, 15.8, -14.5, 0.35),
+        (25, 30.0, -39.0, 15.0, -14.0, 0.45),
+        (45, 33.5, -44.0, 13.5, -12.0, 0.50),
+        (65, 36.8, -45.5, 12.0, -11.5, 0.50),
+        (80, 37.6, -44.5, 10.2, -12.5, 0.50),
+        (92, 35.5, -41.5, 6.0, -12.5, 0.50),
+        (108, 33.0, -38.5, -1.5, -11.5, 0.50),
+        (125, 31.0, -36.0, -6.0, -10.0, 0.50),
     ]
 )
 # where the webs end, by radial place
-_WEBS = np.array([(-60, 82.0), (-44, 87.0), (-27, 97.0), (-7, 106.5), (15, 108.0), (36, 105.0), (50, 100.0)])
-_CAP = 18.0  # length over which the slab closes towards the webs
+_WEBS = np.array([(-60, 82.0), (-44, 86.0), (-27, 96.0), (-7, 106.0), (15, 107.5), (36, 103.0), (50, 98.0)])
+_CAP = 19.0  # length over which the slab closes towards the webs
 _STUB = (-52.0, -42.0)  # end of the forearm, and where its rounding begins
-# lumps of the palmar face: radial and distal place, their spreads, height
+# lumps of the palmar and of the dorsal face: radial and distal place, their spreads, height
 _PADS = (
-    (-27.0, 24.0, 11.0, 19.0, -7.0),  # hypothenar
-    (17.0, 22.0, 12.0, 16.0, -5.0),  # thenar
-    (-4.0, 58.0, 17.0, 18.0, 2.0),  # hollow
+    (-26.0, 16.0, 12.0, 13.0, -5.0),  # hypothenar: heel
+    (-29.0, 38.0, 11.0, 19.0, -4.5),  # and edge of the hand
+    (14.0, 19.0, 13.0, 14.0, -6.5),  # thenar
+    (-5.0, 60.0, 17.0, 19.0, 3.0),  # hollow
 )
+_BONES = (
+    (-19.0, -12.0, 8.0, 9.0, 2.2),  # head of the ulna
+    (3.0, 56.0, 5.0, 26.0, 0.9),  # extensor tendons
+    (19.0, 56.0, 5.0, 24.0, 0.6),
+    (-13.0, 52.0, 5.0, 24.0, 0.6),
+)
+_ARCH = (0.006, 0.0045)  # curvature to the radial and to the ulnar side
 
 
 @dataclass(frozen=True, eq=False)
@@ -59,6 +67,13 @@ class Palm:
         radial, ulnar, top, bottom, square = ((1.0 - part) * _TABLE[row] + part * _TABLE[row + 1]).T
         for px, pd, sx, sd, height in _PADS:
             bottom = bottom + height * np.exp(-0.5 * (((x - px) / sx) ** 2 + ((d - pd) / sd) ** 2))
+        for px, pd, sx, sd, height in _BONES:
+            top = top + height * np.exp(-0.5 * (((x - px) / sx) ** 2 + ((d - pd) / sd) ** 2))
+        # the knuckles lie on an arch: the dorsal face falls to both sides, more to the ulnar one
+        top = top - np.clip(d / 60.0, 0.0, 1.0) * (
+            _ARCH[0] * np.clip(x - 18.0, 0.0, 20.0) ** 2 + _ARCH[1] * np.clip(-8.0 - x, 0.0, 38.0) ** 2
+        )
+        top = np.maximum(top, bottom + 8.0)
         web = _WEB_LINE(np.clip(x, -60.0, 50.0))
         beyond = np.maximum(d - (web - _CAP), 0.0) / _CAP + np.maximum(_STUB[1] - d, 0.0) / (_STUB[1] - _STUB[0])
         across, along = self.stretch[0], self.stretch[2]

@@ -39,51 +39,53 @@ class _Finger:
 
 
 _FINGERS = {
-    "index": _Finger((25.0, 0.0, 85.0), (43.0, 25.5, 24.0), 9.4, 6.0, 6.0),
-    "middle": _Finger((3.5, 1.5, 87.0), (46.5, 30.0, 26.5), 9.5, 0.5, 0.0),
-    "ring": _Finger((-17.0, 0.0, 80.5), (43.5, 28.5, 25.0), 8.9, -5.5, -6.0),
-    "pinky": _Finger((-35.0, -3.5, 71.5), (34.0, 20.5, 21.5), 7.8, -13.0, -13.0),
+    "index": _Finger((26.3, 0.0, 85.0), (43.0, 25.5, 24.0), 9.4, 6.0, 6.0),
+    "middle": _Finger((4.0, 1.5, 87.0), (46.5, 30.0, 26.5), 9.5, 0.5, 0.0),
+    "ring": _Finger((-17.3, 0.0, 80.5), (43.5, 28.5, 25.0), 8.9, -5.5, -6.0),
+    "pinky": _Finger((-36.3, -3.5, 71.5), (34.0, 20.5, 21.5), 7.8, -13.0, -13.0),
 }
 _CURL = (5.0, 8.0, 5.0)  # degrees of flexion at base, knuckle 2, knuckle 3
 
 # axial place as (joint it counts from, fraction of the segment that follows): half-width, dorsal, palmar half-height,
 # in units of the half-width at knuckle 2
 _FINGER_PROFILE = (
-    (-1, 0.0, 0.80, 0.72, 0.80),
-    (0, 0.0, 1.02, 0.98, 1.05),
-    (0, 0.30, 1.06, 0.93, 1.08),
-    (0, 0.65, 0.98, 0.86, 1.00),
-    (1, 0.0, 1.00, 0.90, 0.90),
-    (1, 0.5, 0.91, 0.79, 0.90),
-    (2, 0.0, 0.88, 0.73, 0.80),
-    (2, 0.35, 0.87, 0.64, 0.84),
-    (2, 0.7, 0.82, 0.54, 0.80),
-    (2, 1.0, 0.72, 0.46, 0.66),
+    (-1, 0.0, 0.78, 0.70, 0.80),
+    (0, 0.0, 1.02, 1.02, 1.04),
+    (0, 0.28, 1.05, 0.92, 1.10),
+    (0, 0.62, 0.95, 0.83, 1.04),
+    (1, 0.0, 1.00, 0.92, 0.88),
+    (1, 0.5, 0.89, 0.77, 0.92),
+    (2, 0.0, 0.89, 0.74, 0.78),
+    (2, 0.35, 0.87, 0.62, 0.86),
+    (2, 0.7, 0.82, 0.53, 0.80),
+    (2, 1.0, 0.72, 0.46, 0.62),
 )
 
 _THUMB_BASE = (22.0, -8.0, 22.0)
-_THUMB_LENGTHS = (43.0, 32.0, 28.0)
-_THUMB_HALF_WIDTH = 10.6  # at knuckle 3
-_THUMB_ABDUCTION = (42.0, 42.0, 44.0)  # of the three segments, from the hand's axis, in the dorsal view
-_THUMB_DEPTH = (24.0, 18.0, 14.0)  # towards the palm
+_THUMB_LENGTHS = (43.0, 32.0, 27.5)
+_THUMB_HALF_WIDTH = 10.4  # at knuckle 3
+_THUMB_ABDUCTION = (42.0, 43.0, 49.0)  # of the three segments, from the hand's axis, in the dorsal view
+_THUMB_DEPTH = (25.0, 18.0, 12.0)  # towards the palm
 _THUMB_ROLL = 65.0
 _THUMB_PROFILE = (
-    (-1, 0.0, 0.9, 0.9, 0.9),
-    (0, 0.0, 1.20, 1.10, 1.25),
-    (0, 0.5, 1.25, 1.08, 1.35),
-    (1, 0.0, 1.12, 1.02, 1.10),
-    (1, 0.5, 0.96, 0.87, 0.95),
-    (2, 0.0, 1.00, 0.86, 0.88),
-    (2, 0.35, 1.00, 0.74, 0.90),
-    (2, 0.7, 0.94, 0.60, 0.84),
-    (2, 1.0, 0.80, 0.48, 0.64),
+    (-1, 0.0, 1.00, 0.90, 0.90),
+    (0, 0.0, 1.20, 1.05, 1.25),
+    (0, 0.5, 1.22, 1.05, 1.35),
+    (1, 0.0, 1.16, 1.14, 1.14),
+    (1, 0.5, 0.96, 0.84, 1.00),
+    (2, 0.0, 1.00, 0.90, 0.88),
+    (2, 0.38, 1.04, 0.72, 0.92),
+    (2, 0.7, 0.98, 0.58, 0.86),
+    (2, 1.0, 0.84, 0.46, 0.64),
 )
 
 # flesh beside the bones, from one place to another: axial fraction, half-width, outer and inner half-height
 _THENAR = ((10.0, -9.0, 8.0), (48.0, -24.0, 54.0))
 _THENAR_PROFILE = ((0.0, 9.0, 8.0, 8.0), (0.35, 14.0, 12.5, 10.0), (0.7, 13.0, 11.0, 10.0), (1.0, 9.0, 8.0, 8.0))
-_WEB = ((24.0, -2.0, 62.0), (46.0, -20.0, 48.0))
-_WEB_PROFILE = ((0.0, 14.0, 6.0, 6.0), (0.5, 12.0, 6.0, 6.0), (1.0, 14.0, 8.0, 8.0))
+_BACK = ((17.0, -1.0, 24.0), (33.0, -6.0, 66.0))  # first dorsal interosseous
+_BACK_PROFILE = ((0.0, 9.0, 8.0, 9.0), (0.4, 13.0, 8.0, 9.0), (0.75, 11.0, 7.0, 8.0), (1.0, 7.0, 6.0, 7.0))
+_WEB = ((24.0, -2.0, 58.0), (44.0, -18.0, 44.0))
+_WEB_PROFILE = ((0.0, 17.0, 7.0, 7.0), (0.5, 15.0, 7.0, 8.0), (1.0, 16.0, 8.0, 8.0))
 
 
 @dataclass(frozen=True, eq=False)
@@ -151,6 +153,7 @@ def plan_hand(along: float, across: float, proportions: Mapping[str, tuple[float
         digits=digits,
         thenar=(
             _spindle(place(_THENAR[0]), place(_THENAR[1]), _THENAR_PROFILE, across),
+            _spindle(place(_BACK[0]), place(_BACK[1]), _BACK_PROFILE, across),
             _spindle(place(_WEB[0]), place(_WEB[1]), _WEB_PROFILE, across),
         ),
         stretch=stretch,
@@ -183,6 +186,7 @@ def _digit(
         squareness,
         [(p[2], p[0], p[1]) for p in (before, *local)],
         sizes,
+        (stops[3] + 0.66 * (stops[4] - stops[3]), 0.27 * (stops[4] - stops[3]), 0.62 * half),
     )
     per_joint = np.vstack([_square(dorsal, d) for d in (*steps, steps[2])])
     return Digit(joints, per_joint, flesh)

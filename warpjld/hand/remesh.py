@@ -16,6 +16,7 @@ from warpjld.hand.mesh import Array, Edges, Faces, face_normals, mean_over_neigh
 __all__ = ["remesh", "settle"]
 
 _LONG, _SHORT = 4.0 / 3.0, 4.0 / 5.0
+_COLLAPSES = 8  # passes a round: one takes few edges, since edges near one another exclude each other
 
 
 def remesh(
@@ -34,10 +35,10 @@ def remesh(
     """
     for _ in range(rounds):
         vertices, faces, size = _split(vertices, faces, size)
-        for _ in range(3):
+        for _ in range(_COLLAPSES):
             before = len(faces)
             vertices, faces, size = _collapse(vertices, faces, size)
-            if len(faces) > 0.995 * before:
+            if len(faces) > 0.99 * before:
                 break
         faces = _flip(vertices, _flip(vertices, faces))
         vertices = settle(vertices, faces, size, field)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from warpjld.errors import WarpjldError
@@ -12,8 +14,9 @@ from warpjld.hand.remesh import remesh, settle
 
 __all__ = ["triangulate"]
 
-_LARGEST_REMESHED = 24_000  # vertices; beyond, a remeshed surface is subdivided: far faster, and as even
+_LARGEST_REMESHED = 16_000  # vertices; beyond, a remeshed surface is subdivided: far faster, and as even
 _COARSEST, _FINEST = 2.0, 1.0  # grid spacing [mm]: two millimetres still tell neighbouring fingers apart
+_PACKING = 0.96  # wanted length squared times vertices per area, in a remeshed surface (equilateral: 2 / √3 = 1.15)
 _LOW, _HIGH = np.array([-75.0, -75.0, -205.0]), np.array([112.0, 45.0, 60.0])
 
 
@@ -27,17 +30,21 @@ def triangulate(flesh: Flesh, resolution: int) -> tuple[Array, Faces]:
     shape = _relative_size(flesh, vertices, faces)
     areas = 0.5 * np.linalg.norm(face_normals(vertices, faces), axis=1)
     density = (areas / (shape[faces] ** 2).mean(axis=1)).sum()
-    size = shape * np.sqrt(density * 2.0 / np.sqrt(3.0) / base)
-    vertices, faces, size = remesh(vertices, faces, size, flesh, rounds=6)
-    # what the rounds left over or under is corrected by scaling the wanted lengths
-    size = size * np.sqrt(len(vertices) / base)
-    vertices, faces, size = remesh(vertices, faces, size, flesh, rounds=3)
+    size = shape * np.sqrt(_PACKING * density / base)
+    for rounds in (6, 2, 2, 2):
+        vertices, faces, size = remesh(vertices, faces, size, flesh, rounds)
+        excess = len(vertices) / base
+        if rounds == 2 and abs(excess - 1.0) < 0.03:
+            break
+        size = size * np.sqrt(excess)
     for _ in range(3):
         vertices = settle(vertices, faces, size, flesh)
+    # details finer than the triangles would only be noise
+    flesh = replace(flesh, detail=float(np.clip((resolution - 8_000) / 24_000, 0.0, 1.0)))
     vertices = flesh.project(vertices, steps=2)
-    for _ in range(halvings):
+    for halving in range(halvings):
         vertices, faces = subdivide(vertices, faces)
-        vertices = flesh.project(vertices, steps=2)
+        vertices = flesh.project(vertices, steps=2 if halving == 0 else 1)  # later midpoints lie on it almost
     return vertices, faces
 
 
