@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 from warpjld.covering.covering import Covering
 from warpjld.covering.device import anchors_on, checked_device, drivers_on, parameters_on
 from warpjld.covering.drivers import Drivers, drive
+from warpjld.covering.paper import PaperCovering
 from warpjld.covering.parameters import Parameters
 from warpjld.errors import InputError
 from warpjld.skeleton.kinematics import Poses
@@ -24,7 +25,7 @@ class Gradients:
 
     Attributes:
         parameters: With respect to the parameters of the joints.
-        pose: With respect to the inputs of the operators, frame by frame. Positions, rotations and the halfway rotations
+        pose: With respect to the inputs of the operators, frame by frame. Positions, rotations and halfway rotations
             count as independent of one another; quaternion entries, as four free numbers.
     """
 
@@ -61,12 +62,13 @@ class Differentiable:
         self._covering = covering
         self._device = checked_device(device)
         covering.check(poses)
-        count = len(covering.surface.vertices)
-        chosen = np.arange(count) if vertices is None else np.asarray(vertices)
-        if chosen.size and (chosen.min() < 0 or chosen.max() >= count):
-            raise InputError(f"vertices: indices must lie in 0…{count - 1}")
+        if isinstance(covering, PaperCovering):
+            raise InputError(
+                "covering: the paper's hard-edged operators have no derivatives; bind with method='smooth'"
+            )
+        chosen = covering.chosen(np.arange(len(covering.surface.vertices)) if vertices is None else vertices)
         self._anchors = anchors_on(self._device, covering.anchors, covering.skeleton.rest)
-        self._chosen = wp.array(chosen.astype(np.int32), dtype=wp.int32, device=self._device)
+        self._chosen = wp.array(chosen, dtype=wp.int32, device=self._device)
         drivers = drive(covering.skeleton, covering.anchors, poses)
         self._pose = drivers_on(self._device, drivers, requires_grad=True)
         self._shape = (len(poses), len(chosen))

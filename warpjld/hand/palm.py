@@ -17,11 +17,11 @@ Array = NDArray[np.float64]
 # distal place: radial edge, ulnar edge, dorsal face, palmar face, squareness [mm of the design hand]
 _OUTLINE = np.array(
     [
-        (-56, 30.5, -30.0, 19.0, -18.5, 0.10),
-        (-40, 30.0, -29.5, 18.7, -18.0, 0.12),
-        (-20, 28.8, -28.5, 17.8, -16.5, 0.18),
-        (-5, 28.0, -28.0, 16.5, -15.0, 0.25),
-        (10, 28.5, -32.5, 15.8, -14.5, 0.35),
+        (-56, 31.5, -31.0, 20.0, -19.5, 0.06),
+        (-40, 30.5, -30.0, 19.4, -18.8, 0.08),
+        (-20, 28.8, -28.5, 18.0, -16.8, 0.12),
+        (-5, 28.0, -28.0, 16.7, -15.0, 0.20),
+        (10, 28.8, -32.0, 15.8, -14.5, 0.32),
         (25, 30.0, -39.0, 15.0, -14.0, 0.45),
         (45, 33.5, -44.0, 13.5, -12.0, 0.50),
         (65, 36.8, -45.5, 12.0, -11.5, 0.50),
@@ -56,6 +56,16 @@ class Palm:
     """Signed distance of the slab; ``stretch`` scales the design's axes."""
 
     stretch: Array
+
+    @property
+    def corners(self) -> tuple[Array, Array]:
+        """Two opposite corners of the slab's box [mm]."""
+        low, high = _OUTLINE.min(axis=0), _OUTLINE.max(axis=0)
+        web = float(_WEBS[:, 1].max())
+        return (
+            np.array([low[2], low[4], -web]) * self.stretch,
+            np.array([high[1], high[3], -_STUB[0]]) * self.stretch,
+        )
 
     def __call__(self, points: Array) -> Array:
         """Signed distance of points (n, 3) [mm], negative inside, shape (n,)."""

@@ -14,13 +14,13 @@ from numpy.typing import NDArray
 
 from warpjld.hand.sweep import Sweep
 
-__all__ = ["LENGTH", "BREADTH", "Digit", "Plan", "plan_hand"]
+__all__ = ["BREADTH", "LENGTH", "Digit", "Plan", "plan_hand"]
 
 Array = NDArray[np.float64]
 
 LENGTH, BREADTH = 190.0, 85.0
 
-FOREARM, WRIST = (0.0, 0.5, -44.0), (0.0, 0.5, 0.0)
+FOREARM, WRIST = (0.27, 0.28, -44.0), (-0.1, -0.16, 0.0)  # at their sections' centroids
 CARPOMETACARPAL = {
     "index": (12.0, 2.0, 29.0),
     "middle": (2.0, 3.0, 29.5),
@@ -42,7 +42,7 @@ _FINGERS = {
     "index": _Finger((26.3, 0.0, 85.0), (43.0, 25.5, 24.0), 9.4, 6.0, 6.0),
     "middle": _Finger((4.0, 1.5, 87.0), (46.5, 30.0, 26.5), 9.5, 0.5, 0.0),
     "ring": _Finger((-17.3, 0.0, 80.5), (43.5, 28.5, 25.0), 8.9, -5.5, -6.0),
-    "pinky": _Finger((-36.3, -3.5, 71.5), (34.0, 20.5, 21.5), 7.8, -13.0, -13.0),
+    "pinky": _Finger((-36.3, -3.5, 71.5), (35.0, 21.5, 22.0), 7.8, -13.0, -13.0),
 }
 _CURL = (5.0, 8.0, 5.0)  # degrees of flexion at base, knuckle 2, knuckle 3
 
@@ -54,11 +54,11 @@ _FINGER_PROFILE = (
     (0, 0.28, 1.05, 0.92, 1.10),
     (0, 0.62, 0.95, 0.83, 1.04),
     (1, 0.0, 1.00, 0.92, 0.88),
-    (1, 0.5, 0.89, 0.77, 0.92),
-    (2, 0.0, 0.89, 0.74, 0.78),
-    (2, 0.35, 0.87, 0.62, 0.86),
-    (2, 0.7, 0.82, 0.53, 0.80),
-    (2, 1.0, 0.72, 0.46, 0.62),
+    (1, 0.5, 0.88, 0.77, 0.92),
+    (2, 0.0, 0.87, 0.73, 0.78),
+    (2, 0.35, 0.84, 0.62, 0.85),
+    (2, 0.7, 0.78, 0.52, 0.79),
+    (2, 1.0, 0.67, 0.44, 0.61),
 )
 
 _THUMB_BASE = (22.0, -8.0, 22.0)
@@ -68,7 +68,7 @@ _THUMB_ABDUCTION = (42.0, 43.0, 49.0)  # of the three segments, from the hand's 
 _THUMB_DEPTH = (25.0, 18.0, 12.0)  # towards the palm
 _THUMB_ROLL = 65.0
 _THUMB_PROFILE = (
-    (-1, 0.0, 1.00, 0.90, 0.90),
+    (-1, 0.0, 0.85, 0.75, 0.80),
     (0, 0.0, 1.20, 1.05, 1.25),
     (0, 0.5, 1.22, 1.05, 1.35),
     (1, 0.0, 1.16, 1.14, 1.14),
@@ -144,7 +144,7 @@ def plan_hand(along: float, across: float, proportions: Mapping[str, tuple[float
     up = np.cos(roll) * up + np.sin(roll) * np.cross(up, mean) * np.sign(np.cross(up, mean)[0])
     digits["thumb"] = _digit(
         place(_THUMB_BASE), steps, np.array(_THUMB_LENGTHS) * along * long, up,
-        _THUMB_HALF_WIDTH * across * thick, _THUMB_PROFILE, 14.0 * along, 0.1,
+        _THUMB_HALF_WIDTH * across * thick, _THUMB_PROFILE, 30.0 * along, 0.1,
     )  # fmt: skip
     return Plan(
         forearm=place(FOREARM),

@@ -15,9 +15,7 @@ from warpjld.surface import Surface, weld_surface
 __all__ = ["assemble_rig"]
 
 
-def assemble_rig(
-    source: SourceRig, *, side: str | None = None, unit: str | None = None, up: str | None = None
-) -> Rig:
+def assemble_rig(source: SourceRig, *, side: str | None = None, unit: str | None = None, up: str | None = None) -> Rig:
     """Recognise what ``source`` holds and bring it to the canonical form; arguments as in ``load_rig``."""
     try:
         return _assemble(source, side, unit, up)

@@ -42,16 +42,15 @@ def place(source: SourceRig, *, unit: str | None = None, up: str | None = None) 
     if up is None and _lies_on_z(source.tree, roles):
         up = "z"
         notes.append("up axis: the body stands along Z, turned to Y")
-    turn = np.diag([factor, factor, factor, 1.0])
-    if up == "z":
-        turn = turn @ np.array([[1.0, 0, 0, 0], [0, 0, 1.0, 0], [0, -1.0, 0, 0], [0, 0, 0, 1.0]])
-    if np.array_equal(turn, np.eye(4)):
-        return source
+    turn = np.array([[1.0, 0, 0], [0, 0, 1.0], [0, -1.0, 0]]) if up == "z" else np.eye(3)
+    frames = source.tree.frames.copy()
+    frames[:, :3, :3] = turn @ frames[:, :3, :3]  # directions turn, they do not scale
+    frames[:, :3, 3] = factor * frames[:, :3, 3] @ turn.T
     return replace(
         source,
-        vertices=source.vertices @ turn[:3, :3].T,
-        tree=replace(source.tree, frames=turn @ source.tree.frames),
-        axes={j: turn[:3, :3] @ axis / factor for j, axis in source.axes.items()},
+        vertices=factor * source.vertices @ turn.T,
+        tree=replace(source.tree, frames=frames),
+        axes={j: turn @ axis for j, axis in source.axes.items()},
         notes=(*source.notes, *notes),
     )
 

@@ -36,9 +36,7 @@ def read_accessor(gltf: Any, buffers: list[bytes], index: int) -> NDArray[Any]:
     if accessor.bufferView is None:
         out = np.zeros((accessor.count, *shape), dtype)
     else:
-        out = _strided(
-            gltf, buffers, what, accessor.bufferView, accessor.byteOffset or 0, accessor.count, dtype, shape
-        )
+        out = _strided(gltf, buffers, what, accessor.bufferView, accessor.byteOffset or 0, accessor.count, dtype, shape)
     if accessor.sparse is not None:
         sparse = accessor.sparse
         at_dtype = np.dtype(_COMPONENTS[sparse.indices.componentType]).newbyteorder("<")

@@ -87,9 +87,7 @@ class Document:
         length = np.linalg.norm(quaternion)
         if not length > 0.0:
             raise InputError(f"node '{self.name(node)}': its rotation is not a quaternion", path=self.path)
-        local[:3, :3] = Rotation.from_quat(quaternion / length).as_matrix() * np.array(
-            record.scale or (1.0, 1.0, 1.0)
-        )
+        local[:3, :3] = Rotation.from_quat(quaternion / length).as_matrix() * np.array(record.scale or (1.0, 1.0, 1.0))
         local[:3, 3] = record.translation or (0.0, 0.0, 0.0)
         return local
 

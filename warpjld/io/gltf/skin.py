@@ -199,9 +199,7 @@ def _influences(
         raise InputError(f"mesh '{name}' uses a skin but has no JOINTS_0 and WEIGHTS_0", path=document.path)
     index, weight = np.concatenate(indices, axis=1), np.concatenate(weights, axis=1)
     if index.shape != weight.shape or len(index) != vertices:
-        raise InputError(
-            f"mesh '{name}': joints and weights do not match its {vertices} vertices", path=document.path
-        )
+        raise InputError(f"mesh '{name}': joints and weights do not match its {vertices} vertices", path=document.path)
     if not np.isfinite(weight).all() or (weight < 0).any():
         bad = int(np.argwhere(~(np.isfinite(weight) & (weight >= 0)))[0][0])
         raise InputError(f"mesh '{name}': vertex {bad} has a negative or non-finite weight", path=document.path)

@@ -21,6 +21,9 @@ Points = Mapping[str, NDArray[np.float64]]
 # How much an expected hinge counts against the measured bend: squared sine of the bend at which both count alike
 _FINGER_PRIOR = np.sin(np.radians(20.0)) ** 2
 _THUMB_PRIOR = np.sin(np.radians(25.0)) ** 2
+_LIMB_PRIOR = np.sin(np.radians(20.0)) ** 2
+_HINGES = {"elbow": ("shoulder", "elbow", "wrist"), "knee": ("hip", "knee", "ankle")}
+_TRUNK = ("spine", "neck", "head")
 
 
 def hand_axes(points: Points, side: str) -> dict[str, NDArray[np.float64]]:
@@ -83,18 +86,28 @@ def _along(
 
 
 def body_axes(
-    names: Sequence[str], directions: NDArray[np.float64], up: NDArray[np.float64], forward: NDArray[np.float64]
+    points: Points,
+    directions: Mapping[str, NDArray[np.float64]],
+    up: NDArray[np.float64],
+    forward: NDArray[np.float64],
 ) -> dict[str, NDArray[np.float64]]:
-    """Flexion axes of a body's joints by convention.
+    """Flexion axes of a body's joints, by convention.
 
-    Elbows flex the hand forward and up, shoulders raise the arm forward, hips raise the thigh forward, knees bring
-    the heel back, ankles point the toes down, the trunk, neck and head bow forward.
+    Shoulders raise the arm forward, elbows bring the hand forward, hips raise the thigh forward, knees bring the heel
+    back, ankles and toes point down, trunk, neck and head bow forward. Elbows and knees take the plane of their rest
+    bend where there is one.
+
+    Args:
+        points: Canonical joints → positions [m].
+        directions: Unit directions of their bones.
+        up: The body's up.
+        forward: The direction it faces.
     """
     axes: dict[str, NDArray[np.float64]] = {}
     left = np.cross(up, forward)
-    for name, bone in zip(names, directions, strict=True):
-        part = name.rpartition(".")[2] if "." in name else name.rstrip("0123456789")
-        if part in ("shoulder", "clavicle", "hip", "pelvis", "spine", "neck", "head"):
+    for name, bone in directions.items():
+        side, _, part = name.rpartition(".")
+        if part in ("shoulder", "elbow", "clavicle", "hip", "pelvis", "top") or part.rstrip("0123456789") in _TRUNK:
             flexed = forward
         elif part == "knee":
             flexed = -forward
@@ -104,6 +117,10 @@ def body_axes(
             continue
         axis = np.cross(bone, flexed)
         axes[name] = perpendicular(axis if np.linalg.norm(axis) > 0.2 else -left, bone)
+        chain = _HINGES.get(part)
+        if chain and all(f"{side}.{joint}" in points for joint in chain):
+            hinge = _common_hinge([points[f"{side}.{joint}"] for joint in chain], axes[name], _LIMB_PRIOR)
+            axes[name] = perpendicular(hinge, bone)
     return axes
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections import defaultdict
 
-from warpjld.skeleton.hand import DIGITS
+from warpjld.skeleton.hand import DIGITS, FINGER_JOINTS
 from warpjld.skeleton.recognise.digits import assign_digit
 from warpjld.skeleton.recognise.names import Meaning, read_name
 from warpjld.skeleton.recognise.roles import HandRoles, Roles
@@ -37,6 +37,8 @@ def roles_by_name(tree: SourceTree) -> Roles:
         _hand(tree, meanings, kinds, side, roles)
         if side:
             _limbs(kinds, side, roles)
+            if kinds[side, "hand end"]:
+                roles.body[f"{side}.hand.tip"] = kinds[side, "hand end"][0]
             _toes(tree, kinds, side, roles)
     _trunk(tree, kinds, roles)
     return roles
@@ -97,12 +99,16 @@ def _limbs(kinds: dict[tuple[str | None, str], list[int]], side: str, roles: Rol
 def _toes(tree: SourceTree, kinds: dict[tuple[str | None, str], list[int]], side: str, roles: Roles) -> None:
     toes = kinds[side, "toe"]
     heads = [j for j in toes if tree.parents[j] not in toes]
-    if len(heads) == 1 and f"{side}.ball" not in roles.body:
-        roles.body[f"{side}.ball"] = heads[0]
+    if len(heads) == 1:
+        rest = tree.subtree(heads[0])
+        if f"{side}.ball" not in roles.body:
+            roles.body[f"{side}.ball"] = rest.pop(0)
+        if rest:
+            roles.body[f"{side}.toe.tip"] = rest[-1]
         return
     for n, head in enumerate(heads, start=1):
-        for k, joint in enumerate(j for j in tree.subtree(head) if j in toes):
-            roles.body[f"{side}.toe{n}.{('base', 'knuckle2', 'knuckle3', 'tip')[min(k, 3)]}"] = joint
+        for name, joint in zip(FINGER_JOINTS, tree.subtree(head), strict=False):
+            roles.body[f"{side}.toe{n}.{'tip' if read_name(tree.names[joint]).rank == 4 else name}"] = joint
 
 
 def _trunk(tree: SourceTree, kinds: dict[tuple[str | None, str], list[int]], roles: Roles) -> None:
@@ -111,8 +117,9 @@ def _trunk(tree: SourceTree, kinds: dict[tuple[str | None, str], list[int]], rol
     for name in ("spine", "neck"):
         for n, joint in enumerate(kinds[None, name], start=1):
             roles.body[f"{name}{n}"] = joint
-    if kinds[None, "head"]:
-        roles.body["head"] = kinds[None, "head"][0]
+    for kind, name in (("head", "head"), ("head end", "head.top")):
+        if kinds[None, kind]:
+            roles.body[name] = kinds[None, kind][0]
     if kinds[None, "pelvis"]:
         roles.body["pelvis"] = kinds[None, "pelvis"][0]
     elif kinds[None, "root"]:

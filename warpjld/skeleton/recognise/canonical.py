@@ -14,6 +14,7 @@ from warpjld.skeleton.hand import FINGER_JOINTS, PALM_SEGMENTS
 from warpjld.skeleton.limits import default_limits
 from warpjld.skeleton.recognise.axes import body_axes, hand_axes, perpendicular
 from warpjld.skeleton.recognise.bones import bone_axis, bone_directions
+from warpjld.skeleton.recognise.complete_body import find_extremities, merge_pelvis
 from warpjld.skeleton.recognise.complete_hand import complete_hand
 from warpjld.skeleton.recognise.hand_frame import chirality
 from warpjld.skeleton.recognise.layout import Layout, lay_out
@@ -64,7 +65,7 @@ def canonical_skeleton(
         limits: Channel limits [rad] the file states, likewise.
     """
     roles = recognise(tree)
-    notes = list(roles.notes)
+    notes: list[str] = []
     hand_points: dict[str, dict[str, NDArray[np.float64]]] = {}
     for hand in roles.hands:
         found = {name: tree.positions[j] for name, j in hand.joints.items()}
@@ -73,7 +74,13 @@ def canonical_skeleton(
         hand_points[hand.side] = points
         notes.append(f"{hand.side} hand: recognised by {roles.how}, {len(hand.joints)} of 25 joints in the file")
         notes.extend(added)
+    place = merge_pelvis(tree, roles)
+    notes = [*roles.notes, *notes]
     layout = lay_out(tree, roles, hand_points)
+    if place is not None:
+        layout.positions[layout.names.index("pelvis")] = place
+    if roles.body:
+        _extremities(layout, vertices, faces)
     skeleton = _skeleton(layout, roles, hand_points, axes or {}, limits or {})
     return Canonical(skeleton, tuple(layout.sources), layout.owner, (*notes, *layout.notes))
 
@@ -87,6 +94,19 @@ def _side(hand: HandRoles, points: Mapping[str, NDArray[np.float64]], given: str
     if seen not in (None, chosen):
         notes.append(f"named a {chosen} hand, but thumb and fingers look like a {seen} one")
     return chosen
+
+
+def _extremities(layout: Layout, vertices: NDArray[np.float64], faces: NDArray[np.int32]) -> None:
+    parents = {
+        name: None if parent < 0 else layout.names[parent]
+        for name, parent in zip(layout.names, layout.parents, strict=True)
+    }
+    places = dict(zip(layout.names, layout.positions, strict=True))
+    found = find_extremities(places, parents, vertices, faces)
+    for name, (parent, point) in found.items():
+        layout.add(name, parent, point)
+    if found:
+        layout.notes.append(f"extremities added in the surface: {', '.join(found)}")
 
 
 def _last_bones(tree: SourceTree, hand: HandRoles) -> dict[str, NDArray[np.float64]]:
@@ -121,7 +141,11 @@ def _skeleton(
         axes=np.tile([1.0, 0.0, 0.0], (count, 1)),
         limits=limits,
     )
-    found = body_axes(layout.names, blank.directions, *_facing(layout, number))
+    found = body_axes(
+        dict(zip(layout.names, layout.positions, strict=True)),
+        dict(zip(layout.names, blank.directions, strict=True)),
+        *_facing(layout, number),
+    )
     for side, points in hand_points.items():
         found |= {f"{side}.{name}": axis for name, axis in hand_axes(points, side).items()}
     axes = np.empty((count, 3))

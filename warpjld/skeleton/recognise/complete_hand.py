@@ -105,9 +105,7 @@ def _carpal_ends(points: dict[str, NDArray[np.float64]], fingers: list[str], not
             points[f"{digit}.carpometacarpal"] = points[f"{digit}.carpometacarpal"] + across * (
                 (len(group) - 1) / 2 - k
             )
-        notes.append(
-            f"{label}: metacarpals of {' and '.join(group)} share one head: moved apart along the carpal row"
-        )
+        notes.append(f"{label}: metacarpals of {' and '.join(group)} share one head: moved apart along the carpal row")
 
 
 def _tip(

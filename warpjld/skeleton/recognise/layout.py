@@ -44,13 +44,20 @@ class Layout:
     owner: NDArray[np.int64]
     notes: list[str] = field(default_factory=list)
 
+    def add(self, name: str, parent: str, position: NDArray[np.float64]) -> None:
+        """Append an extremity that the file does not have."""
+        self.parents.append(self.names.index(parent))
+        self.names.append(name)
+        self.sources.append(-1)
+        self.positions = np.vstack([self.positions, position])
+
 
 def lay_out(tree: SourceTree, roles: Roles, hand_points: Mapping[str, Mapping[str, NDArray[np.float64]]]) -> Layout:
     """Arrange recognised and remaining joints.
 
     Limbs are single segments: twist bones, and joints that divide a limb or lie between two recognised ones, belong
-    to the recognised joint above them, with their weights. JLD spreads a twist along a segment by itself, and a bisector
-    plane in the middle of a limb would only add a crease. Face bones belong to the head. What else was not
+    to the recognised joint above them, with their weights. JLD spreads a twist along a segment by itself, and a
+    bisector plane in the middle of a limb would only add a crease. Face bones belong to the head. What else was not
     recognised keeps its name, in lower case.
 
     Args:
@@ -118,9 +125,12 @@ def _kept(tree: SourceTree, of_source: Mapping[int, str], notes: list[str]) -> d
             merged.setdefault(into, []).append(tree.names[j])
         else:
             kept[j] = _own_name(tree, j, of_source)
-    for into, names in merged.items():
-        shown = ", ".join(names[:4]) + (f" and {len(names) - 4} more" if len(names) > 4 else "")
-        notes.append(f"{shown}: part of {into}")
+    if merged:
+        shown = (
+            f"{', '.join(names[:4])}{f' and {len(names) - 4} more' if len(names) > 4 else ''} → {into}"
+            for into, names in merged.items()
+        )
+        notes.append(f"merged into recognised joints: {'; '.join(shown)}")
     if kept:
         notes.append(f"not recognised, kept as joints: {', '.join(kept.values())}")
     return kept

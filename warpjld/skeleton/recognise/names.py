@@ -35,11 +35,13 @@ _DIGITS = {
 _NUMBERED_DIGITS = ("thumb", "index", "middle", "ring", "pinky")
 _RANKS = {
     "metacarpal": 0,
+    "carpometacarpal": 0,
     "metacarpus": 0,
     "meta": 0,
     "palm": 0,
     "carpal": 0,
     "proximal": 1,
+    "base": 1,
     "intermediate": 2,
     "medial": 2,
     "distal": 3,
@@ -47,6 +49,7 @@ _RANKS = {
     "end": 4,
     "nub": 4,
     "null": 4,
+    "top": 4,
 }
 _LETTERS = {"a": 1, "b": 2, "c": 3}
 _KINDS = {
@@ -110,19 +113,16 @@ _COMPOUNDS = {
     ("upper", "arm"),
     ("lower", "arm"),
     ("fore", "arm"),
+    ("up", "arm"),
     ("upper", "leg"),
     ("lower", "leg"),
     ("up", "leg"),
-} | {
+    ("low", "leg"),
     ("upper", "chest"),
     ("toe", "base"),
-    ("low", "leg"),
-    ("up", "arm"),
 }
-_VOCABULARY = sorted(
-    {w for words in (_SIDES, _DIGITS, _RANKS, _KINDS) for w in words if len(w) > 2}
-    | _HELPERS
-    | _FILLERS - {"b", "f", "j"},
+_LONG_FIRST = sorted(
+    {w for words in (_SIDES, _DIGITS, _RANKS, _KINDS, _HELPERS, _FILLERS) for w in words if len(w) > 2},
     key=len,
     reverse=True,
 )
@@ -159,7 +159,7 @@ def read_name(name: str) -> Meaning:
         return Meaning(side, "helper")
     kinds = [_KINDS[w] for w in words if w in _KINDS]
     if "toe" in kinds:
-        return Meaning(side, "toe", rank=_rank(words), number=number)
+        return Meaning(side, "toe", rank=_rank(words), number=numbers[0] if numbers else None)
     digit = next((_DIGITS[w] for w in words if w in _DIGITS), None)
     if digit is None and "finger" in words:
         digit, number = _numbered([w for w in words[words.index("finger") :] if w.isdigit()])
@@ -167,8 +167,9 @@ def read_name(name: str) -> Meaning:
         return Meaning(side, "digit", digit, _rank(words), number)
     if any(w in ("metacarpal", "carpal") for w in words) or ("palm" in words and numbers):
         return Meaning(side, "carpal", rank=0, number=number)
-    if kinds and (_rank(words) or 0) < 4:
-        return Meaning(side, kinds[-1], number=number)
+    if kinds:
+        end = " end" if _rank(words) == 4 else ""
+        return Meaning(side, kinds[-1] + end, number=number)
     return Meaning(side, "palm" if "palm" in words else None, number=number)
 
 
@@ -211,7 +212,7 @@ def _split(piece: str) -> list[str]:
         return [piece]
     rest, out = piece, []
     while rest:
-        word = next((w for w in _VOCABULARY if rest.startswith(w)), None)
+        word = next((w for w in _LONG_FIRST if rest.startswith(w)), None)
         if word is None:
             return [piece]
         out.append(word)

@@ -71,15 +71,22 @@ def winding_numbers(
 
     It stays meaningful for open wrists and for several closed parts in one another.
     """
+    middle = vertices.mean(axis=0)
+    vertices, points = vertices - middle, points - middle
+    a, b, c = (vertices[faces[:, k]] for k in range(3))
+    # every term is linear in the point but for its square, so each is one matrix product
+    normal = np.cross(a, b) + np.cross(b, c) + np.cross(c, a)
+    volume = np.einsum("fk,fk->f", a, np.cross(b, c))
     out = np.empty(len(points))
     rows = max(1, _CHUNK // max(1, len(faces)))
     for start in range(0, len(points), rows):
-        a, b, c = (vertices[faces[:, k]] - points[start : start + rows, None] for k in range(3))
-        la, lb, lc = (np.linalg.norm(x, axis=-1) for x in (a, b, c))
-        volume = np.einsum("pfk,pfk->pf", a, np.cross(b, c))
-        ab, bc, ca = (np.einsum("pfk,pfk->pf", x, y) for x, y in ((a, b), (b, c), (c, a)))
-        solid = 2.0 * np.arctan2(volume, la * lb * lc + ab * lc + bc * la + ca * lb)
-        out[start : start + rows] = solid.sum(axis=1) / (4.0 * np.pi)
+        p = points[start : start + rows]
+        square = (p * p).sum(axis=1)[:, None]
+        gap = vertices[None] - p[:, None]
+        la, lb, lc = np.moveaxis(np.sqrt((gap * gap).sum(axis=2))[:, faces], 2, 0)
+        ab, bc, ca = (np.einsum("fk,fk->f", x, y) - p @ (x + y).T + square for x, y in ((a, b), (b, c), (c, a)))
+        solid = np.arctan2(volume - p @ normal.T, la * lb * lc + ab * lc + bc * la + ca * lb)
+        out[start : start + rows] = solid.sum(axis=1) / (2.0 * np.pi)
     return out
 
 
