@@ -151,8 +151,10 @@ def _skeleton(
     axes = np.empty((count, 3))
     for j, name in enumerate(layout.names):
         source = layout.sources[j]
-        axis = given_axes.get(source, found.get(name, np.array([1.0, 0.0, 0.0])))
-        axes[j] = perpendicular(axis, blank.directions[j])
+        if source in given_axes:
+            axes[j] = given_axes[source] / np.linalg.norm(given_axes[source])
+        else:
+            axes[j] = perpendicular(found.get(name, np.array([1.0, 0.0, 0.0])), blank.directions[j])
         for channel, pair in given_limits.get(source, {}).items():
             limits[j, CHANNELS.index(channel)] = pair
     palms = tuple(
