@@ -43,7 +43,8 @@ def first_hits(
     origins: NDArray[np.float64],
     directions: NDArray[np.float64],
 ) -> NDArray[np.float64]:
-    """Distance along each ray to the first triangle (Möller–Trumbore), ``inf`` where there is none, shape (R,)."""
+    """Distance along each ray of unit direction to its first triangle (Möller–Trumbore), ``inf`` where there is none,
+    shape (R,)."""
     out = np.full(len(origins), np.inf)
     if not len(faces):
         return out
