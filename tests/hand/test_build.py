@@ -142,10 +142,7 @@ def test_every_joint_is_well_inside(hand: Rig) -> None:
     dot = np.einsum
     solid = np.arctan2(
         dot("jtk,jtk->jt", a, np.cross(b, c)),
-        la * lb * lc
-        + dot("jtk,jtk->jt", a, b) * lc
-        + dot("jtk,jtk->jt", b, c) * la
-        + dot("jtk,jtk->jt", c, a) * lb,
+        la * lb * lc + dot("jtk,jtk->jt", a, b) * lc + dot("jtk,jtk->jt", b, c) * la + dot("jtk,jtk->jt", c, a) * lb,
     )
     np.testing.assert_allclose(solid.sum(axis=1) / (2.0 * np.pi), 1.0, atol=1e-6)
     depth = np.linalg.norm(mesh.vertices[None] - hand.skeleton.rest[:, None], axis=2).min(axis=1)
