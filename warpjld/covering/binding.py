@@ -22,7 +22,9 @@ OPERATORS = 4
 STATIONS = 5
 """Places along a pair of neighbouring palm segments where the scale factor λ is evaluated; linear in between."""
 
-SIDE_BAND = 0.5  # |cosine| below which a vertex is partly external and partly internal
+# |cosine| below which a vertex is partly external and partly internal: sections near a joint stand upright outside and
+# lean inside, and a wider band shears the sides less
+SIDE_BAND = 0.75
 FLOOR = 2e-2  # weight below which an operator is dropped, faded so that nothing jumps
 
 
