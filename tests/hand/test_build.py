@@ -85,7 +85,7 @@ def test_volume_of_hand_and_stub(hand: Rig) -> None:
     assert 350e-6 < volume < 450e-6
 
 
-@settings(max_examples=4, deadline=None)
+@settings(max_examples=3, deadline=None)
 @given(length=st.floats(0.14, 0.23), ratio=st.floats(0.38, 0.52))
 def test_length_and_breadth_as_asked(length: float, ratio: float) -> None:
     rig = build_hand(length=length, breadth=ratio * length, resolution=2500)

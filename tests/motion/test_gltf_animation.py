@@ -214,6 +214,22 @@ def test_broken_samplers_are_named(tmp_path: Path) -> None:
         poses_of_gltf(file.save(tmp_path / "b.glb"), driven)
 
 
+def test_impossible_values_are_refused(tmp_path: Path) -> None:
+    file, driven = chain()
+    file.animate(2, "rotation", [0, 1], np.zeros((2, 4)))
+    with pytest.raises(InputError, match="its quaternion is zero"):
+        poses_of_gltf(file.save(tmp_path / "a.glb"), driven)
+    file, driven = chain()
+    file.animate(2, "translation", [0, 1], np.zeros((2, 3)))
+    file.gltf.accessors[0].componentType = None
+    with pytest.raises(InputError, match=r"a\.glb: not as glTF 2.0 wants it|a\.glb: accessor"):
+        poses_of_gltf(file.save(tmp_path / "a.glb"), driven)
+    file, driven = chain()
+    file.animate(2, "translation", [0, 1e9], np.zeros((2, 3)))
+    with pytest.raises(InputError, match="at most 1000000"):
+        poses_of_gltf(file.save(tmp_path / "a.glb"), driven, rate=30)
+
+
 def test_unrelated_skeleton_is_refused(tmp_path: Path) -> None:
     file, _ = chain()
     file.animate(2, "rotation", [0, 1], np.array([turn("z", 0)] * 2))

@@ -218,6 +218,17 @@ def test_mistakes_in_recordings_are_named(tmp_path: Path) -> None:
     broken["frames"][3]["timestamp"] = 0
     with pytest.raises(InputError, match="frame 3: its timestamp"):
         read_hand_track(save(tmp_path, broken))
+    broken["frames"][3]["timestamp"] = float("inf")
+    with pytest.raises(InputError, match="frame 3: its timestamp"):
+        read_hand_track(save(tmp_path, broken))
+    broken = leap(skeleton, poses, packed=False)
+    broken["frames"][1]["pointables"][1]["tipPosition"] = [1, 2]
+    with pytest.raises(InputError, match=r"'index.tip' wants three finite coordinates"):
+        read_hand_track(save(tmp_path, broken))
+    broken = leap(skeleton, poses, packed=True)
+    broken["frames"][2][1] = 5
+    with pytest.raises(InputError, match="packed frames do not fit"):
+        read_hand_track(save(tmp_path, broken))
     broken = webxr(skeleton, poses)
     broken["pose 2"]["wrist"]["offsetMatrix"] = [1, 2]
     with pytest.raises(InputError, match="pose 'pose 2': the offsetMatrix of 'wrist'"):

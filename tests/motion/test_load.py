@@ -30,6 +30,13 @@ def test_limits_are_checked_or_not(tmp_path: Path) -> None:
     assert np.degrees(poses.flexion[-1, hand().index("index.base")]) == pytest.approx(90)
 
 
+def test_slips_of_the_pen_do_not_fill_the_memory(tmp_path: Path) -> None:
+    path = tmp_path / "curl.csv"
+    path.write_text("frame,index.base.flexion\n0,0\n1e15,60\n")
+    with pytest.raises(InputError, match=r"curl.csv: 1e\+15 frames"):
+        load_motion(path, rig(hand()))
+
+
 def test_unknown_suffixes_list_the_known_ones(tmp_path: Path) -> None:
     with pytest.raises(InputError, match=r"unknown kind of motion '.fbx'; known: .csv"):
         load_motion(tmp_path / "walk.fbx", rig(hand()))

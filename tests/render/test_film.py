@@ -40,6 +40,9 @@ def test_film_decodes_to_its_frames(tmp_path: Path, suffix: str) -> None:
             film.append(picture)
     decoded = _decoded(film.path)
     assert decoded.shape == (11, 50, 66, 3)  # even
+    ground = decoded[:, 40:46, 2:60].mean(axis=(0, 1, 2))
+    np.testing.assert_allclose(ground, 30, atol=1.5)
+    np.testing.assert_allclose(decoded[2, 20:28, 12:20].mean(axis=(0, 1)), (220, 120, 60), atol=4)
     # lossy, and colour at half resolution
     assert np.abs(decoded[:, :49, :65].astype(int) - pictures).mean() < 4
     assert [p.name for p in tmp_path.iterdir()] == [film.path.name]

@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from warpjld.motion.frame_times import frame_times
 from warpjld.motion.rotations import slerp
 
 __all__ = ["Clip"]
@@ -40,7 +41,7 @@ class Clip:
         if rate == self.rate or len(self) < 2:
             return replace(self, rate=rate)
         times = np.arange(len(self)) / self.rate
-        at = np.arange(int(np.floor(times[-1] * rate + 1e-6)) + 1) / rate
+        at = frame_times(0.0, times[-1], rate)
         flat = self.positions.reshape(len(self), -1)
         positions = np.stack([np.interp(at, times, column) for column in flat.T], axis=-1)
         return replace(

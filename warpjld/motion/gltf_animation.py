@@ -11,6 +11,7 @@ from scipy.spatial.transform import Rotation
 
 from warpjld.errors import InputError
 from warpjld.motion.clip import Clip
+from warpjld.motion.frame_times import frame_times
 from warpjld.motion.retarget import retarget
 from warpjld.motion.rotations import slerp, unit
 from warpjld.rig import Rig
@@ -46,15 +47,11 @@ def poses_of_gltf(path: str | Path, rig: Rig, *, rate: float | None = None) -> t
     from warpjld.io.gltf.document import open_document
 
     document = open_document(path)
-    if not document.gltf.animations:
-        raise InputError("no animation in this file", path=path)
-    keys = _read_channels(document, document.gltf.animations[0])
-    if not keys:
-        raise InputError("its animation moves no joint", path=path)
-    times = np.unique(np.concatenate([key.times for key in keys]))
-    rate = _spacing(times) if rate is None else rate
-    at = times[0] + np.arange(int(np.floor((times[-1] - times[0]) * rate + 1e-6)) + 1) / rate
-    worlds = _worlds(document, keys, at)
+    try:
+        worlds, rate = _sample(document, rate)
+    except (AttributeError, IndexError, KeyError, TypeError, ValueError) as error:
+        # pygltflib takes any JSON: what the schema forbids shows where it is used
+        raise InputError(f"not as glTF 2.0 wants it: {error}", path=path) from error
     moved = _own_joints(document, rig, worlds)
     if moved is None:
         return retarget(_clip(document, worlds, rate), rig.skeleton), rate
@@ -62,6 +59,23 @@ def poses_of_gltf(path: str | Path, rig: Rig, *, rate: float | None = None) -> t
     rotations = Rotation.from_matrix(moved[..., :3, :3].reshape(-1, 3, 3)).as_quat().reshape(*moved.shape[:2], 4)
     positions = np.einsum("fjab,jb->fja", moved[..., :3, :3], skeleton.rest) + moved[..., :3, 3]
     return poses_from_world(skeleton, positions, rotations), rate
+
+
+def _sample(document: Document, rate: float | None) -> tuple[NDArray[np.float64], float]:
+    """World transforms of all nodes, shape (F, N, 4, 4), over the first animation, and its frames a second."""
+    if not document.gltf.animations:
+        raise InputError("no animation in this file", path=document.path)
+    keys = _read_channels(document, document.gltf.animations[0])
+    if not keys:
+        raise InputError("its animation moves no joint", path=document.path)
+    times = np.unique(np.concatenate([key.times for key in keys]))
+    rate = _spacing(times) if rate is None else rate
+    with np.errstate(invalid="ignore", over="ignore"):
+        worlds = _worlds(document, keys, frame_times(times[0], times[-1], rate))
+    if not np.isfinite(worlds).all():
+        frame, node = np.argwhere(~np.isfinite(worlds))[0][:2]
+        raise InputError(f"node '{document.name(node)}' is not finite at frame {frame}", path=document.path)
+    return worlds, rate
 
 
 class _Keys:
@@ -81,6 +95,8 @@ class _Keys:
             raise InputError(f"{where}: want {want} values, got {values.shape}", path=document.path)
         if not (np.isfinite(self.times).all() and np.isfinite(values).all() and (np.diff(self.times) > 0).all()):
             raise InputError(f"{where}: key times must increase, and all be finite", path=document.path)
+        if path == "rotation" and not (np.linalg.norm(values[per_key // 2 :: per_key], axis=1) > 0.0).all():
+            raise InputError(f"{where}: a key is no rotation: its quaternion is zero", path=document.path)
         self.values = values.reshape(len(self.times), per_key, _PATHS[path])
 
     def __call__(self, at: NDArray[np.float64]) -> NDArray[np.float64]:

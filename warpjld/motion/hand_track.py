@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from warpjld.errors import InputError
+from warpjld.motion.frame_times import frame_times
 from warpjld.motion.rotations import conjugate, minimal_rotation, multiply, rotate, slerp
 from warpjld.skeleton import DIGITS, Poses, Skeleton, poses_from_rotations
 from warpjld.skeleton.hand import FINGER_JOINTS
@@ -86,7 +87,7 @@ def poses_of_hand(track: HandTrack, skeleton: Skeleton, rate: float) -> Poses:
         moved = rotate(conjugate(palm_turn[0]), places.mean(axis=1) - places[0].mean(axis=0)) / scale
         local[:, 0] = turn
         displacement = centre + moved - rotate(turn, centre)
-    at = np.arange(int(np.floor((track.times[-1] - track.times[0]) * rate + 1e-6)) + 1) / rate + track.times[0]
+    at = frame_times(track.times[0], track.times[-1], rate)
     root = np.stack([np.interp(at, track.times, column) for column in displacement.T], axis=-1)
     return poses_from_rotations(skeleton, slerp(track.times, local, at), root_position=root)
 

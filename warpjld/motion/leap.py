@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from warpjld.errors import InputError
 from warpjld.motion.hand_track import HandTrack
@@ -30,7 +32,10 @@ def leap_track(content: Mapping[str, Any]) -> tuple[HandTrack, float]:
     Raises:
         InputError: No frame holds a whole hand, or a frame is not as the format wants it.
     """
-    frames = _unpacked(content["frames"])
+    try:
+        frames = _unpacked(content["frames"])
+    except (AttributeError, IndexError, TypeError, ValueError) as error:
+        raise InputError(f"packed frames do not fit the fields their first row lists ({error})") from error
     times: list[float] = []
     places: list[dict[str, list[float]]] = []
     hand_id = side = None
@@ -44,21 +49,28 @@ def leap_track(content: Mapping[str, Any]) -> tuple[HandTrack, float]:
                 continue
             fingers.sort(key=lambda p: p.get("type", p["id"]))
             time, place = float(frame["timestamp"]) * 1e-6, _joints(fingers)
-        except (KeyError, TypeError, ValueError, AttributeError) as error:
+        except (AttributeError, KeyError, TypeError, ValueError) as error:
             raise InputError(f"frame {number}: not a Leap Motion frame ({error})") from error
-        if times and time <= times[-1]:
-            raise InputError(f"frame {number}: its timestamp does not come after the one before")
+        if not math.isfinite(time) or (times and time <= times[-1]):
+            raise InputError(f"frame {number}: its timestamp is not a time after the one before")
         times.append(time)
         places.append(place)
     if side not in ("left", "right") or not times:
         raise InputError("no frame holds a hand with five fingers")
     joints = set.intersection(*(set(place) for place in places))
-    points = {joint: np.array([place[joint] for place in places], dtype=np.float64) for joint in sorted(joints)}
-    for joint, array in points.items():
-        if array.shape[1:] != (3,) or not np.isfinite(array).all():
-            raise InputError(f"'{joint}' wants three finite coordinates in every frame")
+    points = {joint: _coordinates(joint, [place[joint] for place in places]) for joint in sorted(joints)}
     rate = (len(times) - 1) / (times[-1] - times[0]) if len(times) > 1 else 1.0
     return HandTrack(str(side), np.array(times) - times[0], points), round(rate, 1)
+
+
+def _coordinates(joint: str, rows: list[list[float]]) -> NDArray[np.float64]:
+    try:
+        array = np.array(rows, dtype=np.float64)
+    except (TypeError, ValueError):
+        array = np.empty(0)
+    if array.shape != (len(rows), 3) or not np.isfinite(array).all():
+        raise InputError(f"'{joint}' wants three finite coordinates in every frame")
+    return array
 
 
 def _joints(fingers: Sequence[Mapping[str, Any]]) -> dict[str, list[float]]:

@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from warpjld.errors import InputError
 from warpjld.motion.channels import ROOT_CHANNELS, canonical_channels, resolve_channel
+from warpjld.motion.frame_times import frame_times
 from warpjld.motion.spline import Spline
 from warpjld.skeleton import CHANNELS, Poses, Skeleton, poses_from_angles
 
@@ -164,7 +165,7 @@ class Motion:
     def frames(self) -> NDArray[np.float64]:
         """Every frame from first to last, one apart, shape (F,)."""
         first, last = self.frame_range
-        return np.asarray(first + np.arange(int(np.floor(last - first + 1e-9)) + 1), dtype=np.float64)
+        return frame_times(first, last, 1.0)
 
     def sample(
         self, frames: ArrayLike, skeleton: Skeleton, *, limits: Limits = "error"

@@ -129,8 +129,13 @@ class _Ffmpeg:
             "macro_block_size": 1,
             "pix_fmt_out": "yuv420p",
             "ffmpeg_log_level": "error",
-            # visually lossless, and playable while it loads
-            "output_params": ["-crf", "16", "-preset", "veryfast", "-movflags", "+faststart", "-f", container],
+            # visually lossless, playable while it loads, and with the colours named, or players guess them by size
+            "output_params": [
+                *("-crf", "16", "-preset", "veryfast", "-movflags", "+faststart"),
+                *("-vf", "scale=out_color_matrix=bt709:out_range=tv:flags=accurate_rnd"),
+                *("-colorspace", "bt709", "-color_primaries", "bt709", "-color_trc", "bt709", "-color_range", "tv"),
+                *("-f", container),
+            ],
         }
         self._path = path
         self._frames: Any = None

@@ -3,10 +3,13 @@
 from __future__ import annotations
 
 import contextlib
+import ctypes
 import os
 import sys
 from collections.abc import Iterator
 from typing import TYPE_CHECKING
+
+from warpjld.errors import WarpjldError
 
 if TYPE_CHECKING:
     import pyvista
@@ -14,11 +17,18 @@ if TYPE_CHECKING:
 __all__ = ["open_window"]
 
 _CHOICE = "VTK_DEFAULT_OPENGL_WINDOW"
+_LIBRARIES = {"libEGL.so.1": "vtkEGLRenderWindow", "libOSMesa.so.8": "vtkOSOpenGLRenderWindow"}
 
 
 def open_window(size: tuple[int, int]) -> pyvista.Plotter:
-    """A plotter of ``size`` pixels, without lights and smoothing: pictures are drawn larger and averaged instead,
-    which looks the same everywhere and is the faster way where a processor does the drawing."""
+    """A plotter of ``size`` pixels, without lights and smoothing.
+
+    Pictures are drawn larger and averaged instead, which looks the same everywhere and is the faster way where a
+    processor does the drawing.
+
+    Raises:
+        WarpjldError: No display, and none of the libraries that do without.
+    """
     import pyvista
 
     theme = pyvista.themes.Theme()
@@ -35,8 +45,19 @@ def _without_display() -> Iterator[None]:
     if sys.platform != "linux" or os.environ.get("DISPLAY") or _CHOICE in os.environ:
         yield
         return
-    os.environ[_CHOICE] = "vtkEGLRenderWindow"
+    os.environ[_CHOICE] = _window_kind()
     try:
         yield
     finally:
         os.environ.pop(_CHOICE, None)
+
+
+def _window_kind() -> str:
+    for library, kind in _LIBRARIES.items():
+        with contextlib.suppress(OSError):
+            ctypes.CDLL(library)
+            return kind
+    raise WarpjldError(
+        "drawing without a display needs EGL or OSMesa, and neither is installed "
+        "(Debian, Ubuntu: apt install libegl1 libgl1-mesa-dri)"
+    )

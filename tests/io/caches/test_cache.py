@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import gc
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -71,6 +72,15 @@ def test_left_unclosed_leaves_nothing(surface: Surface, clip: np.ndarray, tmp_pa
     del cache
     gc.collect()
     assert _files(tmp_path) == []
+
+
+@every_format
+def test_surface_without_texture(surface: Surface, clip: np.ndarray, tmp_path: Path, suffix: str) -> None:
+    bare = replace(surface, uv=None)
+    with open_cache(tmp_path / f"a{suffix}", bare, frames=len(clip), rate=25) as cache:
+        cache.write(clip)
+    text = cache.files[0].read_bytes()
+    assert not any(word in text for word in (b"\nvt ", b"primvars:st", b"TEXCOORD", b"uv.npy"))
 
 
 @pytest.mark.parametrize(
