@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import json
+import sys
+from contextlib import redirect_stdout
 from pathlib import Path
 from typing import Any
 
@@ -67,7 +69,7 @@ def _report(rig: Rig) -> dict[str, Any]:
     from warpjld.skeleton.recognise.placing import check_placing
 
     skeleton, surface = rig.skeleton, rig.surface
-    how, domains = _domains(rig)
+    domains = _domains(rig)
     joints = []
     for j, name in enumerate(skeleton.names):
         parent = int(skeleton.parents[j])
@@ -83,7 +85,7 @@ def _report(rig: Rig) -> dict[str, Any]:
                     for channel, pair in zip(CHANNELS, skeleton.limits[j], strict=True)
                     if np.ptp(pair) > 0 and skeleton.children[j]
                 },
-                "vertices": None if domains is None else int(domains[j]),
+                "domain": int(domains[j]),
             }
         )
     return {
@@ -95,7 +97,6 @@ def _report(rig: Rig) -> dict[str, Any]:
             "parts": [part.name for part in surface.parts],
             "size": _round(np.ptp(surface.vertices, axis=0), 4),
         },
-        "domains": how,
         "joints": joints,
         "palms": [[[skeleton.names[a], skeleton.names[b]] for a, b in palm] for palm in skeleton.palms],
         "placing": [
@@ -106,12 +107,14 @@ def _report(rig: Rig) -> dict[str, Any]:
     }
 
 
-def _domains(rig: Rig) -> tuple[str, NDArray[np.int64] | None]:
-    """How vertices were given to joints, and how many each joint's bone moves most."""
-    if rig.skin is None:
-        return "no painted weights", None
-    strongest = rig.skin.joints[np.arange(len(rig.skin.joints)), rig.skin.weights.argmax(axis=1)]
-    return "painted weights", np.bincount(strongest, minlength=len(rig.skeleton))
+def _domains(rig: Rig) -> NDArray[np.int64]:
+    """Vertices in the domain of each segment, counted at the joint the segment ends at, shape (J,) (R16)."""
+    from warpjld.covering import bind
+
+    with redirect_stdout(sys.stderr):  # where kernels are compiled, Warp says so
+        anchors = bind(rig.skeleton, rig.surface).anchors
+    strongest = anchors.segment[np.arange(len(anchors)), anchors.weight.argmax(axis=1)]
+    return np.bincount(anchors.ends[strongest, 1], minlength=len(rig.skeleton))
 
 
 def _print(report: dict[str, Any], quiet: bool) -> None:
@@ -122,9 +125,9 @@ def _print(report: dict[str, Any], quiet: bool) -> None:
             f"{report['file']}\n"
             f"surface: {surface['vertices']} vertices ({surface['source vertices']} in the file), "
             f"{surface['triangles']} triangles, {size} mm, parts: {', '.join(surface['parts'])}\n"
-            f"joints: {len(report['joints'])}; vertices by {report['domains']}\n"
+            f"joints: {len(report['joints'])}; domain: vertices of the segment that ends at a joint\n"
         )
-        rows = [("joint", "in the file", "vertices", "limits")]
+        rows = [("joint", "in the file", "domain", "limits")]
         rows += [_row(joint) for joint in report["joints"]]
         widths = [max(len(row[k]) for row in rows) for k in range(3)]
         for name, source, count, limits in rows:
@@ -143,7 +146,7 @@ def _print(report: dict[str, Any], quiet: bool) -> None:
 
 def _row(joint: dict[str, Any]) -> tuple[str, str, str, str]:
     limits = ", ".join(f"{channel} {low:g}…{high:g}°" for channel, (low, high) in joint["limits"].items())
-    return joint["name"], joint["source"] or "(added)", str(joint["vertices"] or ""), limits
+    return joint["name"], joint["source"] or "(added)", str(joint["domain"] or ""), limits
 
 
 def _round(values: NDArray[np.float64], digits: int) -> list[float]:

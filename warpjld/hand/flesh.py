@@ -45,7 +45,7 @@ class Flesh:
         assert fingers is not None
         hand = _join(Palm(self.plan.stretch)(points), fingers, _FINGER_ROOT * scale)
         thumb = self.plan.digits["thumb"].flesh(points, self.detail)
-        for part in (thumb, *(muscle(points) for muscle in self.plan.thenar)):
+        for part in (thumb, *(muscle(points) for muscle in self.plan.muscles)):
             hand = _join(hand, part, _THUMB_ROOT * scale)
         return hand
 

@@ -80,7 +80,8 @@ class Palm:
         for px, pd, sx, sd, height in _BONES:
             top = top + height * np.exp(-0.5 * (((x - px) / sx) ** 2 + ((d - pd) / sd) ** 2))
         # the knuckles lie on an arch: the dorsal face falls to both sides, more to the ulnar one
-        top = top - np.clip(d / 60.0, 0.0, 1.0) * (
+        rise = np.clip(d / 70.0, 0.0, 1.0)
+        top = top - rise * rise * (3.0 - 2.0 * rise) * (
             _ARCH[0] * np.clip(x - 18.0, 0.0, 20.0) ** 2 + _ARCH[1] * np.clip(-8.0 - x, 0.0, 38.0) ** 2
         )
         top = np.maximum(top, bottom + 8.0)

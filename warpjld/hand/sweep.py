@@ -120,7 +120,8 @@ class Sweep:
         rim = np.sqrt(np.sqrt((u / half_width) ** 4 + along**4))
         away = (rim - 1.0) * half_width
         upper = np.clip(2.5 * height, 0.0, 1.0)
-        fold = 0.045 * half_width * np.exp(-((away / (0.10 * half_width)) ** 2))
+        free = 0.5 + 0.5 * np.tanh(4.0 * (along - 0.55))  # the nail's free edge has no fold
+        fold = 0.045 * half_width * np.exp(-((away / (0.10 * half_width)) ** 2)) * (1.0 - 0.7 * free)
         plate = 0.02 * half_width / (1.0 + np.exp(np.clip(away / (0.05 * half_width), -30.0, 30.0)))
         return upper * upper * (3.0 - 2.0 * upper) * (fold - plate)
 

@@ -38,7 +38,7 @@ def read_accessor(gltf: Any, buffers: list[bytes], index: int) -> NDArray[Any]:
     else:
         out = _strided(gltf, buffers, what, accessor.bufferView, accessor.byteOffset or 0, accessor.count, dtype, shape)
     if accessor.sparse is not None:
-        sparse = accessor.sparse
+        sparse, out = accessor.sparse, out.copy()
         at_dtype = np.dtype(_COMPONENTS[sparse.indices.componentType]).newbyteorder("<")
         at = _strided(
             gltf, buffers, what, sparse.indices.bufferView, sparse.indices.byteOffset or 0, sparse.count, at_dtype, ()

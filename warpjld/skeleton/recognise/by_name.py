@@ -37,6 +37,7 @@ def roles_by_name(tree: SourceTree) -> Roles:
         _hand(tree, meanings, kinds, side, roles)
         if side:
             _limbs(kinds, side, roles)
+            _forearm_stub(tree, side, roles)
             if kinds[side, "hand end"]:
                 roles.body[f"{side}.hand.tip"] = kinds[side, "hand end"][0]
             _toes(tree, kinds, side, roles)
@@ -94,6 +95,13 @@ def _limbs(kinds: dict[tuple[str | None, str], list[int]], side: str, roles: Rol
                 taken.add(kind)
                 # of upperarm01 and upperarm02 the first is the joint, the others divide the limb
                 roles.body[f"{side}.{name}"] = kinds[side, kind][0]
+
+
+def _forearm_stub(tree: SourceTree, side: str, roles: Roles) -> None:
+    """The built-in hand ends in a stub whose root is no elbow, and is called so."""
+    elbow = roles.body.get(f"{side}.elbow")
+    if elbow is not None and tree.names[elbow] == f"{side}.forearm":
+        roles.body[f"{side}.forearm"] = roles.body.pop(f"{side}.elbow")
 
 
 def _toes(tree: SourceTree, kinds: dict[tuple[str | None, str], list[int]], side: str, roles: Roles) -> None:
