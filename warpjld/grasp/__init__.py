@@ -1,0 +1,1 @@
+"""Hands and objects: measuring, closing and judging grasps."""

@@ -1,0 +1,28 @@
+"""How good a grasp is. One measure a file, each with its formula and its source; NumPy and SciPy only.
+
+All take a `Contacts` set, so grasps from elsewhere can be judged too.
+"""
+
+from warpjld.grasp.quality.closure import Closure, force_closure
+from warpjld.grasp.quality.cone import friction_cone
+from warpjld.grasp.quality.contacts import Contacts, patch_spin
+from warpjld.grasp.quality.gravity import SIX_DIRECTIONS, GravityResponse, gravity_displacement
+from warpjld.grasp.quality.resistance import resisted_wrench
+from warpjld.grasp.quality.wrench_space import WrenchSpace, wrench_space
+from warpjld.grasp.quality.wrenches import contact_wrenches, grasp_matrix
+
+__all__ = [
+    "SIX_DIRECTIONS",
+    "Closure",
+    "Contacts",
+    "GravityResponse",
+    "WrenchSpace",
+    "contact_wrenches",
+    "force_closure",
+    "friction_cone",
+    "grasp_matrix",
+    "gravity_displacement",
+    "patch_spin",
+    "resisted_wrench",
+    "wrench_space",
+]

@@ -1,0 +1,100 @@
+"""Force closure: whether the contacts can balance any wrench whatever, given enough force."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from warpjld.errors import WarpjldError
+from warpjld.grasp.quality.contacts import Contacts
+from warpjld.grasp.quality.wrenches import contact_wrenches, has_full_rank
+
+__all__ = ["Closure", "force_closure"]
+
+# HiGHS solves to 1e-7; a margin below this could be its rounding
+_MARGIN = 1e-7
+
+
+@dataclass(frozen=True, eq=False)
+class Closure:
+    """Answer of `force_closure`.
+
+    Attributes:
+        closed: Whether the grasp is force closed.
+        margin: Smallest share any cone edge has in the squeeze below, times the number of edges: 0…1, and 1 where all
+            edges push alike. 0 without closure.
+        full_rank: Whether the wrenches span all six dimensions: without, no friction will close the grasp.
+        squeeze: Normal force of each contact in the internal grasp force found, summing to 1 [N], shape (C,); zeros
+            without closure.
+        forces: The same in the contacts' frames, rows (f_t₁, f_t₂, f_n, τ_n), shape (C, 4).
+    """
+
+    closed: bool
+    margin: float
+    full_rank: bool
+    squeeze: NDArray[np.float64]
+    forces: NDArray[np.float64]
+
+
+def force_closure(
+    contacts: Contacts, center: ArrayLike = (0.0, 0.0, 0.0), *, torque_scale: float = 1.0, edges: int = 8
+) -> Closure:
+    """Whether friction cones, discretised from inside, positively span the space of wrenches.
+
+    Force closure ⇔ the primitive wrenches w_k have rank 6 and the origin lies strictly inside their convex hull
+    (Nguyen 1988, "Constructing force-closure grasps"; Murray, Li & Sastry 1994, Proposition 5.3). Strictly inside means
+    a combination in which every wrench takes part, found by the linear program
+
+        maximise t   subject to   Σ α_k w_k = 0,   Σ α_k = 1,   α_k ≥ t
+
+    (HiGHS). Neither ``center`` nor ``torque_scale`` changes the answer; they only condition the program.
+
+    Args:
+        contacts: C contacts.
+        center: Point torques are taken about [m].
+        torque_scale: Length torques are divided by [m].
+        edges: Edges of a friction cone.
+    """
+    none = Closure(False, 0.0, False, np.zeros(len(contacts)), np.zeros((len(contacts), 4)))
+    if not len(contacts):
+        return none
+    blocks = contact_wrenches(contacts, center, torque_scale, edges)
+    wrenches = np.concatenate(blocks, axis=1)
+    if not has_full_rank(wrenches):
+        return none
+    shares, least = _even_combination(wrenches)
+    if least * wrenches.shape[1] <= _MARGIN:
+        return Closure(False, 0.0, True, none.squeeze, none.forces)
+    forces = _contact_forces(contacts, shares, edges)
+    return Closure(True, float(least * wrenches.shape[1]), True, forces[:, 2], forces)
+
+
+def _even_combination(wrenches: NDArray[np.float64]) -> tuple[NDArray[np.float64], float]:
+    from scipy.optimize import linprog
+
+    count = wrenches.shape[1]
+    # substituting α = t + β, β ≥ 0, leaves bounds instead of a row for every edge
+    equal = np.zeros((7, count + 1))
+    equal[:6, :count] = wrenches
+    equal[:6, count] = wrenches.sum(axis=1)
+    equal[6, :count], equal[6, count] = 1.0, count
+    cost = np.zeros(count + 1)
+    cost[count] = -1.0
+    found = linprog(cost, A_eq=equal, b_eq=np.r_[np.zeros(6), 1.0], bounds=(0.0, None), method="highs")
+    if found.status == 2:  # infeasible: the origin is outside the hull
+        return np.zeros(count), 0.0
+    if found.status != 0:
+        raise WarpjldError(f"force closure: the linear program stopped: {found.message}")
+    return found.x[:count] + found.x[count], float(found.x[count])
+
+
+def _contact_forces(contacts: Contacts, shares: NDArray[np.float64], edges: int) -> NDArray[np.float64]:
+    from warpjld.grasp.quality.cone import friction_cone
+
+    forces, start = np.zeros((len(contacts), 4)), 0
+    for i, cone in enumerate(friction_cone(contacts, edges)):
+        forces[i] = cone @ shares[start : start + cone.shape[1]]
+        start += cone.shape[1]
+    return forces

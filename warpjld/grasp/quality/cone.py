@@ -1,0 +1,48 @@
+"""Friction cones as polyhedral cones: the forces and torques one contact can pass on."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from warpjld.errors import InputError
+from warpjld.grasp.quality.contacts import Contacts
+
+__all__ = ["friction_cone"]
+
+
+def friction_cone(contacts: Contacts, edges: int = 8) -> list[NDArray[np.float64]]:
+    """Edges of every contact's friction cone, for unit normal force.
+
+    A point contact passes forces with f_t ≤ μ f_n (Murray, Li & Sastry 1994, §5.2.1). Its cone is replaced by the
+    pyramid of ``edges`` edges inscribed in it,
+
+        f_k = n + μ (cos θ_k t₁ + sin θ_k t₂),   θ_k = 2πk/edges,
+
+    so a discretised grasp is never judged better than it is; the error falls with edges⁻². A soft finger also passes a
+    torque about its normal, within the ellipsoid (f_t/μ)² + (τ_n/γ)² ≤ f_n² (Howe & Cutkosky 1996), from which the two
+    poles τ_n = ±γ are added to the ring above.
+
+    Args:
+        contacts: C contacts.
+        edges: Edges of a cone, 3 or more.
+
+    Returns:
+        Per contact an array (4, k) of columns (f_t₁, f_t₂, f_n, τ_n) in the contact's own frame; k is ``edges`` for
+        a point contact with friction, 1 for a frictionless one, and 2 more for a soft finger.
+    """
+    if edges < 3:
+        raise InputError(f"edges: a friction cone wants 3 or more, got {edges}")
+    angles = 2.0 * np.pi * np.arange(edges) / edges
+    cones = []
+    for friction, spin in zip(contacts.friction, contacts.spin, strict=True):
+        ring = angles if friction > 0.0 else np.zeros(0)
+        columns = [
+            np.stack([friction * np.cos(ring), friction * np.sin(ring), np.ones_like(ring), np.zeros_like(ring)])
+        ]
+        if spin > 0.0:
+            columns.append(np.array([[0.0, 0.0], [0.0, 0.0], [1.0, 1.0], [spin, -spin]]))
+        elif friction == 0.0:
+            columns.append(np.array([[0.0], [0.0], [1.0], [0.0]]))
+        cones.append(np.concatenate(columns, axis=1))
+    return cones

@@ -1,0 +1,209 @@
+"""How far a held object gives under gravity, from six directions: quasi-static balance on compliant contacts."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from warpjld.errors import InputError, WarpjldError
+from warpjld.grasp.quality.closure import force_closure
+from warpjld.grasp.quality.contacts import Contacts
+from warpjld.grasp.quality.resistance import resisted_wrench
+from warpjld.grasp.quality.wrenches import grasp_matrix
+
+__all__ = ["SIX_DIRECTIONS", "GravityResponse", "gravity_displacement"]
+
+Array = NDArray[np.float64]
+
+SIX_DIRECTIONS = np.array([[1, 0, 0], [-1, 0, 0], [0, 1, 0], [0, -1, 0], [0, 0, 1], [0, 0, -1]], dtype=np.float64)
+"""±x, ±y, ±z, shape (6, 3)."""
+
+# residual of the balance, as a share of the weight
+_BALANCED = 1e-5
+# a spring to the ground, as a share of k_n: of motions no contact feels, the smallest is taken
+_GROUND = 1e-10
+
+
+@dataclass(frozen=True, eq=False)
+class GravityResponse:
+    """Answer of `gravity_displacement`, one entry a direction.
+
+    Attributes:
+        held: Whether the contacts can carry the weight at all, shape (D,).
+        displacements: Displacement of the centre [m], shape (D, 3); infinite where not held.
+        rotations: Small rotation vectors [rad], shape (D, 3); infinite where not held.
+        forces: Contact forces in the contacts' frames (f_t₁, f_t₂, f_n, τ_n) [N, N m], shape (D, C, 4); NaN where
+            not held.
+        residual: Unbalanced wrench over the weight, after the solve, shape (D,); infinite where not held.
+    """
+
+    held: NDArray[np.bool_]
+    displacements: Array
+    rotations: Array
+    forces: Array
+    residual: Array
+
+    @property
+    def distance(self) -> Array:
+        """Length of the displacement of the centre [m], shape (D,)."""
+        return np.asarray(np.linalg.norm(self.displacements, axis=1))
+
+    @property
+    def worst(self) -> float:
+        """The largest of them [m]; infinite where a direction is not held."""
+        return float(self.distance.max())
+
+
+def gravity_displacement(
+    contacts: Contacts,
+    center: ArrayLike,
+    *,
+    mass: float,
+    torque_scale: float,
+    squeeze: float,
+    normal_stiffness: float = 3500.0,
+    tangential_stiffness: float = 2400.0,
+    gravity: float = 9.81,
+    directions: ArrayLike = SIX_DIRECTIONS,
+    edges: int = 8,
+) -> GravityResponse:
+    """Displacement of the object when gravity acts along each direction in turn, the hand standing still.
+
+    Every contact is a spring K = diag(k_t, k_t, k_n, k_s) of the skin behind a Coulomb cone. The object's small motion
+    ξ = (v, ω) changes the forces f_i from their preload f⁰_i (Cutkosky & Kao 1989, "Computing and controlling the
+    compliance of a robotic hand": G K Gᵀ is the grasp's stiffness), and they must balance the weight w:
+
+        f_i(ξ) = Π_i( f⁰_i − K G_iᵀ ξ ),    Σ G_i f_i(ξ) + w = 0,
+
+    Π_i the projection on the friction cone in the metric K⁻¹: it keeps a sticking contact as it is, lets a pulled one
+    go and a loaded one slide. As Π_i is a gradient this is the minimum of the convex potential
+    Φ(ξ) = Σ ½‖f_i(ξ)‖²_{K⁻¹} − w·ξ, that is, the least elastic energy among admissible forces in balance (complementary
+    energy; Han, Trinkle & Li 2000 have the cones). The projection is exact for the round cone. It makes sliding
+    associated: a sliding contact also opens by μ times its slip, which a Coulomb contact does not.
+
+    The preload is the most even internal force that closes the grasp (`force_closure`), scaled to ``squeeze``; zero
+    without closure. Without slip ξ = −(G K Gᵀ)⁻¹(−w) exactly. Where even unbounded forces in the discretised cones
+    cannot carry w, the object is not held.
+
+    Args:
+        contacts: C contacts.
+        center: Centre of mass [m].
+        mass: Mass of the object [kg].
+        torque_scale: Length [m] that brings torques to forces and rotations to lengths; conditions the solve only.
+        squeeze: Sum of the normal forces before gravity acts [N].
+        normal_stiffness: k_n of a contact [N/m]; the default is a finger pulp's under load (reported about 3.5 N/mm).
+        tangential_stiffness: k_t [N/m]; the default is k_n (2 − 2ν)/(2 − ν), ν = 0.48 (Mindlin 1949). Torsion has
+            k_s = k_t (γ/μ)², 4/9 k_t a² for a patch of radius a.
+        gravity: Acceleration [m/s²].
+        directions: Directions gravity acts along, shape (D, 3); normalised here.
+        edges: Edges of the friction cones for closure and for deciding whether the object is held.
+
+    Returns:
+        A response per direction.
+    """
+    stiffness = np.array([tangential_stiffness, tangential_stiffness, normal_stiffness, 0.0])
+    for name, value in (("mass", mass), ("normal_stiffness", normal_stiffness), ("gravity", gravity)):
+        if not (np.isfinite(value) and value > 0.0):
+            raise InputError(f"{name}: want a number > 0, got {value!r}")
+    if not (np.isfinite(tangential_stiffness) and tangential_stiffness > 0.0):
+        raise InputError(f"tangential_stiffness: want a number > 0, got {tangential_stiffness!r}")
+    if not (np.isfinite(squeeze) and squeeze >= 0.0):
+        raise InputError(f"squeeze: want a force ≥ 0 [N], got {squeeze!r}")
+    ways = np.asarray(directions, dtype=np.float64).reshape(-1, 3)
+    ways = ways / np.linalg.norm(ways, axis=1, keepdims=True)
+    count = len(ways)
+    held = np.zeros(count, dtype=bool)
+    motion = np.full((count, 6), np.inf)
+    forces = np.full((count, len(contacts), 4), np.nan)
+    residual = np.full(count, np.inf)
+    springs = _Springs(contacts, grasp_matrix(contacts, center, torque_scale), stiffness)
+    preload = squeeze * force_closure(contacts, center, torque_scale=torque_scale, edges=edges).forces
+    weight = mass * gravity
+    for d, way in enumerate(ways):
+        load = weight * np.r_[way, np.zeros(3)]
+        reach = resisted_wrench(contacts, load, center, torque_scale=torque_scale, budget=1e6 * weight, edges=edges)
+        if reach < 1.0:
+            continue
+        held[d] = True
+        motion[d], forces[d], residual[d] = springs.balance(preload, load)
+        if residual[d] > _BALANCED:
+            raise WarpjldError(f"gravity: direction {d}: forces are unbalanced by {residual[d]:.1e} of the weight")
+    return GravityResponse(held, motion[:, :3], motion[:, 3:] / torque_scale, forces, residual)
+
+
+class _Springs:
+    """Contacts as springs behind friction cones; forces scaled by K^-½, so that cones are round."""
+
+    def __init__(self, contacts: Contacts, matrix: Array, stiffness: Array) -> None:
+        count = len(contacts)
+        friction, spin = contacts.friction, contacts.spin
+        roots = np.tile(np.sqrt(stiffness), (count, 1))
+        # (f_t/μ)² + (τ/γ)² ≤ f_n² is round where k_s = k_t (γ/μ)²
+        turns = (spin > 0.0) & (friction > 0.0)
+        roots[turns, 3] = roots[turns, 0] * spin[turns] / friction[turns]
+        self._roots = roots
+        self._slope = friction * roots[:, 2] / roots[:, 0]
+        # G diag(√K), per contact (C, 6, 4)
+        self._map = matrix.reshape(6, count, 4).transpose(1, 0, 2) * roots[:, None, :]
+
+    def balance(self, preload: Array, load: Array) -> tuple[Array, Array, float]:
+        """Motion (6,) [m], forces (C, 4) and relative residual under a load (6,) [N]."""
+        from scipy.optimize import minimize
+
+        safe = np.where(self._roots > 0.0, self._roots, 1.0)
+        start = np.where(self._roots > 0.0, preload / safe, 0.0)
+        weight = float(np.linalg.norm(load))
+        unit = weight / float(self._roots[:, 2].max() ** 2)  # how far one spring gives: the scale of the unknowns
+
+        def potential(x: Array) -> tuple[float, Array]:
+            scaled = self._project(start - np.einsum("cij,i->cj", self._map, x * unit))[0]
+            slope = -np.einsum("cij,cj->i", self._map, scaled) - load
+            energy = (0.5 * float((scaled**2).sum()) - float(load @ x) * unit) / (weight * unit)
+            return energy + 0.5 * _GROUND * float(x @ x), slope / weight + _GROUND * x
+
+        def curvature(x: Array) -> Array:
+            turned = self._project(start - np.einsum("cij,i->cj", self._map, x * unit))[1]
+            springs = np.einsum("cij,cjk,clk->il", self._map, turned, self._map)
+            return np.asarray(springs * (unit / weight) + _GROUND * np.eye(6))
+
+        found = minimize(
+            potential,
+            np.zeros(6),
+            jac=True,
+            hess=curvature,
+            method="trust-exact",
+            options={"gtol": 0.01 * _BALANCED, "maxiter": 2000, "max_trust_radius": 1e6},
+        )
+        motion = found.x * unit
+        scaled = self._project(start - np.einsum("cij,i->cj", self._map, motion))[0]
+        residual = np.linalg.norm(np.einsum("cij,cj->i", self._map, scaled) + load) / weight
+        return motion, scaled * self._roots, float(residual)
+
+    def _project(self, forces: Array) -> tuple[Array, Array]:
+        """Scaled forces (C, 4) brought into their cones |y_t| ≤ m y_n, and the derivative (C, 4, 4) of doing so."""
+        tangential, normal, slope = forces[:, (0, 1, 3)], forces[:, 2], self._slope
+        length = np.linalg.norm(tangential, axis=1)
+        along = tangential / np.maximum(length, 1e-300)[:, None]
+        sticks = (length <= slope * normal) & (normal >= 0.0)
+        opens = ~sticks & (slope * length <= -normal)
+        slides = ~sticks & ~opens
+        share = (normal + slope * length) / (1.0 + slope**2)
+        out = np.where(sticks[:, None], forces, 0.0)
+        out[slides, 2] = share[slides]
+        out[np.ix_(slides, (0, 1, 3))] = (slope * share)[slides, None] * along[slides]
+
+        turned = np.zeros((len(forces), 4, 4))
+        turned[sticks] = np.eye(4)
+        edge = np.zeros((len(forces), 4))  # the cone's edge that a sliding force is projected on
+        edge[:, (0, 1, 3)] = slope[:, None] * along
+        edge[:, 2] = 1.0
+        across = np.zeros((len(forces), 4, 4))
+        flat = np.eye(3) - along[:, :, None] * along[:, None, :]
+        across[np.ix_(range(len(forces)), (0, 1, 3), (0, 1, 3))] = flat
+        turned[slides] = (
+            edge[slides, :, None] * edge[slides, None, :] / (1.0 + slope[slides, None, None] ** 2)
+            + (slope * share / np.maximum(length, 1e-300))[slides, None, None] * across[slides]
+        )
+        return out, turned
