@@ -55,7 +55,7 @@ def test_a_pushed_away_contact_lets_go() -> None:
 
 def test_a_sliding_pinch_wedges_itself_tighter() -> None:
     """Weight W across a pinch squeezed by N each, beyond 2 μ N. Sliding is associated: by symmetry each contact's
-    trial force (k_t v, N) is projected on the cone's edge along K, f_n = (N + μ (k_n/k_t) k_t v) / (1 + μ² k_n/k_t), and
+    trial force (k_t v, N) is projected on the cone's edge along K, f_n = (N + μ k_n v) / (1 + μ² k_n/k_t), and
     2 μ f_n = W gives v = (W (1 + μ² k_n/k_t)/(2μ) − N) / (μ k_n)."""
     friction, each = 0.3, 1.0
     pinch = two_on_sphere(0.03, friction, 0.004)

@@ -1,0 +1,66 @@
+"""What a study repeats, as the runner sees it."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from warpjld.study.columns import Column
+
+__all__ = ["Experiment", "Outcome", "generator"]
+
+
+@dataclass(frozen=True, eq=False)
+class Outcome:
+    """Result of one trial.
+
+    Attributes:
+        status: One word for how it ended.
+        values: Column → value; a missing column is an empty cell.
+        arrays: Name → array, such as poses. A name has one shape throughout the study; not every trial needs it.
+        message: What is worth knowing.
+    """
+
+    status: str
+    values: Mapping[str, Any] = field(default_factory=dict)
+    arrays: Mapping[str, NDArray[Any]] = field(default_factory=dict)
+    message: str = ""
+
+
+class Experiment(Protocol):
+    """One kind of trial. It is pickled once to each worker, so it holds the plan, not what is loaded from it.
+
+    A trial must depend on nothing but the experiment and its own number: not on what ran before it in the process.
+    """
+
+    columns: tuple[Column, ...]
+    """Schema of ``Outcome.values``."""
+    success: str
+    """Truth column that the success rate counts."""
+    groups: tuple[str, ...]
+    """Columns whose values the summary tells apart."""
+    trials: int
+    seed: int
+
+    def plan(self, trial: int) -> dict[str, Any]:
+        """Columns known before the trial is run: they are in its row even if it fails, so that failures count in the
+        group they belong to."""
+
+    def identity(self) -> dict[str, Any]:
+        """All that determines the results but the number of trials, as JSON: settings, hashes of input files."""
+
+    def run(self, trial: int, rng: np.random.Generator) -> Outcome:
+        """Trial number ``trial``. Exceptions become rows with status "error"."""
+
+    def pictures(self, outcome: Outcome, folder: Path) -> list[Path]:
+        """Draw a trial; may draw nothing."""
+
+
+def generator(seed: int, trial: int) -> np.random.Generator:
+    """The trial's own random numbers: of its number, not of the process or the order it runs in."""
+    return np.random.default_rng(np.random.SeedSequence(seed, spawn_key=(trial,)))

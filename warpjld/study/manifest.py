@@ -1,0 +1,49 @@
+"""What a study was made of and how it ran: everything about it that is no result."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import platform
+import sys
+from collections.abc import Iterable
+from importlib.metadata import PackageNotFoundError, version
+from pathlib import Path
+from typing import Any
+
+__all__ = ["file_hash", "fingerprint", "versions", "write_json"]
+
+_PACKAGES = ("warpjld", "numpy", "scipy", "warp-lang", "trimesh", "pyarrow")
+
+
+def file_hash(path: Path) -> str:
+    """SHA-256 of a file."""
+    with path.open("rb") as file:
+        return hashlib.file_digest(file, "sha256").hexdigest()
+
+
+def fingerprint(identity: dict[str, Any]) -> str:
+    """SHA-256 of settings, whatever their order."""
+    return hashlib.sha256(json.dumps(identity, sort_keys=True, ensure_ascii=False).encode()).hexdigest()
+
+
+def versions(packages: Iterable[str] = _PACKAGES) -> dict[str, str | None]:
+    """Versions of what computes, and of where; None for what is not installed."""
+    found: dict[str, str | None] = {}
+    for name in packages:
+        try:
+            found[name] = version(name)
+        except PackageNotFoundError:
+            found[name] = None
+    if found.get("warpjld") is None:  # run from a source tree
+        from warpjld import __version__
+
+        found["warpjld"] = __version__
+    return found | {"python": sys.version.split()[0], "platform": platform.platform(), "machine": platform.machine()}
+
+
+def write_json(path: Path, content: dict[str, Any]) -> None:
+    """Write a JSON file, whole or not at all."""
+    beside = path.with_name(path.name + ".part")
+    beside.write_text(json.dumps(content, indent=1, ensure_ascii=False) + "\n", encoding="utf-8")
+    beside.replace(path)

@@ -1,0 +1,80 @@
+"""One trial of a finished study again: the same numbers, and pictures of it."""
+
+from __future__ import annotations
+
+import multiprocessing
+from collections.abc import Callable
+from concurrent.futures import ProcessPoolExecutor
+from concurrent.futures.process import BrokenProcessPool
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from warpjld.errors import InputError, WarpjldError
+from warpjld.study.experiment import Experiment, Outcome
+from warpjld.study.manifest import write_json
+from warpjld.study.run import opened
+from warpjld.study.worker import one_thread, perform
+
+__all__ = ["Rerun", "rerun_trial"]
+
+
+@dataclass(frozen=True, eq=False)
+class Rerun:
+    """A trial run again.
+
+    Attributes:
+        row: Its row.
+        differences: Columns and arrays that differ from the study's, bit for bit; empty where all is the same.
+        files: The row as JSON, and the pictures.
+    """
+
+    row: dict[str, Any]
+    differences: tuple[str, ...]
+    files: tuple[Path, ...]
+
+
+def rerun_trial(
+    experiment: Experiment,
+    out: str | Path,
+    trial: int,
+    *,
+    report: Callable[[str, int, int], None] = lambda what, done, total: None,
+) -> Rerun:
+    """Run one trial of a study in ``out`` again, compare it with what is there, and draw it.
+
+    Raises:
+        InputError: ``out`` holds another study, or not this trial.
+        WarpjldError: The trial ends its process again.
+    """
+    folder = Path(out)
+    if not (folder / "study.json").exists():
+        raise InputError("holds no study", path=folder)
+    kept = opened(experiment, folder).read(trial)
+    if kept is None:
+        raise InputError(f"row {trial} is not in the study in {folder}; it has rows 0 to {experiment.trials - 1}")
+    report(f"trial {trial}", 0, 2)
+    row, outcome = _in_a_worker(experiment, trial)
+    differences = [name for name in row if row[name] != kept.row.get(name)]
+    for name in sorted({*outcome.arrays, *kept.arrays}):
+        new, old = outcome.arrays.get(name), kept.arrays.get(name)
+        if new is None or old is None or not np.array_equal(new, old, equal_nan=new.dtype.kind == "f"):
+            differences.append(name)
+    report(f"trial {trial}", 1, 2)
+    target = folder / "rerun" / str(trial)
+    target.mkdir(parents=True, exist_ok=True)
+    files = [target / "row.json", *experiment.pictures(outcome, target)]
+    write_json(files[0], {"row": row, "differences": differences})
+    report(f"trial {trial}", 2, 2)
+    return Rerun(row, tuple(differences), tuple(files))
+
+
+def _in_a_worker(experiment: Experiment, trial: int) -> tuple[dict[str, Any], Outcome]:
+    # not in this process: its libraries may sum on several threads, in another order
+    with one_thread(), ProcessPoolExecutor(1, mp_context=multiprocessing.get_context("spawn")) as pool:
+        try:
+            return pool.submit(perform, experiment, trial).result()
+        except BrokenProcessPool as error:
+            raise WarpjldError(f"trial {trial} ended its process, as it may have done in the study") from error

@@ -1,0 +1,185 @@
+"""Running a study from start, or from where it was stopped, to its table."""
+
+from __future__ import annotations
+
+import json
+import os
+import shutil
+import time
+from collections import Counter
+from collections.abc import Callable
+from dataclasses import asdict, dataclass
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import Any, Literal
+
+from warpjld.errors import InputError
+from warpjld.study.columns import COMMON_COLUMNS, Column
+from warpjld.study.experiment import Experiment
+from warpjld.study.manifest import file_hash, fingerprint, versions, write_json
+from warpjld.study.pool import run_trials
+from warpjld.study.rates import Rate, success_rates
+from warpjld.study.shards import Shards
+from warpjld.study.summary import write_summary
+from warpjld.study.table import gathered, require_parquet, write_arrays, write_csv, write_parquet
+
+__all__ = ["StudyResult", "TableFormat", "opened", "run_study", "table_columns"]
+
+TableFormat = Literal["parquet", "csv", "both"]
+Report = Callable[[str, int, int], None]
+
+_TRIALS, _IDENTITY = "trials", "study.json"
+
+
+@dataclass(frozen=True, eq=False)
+class StudyResult:
+    """What a finished study left.
+
+    Attributes:
+        files: Everything written but the single trials.
+        rates: Success rates, the first of all trials.
+        ran: Trials run now; the others were there already.
+        seconds: Wall-clock time.
+    """
+
+    files: tuple[Path, ...]
+    rates: tuple[Rate, ...]
+    ran: int
+    seconds: float
+
+
+def table_columns(experiment: Experiment) -> tuple[Column, ...]:
+    """Columns of the study's table, in order."""
+    return (*COMMON_COLUMNS, *experiment.columns)
+
+
+def run_study(
+    experiment: Experiment,
+    out: str | Path,
+    *,
+    processes: int | None = None,
+    table: TableFormat = "parquet",
+    fresh: bool = False,
+    title: str = "study",
+    report: Report = lambda what, done, total: None,
+) -> StudyResult:
+    """Run what is missing of a study, then write its table, arrays, manifest and summary.
+
+    ``table.parquet``, ``table.csv`` and ``poses.npz`` depend on nothing but the experiment: not on the number of
+    processes, nor on how often the study was stopped. Wall-clock times are in ``manifest.json``.
+
+    Args:
+        experiment: What to repeat.
+        out: Folder; one that holds the same study is resumed.
+        processes: Worker processes; as many as the machine has cores by default.
+        table: "parquet" (wants the extra ``study``), "csv", or "both".
+        fresh: Forget what ``out`` holds.
+        title: For the summary.
+        report: Called with what is being done, how much is done, and of how much.
+
+    Raises:
+        InputError: ``out`` holds another study, or cannot be written.
+        MissingExtraError: Parquet is wanted and pyarrow is not installed.
+    """
+    if table not in ("parquet", "csv", "both"):
+        raise InputError(f"table: want 'parquet', 'csv' or 'both', got {table!r}")
+    if processes is not None and processes < 1:
+        raise InputError(f"processes: want 1 or more, got {processes}")
+    if table != "csv":
+        require_parquet()
+    began, moment = time.perf_counter(), datetime.now(UTC)
+    folder = Path(out)
+    shards = opened(experiment, folder, fresh=fresh)
+    missing = shards.missing(experiment.trials)
+    workers = min(processes or os.cpu_count() or 1, max(len(missing), 1))
+    finished = experiment.trials - len(missing)
+    report("trials", finished, experiment.trials)
+
+    def done(trial: int, status: str) -> None:
+        nonlocal finished
+        finished += 1
+        report("trials", finished, experiment.trials)
+
+    run_trials(experiment, missing, folder / _TRIALS, processes=workers, done=done)
+    files = _write_results(experiment, folder, shards, table)
+    rows, seconds = _rows_and_seconds(shards, experiment.trials)
+    rates = success_rates(rows, experiment.success, experiment.groups)
+    files += write_summary(folder, title, rates, rows, table_columns(experiment))
+    total = time.perf_counter() - began
+    write_json(
+        folder / "manifest.json",
+        {
+            "title": title,
+            "trials": experiment.trials,
+            "seed": experiment.seed,
+            "seeds": "trial k draws from numpy.random.SeedSequence(seed, spawn_key=(k,))",
+            "fingerprint": fingerprint(experiment.identity()),
+            "experiment": experiment.identity(),
+            "versions": versions(),
+            "statuses": dict(Counter(str(row["status"]) for row in rows).most_common()),
+            "rates": [asdict(rate) for rate in rates],
+            "files": {file.name: file_hash(file) for file in files},
+            "columns": [asdict(column) for column in table_columns(experiment)],
+            "last_run": {
+                "started": moment.isoformat(timespec="seconds"),
+                "seconds": round(total, 3),
+                "processes": workers,
+                "trials_run": len(missing),
+            },
+            "trial_seconds": [round(value, 4) for value in seconds],
+        },
+    )
+    return StudyResult((*files, folder / "manifest.json"), tuple(rates), len(missing), total)
+
+
+def opened(experiment: Experiment, folder: Path, *, fresh: bool = False) -> Shards:
+    """The folder's trials, after making sure that they belong to this experiment.
+
+    Raises:
+        InputError: They do not, or the folder cannot be used.
+    """
+    identity = experiment.identity()
+    known = folder / _IDENTITY
+    try:
+        if fresh and (folder / _TRIALS).exists():
+            shutil.rmtree(folder / _TRIALS)
+        if known.exists() and not fresh:
+            _same_study(json.loads(known.read_text(encoding="utf-8")), identity, folder)
+        elif (folder / _TRIALS).exists():
+            raise InputError("holds trials of an unknown study; choose another folder, or --fresh", path=folder)
+        (folder / _TRIALS).mkdir(parents=True, exist_ok=True)
+        write_json(known, identity)
+    except (OSError, ValueError) as error:
+        raise InputError(f"cannot be used as the study's folder: {error}", path=folder) from error
+    shards = Shards(folder / _TRIALS)
+    shards.sweep()
+    return shards
+
+
+def _same_study(before: dict[str, Any], now: dict[str, Any], folder: Path) -> None:
+    plain = json.loads(json.dumps(now, ensure_ascii=False))
+    if fingerprint(before) == fingerprint(plain):
+        return
+    names = [name for name in {**before, **plain} if before.get(name) != plain.get(name)]
+    raise InputError(
+        f"holds a study with other settings ({', '.join(names)}); choose another folder, or --fresh to start again",
+        path=folder,
+    )
+
+
+def _write_results(experiment: Experiment, folder: Path, shards: Shards, table: TableFormat) -> list[Path]:
+    rows, arrays = gathered(shards.all(experiment.trials))
+    columns, files = table_columns(experiment), []
+    if table != "csv":
+        write_parquet(folder / "table.parquet", rows, columns)
+        files.append(folder / "table.parquet")
+    if table != "parquet":
+        write_csv(folder / "table.csv", rows, columns)
+        files += [folder / "table.csv", folder / "columns.json"]
+    write_arrays(folder / "poses.npz", arrays)
+    return [*files, folder / "poses.npz"]
+
+
+def _rows_and_seconds(shards: Shards, trials: int) -> tuple[list[dict[str, Any]], list[float]]:
+    found = [(shard.row, shard.seconds) for shard in shards.all(trials)]
+    return [row for row, _ in found], [seconds for _, seconds in found]

@@ -1,0 +1,96 @@
+"""Results on disk while a study runs: one file a trial, whole or absent."""
+
+from __future__ import annotations
+
+import base64
+import json
+import os
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+__all__ = ["Shard", "Shards"]
+
+_A_FOLDER = 1000  # file systems and people dislike folders with a hundred thousand files
+
+
+@dataclass(frozen=True, eq=False)
+class Shard:
+    """One trial as kept on disk: a row of the table, its arrays, and the wall-clock seconds, which no table has."""
+
+    trial: int
+    row: dict[str, Any]
+    arrays: dict[str, NDArray[Any]]
+    seconds: float
+
+
+class Shards:
+    """The folder of trials. Numbers are kept exactly: JSON holds doubles by their shortest decimal form, arrays by
+    their bytes."""
+
+    def __init__(self, folder: Path) -> None:
+        self._folder = folder
+
+    def path(self, trial: int) -> Path:
+        """File of a trial."""
+        return self._folder / f"{trial // _A_FOLDER:04d}" / f"{trial:07d}.json"
+
+    def write(self, shard: Shard) -> None:
+        """Keep a trial; whoever reads sees all of it or nothing, whenever the writer is killed."""
+        target = self.path(shard.trial)
+        target.parent.mkdir(parents=True, exist_ok=True)
+        content = {
+            "trial": shard.trial,
+            "row": shard.row,
+            "arrays": {name: _packed(array) for name, array in shard.arrays.items()},
+            "seconds": shard.seconds,
+        }
+        # two writers of one trial (a worker thought dead) must not share a file
+        beside = target.with_name(f"{target.name}.{os.getpid()}.part")
+        beside.write_text(json.dumps(content, allow_nan=True, ensure_ascii=False), encoding="utf-8")
+        beside.replace(target)
+
+    def read(self, trial: int) -> Shard | None:
+        """A trial, or None where it has not been run, or its file is damaged."""
+        try:
+            content = json.loads(self.path(trial).read_text(encoding="utf-8"))
+            arrays = {name: _unpacked(packed) for name, packed in content["arrays"].items()}
+            return Shard(int(content["trial"]), dict(content["row"]), arrays, float(content["seconds"]))
+        except (OSError, ValueError, KeyError, TypeError):
+            return None
+
+    def missing(self, count: int) -> list[int]:
+        """Trials of 0…count − 1 that have no whole file."""
+        return [trial for trial in range(count) if self.read(trial) is None]
+
+    def all(self, count: int) -> Iterator[Shard]:
+        """Trials 0…count − 1 in order.
+
+        Raises:
+            LookupError: One is not there.
+        """
+        for trial in range(count):
+            shard = self.read(trial)
+            if shard is None:
+                raise LookupError(f"trial {trial} has not been run")
+            yield shard
+
+    def sweep(self) -> None:
+        """Remove what killed writers left."""
+        for part in self._folder.glob("*/*.part"):
+            part.unlink(missing_ok=True)
+
+
+def _packed(array: NDArray[Any]) -> dict[str, Any]:
+    plain = np.ascontiguousarray(array)
+    plain = plain.astype(plain.dtype.newbyteorder("<"), copy=False)
+    return {"dtype": plain.dtype.str, "shape": list(plain.shape), "data": base64.b64encode(plain.tobytes()).decode()}
+
+
+def _unpacked(packed: dict[str, Any]) -> NDArray[Any]:
+    raw = np.frombuffer(base64.b64decode(packed["data"]), dtype=np.dtype(packed["dtype"]))
+    return raw.reshape(packed["shape"])
