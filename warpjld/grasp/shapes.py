@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -65,14 +66,18 @@ def box(
     return make_object(name, np.concatenate(points), np.concatenate(faces), origin="box")
 
 
-def cylinder(diameter: float = 0.06, height: float = 0.12, *, segments: int = 64, name: str = "cylinder") -> GraspObject:
+def cylinder(
+    diameter: float = 0.06, height: float = 0.12, *, segments: int = 64, name: str = "cylinder"
+) -> GraspObject:
     """An upright cylinder with flat ends."""
     _check(diameter=diameter, height=height)
     r, h = diameter / 2.0, height / 2.0
     return _turned(name, "cylinder", [(0, -h), (r, -h), (r, h), (0, h)], segments)
 
 
-def plate(diameter: float = 0.20, height: float = 0.02, *, thickness: float = 0.004, name: str = "plate") -> GraspObject:
+def plate(
+    diameter: float = 0.20, height: float = 0.02, *, thickness: float = 0.004, name: str = "plate"
+) -> GraspObject:
     """A plate: a flat bottom, a rising rim with a round edge."""
     _check(diameter=diameter, height=height, thickness=thickness)
     if thickness > 0.5 * height or thickness > 0.1 * diameter:
@@ -137,7 +142,7 @@ def _turned(name: str, origin: str, profile: list[tuple[float, ...]], segments: 
 
 def _subdivided(profile: NDArray[np.float64]) -> NDArray[np.float64]:
     rows = [profile[:1]]
-    for start, end in zip(profile[:-1], profile[1:], strict=True):
+    for start, end in pairwise(profile):
         pieces = int(np.clip(round(float(np.linalg.norm(end - start)) / _EDGE), 1, 64))
         rows.append(start + (end - start) * (np.arange(1, pieces + 1) / pieces)[:, None])
     return np.concatenate(rows)

@@ -91,9 +91,7 @@ def mend(
     triangles = _turned(triangles, turn)
     crossing = len(crossing_faces(points, triangles).faces)
     solid = open_edges == 0 and crossing == 0 and _nested_properly(points, triangles, piece)
-    report = MeshReport(
-        degenerate, duplicates, int(turn.sum()), open_edges, int(piece.max()) + 1, crossing, solid
-    )
+    report = MeshReport(degenerate, duplicates, int(turn.sum()), open_edges, int(piece.max()) + 1, crossing, solid)
     return points, triangles, report
 
 
@@ -168,11 +166,11 @@ def _look_inwards(vertices: NDArray[np.float64], faces: NDArray[np.int32], piece
     inwards = volume < 0.0
     largest = np.abs(volume).argmax()
     outer = pieces[largest][:, ::-1] if inwards[largest] else pieces[largest]
-    for k in np.flatnonzero(inwards):
-        if k != largest:
-            inside = winding_numbers(vertices[pieces[k][:1, 0]], vertices, outer)[0] > 0.5
+    for k in range(len(pieces)):
+        if inwards[k] != inwards[largest]:
             # a cavity looks the other way from the piece around it, whichever way that one looked
-            inwards[k] = inwards[largest] if inside else True
+            within = winding_numbers(vertices[pieces[k][:1, 0]], vertices, outer)[0] > 0.5
+            inwards[k] = inwards[largest] if within else inwards[k]
     return inwards
 
 
