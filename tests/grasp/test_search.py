@@ -1,0 +1,274 @@
+"""Flexion search against analytic contacts, against the covering itself, and in batches."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scipy.optimize import brentq
+from scipy.spatial.transform import Rotation
+
+from tests.covering.tube import SEGMENT, tube, tube_skeleton
+from warpjld.covering import Covering, bind, default_parameters
+from warpjld.errors import InputError
+from warpjld.grasp import NEAREST, FlexionSearch, ObjectSet, Places, Searches, Status, make_object
+from warpjld.grasp.shapes import ball, box
+from warpjld.skeleton import CHANNELS, Poses, poses_from_angles
+
+ANGLE = 1e-4  # radians: asked for
+BALL, PLANE = ball(0.04, subdivisions=6), box(0.5, 0.02, 0.5, edge=1.0)
+
+
+@pytest.fixture(scope="module")
+def stiff() -> Covering:
+    """A tube without inflation, its vertices held by one segment each: they turn rigidly about the joint."""
+    skeleton, surface = tube_skeleton(120.0), tube()
+    plain = default_parameters(skeleton)
+    zero = np.zeros(3)
+    plain = replace(plain, inflation=zero, muscle=zero, proximity=np.full((3, 2), 0.2))
+    beyond = surface.vertices[:, 2] < -SEGMENT
+    domains = np.stack([~beyond, beyond], axis=1).astype(float)
+    return bind(skeleton, surface, parameters=plain, domains=domains)
+
+
+def top(covering: Covering, ratio: float) -> int:
+    """The vertex on the external side of the second segment at that ratio."""
+    wanted = np.array([0.0, 0.008, -SEGMENT * (1 + ratio)])
+    return int(np.linalg.norm(covering.surface.vertices - wanted, axis=1).argmin())
+
+
+def turned(covering: Covering, vertex: int, angle: float) -> np.ndarray:
+    joint = covering.skeleton.rest[1]
+    away = covering.surface.vertices[vertex] - joint
+    return joint + Rotation.from_rotvec([-angle, 0, 0]).apply(away)
+
+
+def straight(covering: Covering, frames: int = 1) -> tuple[Poses, np.ndarray]:
+    angles = np.zeros((frames, len(covering.skeleton), len(CHANNELS)))
+    return poses_from_angles(covering.skeleton, angles), angles
+
+
+@pytest.mark.parametrize("ratio", [0.4, 0.6, 0.75])
+@pytest.mark.parametrize("height", [0.0, 0.006, 0.015])
+def test_bent_segment_touches_a_plane_at_the_analytic_angle(stiff, ratio: float, height: float) -> None:
+    vertex = top(stiff, ratio)
+    x, y, z = stiff.surface.vertices[vertex] - stiff.skeleton.rest[1]
+    # y cos α + z sin α = −height
+    exact = np.arctan2(y, -z) + np.arcsin(height / np.hypot(y, z)) if height <= np.hypot(y, z) else None
+    floor = PLANE.placed((0, -height - 0.01, 0))
+    above = int(np.flatnonzero(floor.normals[:, 1] > 0.9)[0])
+    search = FlexionSearch(stiff, ObjectSet(floor))
+    found = search.run(*straight(stiff), Searches(vertex=vertex, joint=1, facet=[above, NEAREST]))
+    if exact is None:
+        assert (found.status == Status.NO_CONTACT).all()
+        return
+    assert (found.status == Status.CONVERGED).all()
+    np.testing.assert_allclose(found.angles[:, 0], exact, atol=ANGLE)
+    assert (np.abs(found.distance) < 1e-6).all()
+    assert x == pytest.approx(0, abs=1e-12)
+
+
+@pytest.mark.parametrize("centre", [(0, -0.035, -0.04), (0.006, -0.03, -0.055), (0, -0.03, -0.02)])
+@pytest.mark.parametrize("distance", [0.0, 0.002])
+def test_bent_segment_touches_a_sphere_at_the_analytic_angle(stiff, centre, distance: float) -> None:
+    vertex = top(stiff, 0.75)
+    gap = lambda a: np.linalg.norm(turned(stiff, vertex, a) - centre) - 0.02 - distance  # noqa: E731
+    exact = brentq(gap, 0, next(a for a in np.linspace(0, 2, 200) if gap(a) < 0), xtol=1e-12)
+    search = FlexionSearch(stiff, ObjectSet(BALL.placed(centre)))
+    found = search.run(*straight(stiff), Searches(vertex=vertex, joint=1, distance=distance))
+    assert found.status[0] == Status.CONVERGED
+    np.testing.assert_allclose(found.angles[0, 0], exact, atol=ANGLE)
+
+
+def test_every_status_with_its_message(stiff) -> None:
+    vertex = top(stiff, 0.75)
+    start = stiff.surface.vertices[vertex]
+    places = Places.of([start, (0, 0.5, 0), start + [0, 0.03, 0], (0, -0.2, -0.03)])
+    poses, angles = straight(stiff)
+    search = FlexionSearch(stiff, ObjectSet(BALL))
+    found = search.run(poses, angles, Searches(vertex=vertex, joint=1, place=[0, 1, 2, 3]), places=places)
+    assert found.status.tolist() == [Status.INSIDE, *[Status.NO_CONTACT] * 3]
+    assert found.message(0).startswith("already inside the object by 20.00 mm at 0.00°")
+    assert "closest approach 10.00 mm at 0.00°" in found.message(2)  # it only moves away
+    assert 0 < found.angles[3, 0] < np.radians(120)  # somewhere on the way down
+    closest = min(
+        np.linalg.norm(turned(stiff, vertex, a) - places.position[3]) - 0.02
+        for a in np.linspace(0, np.radians(120), 999)
+    )
+    assert found.distance[3] == pytest.approx(closest, abs=1e-6)
+    at_limit = search.run(poses, angles, Searches(vertex=vertex, joint=1, stop=0.0), places=places[1])
+    assert at_limit.status[0] == Status.AT_LIMIT
+    assert "at its limit" in at_limit.message(0)
+    stretched = search.run(poses, angles, Searches(vertex=vertex, joint=1, rate=-1.0), places=places[2])
+    assert stretched.status[0] == Status.CONVERGED
+    assert stretched.angles[0, 0] < 0
+
+
+def test_a_short_contact_is_not_stepped_over(stiff) -> None:
+    vertex = top(stiff, 0.75)
+    middle = turned(stiff, vertex, 0.9)
+    outward = (middle - stiff.skeleton.rest[1]) / np.linalg.norm(middle - stiff.skeleton.rest[1])
+    grazing = ObjectSet(BALL.placed(middle + outward * (0.02 - 2e-5)))
+    found = FlexionSearch(stiff, grazing).run(*straight(stiff), Searches(vertex=vertex, joint=1))
+    assert found.status[0] == Status.CONVERGED
+    assert found.angles[0, 0] < 0.9
+
+
+def test_an_opening_is_not_a_contact(stiff) -> None:
+    whole = ball(0.03, subdivisions=4)
+    bowl = make_object("bowl", whole.vertices, whole.faces[whole.vertices[whole.faces][:, :, 1].mean(axis=1) < 0.002])
+    vertex = top(stiff, 0.75)
+    objects = ObjectSet(bowl.placed(turned(stiff, vertex, 1.0)))
+    found = FlexionSearch(stiff, objects).run(*straight(stiff), Searches(vertex=vertex, joint=1, stop=1.1))
+    assert found.status[0] == Status.OPENING
+
+
+def test_beside_the_facet_is_told(stiff) -> None:
+    vertex, floor = top(stiff, 0.6), PLANE.placed((0.0, -0.02, 0))
+    beside = int(np.flatnonzero(floor.normals[:, 1] > 0.9)[0])
+    search = FlexionSearch(stiff, ObjectSet([floor, floor.placed((5.0, -0.02, 0))]))
+    found = search.run(
+        *straight(stiff), Searches(vertex=vertex, joint=1, facet=[beside, beside + 1], thing=[[0], [1]][0])
+    )
+    assert found.inside.sum() == 1  # one of the two triangles of the top lies under the vertex
+    found = search.run(*straight(stiff), Searches(vertex=vertex, joint=1, facet=beside, thing=1))
+    assert not found.inside[0]
+    assert "beside the facet" in found.message()
+
+
+def posed(covering: Covering, frames: int, seed: int = 0) -> tuple[Poses, np.ndarray]:
+    """Random poses, placed and turned as a whole."""
+    rng = np.random.default_rng(seed)
+    low, high = np.moveaxis(covering.skeleton.limits, -1, 0)
+    angles = low + (high - low) * rng.uniform(0, 0.5, size=(frames, *low.shape))
+    shift, turn = rng.normal(size=(frames, 3)) * 0.05, Rotation.random(frames, rng=rng).as_quat()
+    return poses_from_angles(covering.skeleton, angles, root_position=shift, root_rotation=turn), angles
+
+
+JOINTS = ("wrist", "index.base", "thumb.base", "pinky.carpometacarpal", "ring.knuckle2", "thumb.knuckle3")
+
+
+def many(covering: Covering, count: int, frames: int, seed: int = 1) -> Searches:
+    rng = np.random.default_rng(seed)
+    joints = np.array([covering.skeleton.index(name) for name in JOINTS])
+    return Searches(
+        vertex=rng.integers(len(covering.surface.vertices), size=count),
+        joint=rng.choice(joints, count),
+        frame=rng.integers(frames, size=count),
+        covering=rng.integers(2, size=count),
+        thing=rng.integers(2, size=count),
+        facet=np.where(rng.random(count) < 0.5, NEAREST, rng.integers(300, size=count)),
+        place=rng.integers(5, size=count),
+    )
+
+
+@pytest.fixture(scope="module")
+def bench(covering: Covering):
+    """Two parameter sets, two objects, four poses, five places near the hand."""
+    other = covering.with_parameters(replace(covering.parameters, inflation=covering.parameters.inflation * 2 + 0.1))
+    poses, angles = posed(covering, 4)
+    rng = np.random.default_rng(5)
+    middle = poses.positions[rng.integers(4, size=5), rng.integers(len(covering.skeleton), size=5)]
+    places = Places.of(middle + rng.normal(size=(5, 3)) * 0.03, rng.normal(size=(5, 4)))
+    search = FlexionSearch([covering, other], ObjectSet([ball(0.03), box(0.02, 0.03, 0.04)]))
+    return search, poses, angles, places
+
+
+def test_what_is_searched_is_what_the_covering_gives(covering, bench) -> None:
+    search, poses, angles, places = bench
+    searches = many(covering, 400, 4)
+    found = search.run(poses, angles, searches, places=places)
+    assert set(found.status) >= {Status.CONVERGED, Status.NO_CONTACT, Status.INSIDE}
+    again = angles[searches.frame]
+    again[np.arange(400), searches.joint, 0] = found.angles[:, 0]
+    base = poses_from_angles(covering.skeleton, angles)
+    turn = Rotation.from_quat(poses.rotations[:, 0]) * Rotation.from_quat(base.rotations[:, 0]).inv()
+    shift = poses.positions[:, 0] - covering.skeleton.rest[0]
+    bent = poses_from_angles(
+        covering.skeleton,
+        again,
+        root_position=shift[searches.frame],
+        root_rotation=turn.as_quat()[searches.frame],
+    )
+    for k in np.flatnonzero(searches.facet == NEAREST)[:60]:
+        point = search.coverings[searches.covering[k]].points(bent[k : k + 1], [searches.vertex[k]])[0]
+        at = search.objects.distances(point, which=searches.thing[k], places=places[searches.place[k]])
+        assert at.distance[0, 0] == pytest.approx(found.distance[k], abs=2e-7)
+
+
+def test_a_batch_is_bit_for_bit_what_its_searches_are_alone(covering, bench) -> None:
+    search, poses, angles, places = bench
+    searches = many(covering, 3000, 4)
+    together = search.run(poses, angles, searches, places=places, threads=2)
+    for k in range(0, 3000, 100):
+        f = searches.frame[k]
+        alone = search.run(
+            poses[f : f + 1],
+            angles[f : f + 1],
+            Searches(
+                vertex=searches.vertex[k],
+                joint=searches.joint[k],
+                covering=searches.covering[k],
+                thing=searches.thing[k],
+                facet=searches.facet[k],
+                place=0,
+            ),
+            places=places[searches.place[k]],
+        )
+        for field in ("status", "closing", "distance", "facet", "evaluations", "angles"):
+            np.testing.assert_array_equal(getattr(alone, field)[0], getattr(together, field)[k])
+
+
+def test_joints_may_bend_together(covering) -> None:
+    names = ("index.base", "index.knuckle2", "index.knuckle3")
+    joints = [covering.skeleton.index(name) for name in names]
+    poses, angles = straight(covering)
+    tip = int(np.linalg.norm(covering.surface.vertices - covering.skeleton.rest[joints[2] + 1], axis=1).argmin())
+    angles[0, joints, 0] = 0.9, 0.9, 0.63
+    curled = covering.points(poses_from_angles(covering.skeleton, angles), [tip])[0, 0]
+    angles[:] = 0.0
+    things = ObjectSet(ball(0.03).placed(curled))
+    found = FlexionSearch(covering, things).run(
+        poses, angles, Searches(vertex=tip, joint=[joints], rate=[[1.0, 1.0, 0.7]])
+    )
+    assert found.status[0] == Status.CONVERGED
+    np.testing.assert_allclose(found.angles[0, :3], found.closing[0] * np.array([1, 1, 0.7]), rtol=1e-5)
+    angles[0, joints, 0] = found.angles[0, :3]
+    point = covering.points(poses_from_angles(covering.skeleton, angles), [tip])[0]
+    assert abs(things.distances(point).distance[0, 0]) < 1.2e-6
+    with pytest.raises(InputError, match="one beyond the other"):
+        FlexionSearch(covering, things).run(poses, angles, Searches(vertex=tip, joint=[joints[::-1]]))
+
+
+@pytest.mark.parametrize(
+    ("change", "says"),
+    [
+        ({"vertex": 10**6}, "vertex must lie in 0"),
+        ({"vertex": -1}, "vertex must lie in 0"),
+        ({"joint": 99}, "joint must lie in 0"),
+        ({"frame": 1}, "frame must lie in 0…0"),
+        ({"thing": 1}, "thing must lie in 0…0"),
+        ({"facet": 10**6}, "facets 0 to"),
+        ({"facet": -2}, "facets 0 to"),
+        ({"place": 3}, "place must lie in 0…0"),
+        ({"distance": np.nan}, "distance is not finite"),
+        ({"rate": np.inf}, "rate and stop must be finite"),
+        ({"vertex": [1, 2], "facet": [1, 2, 3]}, "one value or one for each"),
+    ],
+)
+def test_wrong_searches(stiff, change, says: str) -> None:
+    search = FlexionSearch(stiff, ObjectSet(ball()))
+    with pytest.raises(InputError, match=says):
+        search.run(*straight(stiff), Searches(**({"vertex": 1, "joint": 1} | change)))
+
+
+def test_other_wrong_input(stiff) -> None:
+    search, (poses, angles) = FlexionSearch(stiff, ObjectSet(ball())), straight(stiff)
+    with pytest.raises(InputError, match="angles: want shape"):
+        search.run(poses, angles[:, :2], Searches(vertex=1, joint=1))
+    with pytest.raises(InputError, match="not finite"):
+        search.run(poses, angles * np.nan, Searches(vertex=1, joint=1))
+    with pytest.raises(InputError, match="tolerance"):
+        search.run(poses, angles, Searches(vertex=1, joint=1), tolerance=1e-12)
+    paper = bind(stiff.skeleton, stiff.surface, method="paper")
+    with pytest.raises(InputError, match="smooth method only"):
+        FlexionSearch(paper, ObjectSet(ball()))

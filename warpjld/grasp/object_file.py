@@ -1,0 +1,59 @@
+"""Objects from files: whatever trimesh reads, in metres with Y up."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Literal
+
+import numpy as np
+
+from warpjld.errors import InputError
+from warpjld.grasp.objects import GraspObject, make_object
+from warpjld.io.mesh_file import read_mesh
+
+__all__ = ["UNITS", "load_object"]
+
+UNITS = {"m": 1.0, "dm": 0.1, "cm": 0.01, "mm": 0.001, "in": 0.0254}
+_TURNS = {
+    "y": np.eye(3),
+    "z": np.array([[1.0, 0, 0], [0, 0, 1], [0, -1, 0]]),
+    "x": np.array([[0.0, -1, 0], [1, 0, 0], [0, 0, 1]]),
+}
+
+
+def load_object(
+    path: str | Path,
+    *,
+    name: str | None = None,
+    unit: str = "m",
+    up: Literal["x", "y", "z"] = "y",
+    scale: float = 1.0,
+    centre: bool = False,
+) -> GraspObject:
+    """Read an object's surface and check it (see ``GraspObject.report``).
+
+    Args:
+        path: Surface file: OBJ, STL, PLY, OFF, glTF, …
+        name: For messages; the file's stem if left out.
+        unit: Unit of the file's numbers, one of ``UNITS``.
+        up: The file's axis that points up; it is turned to Y.
+        scale: Times larger.
+        centre: Put the origin at the centre of the bounding box instead of the file's own.
+
+    Raises:
+        InputError: Unreadable, empty, not finite, not manifold, an unknown unit or axis.
+    """
+    if unit not in UNITS:
+        raise InputError(f"unit: want one of {', '.join(UNITS)}, got '{unit}'")
+    if up not in _TURNS:
+        raise InputError(f"up: want x, y or z, got '{up}'")
+    if not (np.isfinite(scale) and scale > 0.0):
+        raise InputError(f"scale: want a number above 0, got {scale:g}")
+    file = read_mesh(path)
+    vertices = (UNITS[unit] * scale) * file.vertices @ _TURNS[up].T
+    if centre:
+        vertices -= (vertices.min(axis=0) + vertices.max(axis=0)) / 2.0
+    try:
+        return make_object(name or file.path.stem, vertices, file.faces, parts=file.parts, origin=str(path))
+    except InputError as error:
+        raise InputError(error.message, path=path) from None

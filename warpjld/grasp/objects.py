@@ -1,0 +1,168 @@
+"""Objects to be grasped: a rigid surface in its own frame, and where it stands."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from scipy.spatial.transform import Rotation
+
+from warpjld.errors import InputError
+from warpjld.grasp.validation import MeshReport, mend
+from warpjld.surface import Part, weld_surface
+
+__all__ = ["GraspObject", "Places", "make_object"]
+
+
+@dataclass(frozen=True, eq=False)
+class Places:
+    """P rigid placements: a point x of the object's frame lies at rotation · x + position.
+
+    Attributes:
+        position: Where the object's origin lies [m], shape (P, 3).
+        rotation: Unit quaternions x, y, z, w, shape (P, 4).
+    """
+
+    position: NDArray[np.float64]
+    rotation: NDArray[np.float64]
+
+    @staticmethod
+    def of(position: ArrayLike = (0.0, 0.0, 0.0), rotation: ArrayLike = (0.0, 0.0, 0.0, 1.0)) -> Places:
+        """One or more placements; one position goes with many rotations and the other way round.
+
+        Raises:
+            InputError: Wrong shapes, not finite, or a rotation without length.
+        """
+        at = np.atleast_2d(np.asarray(position, dtype=np.float64))
+        turn = np.atleast_2d(np.asarray(rotation, dtype=np.float64))
+        if at.shape[1:] != (3,) or turn.shape[1:] != (4,) or len({len(at), len(turn), 1}) > 2:
+            raise InputError(f"places: want positions (n, 3) and rotations (n, 4), got {at.shape} and {turn.shape}")
+        if not (np.isfinite(at).all() and np.isfinite(turn).all()):
+            raise InputError("places: positions and rotations must be finite")
+        length = np.linalg.norm(turn, axis=1, keepdims=True)
+        if (length < 1e-9).any():
+            raise InputError("places: a rotation quaternion has no length")
+        count = max(len(at), len(turn))
+        return Places(np.broadcast_to(at, (count, 3)).copy(), np.broadcast_to(turn / length, (count, 4)).copy())
+
+    def __len__(self) -> int:
+        return len(self.position)
+
+    def __getitem__(self, which: Any) -> Places:
+        return Places(np.atleast_2d(self.position[which]), np.atleast_2d(self.rotation[which]))
+
+    def apply(self, points: ArrayLike) -> NDArray[np.float64]:
+        """Points of the object's frame (n, 3) on the stage [m], shape (P, n, 3)."""
+        turn = Rotation.from_quat(self.rotation).as_matrix()
+        local = np.asarray(points, dtype=np.float64)
+        return np.einsum("pij,nj->pni", turn, local) + self.position[:, None]
+
+    def to_local(self, points: ArrayLike) -> NDArray[np.float64]:
+        """Stage points (n, 3) in the object's frame [m], shape (P, n, 3)."""
+        turn = Rotation.from_quat(self.rotation).as_matrix()
+        away = np.asarray(points, dtype=np.float64)[None] - self.position[:, None]
+        return np.einsum("pji,pnj->pni", turn, away)
+
+
+@dataclass(frozen=True, eq=False)
+class GraspObject:
+    """A rigid object.
+
+    Attributes:
+        name: For messages.
+        vertices: Positions in the object's frame [m], shape (n, 3).
+        faces: Triangles, anticlockwise seen from outside, shape (t, 3). A facet's number is its row.
+        report: What was found on the surface when it came in.
+        place: Where it stands at first.
+        origin: File it comes from, or the built-in shape.
+    """
+
+    name: str
+    vertices: NDArray[np.float64]
+    faces: NDArray[np.int32]
+    report: MeshReport = field(default_factory=MeshReport)
+    place: Places = field(default_factory=Places.of)
+    origin: str = ""
+
+    def placed(self, position: ArrayLike = (0.0, 0.0, 0.0), rotation: ArrayLike = (0.0, 0.0, 0.0, 1.0)) -> GraspObject:
+        """The same object standing elsewhere."""
+        return replace(self, place=Places.of(position, rotation))
+
+    def scaled(self, factor: float) -> GraspObject:
+        """The same object larger or smaller about its own origin.
+
+        Raises:
+            InputError: A factor that is not a positive number.
+        """
+        if not (np.isfinite(factor) and factor > 0.0):
+            raise InputError(f"scale: want a number above 0, got {factor:g}")
+        return replace(self, vertices=self.vertices * factor)
+
+    def check_facet(self, facet: int) -> int:
+        """The facet's number, or an InputError that says which there are."""
+        if not 0 <= facet < len(self.faces):
+            raise InputError(f"object {self.name} has facets 0 to {len(self.faces) - 1}, got {facet}")
+        return int(facet)
+
+    @cached_property
+    def normals(self) -> NDArray[np.float64]:
+        """Unit normals of the facets, shape (t, 3)."""
+        a, b, c = (self.vertices[self.faces[:, k]] for k in range(3))
+        normal = np.cross(b - a, c - a)
+        return np.asarray(normal / np.linalg.norm(normal, axis=1, keepdims=True))
+
+    @cached_property
+    def volume(self) -> float:
+        """Enclosed volume [m³]; holes are closed by flat fans."""
+        from warpjld.covering.quality import enclosed_volume
+
+        return float(enclosed_volume(self.vertices, self.faces))
+
+    @cached_property
+    def centroid(self) -> NDArray[np.float64]:
+        """Centre of the enclosed volume [m], the centre of mass at even density, shape (3,).
+
+        Σ V_t (a + b + c) / 4 over tetrahedra from the mean vertex; the bounding box's centre where there is no volume.
+        """
+        middle = self.vertices.mean(axis=0)
+        a, b, c = (self.vertices[self.faces[:, k]] - middle for k in range(3))
+        six = (a * np.cross(b, c)).sum(axis=1)
+        if not self.report.watertight or abs(six.sum()) < 1e-15:
+            return np.asarray((self.vertices.min(axis=0) + self.vertices.max(axis=0)) / 2.0)
+        return np.asarray(middle + (six[:, None] * (a + b + c) / 4.0).sum(axis=0) / six.sum())
+
+    @property
+    def size(self) -> NDArray[np.float64]:
+        """Extent along the axes of its own frame [m], shape (3,)."""
+        return np.asarray(np.ptp(self.vertices, axis=0))
+
+
+def make_object(
+    name: str,
+    vertices: ArrayLike,
+    faces: ArrayLike,
+    *,
+    parts: tuple[Part, ...] = (),
+    origin: str = "",
+) -> GraspObject:
+    """An object from arrays: welded, checked and mended (see ``report``).
+
+    Args:
+        name: For messages.
+        vertices: Positions [m], shape (n, 3).
+        faces: Triangles, shape (t, 3).
+        parts: Ranges that are welded each by itself.
+        origin: Where it comes from.
+
+    Raises:
+        InputError: Empty, not finite, wrong shapes, not manifold, or one-sided.
+    """
+    try:
+        surface = weld_surface(vertices, faces, parts=parts)
+        points, triangles, report = mend(surface.vertices, surface.faces)
+    except InputError as error:
+        raise InputError(f"object {name}: {error.message}", path=error.path) from None
+    return GraspObject(name, points, triangles, report, origin=origin)

@@ -1,0 +1,196 @@
+"""Coverings, poses and moving joints as the search kernels want them."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial.transform import Rotation
+
+from warpjld.covering import Covering
+from warpjld.covering.binding import STATIONS
+from warpjld.covering.device import anchors_on, array_on, parameters_on
+from warpjld.covering.drivers import flexion_ratio
+from warpjld.errors import InputError
+from warpjld.skeleton import CHANNELS, Poses, Skeleton
+
+__all__ = ["Chains", "drives_on", "posture_on", "skin_on"]
+
+_FLEXION = CHANNELS.index("flexion")
+
+
+@dataclass(frozen=True, eq=False)
+class Chains:
+    """R chains of joints that close together, each in some frame.
+
+    Attributes:
+        frame: Shape (R,).
+        joints: From the root outwards, -1 where there are fewer than four, shape (R, 4).
+        rates: Turn of every joint for a closing of one [rad], negative where it extends, shape (R, 4).
+        stops: Angle at which each stays [rad], shape (R, 4).
+        starts: Angle at which each begins [rad], shape (R, 4).
+    """
+
+    frame: NDArray[np.int32]
+    joints: NDArray[np.int32]
+    rates: NDArray[np.float64]
+    stops: NDArray[np.float64]
+    starts: NDArray[np.float64]
+
+    @property
+    def reach(self) -> NDArray[np.float64]:
+        """Closing at which the last joint has come to its stop, shape (R,)."""
+        moving = (self.joints >= 0) & (self.rates != 0.0)
+        span = (self.stops - self.starts) / np.where(moving, self.rates, 1.0)
+        return np.asarray(np.where(moving, span, 0.0).max(axis=1, initial=0.0))
+
+    def angles(self, closing: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Angle of every joint when its chain has closed by that much (R,) [rad], shape (R, 4)."""
+        low, high = np.minimum(self.starts, self.stops), np.maximum(self.starts, self.stops)
+        return np.asarray(np.clip(self.starts + self.rates * closing[:, None], low, high))
+
+
+def skin_on(device: Any, coverings: Sequence[Covering]) -> Any:
+    """``warpjld_kernels.flexion_search.Skin``: the operators of coverings of one skeleton and surface, one below the
+    other, so that vertex v of the c-th is row c · V + v."""
+    import warp as wp
+    from warpjld_kernels.anchored import pack_coefficients
+    from warpjld_kernels.flexion_search import Skin
+
+    first = coverings[0]
+    columns: dict[str, list[NDArray]] = {n: [] for n in ("offset", "rotation", "rounding", "muscle")}
+    for covering in coverings:
+        if covering.skeleton is not first.skeleton or len(covering.anchors) != len(first.anchors):
+            raise InputError("coverings: want parameter sets of one surface on one skeleton (with_parameters)")
+        if type(covering) is not Covering:
+            raise InputError("coverings: searches know the smooth method only; bind with method='smooth'")
+        shape = covering.anchors.weight.shape
+        kinds = {"offset": wp.vec3, "rotation": wp.vec3, "rounding": wp.vec2, "muscle": wp.vec3}
+        sizes = {"offset": shape[0], "rotation": shape, "rounding": shape, "muscle": shape}
+        outs = [wp.empty(sizes[n], dtype=kinds[n], device=device) for n in columns]
+        model = [anchors_on(device, covering.anchors, covering.skeleton.rest)]
+        model.append(parameters_on(device, covering.parameters))
+        wp.launch(pack_coefficients, dim=shape[0], inputs=model, outputs=outs, device=device)
+        for name, out in zip(columns, outs, strict=True):
+            columns[name].append(out.numpy())
+    skin = Skin()
+    anchors = [covering.anchors for covering in coverings]
+    for name, kind in (("offset", wp.vec3), ("rotation", wp.vec3), ("rounding", wp.vec2), ("muscle", wp.vec3)):
+        setattr(skin, name, array_on(device, np.concatenate(columns[name]), kind))
+    for name, kind in (
+        ("segment", wp.int32),
+        ("weight", float),
+        ("ratio", float),
+        ("pair", wp.int32),
+        ("between", float),
+        ("station", float),
+    ):
+        setattr(skin, name, array_on(device, np.concatenate([getattr(a, name) for a in anchors]), kind))
+    skin.ends = array_on(device, anchors[0].ends, wp.int32)
+    skin.parents = array_on(device, first.skeleton.parents, wp.int32)
+    pairs = anchors[0].pairs if len(anchors[0].pairs) else np.zeros((1, 2), np.int32)
+    skin.pairs = array_on(device, pairs, wp.int32)
+    skin.across = array_on(device, _rest_lengths(first, pairs), float)
+    proximal = anchors[0].ends[pairs, 0]
+    skin.palm = array_on(device, np.stack([c.parameters.palm[proximal].mean(axis=1) for c in coverings]), float)
+    skin.vertices = len(anchors[0])
+    return skin
+
+
+def posture_on(device: Any, skeleton: Skeleton, poses: Poses, origin: NDArray[np.float64]) -> Any:
+    """``warpjld_kernels.flexion_search.Posture``, relative to a point of every frame, shape (F, 3)."""
+    import warp as wp
+    from warpjld_kernels.flexion_search import Posture
+
+    posture = Posture()
+    posture.positions = array_on(device, poses.positions - origin[:, None], wp.vec3)
+    posture.rotations = array_on(device, poses.rotations, wp.quat)
+    posture.flexion_ratio = array_on(device, flexion_ratio(skeleton, poses.flexion), float)
+    return posture
+
+
+def drives_on(device: Any, skeleton: Skeleton, poses: Poses, angles: NDArray[np.float64], chains: Chains) -> Any:
+    """``warpjld_kernels.flexion_search.Drives``."""
+    import warp as wp
+    from warpjld_kernels.flexion_search import Drives
+
+    frame, joints = chains.frame, chains.joints
+    used = joints >= 0
+    j = np.where(used, joints, 0)
+    channels = angles[frame[:, None], j]
+    mirror = skeleton.mirror[j]
+    direction, axis = skeleton.directions[j], skeleton.axes[j]
+    normal = np.cross(direction, axis)
+    before = _about(normal, mirror * channels[..., CHANNELS.index("abduction")])
+    bend = _turn(_about(direction, mirror * channels[..., CHANNELS.index("pivot")]), axis)
+    after = _about(direction, -mirror * channels[..., CHANNELS.index("twisting")])
+    local = Rotation.from_quat(_flat(before)) * Rotation.from_quat(_flat(_about(bend, channels[..., _FLEXION])))
+    local = local * Rotation.from_quat(_flat(after))
+    carried = Rotation.from_quat(_flat(poses.rotations[frame[:, None], j])) * local.inv()
+    world = (carried * Rotation.from_quat(_flat(before))).apply(bend.reshape(-1, 3)).reshape(bend.shape)
+    upright = direction - axis * (direction * axis).sum(axis=-1, keepdims=True)
+    length = np.linalg.norm(upright, axis=-1, keepdims=True)
+    upright = np.where(length > 1e-6, upright / np.maximum(length, 1e-12), 0.0)
+    largest = skeleton.limits[j, _FLEXION, 1]
+    moves = (largest > 1e-6) & (skeleton.parents[j] >= 0)
+    out = Drives()
+    for name, values, kind in (
+        ("frame", frame, wp.int32),
+        ("reach", chains.reach, float),
+        ("count", used.sum(axis=1), wp.int32),
+        ("joint", joints, wp.int32),
+        ("rate", chains.rates, float),
+        ("start", chains.starts, float),
+        ("stop", chains.stops, float),
+        ("axis", world, wp.vec3),
+        ("before", before, wp.quat),
+        ("bend", bend, wp.vec3),
+        ("after", after, wp.quat),
+        ("direction", direction, wp.vec3),
+        ("upright", upright, wp.vec3),
+        ("level", np.cross(axis, upright), wp.vec3),
+        ("largest", np.where(moves, 1.0 / np.where(moves, largest, 1.0), 0.0), float),
+        ("depth", _depths(skeleton, joints), wp.int32),
+    ):
+        setattr(out, name, array_on(device, values, kind))
+    return out
+
+
+def _depths(skeleton: Skeleton, joints: NDArray[np.int32]) -> NDArray[np.int32]:
+    """How many of a chain's joints lie at or above each joint of the skeleton, shape (R, J)."""
+    unique, place = np.unique(joints, axis=0, return_inverse=True)
+    out = np.zeros((len(unique), len(skeleton)), dtype=np.int32)
+    for row, chain in zip(out, unique, strict=True):
+        movers = [int(j) for j in chain if j >= 0]
+        for j in range(len(skeleton)):
+            parent = skeleton.parents[j]
+            row[j] = (row[parent] if parent >= 0 else 0) + (j in movers)
+        if [int(row[m]) for m in movers] != list(range(1, len(movers) + 1)):
+            names = ", ".join(skeleton.names[m] for m in movers)
+            raise InputError(f"joints that close together must lie one beyond the other, got {names}")
+    return out[place.ravel()]
+
+
+def _rest_lengths(covering: Covering, pairs: NDArray[np.int32]) -> NDArray[np.float64]:
+    ends, rest = covering.anchors.ends, covering.skeleton.rest
+    place = np.linspace(0.0, 1.0, STATIONS)[:, None]
+    starts = rest[ends[pairs[:, 1], 0]] - rest[ends[pairs[:, 0], 0]]
+    stops = rest[ends[pairs[:, 1], 1]] - rest[ends[pairs[:, 0], 1]]
+    across = (1.0 - place) * starts[:, None] + place * stops[:, None]
+    return np.asarray(np.maximum(np.linalg.norm(across, axis=-1), 1e-9))
+
+
+def _about(axis: NDArray[np.float64], angle: NDArray[np.float64]) -> NDArray[np.float64]:
+    half = 0.5 * np.broadcast_to(angle, axis.shape[:-1])[..., None]
+    return np.concatenate([np.sin(half) * axis, np.cos(half)], axis=-1)
+
+
+def _turn(q: NDArray[np.float64], v: NDArray[np.float64]) -> NDArray[np.float64]:
+    return Rotation.from_quat(_flat(q)).apply(v.reshape(-1, 3)).reshape(v.shape)
+
+
+def _flat(q: NDArray[np.float64]) -> NDArray[np.float64]:
+    return q.reshape(-1, 4)
