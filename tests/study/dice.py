@@ -34,6 +34,7 @@ class Dice:
         Column("table", "text", "", "Where it was thrown."),
     )
     success = "wide"
+    shown = ("thrown",)
     groups = ("table",)
 
     def plan(self, trial: int) -> dict[str, Any]:
@@ -57,7 +58,7 @@ class Dice:
         pose = rng.normal(size=(40, 40)) @ rng.normal(size=(40, 40))
         return Outcome("thrown", values, {f"pose {'ab'[trial % 2]}": pose[: 2 + trial % 2]})
 
-    def pictures(self, outcome: Outcome, folder: Path) -> list[Path]:
+    def pictures(self, trial: int, outcome: Outcome, folder: Path) -> list[Path]:
         (folder / "die.txt").write_text(str(outcome.values["thrown"]))
         return [folder / "die.txt"]
 

@@ -15,6 +15,7 @@ __all__ = ["main"]
 _COMMANDS = {
     "run": "Run a command script: animation, pictures, film, exports.",
     "deform": "Deform a rig by a motion file.",
+    "study": "Run many grasps and bring them into one table.",
     "inspect": "Report what was recognised in a rig.",
     "calibrate": "Fit the covering's parameters to a rig.",
     "shell": "Type commands of the language and look at the result.",

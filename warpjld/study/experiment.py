@@ -38,14 +38,29 @@ class Experiment(Protocol):
     A trial must depend on nothing but the experiment and its own number: not on what ran before it in the process.
     """
 
-    columns: tuple[Column, ...]
-    """Schema of ``Outcome.values``."""
-    success: str
-    """Truth column that the success rate counts."""
-    groups: tuple[str, ...]
-    """Columns whose values the summary tells apart."""
-    trials: int
-    seed: int
+    @property
+    def columns(self) -> tuple[Column, ...]:
+        """Schema of ``Outcome.values``."""
+
+    @property
+    def success(self) -> str:
+        """Truth column that the success rate counts."""
+
+    @property
+    def groups(self) -> tuple[str, ...]:
+        """Columns whose values the summary tells apart."""
+
+    @property
+    def shown(self) -> tuple[str, ...]:
+        """Number columns whose distributions the summary draws, six at most."""
+
+    @property
+    def trials(self) -> int:
+        """How many trials."""
+
+    @property
+    def seed(self) -> int:
+        """What all random numbers come from."""
 
     def plan(self, trial: int) -> dict[str, Any]:
         """Columns known before the trial is run: they are in its row even if it fails, so that failures count in the
@@ -57,7 +72,7 @@ class Experiment(Protocol):
     def run(self, trial: int, rng: np.random.Generator) -> Outcome:
         """Trial number ``trial``. Exceptions become rows with status "error"."""
 
-    def pictures(self, outcome: Outcome, folder: Path) -> list[Path]:
+    def pictures(self, trial: int, outcome: Outcome, folder: Path) -> list[Path]:
         """Draw a trial; may draw nothing."""
 
 

@@ -65,7 +65,7 @@ def rerun_trial(
     report(f"trial {trial}", 1, 2)
     target = folder / "rerun" / str(trial)
     target.mkdir(parents=True, exist_ok=True)
-    files = [target / "row.json", *experiment.pictures(outcome, target)]
+    files = [target / "row.json", *experiment.pictures(trial, outcome, target)]
     write_json(files[0], {"row": row, "differences": differences})
     report(f"trial {trial}", 2, 2)
     return Rerun(row, tuple(differences), tuple(files))

@@ -104,7 +104,8 @@ def run_study(
     files = _write_results(experiment, folder, shards, table)
     rows, seconds = _rows_and_seconds(shards, experiment.trials)
     rates = success_rates(rows, experiment.success, experiment.groups)
-    files += write_summary(folder, title, rates, rows, table_columns(experiment))
+    shown = [column for column in experiment.columns if column.name in experiment.shown]
+    files += write_summary(folder, title, rates, rows, shown)
     total = time.perf_counter() - began
     write_json(
         folder / "manifest.json",

@@ -22,7 +22,7 @@ td:first-child,td:nth-child(2),th:first-child,th:nth-child(2){text-align:left}im
 
 
 def write_summary(
-    folder: Path, title: str, rates: Sequence[Rate], rows: Sequence[dict[str, Any]], columns: Sequence[Column]
+    folder: Path, title: str, rates: Sequence[Rate], rows: Sequence[dict[str, Any]], shown: Sequence[Column]
 ) -> list[Path]:
     """Write ``summary.png`` and ``summary.html``, which holds the picture too.
 
@@ -31,13 +31,13 @@ def write_summary(
         title: Name of the study.
         rates: See `success_rates`.
         rows: The table.
-        columns: Its schema; numbers with a unit or named in it are drawn as distributions.
+        shown: Number columns to draw as distributions.
 
     Returns:
         The files written.
     """
     picture, page = folder / "summary.png", folder / "summary.html"
-    _draw(picture, title, rates, rows, columns)
+    _draw(picture, title, rates, rows, shown)
     encoded = base64.b64encode(picture.read_bytes()).decode()
     beside = page.with_name(page.name + ".part")
     beside.write_text(_page(title, rates, encoded), encoding="utf-8")
@@ -46,12 +46,12 @@ def write_summary(
 
 
 def _draw(
-    path: Path, title: str, rates: Sequence[Rate], rows: Sequence[dict[str, Any]], columns: Sequence[Column]
+    path: Path, title: str, rates: Sequence[Rate], rows: Sequence[dict[str, Any]], shown: Sequence[Column]
 ) -> None:
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
 
-    measured = [c for c in columns if c.kind == "number" and _spread(rows, c.name)][:6]
+    measured = [column for column in shown if _spread(rows, column.name)]
     statuses = rates[0].statuses
     left = 0.34 * len(rates) + 0.3 * len(statuses) + 2.0
     height = max(left, 1.5 * ((len(measured) + 1) // 2) + 1.0, 4.2)

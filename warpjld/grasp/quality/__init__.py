@@ -8,6 +8,7 @@ from warpjld.grasp.quality.cone import friction_cone
 from warpjld.grasp.quality.contacts import Contacts, patch_spin
 from warpjld.grasp.quality.gravity import SIX_DIRECTIONS, GravityResponse, gravity_displacement
 from warpjld.grasp.quality.resistance import resisted_wrench
+from warpjld.grasp.quality.touch import Patches, contact_patches, vertex_areas
 from warpjld.grasp.quality.wrench_space import WrenchSpace, wrench_space
 from warpjld.grasp.quality.wrenches import contact_wrenches, grasp_matrix
 
@@ -16,7 +17,9 @@ __all__ = [
     "Closure",
     "Contacts",
     "GravityResponse",
+    "Patches",
     "WrenchSpace",
+    "contact_patches",
     "contact_wrenches",
     "force_closure",
     "friction_cone",
@@ -24,5 +27,6 @@ __all__ = [
     "gravity_displacement",
     "patch_spin",
     "resisted_wrench",
+    "vertex_areas",
     "wrench_space",
 ]

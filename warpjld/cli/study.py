@@ -1,0 +1,128 @@
+"""``warpjld study``: many grasps, planned in a TOML file, brought into one table."""
+
+from __future__ import annotations
+
+import json
+import signal
+from pathlib import Path
+from typing import TYPE_CHECKING, Literal
+
+import click
+
+if TYPE_CHECKING:
+    from warpjld.study import Rerun, StudyResult
+
+__all__ = ["command"]
+
+
+@click.command("study")
+@click.argument("plan", type=click.Path(path_type=Path))
+@click.option("-o", "--out", type=click.Path(path_type=Path), default="out", show_default=True, help="Output folder.")
+@click.option("--processes", type=click.IntRange(min=1), help="Worker processes; one a core by default.")
+@click.option(
+    "--table",
+    type=click.Choice(["parquet", "csv", "both"]),
+    default="parquet",
+    show_default=True,
+    help="Format of the results table.",
+)
+@click.option("--fresh", is_flag=True, help="Start again, forgetting the trials in the output folder.")
+@click.option("--rerun", "row", type=click.IntRange(min=0), metavar="ROW", help="Repeat one trial, with pictures.")
+@click.option("--check", is_flag=True, help="Read the plan and load its hands and objects; run nothing.")
+@click.option("--json", "as_json", is_flag=True, help="Write the summary to stdout as JSON.")
+@click.option("-q", "--quiet", is_flag=True, help="Say nothing but errors.")
+def command(
+    plan: Path,
+    out: Path,
+    processes: int | None,
+    table: Literal["parquet", "csv", "both"],
+    fresh: bool,
+    row: int | None,
+    check: bool,
+    as_json: bool,
+    quiet: bool,
+) -> None:
+    """Run the grasp study PLAN (TOML), or go on where it was stopped.
+
+    Leaves a table, the poses, a manifest and a summary in the output folder. The table is the same, byte for byte,
+    whatever the number of processes and however often the study was stopped."""
+    from warpjld.cli.progress import progress, silence_warp
+    from warpjld.errors import InputError
+    from warpjld.study import rerun_trial, run_study
+    from warpjld.study.grasping import GraspExperiment, load_plan
+
+    silence_warp()
+    # a polite kill stops as Ctrl-C does: what is finished is kept
+    signal.signal(signal.SIGTERM, signal.default_int_handler)
+    settings = load_plan(plan)
+    experiment = GraspExperiment(settings)
+    if row is not None:
+        if fresh or check:
+            raise InputError("--rerun repeats a trial that is there: --fresh and --check do not go with it")
+        with progress(quiet) as report:
+            again = rerun_trial(experiment, out, row, report=report)
+        _tell_rerun(again, as_json, quiet)
+        return
+    with progress(quiet) as report:
+        report("loading hands and objects", 0, 1)
+        notes = experiment.check()
+        if not check:
+            result = run_study(
+                experiment, out, processes=processes, table=table, fresh=fresh, title=settings.title, report=report
+            )
+    if check:
+        if not quiet:
+            for note in notes:
+                click.echo(f"note: {note}")
+            click.echo(f"{plan}: {settings.trials} trials of {_combinations(settings.trials, experiment)}")
+        return
+    _tell(result, notes, as_json, quiet)
+
+
+def _combinations(trials: int, experiment: object) -> str:
+    from warpjld.study.grasping import GraspExperiment
+
+    assert isinstance(experiment, GraspExperiment)
+    plan = experiment.settings
+    count = len(plan.hands) * len(plan.objects) * len(plan.scales) * len(plan.frictions)
+    return f"{min(count, trials)} of {count} combinations of hand, object, scale and friction"
+
+
+def _tell(result: StudyResult, notes: list[str], as_json: bool, quiet: bool) -> None:
+    from dataclasses import asdict
+
+    if as_json:
+        summary = {
+            "files": [str(file) for file in result.files],
+            "rates": [asdict(rate) for rate in result.rates],
+            "trials_run": result.ran,
+            "seconds": round(result.seconds, 3),
+            "notes": notes,
+        }
+        click.echo(json.dumps(summary, indent=1, ensure_ascii=False))
+        return
+    if quiet:
+        return
+    for note in notes:
+        click.echo(f"note: {note}")
+    for rate in result.rates:
+        name = f"{rate.group} {rate.value}" if rate.group else "all"
+        ended = ", ".join(f"{status} {count}" for status, count in rate.statuses.items())
+        share = f"{100 * rate.rate:5.1f} %  ({100 * rate.low:.0f}–{100 * rate.high:.0f} %)"
+        click.echo(f"{name:32} {rate.successes:5d} of {rate.trials:5d}  {share:20}  {ended}")
+    click.echo(f"{result.ran} trials run in {result.seconds:.1f} s; {', '.join(str(file) for file in result.files)}")
+
+
+def _tell_rerun(again: Rerun, as_json: bool, quiet: bool) -> None:
+    same = not again.differences
+    if as_json:
+        files = [str(file) for file in again.files]
+        content = {"row": again.row, "differences": again.differences, "files": files}
+        click.echo(json.dumps(content, indent=1, ensure_ascii=False))
+    elif not quiet:
+        for name, value in again.row.items():
+            click.echo(f"{name:16} {'' if value is None else value}")
+        click.echo("the same as in the study, bit for bit" if same else f"differs in: {', '.join(again.differences)}")
+        click.echo(", ".join(str(file) for file in again.files))
+    if not same:
+        raise SystemExit(1)

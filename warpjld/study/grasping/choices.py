@@ -1,0 +1,188 @@
+"""The hands and objects of a grasp study, as a study file names them."""
+
+from __future__ import annotations
+
+from dataclasses import asdict, dataclass, replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from warpjld.errors import InputError
+from warpjld.study.manifest import file_hash
+from warpjld.study.toml_table import TomlTable
+
+if TYPE_CHECKING:
+    from warpjld.grasp import GraspObject
+    from warpjld.rig import Rig
+
+__all__ = ["HandChoice", "ObjectChoice", "read_hand", "read_object"]
+
+_SIZES = ("length", "breadth")
+
+
+@dataclass(frozen=True)
+class HandChoice:
+    """One hand: built in, at a size, or from a file.
+
+    Attributes:
+        name: In the table; unique in a study.
+        side: "left" or "right"; None leaves it to the file.
+        length: Of a built-in hand, from wrist to the tip of the middle finger [m].
+        breadth: Of a built-in hand, across the palm [m].
+        resolution: Vertices of a built-in hand, about.
+        file: Rig file.
+        skeleton: Skeleton file of a surface without joints; likewise ``unit`` and ``up``, as for ``load_rig``.
+    """
+
+    name: str
+    side: str | None = None
+    length: float = 0.19
+    breadth: float = 0.085
+    resolution: int = 4000
+    file: Path | None = None
+    skeleton: Path | None = None
+    unit: str | None = None
+    up: str | None = None
+
+    def load(self) -> Rig:
+        """Build or read the hand."""
+        if self.file is None:
+            from warpjld.hand import build_hand
+
+            return build_hand(
+                self.side or "right", length=self.length, breadth=self.breadth, resolution=self.resolution
+            )
+        from warpjld.io import load_rig
+
+        return load_rig(self.file, skeleton=self.skeleton, side=self.side, unit=self.unit, up=self.up)
+
+    def identity(self) -> dict[str, Any]:
+        """Settings, and hashes in place of paths."""
+        return _hashed(asdict(self))
+
+
+@dataclass(frozen=True)
+class ObjectChoice:
+    """One object: built in, at a size, or from a file.
+
+    Attributes:
+        name: In the table; unique in a study.
+        shape: Built-in shape, or None for a file.
+        sizes: Sizes of the built-in shape by name [m].
+        file: Surface file.
+        unit: Unit of the file's numbers.
+        up: The file's axis that points up.
+        mass: Mass at scale 1 [kg], or None to have it from density and volume.
+    """
+
+    name: str
+    shape: str | None = None
+    sizes: tuple[tuple[str, float], ...] = ()
+    file: Path | None = None
+    unit: str = "m"
+    up: str = "y"
+    mass: float | None = None
+
+    def load(self, scale: float) -> GraspObject:
+        """Build or read the object, its bounding box centred on the origin, Y up."""
+        if self.shape is not None:
+            from warpjld.grasp.shapes import SHAPES
+
+            return SHAPES[self.shape](**dict(self.sizes), name=self.name).scaled(scale)
+        from warpjld.grasp import load_object
+
+        assert self.file is not None
+        return load_object(self.file, name=self.name, unit=self.unit, up=self.up, scale=scale, centre=True)  # type: ignore[arg-type]
+
+    def identity(self) -> dict[str, Any]:
+        """Settings, and hashes in place of paths."""
+        return _hashed(asdict(self))
+
+
+def read_hand(table: TomlTable) -> HandChoice:
+    """A hand from a table [[hands]]."""
+    if ("builtin" in table) == ("file" in table):
+        table.fail("builtin", 'want either builtin = "left" or "right", or file = "…"')
+    name = table.text("name")
+    if "file" in table:
+        file = _path(table, "file")
+        choice = HandChoice(
+            name or file.stem,
+            side=table.text("side", known=("left", "right")),
+            file=file,
+            skeleton=_path(table, "skeleton") if "skeleton" in table else None,
+            unit=table.text("unit", known=("m", "cm", "mm")),
+            up=table.text("up", known=("y", "z")),
+        )
+    else:
+        side = table.text("builtin", known=("left", "right"))
+        assert side is not None
+        sizes, words = _hand_sizes(table)
+        resolution = table.integer("resolution", 4000, least=1500)
+        own = replace(HandChoice(name or f"{side} {words}".strip(), side=side, resolution=resolution), **sizes)  # type: ignore[arg-type]
+        choice = own
+    table.finish()
+    return choice
+
+
+def _hand_sizes(table: TomlTable) -> tuple[dict[str, float], str]:
+    share = table.number("percentile", above=0.0, most=99.999)
+    sex = table.text("sex", known=("female", "male"))
+    own = {key: table.number(key, above=0.0) for key in _SIZES}
+    given = {key: value for key, value in own.items() if value is not None}
+    if share is None and sex is None:
+        return given, " ".join(f"{1000 * value:g}" for value in given.values())
+    if share is None or sex is None:
+        table.fail("percentile" if share is None else "sex", "is missing: percentile and sex go together")
+    if given:
+        table.fail(next(iter(given)), "cannot be given beside percentile and sex")
+    from warpjld.hand import percentile
+
+    return percentile(share, sex), f"{sex} {share:g} %"
+
+
+def read_object(table: TomlTable) -> ObjectChoice:
+    """An object from a table [[objects]]."""
+    from warpjld.grasp.object_file import UNITS
+    from warpjld.grasp.shapes import SHAPES
+
+    if ("builtin" in table) == ("file" in table):
+        table.fail("builtin", f'want either builtin = one of {", ".join(SHAPES)}, or file = "…"')
+    name, mass = table.text("name"), table.number("mass", above=0.0)
+    if "file" in table:
+        file = _path(table, "file")
+        unit, up = table.text("unit", "m", known=tuple(UNITS)), table.text("up", "y", known=("x", "y", "z"))
+        choice = ObjectChoice(name or file.stem, file=file, unit=unit or "m", up=up or "y", mass=mass)
+    else:
+        shape = table.text("builtin", known=tuple(SHAPES))
+        assert shape is not None
+        sizes = {key: table.number(key, above=0.0) for key in _size_names(SHAPES[shape])}
+        given = tuple((key, value) for key, value in sizes.items() if value is not None)
+        choice = ObjectChoice(name or shape, shape=shape, sizes=given, mass=mass)
+    table.finish()
+    return choice
+
+
+def _size_names(build: Any) -> list[str]:
+    """Sizes of a built-in shape: its positional arguments."""
+    from inspect import Parameter, signature
+
+    return [p.name for p in signature(build).parameters.values() if p.kind is Parameter.POSITIONAL_OR_KEYWORD]
+
+
+def _path(table: TomlTable, key: str) -> Path:
+    text = table.text(key)
+    assert text is not None
+    path = table.folder / text
+    if not path.is_file():
+        table.fail(key, f"no such file: {path}")
+    return path
+
+
+def _hashed(settings: dict[str, Any]) -> dict[str, Any]:
+    for key, value in settings.items():
+        if isinstance(value, Path):
+            try:
+                settings[key] = {"name": value.name, "sha256": file_hash(value)}
+            except OSError as error:
+                raise InputError(f"cannot read it: {error.strerror}", path=value) from error
+    return settings

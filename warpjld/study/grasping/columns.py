@@ -1,0 +1,51 @@
+"""The table of a grasp study.
+
+The object does not move: its frame, Y up and its bounding box centred on the origin, is the frame of all columns.
+"""
+
+from __future__ import annotations
+
+from warpjld.study.columns import Column
+
+__all__ = ["GRASP_COLUMNS"]
+
+_PLANNED = (
+    Column("hand", "text", "", "Name of the hand in the study file."),
+    Column("object", "text", "", "Name of the object in the study file."),
+    Column("scale", "number", "", "Scale of the object."),
+    Column("friction", "number", "", "Coulomb coefficient of skin on object."),
+)
+_PLACED = (
+    Column("approach_x", "number", "", "Unit vector from the object to where the hand comes from, object frame, x."),
+    Column("approach_y", "number", "", "The same, y."),
+    Column("approach_z", "number", "", "The same, z."),
+    Column("gap", "number", "m", "Distance between palm and object along the approach, before closing."),
+    Column("tilt", "number", "rad", "Angle between the palm's normal and the approach."),
+    Column("wrist_x", "number", "m", "Position of the wrist joint, object frame, x."),
+    Column("wrist_y", "number", "m", "The same, y."),
+    Column("wrist_z", "number", "m", "The same, z."),
+)
+_TOUCH = (
+    Column("contacts", "integer", "", "Patches of skin in contact: one a segment of the hand that touches."),
+    Column("digits", "integer", "", "Digits in contact, thumb included, palm not."),
+    Column("area", "number", "m²", "Skin in contact."),
+    *(Column(f"area_{part}", "number", "m²", f"Skin of the {part} in contact.")
+      for part in ("thumb", "index", "middle", "ring", "pinky", "palm")),
+)  # fmt: skip
+_MEASURED = (
+    Column("penetration", "number", "m", "Deepest skin vertex inside the object; 0 where none is."),
+    Column("overlap", "number", "m³", "Volume common to hand and object, on a grid (see warpjld.grasp.Intersection)."),
+    Column("closed", "truth", "", "Force closure with discretised cones (Nguyen 1988)."),
+    Column("margin", "number", "", "Evenness of the closing force: smallest share of a cone edge × number of edges."),
+    Column("epsilon", "number", "N", "Ferrari–Canny epsilon, 1 N of normal force, torques over torque_scale."),
+    Column("volume", "number", "N⁶", "Volume of the grasp wrench space, likewise."),
+    Column("torque_scale", "number", "m", "Length that torques are divided by."),
+    Column("mass", "number", "kg", "Mass of the object."),
+    Column("displacement", "number", "m", "Largest displacement of the centre of mass under gravity from ±x, ±y, ±z;"
+           " empty where a direction is not held."),
+    Column("held", "integer", "", "Directions of the six in which the weight is held."),
+    Column("success", "truth", "", "Force closure, penetration and displacement within the study's limits."),
+)  # fmt: skip
+
+GRASP_COLUMNS = (*_PLANNED, *_PLACED, *_TOUCH, *_MEASURED)
+"""Columns after the ones every study has."""

@@ -1,0 +1,84 @@
+"""Hands and objects of a grasp study, loaded once in a process."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import lru_cache
+
+import numpy as np
+from numpy.typing import NDArray
+
+from warpjld.covering import Covering, bind
+from warpjld.errors import InputError
+from warpjld.grasp import GraspObject, ObjectSet
+from warpjld.rig import Rig
+from warpjld.study.grasping.choices import HandChoice, ObjectChoice
+from warpjld.study.grasping.wrist import Palm, find_palm
+
+__all__ = ["Hand", "Thing", "hand_of", "thing_of"]
+
+
+@dataclass(frozen=True, eq=False)
+class Hand:
+    """A hand ready for trials.
+
+    Attributes:
+        rig: As built or read.
+        covering: Bound.
+        palm: Where its palm is.
+        parts: Segment of every vertex, shape (V,), -1 for the forearm.
+        names: Names of the segments, without side.
+    """
+
+    rig: Rig
+    covering: Covering
+    palm: Palm
+    parts: NDArray[np.int64]
+    names: tuple[str, ...]
+
+
+@dataclass(frozen=True, eq=False)
+class Thing:
+    """An object ready for trials, at its scale.
+
+    Attributes:
+        objects: The only one of its set.
+        mass: [kg].
+        radius: Largest distance of its surface from its centre of mass [m].
+    """
+
+    objects: ObjectSet
+    mass: float
+    radius: float
+
+    @property
+    def body(self) -> GraspObject:
+        """The object."""
+        return self.objects.objects[0]
+
+
+@lru_cache(maxsize=4)
+def hand_of(choice: HandChoice) -> Hand:
+    """Build or read a hand and bind it; kept for the process."""
+    rig = choice.load()
+    covering = bind(rig.skeleton, rig.surface, skin=rig.skin)
+    names = tuple(fan.name.removeprefix("left.").removeprefix("right.") for fan in covering.fans)
+    parts = covering.domains.argmax(axis=1).astype(np.int64)
+    parts[np.isin(parts, [k for k, name in enumerate(names) if name == "forearm"])] = -1
+    return Hand(rig, covering, find_palm(rig.skeleton, rig.surface.vertices), parts, names)
+
+
+@lru_cache(maxsize=32)
+def thing_of(choice: ObjectChoice, scale: float, density: float) -> Thing:
+    """Build or read an object at a scale; kept for the process.
+
+    Raises:
+        InputError: It cannot be used, or has neither volume nor mass.
+    """
+    body = choice.load(scale)
+    # a given mass is that of the object as it is; a larger one is heavier by its volume
+    mass = density * abs(body.volume) if choice.mass is None else choice.mass * scale**3
+    if not mass > 0.0:
+        raise InputError(f"object {choice.name}: encloses no volume; give it a mass")
+    radius = float(np.linalg.norm(body.vertices - body.centroid, axis=1).max())
+    return Thing(ObjectSet(body), mass, radius)

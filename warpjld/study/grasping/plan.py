@@ -1,0 +1,174 @@
+"""A grasp study's plan, read from a TOML file."""
+
+from __future__ import annotations
+
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any, Literal
+
+from warpjld.skeleton import DIGITS
+from warpjld.study.grasping.choices import HandChoice, ObjectChoice, read_hand, read_object
+from warpjld.study.manifest import versions
+from warpjld.study.toml_table import TomlTable, read_toml
+
+__all__ = ["GraspPlan", "Measuring", "WristRange", "load_plan"]
+
+_COMPUTING = ("warpjld", "numpy", "scipy", "warp-lang")
+
+
+@dataclass(frozen=True)
+class WristRange:
+    """Where the wrist is drawn from; each pair is a range with even probability.
+
+    Attributes:
+        elevation: Angle above the horizon that the hand comes from [°]; even over the sphere's area.
+        azimuth: Direction that it comes from, about the object's Y axis, 0 along +Z [°].
+        roll: Turn of the fingers about the direction of approach [°].
+        tilt: Angle between the palm's normal and the direction of approach [°].
+        gap: Distance from palm to object along the approach [m].
+        offset: How far beside the object's centre the palm aims, as a share of the object's half extent.
+    """
+
+    elevation: tuple[float, float] = (-90.0, 90.0)
+    azimuth: tuple[float, float] = (-180.0, 180.0)
+    roll: tuple[float, float] = (-180.0, 180.0)
+    tilt: tuple[float, float] = (0.0, 20.0)
+    gap: tuple[float, float] = (0.0, 0.02)
+    offset: tuple[float, float] = (0.0, 0.3)
+
+
+@dataclass(frozen=True)
+class Measuring:
+    """How a grasp is measured and what counts as success.
+
+    Attributes:
+        contact: Largest distance of skin that counts as contact [m].
+        edges: Edges of the friction cones.
+        norm: Norm of the wrench space, "L1" or "Linf".
+        torque_scale: Length torques are divided by [m]; None takes the object's largest radius about its centre.
+        density: Of objects without a mass [kg/m³].
+        squeeze: Sum of normal forces before gravity acts [N].
+        normal_stiffness: Of the skin at a contact [N/m].
+        tangential_stiffness: Likewise, along the surface [N/m].
+        penetration: Deepest penetration of a success [m].
+        displacement: Largest displacement under gravity of a success [m]; None asks for none.
+    """
+
+    contact: float = 5e-4
+    edges: int = 8
+    norm: Literal["L1", "Linf"] = "L1"
+    torque_scale: float | None = None
+    density: float = 300.0
+    squeeze: float = 10.0
+    normal_stiffness: float = 3500.0
+    tangential_stiffness: float = 2400.0
+    penetration: float = 1e-3
+    displacement: float | None = None
+
+
+@dataclass(frozen=True)
+class GraspPlan:
+    """All of a study but its number of trials decides what trial k is: studies can be made longer later.
+
+    Trial k takes combination k modulo hands × objects × scales × frictions, in this order, frictions fastest.
+    """
+
+    title: str
+    trials: int
+    seed: int
+    hands: tuple[HandChoice, ...]
+    objects: tuple[ObjectChoice, ...]
+    scales: tuple[float, ...]
+    frictions: tuple[float, ...]
+    digits: tuple[str, ...]
+    wrist: WristRange
+    measuring: Measuring
+
+    def combination(self, trial: int) -> tuple[HandChoice, ObjectChoice, float, float]:
+        """Hand, object, scale and friction of a trial."""
+        rest, friction = divmod(trial, len(self.frictions))
+        rest, scale = divmod(rest, len(self.scales))
+        rest, thing = divmod(rest, len(self.objects))
+        return self.hands[rest % len(self.hands)], self.objects[thing], self.scales[scale], self.frictions[friction]
+
+    def identity(self) -> dict[str, Any]:
+        """All that decides the results, as JSON; hashes stand for files."""
+        settings = asdict(self)
+        del settings["trials"], settings["title"]
+        settings["hands"] = [hand.identity() for hand in self.hands]
+        settings["objects"] = [thing.identity() for thing in self.objects]
+        return settings | {"versions": {name: versions([name])[name] for name in _COMPUTING}}
+
+
+def load_plan(path: str | Path) -> GraspPlan:
+    """Read a study file; see ``docs/study.md`` for its keys.
+
+    Raises:
+        InputError: Unreadable, an unknown key (with a suggestion), or a value out of range: file, line and key named.
+    """
+    top = read_toml(path)
+    title = top.text("title", Path(path).stem)
+    plan = GraspPlan(
+        title=title or Path(path).stem,
+        trials=top.integer("trials", least=1),
+        seed=top.integer("seed", least=0),
+        hands=tuple(read_hand(table) for table in top.tables("hands")),
+        objects=tuple(read_object(table) for table in top.tables("objects")),
+        scales=top.numbers("scales", (1.0,), above=0.0, most=100.0),
+        frictions=top.numbers("friction", (0.6,), above=0.0, most=10.0),
+        digits=top.texts("digits", tuple(reversed(DIGITS)), known=DIGITS),
+        wrist=_read_wrist(top.table("wrist")),
+        measuring=_read_measuring(top.table("measuring")),
+    )
+    top.finish()
+    for kind, names in (("hands", [h.name for h in plan.hands]), ("objects", [o.name for o in plan.objects])):
+        twice = [name for name in names if names.count(name) > 1]
+        if twice:
+            top.fail(kind, f"two are called '{twice[0]}'; give them a name each")
+    return plan
+
+
+def _read_wrist(table: TomlTable) -> WristRange:
+    default = WristRange()
+    found = WristRange(
+        elevation=_range(table, "elevation", default.elevation, -90.0, 90.0),
+        azimuth=_range(table, "azimuth", default.azimuth, -360.0, 360.0),
+        roll=_range(table, "roll", default.roll, -360.0, 360.0),
+        tilt=_range(table, "tilt", default.tilt, 0.0, 90.0),
+        gap=_range(table, "gap", default.gap, 0.0, 1.0),
+        offset=_range(table, "offset", default.offset, 0.0, 1.0),
+    )
+    table.finish()
+    return found
+
+
+def _read_measuring(table: TomlTable) -> Measuring:
+    default = Measuring()
+
+    def number(key: str, **limits: float) -> float:
+        value = table.number(key, getattr(default, key), **limits)
+        assert value is not None
+        return value
+
+    norm = table.text("norm", default.norm, known=("L1", "Linf"))
+    found = Measuring(
+        contact=number("contact", above=0.0, most=0.01),
+        edges=table.integer("edges", default.edges, least=3),
+        norm="Linf" if norm == "Linf" else "L1",
+        torque_scale=table.number("torque_scale", above=0.0),
+        density=number("density", above=0.0),
+        squeeze=number("squeeze", least=0.0),
+        normal_stiffness=number("normal_stiffness", above=0.0),
+        tangential_stiffness=number("tangential_stiffness", above=0.0),
+        penetration=number("penetration", least=0.0),
+        displacement=table.number("displacement", above=0.0),
+    )
+    table.finish()
+    return found
+
+
+def _range(table: TomlTable, key: str, default: tuple[float, float], least: float, most: float) -> tuple[float, float]:
+    low, high = table.numbers(key, default, least=least, most=most, count=2)
+    if low > high:
+        table.fail(key, f"want the smaller number first, got {low:g} and {high:g}")
+    return low, high

@@ -1,0 +1,129 @@
+"""Placing a hand beside an object: where the palm is, and how wrists are drawn at random."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial.transform import Rotation
+
+from warpjld.errors import InputError
+from warpjld.grasp import ObjectSet
+from warpjld.skeleton import Skeleton
+from warpjld.study.grasping.plan import WristRange
+
+__all__ = ["Approach", "Palm", "draw_approach", "find_palm", "place_palm", "touch_along"]
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class Palm:
+    """Frame of a hand's palm at rest.
+
+    Attributes:
+        point: On the skin in the middle of the palm [m], shape (3,).
+        normal: Unit normal out of the palm, shape (3,).
+        fingers: Unit direction towards the fingers, normal to it, shape (3,).
+    """
+
+    point: Array
+    normal: Array
+    fingers: Array
+
+
+@dataclass(frozen=True, eq=False)
+class Approach:
+    """One draw of the wrist, in the object's frame.
+
+    Attributes:
+        direction: Unit vector from the object to where the hand comes from, shape (3,).
+        aim: Where in the object the palm aims at [m], shape (3,).
+        fingers: Unit direction of the fingers, normal to ``direction``, shape (3,).
+        tilt: Angle of the palm's normal to the approach, about an axis at angle ``about`` [rad].
+        about: See ``tilt``.
+        gap: Distance left between palm and object along the approach [m].
+    """
+
+    direction: Array
+    aim: Array
+    fingers: Array
+    tilt: float
+    about: float
+    gap: float
+
+
+def find_palm(skeleton: Skeleton, vertices: NDArray[np.floating]) -> Palm:
+    """The palm of a hand: halfway along the middle finger's metacarpal, on the palmar side of the skin.
+
+    Args:
+        skeleton: With one hand.
+        vertices: Its skin at rest [m], shape (V, 3).
+
+    Raises:
+        InputError: The skeleton has no middle finger, or those of two hands.
+    """
+    wrist, base = (skeleton.rest[skeleton.index(name)] for name in ("wrist", "middle.base"))
+    axis = skeleton.axes[skeleton.index("middle.base")]
+    fingers = (base - wrist) / np.linalg.norm(base - wrist)
+    # segment × flexion axis points to the back of the hand (R20)
+    normal = -np.cross(fingers, axis - fingers * (fingers @ axis))
+    normal /= np.linalg.norm(normal)
+    inside = wrist + 0.7 * (base - wrist)
+    away = vertices - inside
+    height = away @ normal
+    beside = np.linalg.norm(away - height[:, None] * normal, axis=1)
+    near = (beside < 0.15 * np.linalg.norm(base - wrist)) & (height > 0.0)
+    if not near.any():
+        raise InputError("hand: found no skin on the palm's side of the middle metacarpal")
+    return Palm(inside + float(height[near].mean()) * normal, normal, fingers)
+
+
+def draw_approach(ranges: WristRange, rng: np.random.Generator, extent: Array) -> Approach:
+    """Draw a wrist. Always takes the same number of random numbers.
+
+    Args:
+        ranges: Where from.
+        rng: Source of randomness.
+        extent: Extent of the object along its axes [m], its middle at the origin.
+    """
+    low, high = np.sin(np.radians(ranges.elevation))
+    height = rng.uniform(low, high)
+    azimuth, roll = (np.radians(rng.uniform(*span)) for span in (ranges.azimuth, ranges.roll))
+    flat = np.sqrt(max(0.0, 1.0 - height**2))
+    direction = np.array([flat * np.sin(azimuth), height, flat * np.cos(azimuth)])
+    tilt, about = np.radians(rng.uniform(*ranges.tilt)), rng.uniform(-np.pi, np.pi)
+    gap = rng.uniform(*ranges.gap)
+    aside = rng.normal(size=3)
+    aside *= rng.uniform(*ranges.offset) / np.linalg.norm(aside)
+    # upright, fingers across; then rolled about the approach
+    level = np.array([np.cos(azimuth), 0.0, -np.sin(azimuth)])
+    fingers = Rotation.from_rotvec(roll * direction).apply(level)
+    return Approach(direction, aside * extent / 2.0, fingers, float(tilt), float(about), float(gap))
+
+
+def touch_along(objects: ObjectSet, start: Array, direction: Array, reach: float) -> float | None:
+    """How far a point moves along a direction until it meets the object [m]; None if it misses.
+
+    Sphere tracing (Hart 1996): steps of the distance itself.
+    """
+    travelled = 0.0
+    for _ in range(200):
+        gap = float(objects.distances(start[None] + travelled * direction, threads=1).distance[0, 0])
+        if gap < 1e-5:
+            return travelled
+        travelled += gap
+        if travelled > reach:
+            return None
+    return travelled
+
+
+def place_palm(palm: Palm, approach: Approach, point: Array) -> tuple[Array, Array]:
+    """Rotation (3, 3) and translation (3,) that bring a palm to a point, facing against the approach, tilted."""
+    facing = np.stack([palm.fingers, palm.normal, np.cross(palm.fingers, palm.normal)], axis=1)
+    wanted = np.stack([approach.fingers, -approach.direction, np.cross(approach.fingers, -approach.direction)], axis=1)
+    across = np.cross(approach.direction, approach.fingers)
+    axis = np.cos(approach.about) * approach.fingers + np.sin(approach.about) * across
+    turn = Rotation.from_rotvec(approach.tilt * axis).as_matrix() @ wanted @ facing.T
+    return turn, point - turn @ palm.point

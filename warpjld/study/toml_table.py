@@ -1,0 +1,171 @@
+"""TOML files read strictly: every key is asked for, checked, and named where it is wrong."""
+
+from __future__ import annotations
+
+import math
+import re
+import tomllib
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any, NoReturn
+
+from warpjld.errors import InputError
+from warpjld.script.suggest import did_you_mean
+
+__all__ = ["TomlTable", "read_toml"]
+
+
+def read_toml(path: str | Path) -> TomlTable:
+    """The top table of a file.
+
+    Raises:
+        InputError: Unreadable, or not TOML.
+    """
+    try:
+        text = Path(path).read_text(encoding="utf-8")
+    except OSError as error:
+        raise InputError(f"cannot read it: {error.strerror}", path=path) from error
+    except UnicodeDecodeError as error:
+        raise InputError(f"not UTF-8 text: byte {error.start}", path=path) from error
+    try:
+        return TomlTable(tomllib.loads(text), "", Path(path), text.splitlines())
+    except tomllib.TOMLDecodeError as error:
+        found = re.search(r"\(at line (\d+), column (\d+)\)", str(error))
+        line, column = (int(found[1]), int(found[2])) if found else (None, None)
+        message = re.sub(r" \(at .*\)$", "", str(error))
+        raise InputError(f"not TOML: {message}", path=path, line=line, column=column) from error
+
+
+class TomlTable:
+    """A table whose keys are taken one by one; `finish` refuses the ones nobody asked for."""
+
+    def __init__(self, content: dict[str, Any], name: str, path: Path, lines: Sequence[str]) -> None:
+        self._content, self._name, self._path, self._lines = content, name, path, lines
+        self._asked: list[str] = []
+
+    def __contains__(self, key: str) -> bool:
+        return key in self._content
+
+    @property
+    def folder(self) -> Path:
+        """Folder of the file, which its relative paths start from."""
+        return self._path.parent
+
+    def fail(self, key: str, message: str) -> NoReturn:
+        """Raise InputError about a key, with the line it probably stands in."""
+        raise InputError(f"{self._called(key)}: {message}", path=self._path, line=self._line(key))
+
+    def text(self, key: str, default: str | None = None, *, known: Sequence[str] = ()) -> str | None:
+        """A string, one of ``known`` if given."""
+        value = self._take(key, default)
+        if value is None:
+            return None
+        if not isinstance(value, str):
+            self.fail(key, f"want text, got {value!r}")
+        if known and value not in known:
+            self.fail(key, f"want one of {', '.join(known)}, got '{value}'{did_you_mean(value, known)}")
+        return value
+
+    def truth(self, key: str, default: bool) -> bool:
+        """true or false."""
+        value = self._take(key, default)
+        if not isinstance(value, bool):
+            self.fail(key, f"want true or false, got {value!r}")
+        return value
+
+    def integer(self, key: str, default: int | None = None, *, least: int = 0) -> int:
+        """A whole number; required where there is no default."""
+        value = self._take(key, default)
+        if value is None:
+            self.fail(key, "is missing")
+        if not isinstance(value, int) or isinstance(value, bool) or value < least:
+            self.fail(key, f"want a whole number from {least} on, got {value!r}")
+        return value
+
+    def number(
+        self, key: str, default: float | None = None, *, above: float = -math.inf, least: float = -math.inf,
+        most: float = math.inf,
+    ) -> float | None:  # fmt: skip
+        """A finite number in range, or None where it is missing and has no default."""
+        value = self._take(key, default)
+        return None if value is None else self._number(key, value, above, least, most)
+
+    def numbers(
+        self, key: str, default: Sequence[float], *, above: float = -math.inf, least: float = -math.inf,
+        most: float = math.inf, count: int | None = None,
+    ) -> tuple[float, ...]:  # fmt: skip
+        """Finite numbers in range; one number stands for a list of one."""
+        value = self._take(key, list(default))
+        items = value if isinstance(value, list) else [value]
+        if not items or (count is not None and len(items) != count):
+            self.fail(key, f"want {count or 'one or more'} numbers, got {value!r}")
+        return tuple(self._number(key, item, above, least, most) for item in items)
+
+    def texts(self, key: str, default: Sequence[str], *, known: Sequence[str]) -> tuple[str, ...]:
+        """Different strings out of ``known``, one or more."""
+        value = self._take(key, list(default))
+        if not isinstance(value, list) or not value or not all(isinstance(item, str) for item in value):
+            self.fail(key, f"want a list of names, got {value!r}")
+        for item in value:
+            if item not in known:
+                self.fail(key, f"want some of {', '.join(known)}, got '{item}'{did_you_mean(item, known)}")
+        if len(set(value)) != len(value):
+            self.fail(key, f"names one twice: {value!r}")
+        return tuple(value)
+
+    def table(self, key: str) -> TomlTable:
+        """A table, empty where it is missing."""
+        value = self._take(key, {})
+        if not isinstance(value, dict):
+            self.fail(key, f"want a table [{self._called(key)}], got {value!r}")
+        return TomlTable(value, self._called(key), self._path, self._lines)
+
+    def tables(self, key: str) -> list[TomlTable]:
+        """One or more tables [[key]]."""
+        value = self._take(key, None)
+        if not isinstance(value, list) or not value or not all(isinstance(item, dict) for item in value):
+            self.fail(key, f"want one or more tables [[{self._called(key)}]]")
+        return [TomlTable(v, f"{self._called(key)}[{k}]", self._path, self._lines) for k, v in enumerate(value)]
+
+    def finish(self) -> None:
+        """Raise InputError where a key was never asked for: misspelt, or in the wrong table."""
+        for key in self._content:
+            if key not in self._asked:
+                hint = did_you_mean(key, self._asked) or f"; known: {', '.join(self._asked)}"
+                self.fail(key, f"unknown key{hint}")
+
+    def _take(self, key: str, default: Any) -> Any:
+        self._asked.append(key)
+        return self._content.get(key, default)
+
+    def _number(self, key: str, value: Any, above: float, least: float, most: float) -> float:
+        if not isinstance(value, int | float) or isinstance(value, bool) or not math.isfinite(value):
+            self.fail(key, f"want a finite number, got {value!r}")
+        if value <= above or not least <= value <= most:
+            wanted = [f"above {above:g}"] * (above > -math.inf) + [f"from {least:g} on"] * (least > -math.inf)
+            wanted += [f"up to {most:g}"] * (most < math.inf)
+            self.fail(key, f"want a number {' and '.join(wanted)}, got {value!r}")
+        return float(value)
+
+    def _called(self, key: str) -> str:
+        return f"{self._name}.{key}" if self._name else key
+
+    def _line(self, key: str) -> int | None:
+        """Line of the key; in the k-th table of its name where tables repeat."""
+        header = re.sub(r"\[\d+\]", "", self._name)
+        skip = [int(n) for n in re.findall(r"\[(\d+)\]", self._name)]
+        current, seen = "", -1
+        for number, line in enumerate(self._lines, 1):
+            opened = re.match(r"\s*\[+\s*([^\]]+?)\s*\]+", line)
+            if opened:
+                current = opened[1]
+                seen += current == header
+                if current == (f"{header}.{key}" if header else key):
+                    return number
+            elif (
+                current == header
+                and (not skip or seen == skip[-1])
+                and re.match(rf"\s*[\"']?{re.escape(key)}[\"']?\s*[.=]", line)
+            ):
+                return number
+        return None
