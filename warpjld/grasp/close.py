@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import lru_cache
+from functools import lru_cache, partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,6 +15,7 @@ from warpjld.errors import InputError
 from warpjld.grasp.distance import ObjectSet
 from warpjld.grasp.objects import Places
 from warpjld.grasp.search import FlexionSearch, Searches, Status
+from warpjld.grasp.separate import keep_apart
 from warpjld.skeleton import CHANNELS, DIGITS, Poses, Skeleton, poses_from_angles
 
 __all__ = ["Closed", "close_hand", "digit_chains", "pad_vertex"]
@@ -113,6 +114,7 @@ def close_hand(
     places: Places | None = None,
     digits: Sequence[str] = (),
     coupling: tuple[float, float] | None = None,
+    apart: bool = True,
     tolerance: float = 1e-5,
     threads: int | None = None,
 ) -> Closed:
@@ -132,6 +134,7 @@ def close_hand(
         places: Place of every hand's object; the objects' own if left out.
         digits: Names of digits; all if left out.
         coupling: Rates of the second and third joint relative to the base.
+        apart: Stop digits that would pass through one another or the palm; the costliest part.
         tolerance: Distance that counts as a touch [m].
         threads: CPU threads.
 
@@ -152,7 +155,7 @@ def close_hand(
     joints = np.array([chains[name] for name in names])
     first = 0
     if coupling is not None:
-        closed, ended, at = hand.bend(joints, np.array([1.0, *coupling]))
+        _, ended, at = hand.bend(joints, np.array([1.0, *coupling]))
         status[..., 0] = ended
         # the joint whose segment was touched, and those before it, stay
         hand.free = at
@@ -161,6 +164,11 @@ def close_hand(
         keep = status[..., k] == int(Status.CONVERGED) if coupling is not None else np.zeros_like(ended, dtype=bool)
         status[..., k] = np.where(keep, status[..., k], ended)
     hand.settle(joints)
+    if apart:
+        for g in range(count):
+            hand.angles[g], stopped = keep_apart(covering, partial(hand.poses_of, g), angles[g], hand.angles[g], chains)
+            for name in stopped:
+                status[g, names.index(name)] = int(Status.BLOCKED)
     return Closed(hand.angles, tuple(names), status, np.maximum(0.0, -hand.gap(joints)).max(axis=1))
 
 
@@ -196,6 +204,16 @@ class _Hand:
             self.angles if angles is None else angles,
             root_position=self._shift,
             root_rotation=self._turn,
+        )
+
+    def poses_of(self, g: int, angles: NDArray[np.float64]) -> Poses:
+        """Poses of one hand with other angles (n, J, 4)."""
+        count = len(angles)
+        return poses_from_angles(
+            self.covering.skeleton,
+            angles,
+            root_position=np.repeat(self._shift[g : g + 1], count, axis=0),
+            root_rotation=np.repeat(self._turn[g : g + 1], count, axis=0),
         )
 
     def bend(
@@ -249,9 +267,7 @@ class _Hand:
             place = closing[:, own].argmin(axis=1)
             rows = np.arange(count)
             best[:, d] = closing[:, own][rows, place]
-            ended[:, d] = np.where(
-                np.isfinite(best[:, d]), status[:, own][rows, place], int(Status.NO_CONTACT)
-            )
+            ended[:, d] = np.where(np.isfinite(best[:, d]), status[:, own][rows, place], int(Status.NO_CONTACT))
             touched = vertex[own][place]
             for k, joint in enumerate(chain):
                 at[:, d] = np.where(

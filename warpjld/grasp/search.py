@@ -37,6 +37,7 @@ class Status(IntEnum):
     INSIDE = 2
     AT_LIMIT = 3
     OPENING = 4
+    BLOCKED = 5
 
     @property
     def message(self) -> str:
@@ -47,6 +48,7 @@ class Status(IntEnum):
             "already inside the object",
             "the joint is at its limit",
             "slips in through an opening of the object's surface",
+            "stopped by another digit or the palm",
         )[self]
 
 

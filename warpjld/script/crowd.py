@@ -92,6 +92,18 @@ class Crowd:
             for prop, vertices in zip(self.props, self.solid_vertices(0, shift), strict=True)
         ]
 
+    def moved_solids(self, frame: int, shift: NDArray[np.float64] | float = 0.0) -> list[NDArray[np.float64] | None]:
+        """As ``solid_vertices``; None for objects that are where they were a frame before."""
+        if np.any(shift) or frame == 0:
+            return [*self.solid_vertices(frame, shift)]
+        return [
+            None
+            if np.array_equal(places.position[frame], places.position[frame - 1])
+            and np.array_equal(places.rotation[frame], places.rotation[frame - 1])
+            else places[frame].apply(prop.thing.vertices)[0]
+            for prop, places in zip(self.props, self.places, strict=True)
+        ]
+
     def solid_vertices(self, frame: int, shift: NDArray[np.float64] | float = 0.0) -> list[NDArray[np.float64]]:
         """Vertices of every object at the frame of that place in the sequence, less a shift [m]."""
         pairs = zip(self.props, self.places, strict=True)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
@@ -19,7 +20,7 @@ if TYPE_CHECKING:
     from warpjld.script.props import Prop
     from warpjld.script.scene import Actor, Scene
 
-__all__ = ["Attempt", "contact_reports", "placed_at", "posture", "search_flexion"]
+__all__ = ["Attempt", "close_digits", "contact_reports", "placed_at", "posture", "search_flexion"]
 
 
 @dataclass(frozen=True)
@@ -87,6 +88,53 @@ def search_flexion(
     bent = actor.placement.apply(poses_from_angles(actor.skeleton, angles, root_position=root), np.array([key]))
     inside = intersection(covering, covering.deform(bent)[0], thing)
     return found, str(inside)
+
+
+def close_digits(
+    scene: Scene,
+    actor: Actor,
+    prop: Prop,
+    side: str,
+    first: float,
+    last: float,
+    digits: Sequence[str],
+    coupling: tuple[float, float] | None,
+) -> Attempt:
+    """Close digits on an object: keys of the open hand at ``first``, of the closed one at ``last``."""
+    from warpjld.grasp import ObjectSet, Status
+    from warpjld.grasp.close import close_hand, digit_chains
+    from warpjld.grasp.intersection import intersection
+
+    covering = cover(actor)
+    poses, angles = posture(scene, actor, last)
+    thing = placed_at(scene, prop, last)
+    wanted = list(digits) or [name for name in digit_chains(actor.skeleton) if name.startswith(f"{side}.")]
+    closed = close_hand(covering, poses, angles, ObjectSet(thing), digits=wanted, coupling=coupling)
+    chains = digit_chains(actor.skeleton, wanted)
+    grip = {}
+    for name in closed.digits:
+        for joint in chains[name]:
+            channel = f"{actor.skeleton.names[joint]}.flexion"
+            before = float(actor.motion.value(channel, first))
+            grip[channel] = before
+            actor.set_keys(channel, [first], before, scene.spline)
+            actor.set_keys(channel, [last], float(closed.angles[0, joint, 0]), scene.spline)
+    scene.grips[actor.name] = scene.grips.get(actor.name, {}) | grip
+    poses, _ = posture(scene, actor, last)
+    inside = intersection(covering, covering.deform(poses)[0], thing)
+    touching = closed.touching()[0]
+    rows = {name: [Status(int(s)).name for s in closed.status[0, d]] for d, name in enumerate(closed.digits)}
+    message = f"{int(touching.sum())} of {len(touching)} digits touch"
+    blocked = [name for name, statuses in rows.items() if "BLOCKED" in statuses]
+    begun = [name for name, statuses in rows.items() if "INSIDE" in statuses]
+    if blocked:
+        message += f"; stopped by another digit or the palm: {', '.join(blocked)}"
+    if begun:
+        message += f"; in the object before closing: {', '.join(begun)}"
+    message += f"; {inside}"
+    status = "INSIDE" if begun else ("CONVERGED" if touching.any() else "NO_CONTACT")
+    values = {"digits": rows, "penetration_mm": round(1e3 * inside.deepest, 4)}
+    return Attempt(f"GRASP {prop.name}", last, actor.name, prop.name, status, message, values)
 
 
 def contact_reports(scene: Scene, crowd: Crowd) -> list[dict[str, Any]]:

@@ -32,7 +32,7 @@ class FilmStudio:
     def take(self, frame: int, vertices: NDArray[np.float32]) -> None:
         """The frame of that place in the sequence, with the vertices of all actors [m], shape (V, 3)."""
         shift = self._crowd.shift(self._camera, frame)
-        solids = self._crowd.solid_vertices(frame, shift)
+        solids = self._crowd.moved_solids(frame, shift)
         self._film.append(self._stage.draw(vertices - shift, joints=self._crowd.joints(frame) - shift, solids=solids))
 
 

@@ -163,6 +163,7 @@ class Scene:
         actors: By name, in the order they came on stage.
         props: Objects by name.
         attempts: Searches and grasps made so far, for the summary.
+        grips: Angles of an actor's digits before it closed them, by channel [rad].
         current: The actor that commands without a side speak to.
         first, last: Frames to make, both included; None: from the first key to the last.
         rate: Frames a second.
@@ -177,6 +178,7 @@ class Scene:
     actors: dict[str, Actor] = field(default_factory=dict)
     props: dict[str, Prop] = field(default_factory=dict)
     attempts: list[Attempt] = field(default_factory=list)
+    grips: dict[str, dict[str, float]] = field(default_factory=dict)
     current: str | None = None
     first: int | None = None
     last: int | None = None

@@ -147,6 +147,59 @@ def auto_f_2_3(scene: Scene, arguments: Arguments) -> None:
     _search(scene, arguments, "AUTO_F_2_3", key, side, joint, finger.lower())
 
 
+@command(
+    "GRASP",
+    syntax=(
+        "GRASP <key1> <key2> [LEFT/RIGHT] <object> [THUMB/INDEX/MIDDLE/RING/PINKY …] "
+        "[COUPLING <second joint> <third joint>]"
+    ),
+    help="Digits close from key1 on and touch the object at key2; COUPLING bends their joints together at these rates.",
+    group="Grasping",
+)
+def grasp(scene: Scene, arguments: Arguments) -> None:
+    """R90."""
+    from warpjld.script.grasping import close_digits
+
+    first = arguments.number("key1 (the frame at which the digits begin to close)")
+    last = arguments.number("key2 (the frame at which they touch)")
+    if last <= first:
+        raise arguments.error(f"key2 must come after key1 ({first:g}), got {last:g}")
+    side = _side(scene, arguments)
+    prop = _prop(scene, arguments)
+    digits = []
+    while digit := arguments.keyword(*FINGERS):
+        digits.append(f"{side}.{digit.lower()}")
+    options = arguments.options(
+        coupling=lambda: (
+            arguments.number("the second joint's rate", minimum=0.0, maximum=10.0),
+            arguments.number("the third joint's rate", minimum=0.0, maximum=10.0),
+        )
+    )
+    coupling = cast("tuple[float, float] | None", options.get("coupling"))
+    actor = scene.actor_with(side)
+    scene.attempts.append(close_digits(scene, actor, prop, side, first, last, digits, coupling))
+
+
+@command(
+    "RELEASE",
+    syntax="RELEASE <key1> <key2> [LEFT/RIGHT]",
+    help="Digits closed by GRASP open again from key1 on; at key2 they are as before it.",
+    group="Grasping",
+)
+def release(scene: Scene, arguments: Arguments) -> None:
+    """R69: objects are let go."""
+    first = arguments.number("key1 (the frame at which the digits begin to open)")
+    last = arguments.number("key2 (the frame at which they are open)")
+    if last <= first:
+        raise arguments.error(f"key2 must come after key1 ({first:g}), got {last:g}")
+    actor = scene.actor_with(_side(scene, arguments))
+    if actor.name not in scene.grips:
+        raise arguments.error(f"actor {actor.name} has grasped nothing", arguments.position)
+    for channel, value in scene.grips.pop(actor.name).items():
+        actor.set_keys(channel, [first], float(actor.motion.value(channel, first)), scene.spline)
+        actor.set_keys(channel, [last], value, scene.spline)
+
+
 def _search(scene: Scene, arguments: Arguments, name: str, key: float, side: str, joint_name: str, finger: str) -> None:
     from warpjld.grasp import NEAREST, Status
     from warpjld.grasp.close import pad_vertex
