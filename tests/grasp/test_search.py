@@ -82,13 +82,13 @@ def test_bent_segment_touches_a_sphere_at_the_analytic_angle(stiff, centre, dist
 def test_every_status_with_its_message(stiff) -> None:
     vertex = top(stiff, 0.75)
     start = stiff.surface.vertices[vertex]
-    places = Places.of([start, (0, 0.5, 0), start + [0, 0.03, 0], (0, -0.2, -0.03)])
+    places = Places.of([start, (0, 0.5, 0), start + np.array([0, 0.025, 0]), (0, -0.2, -0.03)])
     poses, angles = straight(stiff)
     search = FlexionSearch(stiff, ObjectSet(BALL))
     found = search.run(poses, angles, Searches(vertex=vertex, joint=1, place=[0, 1, 2, 3]), places=places)
     assert found.status.tolist() == [Status.INSIDE, *[Status.NO_CONTACT] * 3]
     assert found.message(0).startswith("already inside the object by 20.00 mm at 0.00°")
-    assert "closest approach 10.00 mm at 0.00°" in found.message(2)  # it only moves away
+    assert "closest approach 5.00 mm at 0.00°" in found.message(2)  # it only moves away
     assert 0 < found.angles[3, 0] < np.radians(120)  # somewhere on the way down
     closest = min(
         np.linalg.norm(turned(stiff, vertex, a) - places.position[3]) - 0.02

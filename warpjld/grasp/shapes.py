@@ -13,6 +13,7 @@ from warpjld.grasp.objects import GraspObject, make_object
 
 __all__ = ["SHAPES", "ball", "box", "cylinder", "glass", "plate"]
 
+_MOST = 24  # edges along a side of a box, so that tables stay light
 _EDGE = 0.004  # length of an edge on flat and straight parts [m]
 
 
@@ -49,7 +50,7 @@ def box(
     """A box: extent along x, y and z; every side is a grid with edges of about ``edge`` [m]."""
     _check(width=width, height=height, depth=depth, edge=edge)
     size = np.array([width, height, depth])
-    steps = [np.linspace(-0.5, 0.5, int(np.clip(round(s / edge), 1, 64)) + 1) for s in size]
+    steps = [np.linspace(-0.5, 0.5, int(np.clip(round(s / edge), 1, _MOST)) + 1) for s in size]
     points, faces, start = [], [], 0
     for axis in range(3):
         u, v = (axis + 1) % 3, (axis + 2) % 3

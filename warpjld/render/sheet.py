@@ -9,7 +9,7 @@ from numpy.typing import ArrayLike
 
 from warpjld.errors import InputError
 from warpjld.render.camera import Camera
-from warpjld.render.scene import Image, Look, Scene
+from warpjld.render.scene import Image, Look, Scene, Solid
 from warpjld.render.style import Quality, Style
 from warpjld.render.text import font, write
 
@@ -78,6 +78,8 @@ def contact_sheet(
     *,
     joints: ArrayLike | None = None,
     segments: ArrayLike | None = None,
+    solids: Sequence[Solid] = (),
+    moved: Sequence[Sequence[ArrayLike]] | None = None,
     numbers: Sequence[int] | None = None,
     looks: Sequence[Look] = ("wireframe", "shaded"),
     columns: int = 6,
@@ -94,6 +96,8 @@ def contact_sheet(
         camera: Framed for all of them, see `Camera.view`; give it the cell's ``size``.
         joints: Joint positions of the same frames [m], shape (F, J, 3).
         segments: Proximal and distal joint of each segment, shape (B, 2).
+        solids: Objects beside the surface.
+        moved: Vertices of every object in every frame [m], where they move.
         numbers: Frame numbers for the captions; 0, 1, … if left out.
         looks: Kinds of picture, one above the other.
         columns: Frames side by side; more frames go on below.
@@ -116,13 +120,24 @@ def contact_sheet(
         raise InputError(f"numbers: want {len(frames)}, one a frame, got {len(names)}")
     if columns < 1:
         raise InputError(f"columns: want 1 or more, got {columns}")
+    if moved is not None and len(moved) != len(frames):
+        raise InputError(f"moved: want {len(frames)} frames as of vertices, got {len(moved)}")
     style, quality = style or Style(), quality or Quality()
     strips: list[list[Image]] = []
     for look in looks:
         boned = bones is not None and segments is not None and look == "wireframe"
         drawn = segments if boned else None
-        with Scene(faces, camera, look=look, size=size, segments=drawn, style=style, quality=quality) as scene:
-            strip = [scene.draw(points, joints=None if bones is None else bones[f]) for f, points in enumerate(frames)]
+        with Scene(
+            faces, camera, look=look, size=size, segments=drawn, solids=solids, style=style, quality=quality
+        ) as scene:
+            strip = [
+                scene.draw(
+                    points,
+                    joints=None if bones is None else bones[f],
+                    solids=() if moved is None else moved[f],
+                )
+                for f, points in enumerate(frames)
+            ]
         strips.append(strip)
     rows = []
     for first in range(0, len(frames), columns):

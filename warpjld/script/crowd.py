@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import TYPE_CHECKING, Literal
@@ -10,13 +10,16 @@ from typing import TYPE_CHECKING, Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from warpjld.script.props import Prop
 from warpjld.script.scene import Actor, Camera
 from warpjld.script.staging import stage
 from warpjld.skeleton import Poses, Skeleton
 
 if TYPE_CHECKING:
     from warpjld.covering import Covering
+    from warpjld.grasp import Places
     from warpjld.render import Camera as RenderCamera
+    from warpjld.render import Solid
 
 __all__ = ["Crowd", "Role"]
 
@@ -40,11 +43,15 @@ class Crowd:
         roles: In the order of the scene's actors.
         frames: Frame numbers of their poses, shape (F,).
         device: Warp device of the covering.
+        props: Objects on the stage.
+        whereabouts: Places of an object at some frames.
     """
 
     roles: Sequence[Role]
     frames: NDArray[np.float64]
     device: str = "cpu"
+    props: Sequence[Prop] = ()
+    whereabouts: Callable[[Prop, NDArray[np.float64]], Places] | None = None
 
     @cached_property
     def faces(self) -> NDArray[np.int32]:
@@ -67,7 +74,40 @@ class Crowd:
     def at(self, frame: float, rate: float) -> Crowd:
         """The same roles at one frame, whole or not, of a scene with that rate [1/s]."""
         moment = np.array([frame])
-        return Crowd([replace(role, poses=stage(role.actor, moment, rate)) for role in self.roles], moment, self.device)
+        roles = [replace(role, poses=stage(role.actor, moment, rate)) for role in self.roles]
+        return replace(self, roles=roles, frames=moment)
+
+    @cached_property
+    def places(self) -> list[Places]:
+        """Places of every object at the frames."""
+        assert self.whereabouts is not None or not self.props
+        return [self.whereabouts(prop, self.frames) for prop in self.props if self.whereabouts]
+
+    def solids(self, shift: NDArray[np.float64] | float = 0.0) -> list[Solid]:
+        """The objects as they are drawn, at the first frame, less a shift [m]."""
+        from warpjld.render import Solid
+
+        return [
+            Solid(vertices, prop.thing.faces, color=prop.color)
+            for prop, vertices in zip(self.props, self.solid_vertices(0, shift), strict=True)
+        ]
+
+    def moved_solids(self, frame: int, shift: NDArray[np.float64] | float = 0.0) -> list[NDArray[np.float64] | None]:
+        """As ``solid_vertices``; None for objects that are where they were a frame before."""
+        if np.any(shift) or frame == 0:
+            return [*self.solid_vertices(frame, shift)]
+        return [
+            None
+            if np.array_equal(places.position[frame], places.position[frame - 1])
+            and np.array_equal(places.rotation[frame], places.rotation[frame - 1])
+            else places[frame].apply(prop.thing.vertices)[0]
+            for prop, places in zip(self.props, self.places, strict=True)
+        ]
+
+    def solid_vertices(self, frame: int, shift: NDArray[np.float64] | float = 0.0) -> list[NDArray[np.float64]]:
+        """Vertices of every object at the frame of that place in the sequence, less a shift [m]."""
+        pairs = zip(self.props, self.places, strict=True)
+        return [places[frame].apply(prop.thing.vertices)[0] - shift for prop, places in pairs]
 
     def joints(self, frame: int) -> NDArray[np.float64]:
         """Joint positions of all at the frame of that place in the sequence [m], shape (J, 3)."""
@@ -111,7 +151,8 @@ class Crowd:
         shifts = np.stack([self.shift(camera, frame) for frame in range(count)])
         surfaces = [points - shifts[frame] for frame, points in self._samples.items()]
         joints = [(role.poses.positions - shifts[:, None]).reshape(-1, 3) for role in self.roles]
-        return np.concatenate([*surfaces, *joints])
+        boxes = [box - shifts[frame] for frame in range(count) for box in self.solid_vertices(frame) if len(self.props)]
+        return np.concatenate([*surfaces, *joints, *boxes])
 
     @cached_property
     def _samples(self) -> dict[int, NDArray[np.float32]]:

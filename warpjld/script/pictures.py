@@ -32,7 +32,8 @@ class FilmStudio:
     def take(self, frame: int, vertices: NDArray[np.float32]) -> None:
         """The frame of that place in the sequence, with the vertices of all actors [m], shape (V, 3)."""
         shift = self._crowd.shift(self._camera, frame)
-        self._film.append(self._stage.draw(vertices - shift, joints=self._crowd.joints(frame) - shift))
+        solids = self._crowd.moved_solids(frame, shift)
+        self._film.append(self._stage.draw(vertices - shift, joints=self._crowd.joints(frame) - shift, solids=solids))
 
 
 @contextmanager
@@ -45,6 +46,7 @@ def film_studio(scene: Scene, crowd: Crowd, film: Film, path: Path) -> Iterator[
             look=film.style,
             size=scene.size,
             segments=_bones(crowd, film.style),
+            solids=crowd.solids(),
             quality=render.Quality.film(),
         ) as stage_,
         render.Film(path, rate=scene.rate) as writer,
@@ -55,14 +57,15 @@ def film_studio(scene: Scene, crowd: Crowd, film: Film, path: Path) -> Iterator[
 def draw_picture(scene: Scene, crowd: Crowd, picture: Picture, path: Path) -> None:
     """A ``PICTURE``; the camera shows the whole sequence, so that pictures of one scene fit together."""
     now = crowd.at(picture.frame, scene.rate)
+    shift = now.shift(picture.camera, 0)
     with render.Scene(
         crowd.faces,
         crowd.camera(picture.camera, scene.size),
         look=picture.style,
         size=scene.size,
         segments=_bones(crowd, picture.style),
+        solids=now.solids(shift),
     ) as stage_:
-        shift = now.shift(picture.camera, 0)
         render.save_picture(path, stage_.draw(now.surface(0) - shift, joints=now.joints(0) - shift))
 
 
@@ -77,6 +80,8 @@ def draw_contact_sheet(scene: Scene, crowd: Crowd, sheet: ContactSheet, path: Pa
         crowd.camera(sheet.camera, cell),
         joints=np.stack([m.joints(0) - m.shift(sheet.camera, 0) for m in moments]),
         segments=crowd.segments,
+        solids=moments[0].solids(moments[0].shift(sheet.camera, 0)),
+        moved=[m.solid_vertices(0, m.shift(sheet.camera, 0)) for m in moments],
         numbers=[round(frame, 3) if frame % 1 else int(frame) for frame in frames],  # type: ignore[misc]
         size=cell,
         title=title,
@@ -96,7 +101,7 @@ def sheet_frames(scene: Scene, frames: NDArray[np.float64]) -> tuple[float, ...]
 def preview(scene: Scene, frame: float, style: Style) -> Path:
     """A picture of any frame of the scene as it is, in the output folder (R5)."""
     roles = [Role(a, cover(a), stage(a, np.array([frame]), scene.rate)) for a in scene.actors.values()]
-    crowd = Crowd(roles, np.array([frame]))
+    crowd = Crowd(roles, np.array([frame]), props=list(scene.props.values()), whereabouts=scene.whereabouts)
     name = f"{style}-{frame:g}.png"
     with OutputFolder(scene.folder) as out:
         draw_picture(scene, crowd, Picture(name, frame, style, scene.camera), out.place(name))

@@ -28,7 +28,7 @@ if TYPE_CHECKING:
 __all__ = ["GROUPS", "NOTES", "RESERVED", "Command", "Registry", "all_commands", "command", "commands_table"]
 
 ENTRY_POINTS = "warpjld.commands"
-GROUPS = ("Actors", "Animation", "Covering", "Output", "Flow")
+GROUPS = ("Actors", "Animation", "Grasping", "Covering", "Output", "Flow")
 """Headings of our own commands, in the order in which the table of commands prints them."""
 
 NOTES = {
@@ -52,7 +52,7 @@ RESERVED = (
 )
 """Words that no command and no macro may be called by."""
 
-_BUILT_IN = ("actors", "animation", "covering", "output", "flow")
+_BUILT_IN = ("actors", "animation", "grasping", "covering", "output", "flow")
 
 Function = Callable[["Scene", "Arguments"], None]
 _F = TypeVar("_F", bound=Function)

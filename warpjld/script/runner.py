@@ -14,7 +14,9 @@ from warpjld.script.binding import cover
 from warpjld.script.crowd import Crowd, Role
 from warpjld.script.folder import OutputFolder
 from warpjld.script.formats import check_available, video_is_available
+from warpjld.script.grasping import contact_reports
 from warpjld.script.pictures import draw_contact_sheet, draw_picture, film_studio
+from warpjld.script.props import Prop, prop_surface
 from warpjld.script.scene import Actor, ContactSheet, Export, Film, Output, Picture, Scene
 from warpjld.script.staging import frame_numbers, notes, stage
 from warpjld.script.summary import Summary
@@ -76,6 +78,9 @@ def run_scene(
             crowd = cast(scene, frames, device=device, progress=progress)
         with summary.timed("frames"):
             _make_sequences(scene, crowd, frames, outputs, out, threads, progress)
+        if scene.props:
+            with summary.timed("contacts"):
+                summary.contacts = contact_reports(scene, crowd)
         with summary.timed("pictures"):
             _make_pictures(scene, crowd, outputs, out, progress, "" if script is None else script.stem)
         return summary.write(out)
@@ -93,7 +98,7 @@ def cast(
     for number, actor in enumerate(scene.actors.values()):
         progress(f"binding {actor.name.lower()}", number, len(scene.actors))
         roles.append(Role(actor, cover(actor), stage(actor, frames, scene.rate)))
-    return Crowd(roles, frames, device)
+    return Crowd(roles, frames, device, list(scene.props.values()), scene.whereabouts)
 
 
 def _names(scene: Scene, outputs: Sequence[Output]) -> list[str]:
@@ -101,6 +106,7 @@ def _names(scene: Scene, outputs: Sequence[Output]) -> list[str]:
     for output in outputs:
         if isinstance(output, Export):
             names += [_export_name(output, actor, scene) for actor in _exported(output, scene)]
+            names += [_prop_export_name(output, prop) for prop in _exported_props(output, scene)]
         else:
             names.append(output.name)
     return names
@@ -116,6 +122,16 @@ def _export_name(export: Export, actor: Actor, scene: Scene) -> str:
         return export.name
     path = PurePosixPath(export.name)
     return str(path.with_name(f"{path.stem}-{actor.name.lower()}{path.suffix}"))
+
+
+def _exported_props(export: Export, scene: Scene) -> list[Prop]:
+    """Objects go along where all actors are exported."""
+    return list(scene.props.values()) if export.actor is None else []
+
+
+def _prop_export_name(export: Export, prop: Prop) -> str:
+    path = PurePosixPath(export.name)
+    return str(path.with_name(f"{path.stem}-{prop.name.lower()}{path.suffix}"))
 
 
 def _make_sequences(
@@ -152,6 +168,23 @@ def _make_sequences(
             ]
             for role in crowd.roles
         ]
+        prop_caches = [
+            [
+                stack.enter_context(
+                    open_cache(
+                        out.place(_prop_export_name(export, prop)),
+                        prop_surface(prop),
+                        frames=len(frames),
+                        rate=scene.rate,
+                        start_frame=int(frames[0]),
+                        name=prop.name.lower(),
+                    )
+                )
+                for export in exports
+                if export.actor is None
+            ]
+            for prop in crowd.props
+        ]
         studios = [stack.enter_context(film_studio(scene, crowd, film, out.place(film.name))) for film in films]
         blocks = [
             role.covering.blocks(role.poses, frames=_BLOCK, device=crowd.device, threads=threads)
@@ -162,7 +195,12 @@ def _make_sequences(
             for actor_caches, (_, vertices) in zip(caches, parts, strict=True):
                 for cache in actor_caches:
                     cache.write(vertices)
-            for k in range(len(parts[0][1])):
+            count = len(parts[0][1])
+            for prop, places, object_caches in zip(crowd.props, crowd.places, prop_caches, strict=True):
+                for cache in object_caches:
+                    moved = places[start : start + count].apply(prop.thing.vertices)
+                    cache.write(moved.astype(np.float32))
+            for k in range(count):
                 progress("frames", start + k, len(frames))
                 together = np.concatenate([vertices[k] for _, vertices in parts])
                 for studio in studios:

@@ -7,14 +7,20 @@ from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Literal
 
+import numpy as np
+from numpy.typing import NDArray
+
 from warpjld.errors import InputError
 from warpjld.script.placement import Placement
 from warpjld.script.suggest import did_you_mean
 
 if TYPE_CHECKING:
     from warpjld.covering import Covering, Parameters
+    from warpjld.grasp import Places
     from warpjld.motion import Motion
     from warpjld.rig import Rig
+    from warpjld.script.grasping import Attempt
+    from warpjld.script.props import Prop
     from warpjld.skeleton import Poses, Skeleton
 
 __all__ = [
@@ -155,6 +161,9 @@ class Scene:
 
     Attributes:
         actors: By name, in the order they came on stage.
+        props: Objects by name.
+        attempts: Searches and grasps made so far, for the summary.
+        grips: Angles of an actor's digits before it closed them, by channel [rad].
         current: The actor that commands without a side speak to.
         first, last: Frames to make, both included; None: from the first key to the last.
         rate: Frames a second.
@@ -167,6 +176,9 @@ class Scene:
     """
 
     actors: dict[str, Actor] = field(default_factory=dict)
+    props: dict[str, Prop] = field(default_factory=dict)
+    attempts: list[Attempt] = field(default_factory=list)
+    grips: dict[str, dict[str, float]] = field(default_factory=dict)
     current: str | None = None
     first: int | None = None
     last: int | None = None
@@ -207,6 +219,23 @@ class Scene:
         if key not in self.actors:
             raise InputError(f"there is no actor {name}{did_you_mean(key, self.actors)}")
         return self.actors[key]
+
+    def prop(self, name: str) -> Prop:
+        """The object of that name.
+
+        Raises:
+            InputError: There is none.
+        """
+        if name.upper() not in self.props:
+            first = "" if self.props else "; bring one on with a line such as OBJECT APPLE BALL 0.07"
+            raise InputError(f"there is no object {name}{did_you_mean(name, self.props)}{first}")
+        return self.props[name.upper()]
+
+    def whereabouts(self, prop: Prop, frames: NDArray[np.float64]) -> Places:
+        """Where an object is at F frames."""
+        from warpjld.script.props import prop_places
+
+        return prop_places(self, prop, frames)
 
     def actor_with(self, side: str) -> Actor:
         """The actor whose left or right limbs are meant: the current one if it has any, else the only one that has.

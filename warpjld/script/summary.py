@@ -30,6 +30,7 @@ class Summary:
 
     Attributes:
         seconds: Time of each stage.
+        contacts: What touches which object, by frame.
         notes: What was guessed, held at a limit, left out or looks suspicious.
     """
 
@@ -38,6 +39,7 @@ class Summary:
     script: Path | None
     device: str
     seconds: dict[str, float] = field(default_factory=dict)
+    contacts: list[dict[str, Any]] = field(default_factory=list)
     notes: list[str] = field(default_factory=list)
 
     @contextmanager
@@ -80,6 +82,18 @@ class Summary:
                 }
                 for actor in self.scene.actors.values()
             ],
+            "objects": [
+                {
+                    "name": prop.name,
+                    "origin": prop.thing.origin,
+                    "facets": len(prop.thing.faces),
+                    "watertight": prop.thing.report.watertight,
+                    "found": prop.thing.report.notes(),
+                }
+                for prop in self.scene.props.values()
+            ],
+            "searches": [attempt.content() for attempt in self.scene.attempts],
+            "contacts": self.contacts,
             "files": list(files),
             "seconds": self.seconds,
             "notes": self.notes,
@@ -94,6 +108,14 @@ def table(content: dict[str, Any], say: Callable[[str], None] = print) -> None:
     console = Console(highlight=False, markup=False, soft_wrap=True)
     frames = content["frames"]
     with console.capture() as lines:
+        for thing in content.get("objects", []):
+            console.print(f"{thing['name']}: {thing['origin']}, {thing['facets']:,} facets")
+            for found in thing["found"]:
+                console.print(f"  {found}")
+        for search in content.get("searches", []):
+            console.print(f"{search['command']} at {search['frame']:g}: {search['message']}")
+        for row in content.get("contacts", []):
+            console.print(f"frame {row['frame']:g}, {row['actor']} and {row['object']}: {row['message']}")
         for actor in content["actors"]:
             drive = "a motion file" if actor["recorded"] else f"{actor['keys']} keys"
             console.print(f"{actor['name']}: {actor['rig']}, {actor['vertices']:,} vertices, {drive}")

@@ -1,0 +1,189 @@
+"""What of a hand lies inside an object: vertices, depths and volume (A §7.2, R75), and what touches."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from warpjld.covering import Covering
+from warpjld.covering.intersections import surface_parts
+from warpjld.errors import InputError
+from warpjld.grasp.distance import ObjectSet
+from warpjld.grasp.objects import GraspObject, Places
+from warpjld.grasp.validation import MeshReport
+
+__all__ = ["Contact", "Intersection", "contacts", "intersection", "part_vertices"]
+
+_CELLS = 48  # grid cells along the longest side of the overlap
+_FINEST = 2e-4  # their smallest edge [m]
+
+
+@dataclass(frozen=True, eq=False)
+class Intersection:
+    """What of a part lies inside an object.
+
+    Attributes:
+        vertices: Vertices inside, shape (n,).
+        depths: How deep [m], positive, shape (n,).
+        volume: Common volume [m³]: the midpoint rule on a grid over the overlap, cells at either surface counted by
+            the share that a plane at their signed distance cuts off, Σ h³ c(d_hand) c(d_object) with
+            c(d) = clamp(½ − d / h, 0, 1).
+        spacing: The grid's h [m]; 0 where no vertex of one lies inside the other, and the volume counts as 0.
+    """
+
+    vertices: NDArray[np.int32]
+    depths: NDArray[np.float64]
+    volume: float
+    spacing: float
+
+    @property
+    def deepest(self) -> float:
+        """Largest depth [m]; 0 where nothing is inside."""
+        return float(self.depths.max(initial=0.0))
+
+    def __str__(self) -> str:
+        if not len(self.vertices):
+            return "no vertex inside"
+        return (
+            f"{len(self.vertices)} vertices inside, deepest {1e3 * self.deepest:.2f} mm, "
+            f"volume {1e9 * self.volume:.0f} mm³ (grid of {1e3 * self.spacing:.2f} mm)"
+        )
+
+
+@dataclass(frozen=True)
+class Contact:
+    """Where one part of a hand touches an object.
+
+    Attributes:
+        part: E.g. ``left.index``, ``left.palm``.
+        vertices: Vertices nearer than the tolerance, those inside included.
+        deepest: Largest penetration [m]; 0 where none.
+        nearest: Smallest signed distance [m].
+    """
+
+    part: str
+    vertices: int
+    deepest: float
+    nearest: float
+
+
+def part_vertices(covering: Covering, part: str | None) -> NDArray[np.int32]:
+    """Vertices of a segment (``index.knuckle2``: the one that begins at that joint), a digit (``index``), ``palm``,
+    or of everything (None).
+
+    Raises:
+        InputError: There is no such part; suggests the nearest.
+    """
+    if part is None:
+        return np.arange(len(covering.surface.vertices), dtype=np.int32)
+    wanted = part.lower()
+    owner = covering.domains.argmax(axis=1)
+    short = [_without_side(fan.name) for fan in covering.fans]
+    chosen = [
+        k
+        for k, fan in enumerate(covering.fans)
+        if wanted in (fan.name, short[k]) or fan.name.startswith(f"{wanted}.") or short[k].startswith(f"{wanted}.")
+    ]
+    if not chosen:
+        from difflib import get_close_matches
+
+        known = {*(fan.name for fan in covering.fans), *short, *(name.partition(".")[0] for name in short)}
+        close = get_close_matches(wanted, sorted(known), n=1)
+        raise InputError(f"no part '{part}' in this surface" + (f"; did you mean '{close[0]}'?" if close else ""))
+    return np.flatnonzero(np.isin(owner, chosen)).astype(np.int32)
+
+
+def intersection(
+    covering: Covering,
+    vertices: NDArray[np.floating],
+    thing: GraspObject,
+    *,
+    place: Places | None = None,
+    part: str | None = None,
+    spacing: float | None = None,
+) -> Intersection:
+    """Intersection process (A §7.2): the distance of every vertex of a part to an object.
+
+    Args:
+        covering: Whose parts and faces.
+        vertices: The deformed surface [m], shape (V, 3).
+        thing: The object.
+        place: One placement; the object's own if left out.
+        part: Segment or digit, see :func:`part_vertices`; everything if left out.
+        spacing: Edge of the volume's grid cells [m]; by default a 48th of the overlap, 0.2 mm at least.
+
+    Raises:
+        InputError: No such part, or a surface of another size.
+    """
+    if vertices.shape != (len(covering.surface.vertices), 3):
+        raise InputError(f"vertices: want shape {(len(covering.surface.vertices), 3)}, got {vertices.shape}")
+    where = thing.place if place is None else place
+    objects = ObjectSet(thing.placed(where.position[0], where.rotation[0]))
+    chosen = part_vertices(covering, part)
+    distance = objects.distances(vertices[chosen]).distance[0].astype(np.float64)
+    inside = distance < 0.0
+    volume, h = _common_volume(covering, vertices, objects, chosen, distance, spacing)
+    return Intersection(chosen[inside], -distance[inside], volume, h)
+
+
+def contacts(
+    covering: Covering,
+    vertices: NDArray[np.floating],
+    thing: GraspObject,
+    *,
+    place: Places | None = None,
+    tolerance: float = 5e-4,
+) -> list[Contact]:
+    """Parts of a deformed surface (V, 3) that touch an object, nearer than ``tolerance`` [m]."""
+    where = thing.place if place is None else place
+    objects = ObjectSet(thing.placed(where.position[0], where.rotation[0]))
+    distance = objects.distances(vertices, limit=max(0.05, tolerance)).distance[0]
+    parts = surface_parts(covering)
+    part_of = np.zeros(len(distance), dtype=np.int32)
+    part_of[covering.surface.faces.ravel()] = np.repeat(parts.of_face, 3)
+    found = []
+    for k, name in enumerate(parts.names):
+        own = distance[part_of == k]
+        if len(own) and own.min() < tolerance:
+            nearest = float(own.min())
+            found.append(Contact(name, int((own < tolerance).sum()), max(0.0, -nearest), nearest))
+    return found
+
+
+def _common_volume(
+    covering: Covering,
+    vertices: NDArray[np.floating],
+    objects: ObjectSet,
+    chosen: NDArray[np.int32],
+    distance: NDArray[np.float64],
+    spacing: float | None,
+) -> tuple[float, float]:
+    thing = objects.objects[0]
+    stage = thing.place.apply(thing.vertices)[0]
+    # surfaces may be open or pass through themselves: the winding number decides
+    report = MeshReport(open_edges=1, solid=False)
+    skin = ObjectSet(GraspObject("skin", np.asarray(vertices, dtype=np.float64), covering.surface.faces, report))
+    swallowed = skin.distances(stage).distance[0] < 0.0
+    seen = np.concatenate([vertices[chosen][distance < 0.0], stage[swallowed]])
+    if not len(seen):
+        return 0.0, 0.0
+    low, high = seen.min(axis=0), seen.max(axis=0)
+    h = spacing or max(_FINEST, float((high - low).max()) / _CELLS)
+    low, high = low - 2.0 * h, high + 2.0 * h
+    axes = [np.arange(a + h / 2.0, b, h) for a, b in zip(low, high, strict=True)]
+    points = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 3)
+    share = np.clip(0.5 - objects.distances(points).distance[0] / h, 0.0, 1.0)
+    points, share = points[share > 0.0], share[share > 0.0]
+    to_skin = skin.distances(points)
+    share = share * np.clip(0.5 - to_skin.distance[0] / h, 0.0, 1.0)
+    if len(chosen) < len(vertices):  # of a part: what is nearest to its skin
+        own = np.isin(covering.surface.faces, chosen).sum(axis=1) >= 2
+        share = share * own[to_skin.face[0]]
+    return float(share.sum(dtype=np.float64) * h**3), h
+
+
+def _without_side(name: str) -> str:
+    side, _, rest = name.partition(".")
+    return rest if side in ("left", "right") else name

@@ -1,0 +1,285 @@
+"""Objects: bringing them on, letting them follow joints, and bending joints until skin touches them (A §7, §9)."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING, Literal, cast
+
+import numpy as np
+
+from warpjld.errors import InputError
+from warpjld.script.arguments import Arguments
+from warpjld.script.commands.animation import FINGERS, SIDES
+from warpjld.script.keys import read_joint
+from warpjld.script.registry import command
+from warpjld.script.scene import Scene
+from warpjld.skeleton import CHANNELS
+
+if TYPE_CHECKING:
+    from warpjld.grasp import GraspObject
+    from warpjld.script.scene import Actor
+
+_SHAPES = ("BALL", "BOX", "CYLINDER", "PLATE", "GLASS")
+_AUTO = "<key> [LEFT/RIGHT] {}<hand vertex or PAD> <object> <facet or NEAREST> [DISTANCE <metres>]"
+
+
+@command(
+    "OBJECT",
+    syntax=(
+        'OBJECT <name> <BALL/BOX/CYLINDER/PLATE/GLASS> [<metres> …] or OBJECT <name> "<surface file>" '
+        "[UNIT <M/CM/MM/…>] [UP <X/Y/Z>] [CENTRE], then [SCALE <factor>] [AT <x> <y> <z>] [TURN <x> <y> <z>] "
+        '[COLOR "<colour>"]'
+    ),
+    help="Bring on an object: a built-in shape of given sizes, or a surface from a file.",
+    group="Grasping",
+)
+def object_(scene: Scene, arguments: Arguments) -> None:
+    """A §7: a list of objects."""
+    from scipy.spatial.transform import Rotation
+
+    from warpjld.grasp.object_file import UNITS
+    from warpjld.script.props import COLORS, Prop
+
+    name = arguments.name("the object's name").upper()
+    if name in scene.props or name in scene.actors:
+        raise arguments.error(f"there is an object or actor {name} already")
+    shape, sizes, path = None, [], None
+    if arguments.has_text():
+        path = arguments.input_file("a surface file")
+    else:
+        shape = arguments.choice("a shape, or a surface file in quotes", _SHAPES).lower()
+        while arguments.has_number():
+            sizes.append(arguments.number("a size in metres", above=0.0, maximum=100.0))
+    where = arguments.last
+    options = arguments.options(
+        unit=lambda: arguments.choice("the unit", [u.upper() for u in UNITS]).lower(),
+        up=lambda: arguments.choice("the axis that points up", ("X", "Y", "Z")).lower(),
+        centre=lambda: True,
+        scale=lambda: arguments.number("the scale", above=0.0),
+        at=lambda: arguments.vector("the place's"),
+        turn=lambda: arguments.vector("the rotation about"),
+        color=lambda: arguments.text("a colour"),
+    )
+    if path is None and {"unit", "up", "centre"} & set(options):
+        raise arguments.error("UNIT, UP and CENTRE are for surfaces from files", where)
+    try:
+        thing = _made(name.lower(), shape, sizes, path, options)
+    except TypeError:
+        raise arguments.error(f"too many sizes for a {str(shape).upper()}", where) from None
+    except InputError as error:
+        raise arguments.error(str(error), where) from None
+    turn = Rotation.from_euler("xyz", np.radians(cast(tuple, options.get("turn", (0.0, 0.0, 0.0)))))
+    thing = thing.placed(cast(tuple, options.get("at", (0.0, 0.0, 0.0))), turn.as_quat())
+    color = str(options.get("color", COLORS[len(scene.props) % len(COLORS)]))
+    scene.props[name] = Prop(name, thing, color)
+
+
+@command(
+    "OBJECTS",
+    syntax=(
+        "OBJECTS <object> <THUMB/INDEX/MIDDLE/RING/PINKY> <LEFT/RIGHT> <KNUCKLES2/KNUCKLES3> <start> <stop> "
+        "or OBJECTS <object> JOINT <joint> <start> <stop>"
+    ),
+    help="An object follows a joint from one frame to another; before and after it stays where it is.",
+    group="Grasping",
+)
+def objects(scene: Scene, arguments: Arguments) -> None:
+    """R69–R72, R85, C14."""
+    from warpjld.grasp.attach import Association
+
+    prop = _prop(scene, arguments)
+    if arguments.keyword("JOINT"):
+        actor, joint = read_joint(scene, arguments)
+    else:
+        finger, side, knuckle = arguments.choices(FINGERS, SIDES, ("KNUCKLES2", "KNUCKLES3"))
+        actor = scene.actor_with(side)
+        joint = _joint(actor, f"{side}.{finger}.{knuckle.replace('KNUCKLES', 'knuckle')}", arguments)
+    start = arguments.number("the starting time (a frame)")
+    stop = arguments.number("the stopping time (a frame)")
+    if stop < start:
+        raise arguments.error(f"the stopping time must not come before the starting time ({start:g}), got {stop:g}")
+    for other in prop.associations:
+        if start < other.stop and other.start < stop:
+            taken = f"{other.start:g} to {other.stop:g}"
+            raise arguments.error(f"{prop.name} follows another joint from {taken} already")
+    prop.associations.append(Association(actor.name, joint, start, stop))
+
+
+@command(
+    "AUTO_WRIST",
+    syntax=f"AUTO_WRIST {_AUTO.format('')}",
+    help="Flexion of the wrist at a key with which a vertex of the hand touches an object.",
+    group="Grasping",
+)
+def auto_wrist(scene: Scene, arguments: Arguments) -> None:
+    """R86."""
+    key = arguments.number("the key (a frame)")
+    side = _side(scene, arguments)
+    _search(scene, arguments, "AUTO_WRIST", key, side, "wrist", "middle")
+
+
+@command(
+    "AUTO_F_1",
+    syntax=f"AUTO_F_1 {_AUTO.format('<THUMB/INDEX/MIDDLE/RING/PINKY> ')}",
+    help="Flexion at the base of a finger with which a vertex touches an object.",
+    group="Grasping",
+)
+def auto_f_1(scene: Scene, arguments: Arguments) -> None:
+    """R87."""
+    key = arguments.number("the key (a frame)")
+    side = _side(scene, arguments)
+    finger = arguments.choice("the finger", FINGERS).lower()
+    _search(scene, arguments, "AUTO_F_1", key, side, f"{finger}.base", finger)
+
+
+@command(
+    "AUTO_F_2_3",
+    syntax=f"AUTO_F_2_3 {_AUTO.format('<THUMB/INDEX/MIDDLE/RING/PINKY> <KNUCKLES2/KNUCKLES3> ')}",
+    help="Flexion of a finger's second or third joint with which a vertex touches an object.",
+    group="Grasping",
+)
+def auto_f_2_3(scene: Scene, arguments: Arguments) -> None:
+    """R87."""
+    key = arguments.number("the key (a frame)")
+    side = _side(scene, arguments)
+    finger, knuckle = arguments.choices(FINGERS, ("KNUCKLES2", "KNUCKLES3"))
+    joint = f"{finger}.{knuckle.replace('KNUCKLES', 'knuckle')}".lower()
+    _search(scene, arguments, "AUTO_F_2_3", key, side, joint, finger.lower())
+
+
+@command(
+    "GRASP",
+    syntax=(
+        "GRASP <key1> <key2> [LEFT/RIGHT] <object> [THUMB/INDEX/MIDDLE/RING/PINKY …] "
+        "[COUPLING <second joint> <third joint>]"
+    ),
+    help="Digits close from key1 on and touch the object at key2; COUPLING bends their joints together at these rates.",
+    group="Grasping",
+)
+def grasp(scene: Scene, arguments: Arguments) -> None:
+    """R90."""
+    from warpjld.script.grasping import close_digits
+
+    first = arguments.number("key1 (the frame at which the digits begin to close)")
+    last = arguments.number("key2 (the frame at which they touch)")
+    if last <= first:
+        raise arguments.error(f"key2 must come after key1 ({first:g}), got {last:g}")
+    side = _side(scene, arguments)
+    prop = _prop(scene, arguments)
+    digits = []
+    while digit := arguments.keyword(*FINGERS):
+        digits.append(f"{side}.{digit.lower()}")
+    options = arguments.options(
+        coupling=lambda: (
+            arguments.number("the second joint's rate", minimum=0.0, maximum=10.0),
+            arguments.number("the third joint's rate", minimum=0.0, maximum=10.0),
+        )
+    )
+    coupling = cast("tuple[float, float] | None", options.get("coupling"))
+    actor = scene.actor_with(side)
+    scene.attempts.append(close_digits(scene, actor, prop, side, first, last, digits, coupling))
+
+
+@command(
+    "RELEASE",
+    syntax="RELEASE <key1> <key2> [LEFT/RIGHT]",
+    help="Digits closed by GRASP open again from key1 on; at key2 they are as before it.",
+    group="Grasping",
+)
+def release(scene: Scene, arguments: Arguments) -> None:
+    """R69: objects are let go."""
+    first = arguments.number("key1 (the frame at which the digits begin to open)")
+    last = arguments.number("key2 (the frame at which they are open)")
+    if last <= first:
+        raise arguments.error(f"key2 must come after key1 ({first:g}), got {last:g}")
+    actor = scene.actor_with(_side(scene, arguments))
+    if actor.name not in scene.grips:
+        raise arguments.error(f"actor {actor.name} has grasped nothing", arguments.position)
+    for channel, value in scene.grips.pop(actor.name).items():
+        actor.set_keys(channel, [first], float(actor.motion.value(channel, first)), scene.spline)
+        actor.set_keys(channel, [last], value, scene.spline)
+
+
+def _search(scene: Scene, arguments: Arguments, name: str, key: float, side: str, joint_name: str, finger: str) -> None:
+    from warpjld.grasp import NEAREST, Status
+    from warpjld.grasp.close import pad_vertex
+    from warpjld.script.binding import cover
+    from warpjld.script.grasping import Attempt, search_flexion
+
+    actor = scene.actor_with(side)
+    joint = _joint(actor, f"{side}.{joint_name}", arguments)
+    covering = cover(actor)
+    if arguments.keyword("PAD"):
+        vertex = pad_vertex(covering, f"{side}.{finger}".lower())
+    else:
+        last = len(covering.surface.vertices) - 1
+        vertex = arguments.integer("the hand vertex (its number, or PAD)", minimum=0, maximum=last)
+    prop = _prop(scene, arguments)
+    if arguments.keyword("NEAREST"):
+        facet = NEAREST
+    else:
+        facet = arguments.integer("the facet (its number, or NEAREST)", minimum=0, maximum=len(prop.thing.faces) - 1)
+    options = arguments.options(distance=lambda: arguments.number("the distance in metres"))
+    distance = float(cast(float, options.get("distance", 0.0)))
+    found, inside = search_flexion(scene, actor, prop, key, joint, vertex, facet, distance)
+    status = Status(int(found.status[0]))
+    message = found.message()
+    if status is Status.CONVERGED:
+        channel = f"{actor.skeleton.names[joint]}.{CHANNELS[0]}"
+        actor.set_keys(channel, [key], float(found.angles[0, 0]), scene.spline)
+        if inside != "no vertex inside":
+            message += f"; not solved: {inside}"
+    values = {
+        "joint": actor.skeleton.names[joint],
+        "vertex": vertex,
+        "facet": int(found.facet[0]),
+        "angle_degrees": round(math.degrees(found.angles[0, 0]), 4),
+        "distance_mm": round(1e3 * float(found.distance[0]), 4),
+        "collisions": inside,
+    }
+    what = f"{name} {actor.skeleton.names[joint]} vertex {vertex} {prop.name}"
+    scene.attempts.append(Attempt(what, key, actor.name, prop.name, status.name, message, values))
+
+
+def _made(name: str, shape: str | None, sizes: list[float], path: object, options: dict[str, object]) -> GraspObject:
+    from warpjld.grasp.object_file import load_object
+    from warpjld.grasp.shapes import SHAPES
+
+    scale = float(cast(float, options.get("scale", 1.0)))
+    if shape is not None:
+        return SHAPES[shape](*sizes, name=name).scaled(scale)
+    return load_object(
+        str(path),
+        name=name,
+        unit=str(options.get("unit", "m")),
+        up=cast(Literal["x", "y", "z"], options.get("up", "y")),
+        scale=scale,
+        centre="centre" in options,
+    )
+
+
+def _prop(scene: Scene, arguments: Arguments):  # type: ignore[no-untyped-def]
+    name = arguments.name("an object's name")
+    try:
+        return scene.prop(name)
+    except InputError as error:
+        raise arguments.error(error.message) from None
+
+
+def _side(scene: Scene, arguments: Arguments) -> str:
+    """The side as written, or that of the current actor where it has only one."""
+    side = arguments.keyword(*SIDES)
+    if side is not None:
+        return side.lower()
+    names = scene.actor().skeleton.names
+    sides = [s for s in ("left", "right") if any(n.startswith(f"{s}.") for n in names)]
+    if len(sides) != 1:
+        raise arguments.expected("LEFT/RIGHT")
+    return sides[0]
+
+
+def _joint(actor: Actor, name: str, arguments: Arguments) -> int:
+    try:
+        return actor.skeleton.index(name.lower())
+    except InputError as error:
+        raise arguments.error(error.message) from None

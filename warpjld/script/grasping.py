@@ -1,0 +1,165 @@
+"""Searches of a script: where actors and objects are at a key, what was found, and what touches in the end."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from warpjld.errors import InputError
+from warpjld.script.binding import cover
+from warpjld.script.staging import stage
+from warpjld.skeleton import Poses
+
+if TYPE_CHECKING:
+    from warpjld.grasp import Found, GraspObject
+    from warpjld.script.crowd import Crowd
+    from warpjld.script.props import Prop
+    from warpjld.script.scene import Actor, Scene
+
+__all__ = ["Attempt", "close_digits", "contact_reports", "placed_at", "posture", "search_flexion"]
+
+
+@dataclass(frozen=True)
+class Attempt:
+    """A search or a grasp and how it ended.
+
+    Attributes:
+        command: As the script calls it, with what it was about.
+        frame: The key.
+        actor: Who.
+        object: What.
+        status: One word.
+        message: For people.
+        values: More, as plain values.
+    """
+
+    command: str
+    frame: float
+    actor: str
+    object: str
+    status: str
+    message: str
+    values: dict[str, Any]
+
+    def content(self) -> dict[str, Any]:
+        """As plain values."""
+        plain = {k: getattr(self, k) for k in ("command", "frame", "actor", "object", "status", "message")}
+        return plain | self.values
+
+
+def posture(scene: Scene, actor: Actor, key: float) -> tuple[Poses, NDArray[np.float64]]:
+    """Pose and joint angles (1, J, 4) of an actor at a frame.
+
+    Raises:
+        InputError: It is driven by a motion file, which has no angles to change.
+    """
+    if actor.recorded is not None:
+        raise InputError(f"actor {actor.name} is driven by a MOTION file: no angle can be searched")
+    moment = np.array([key])
+    angles, _ = actor.motion.sample(moment, actor.skeleton)
+    return stage(actor, moment, scene.rate), angles
+
+
+def placed_at(scene: Scene, prop: Prop, key: float) -> GraspObject:
+    """An object where it is at a frame."""
+    there = scene.whereabouts(prop, np.array([key]))
+    return prop.thing.placed(there.position[0], there.rotation[0])
+
+
+def search_flexion(
+    scene: Scene, actor: Actor, prop: Prop, key: float, joint: int, vertex: int, facet: int, distance: float
+) -> tuple[Found, str]:
+    """The flexion of a joint at which a vertex touches an object at a key, and what it does not solve (R77)."""
+    from warpjld.grasp import FlexionSearch, ObjectSet, Searches
+    from warpjld.grasp.intersection import intersection
+    from warpjld.skeleton import poses_from_angles
+
+    covering = cover(actor)
+    poses, angles = posture(scene, actor, key)
+    thing = placed_at(scene, prop, key)
+    search = FlexionSearch(covering, ObjectSet(thing))
+    found = search.run(poses, angles, Searches(vertex=vertex, joint=joint, facet=facet, distance=distance))
+    angles[0, joint, 0] = found.angles[0, 0]
+    _, root = actor.motion.sample(np.array([key]), actor.skeleton)
+    bent = actor.placement.apply(poses_from_angles(actor.skeleton, angles, root_position=root), np.array([key]))
+    inside = intersection(covering, covering.deform(bent)[0], thing)
+    return found, str(inside)
+
+
+def close_digits(
+    scene: Scene,
+    actor: Actor,
+    prop: Prop,
+    side: str,
+    first: float,
+    last: float,
+    digits: Sequence[str],
+    coupling: tuple[float, float] | None,
+) -> Attempt:
+    """Close digits on an object: keys of the open hand at ``first``, of the closed one at ``last``."""
+    from warpjld.grasp import ObjectSet, Status
+    from warpjld.grasp.close import close_hand, digit_chains
+    from warpjld.grasp.intersection import intersection
+
+    covering = cover(actor)
+    poses, angles = posture(scene, actor, last)
+    thing = placed_at(scene, prop, last)
+    wanted = list(digits) or [name for name in digit_chains(actor.skeleton) if name.startswith(f"{side}.")]
+    closed = close_hand(covering, poses, angles, ObjectSet(thing), digits=wanted, coupling=coupling)
+    chains = digit_chains(actor.skeleton, wanted)
+    grip = {}
+    for name in closed.digits:
+        for joint in chains[name]:
+            channel = f"{actor.skeleton.names[joint]}.flexion"
+            before = float(actor.motion.value(channel, first))
+            grip[channel] = before
+            actor.set_keys(channel, [first], before, scene.spline)
+            actor.set_keys(channel, [last], float(closed.angles[0, joint, 0]), scene.spline)
+    scene.grips[actor.name] = scene.grips.get(actor.name, {}) | grip
+    poses, _ = posture(scene, actor, last)
+    inside = intersection(covering, covering.deform(poses)[0], thing)
+    touching = closed.touching()[0]
+    rows = {name: [Status(int(s)).name for s in closed.status[0, d]] for d, name in enumerate(closed.digits)}
+    message = f"{int(touching.sum())} of {len(touching)} digits touch"
+    blocked = [name for name, statuses in rows.items() if "BLOCKED" in statuses]
+    begun = [name for name, statuses in rows.items() if "INSIDE" in statuses]
+    if blocked:
+        message += f"; stopped by another digit or the palm: {', '.join(blocked)}"
+    if begun:
+        message += f"; in the object before closing: {', '.join(begun)}"
+    message += f"; {inside}"
+    status = "INSIDE" if begun else ("CONVERGED" if touching.any() else "NO_CONTACT")
+    values = {"digits": rows, "penetration_mm": round(1e3 * inside.deepest, 4)}
+    return Attempt(f"GRASP {prop.name}", last, actor.name, prop.name, status, message, values)
+
+
+def contact_reports(scene: Scene, crowd: Crowd) -> list[dict[str, Any]]:
+    """What touches which object at the keys of searches and grasps, and where objects are taken and let go."""
+    from warpjld.grasp.intersection import contacts
+
+    moments: dict[tuple[str, str], set[float]] = {}
+    for attempt in scene.attempts:
+        moments.setdefault((attempt.actor, attempt.object), set()).add(attempt.frame)
+    for prop in crowd.props:
+        for one in prop.associations:
+            moments.setdefault((one.actor, prop.name), set()).update((one.start, one.stop))
+    rows = []
+    for (actor, name), frames in moments.items():
+        role = next(role for role in crowd.roles if role.actor.name == actor)
+        for frame in sorted(frames):
+            poses = stage(role.actor, np.array([frame]), scene.rate)
+            thing = placed_at(scene, scene.prop(name), frame)
+            found = contacts(role.covering, role.covering.deform(poses, device=crowd.device)[0], thing)
+            parts = [
+                {"part": c.part, "vertices": c.vertices, "penetration_mm": round(1e3 * c.deepest, 3)} for c in found
+            ]
+            told = ", ".join(f"{c.part} {c.vertices} vertices" for c in found) or "nothing touches"
+            deepest = max((c.deepest for c in found), default=0.0)
+            if found:
+                told += f"; deepest penetration {1e3 * deepest:.2f} mm"
+            rows.append({"frame": frame, "actor": actor, "object": name, "parts": parts, "message": told})
+    return rows
