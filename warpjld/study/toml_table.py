@@ -127,11 +127,16 @@ class TomlTable:
             self.fail(key, f"want one or more tables [[{self._called(key)}]]")
         return [TomlTable(v, f"{self._called(key)}[{k}]", self._path, self._lines) for k, v in enumerate(value)]
 
-    def finish(self) -> None:
-        """Raise InputError where a key was never asked for: misspelt, or in the wrong table."""
+    def finish(self, known: Sequence[str] = ()) -> None:
+        """Raise InputError where a key was never asked for: misspelt, or in the wrong table.
+
+        Args:
+            known: Keys that could have been asked for, to be suggested too.
+        """
         for key in self._content:
             if key not in self._asked:
-                hint = did_you_mean(key, self._asked) or f"; known: {', '.join(self._asked)}"
+                names = list(dict.fromkeys([*self._asked, *known]))
+                hint = did_you_mean(key, names) or f"; known: {', '.join(names)}"
                 self.fail(key, f"unknown key{hint}")
 
     def _take(self, key: str, default: Any) -> Any:

@@ -12,7 +12,9 @@ from warpjld.covering import Covering, bind
 from warpjld.errors import InputError
 from warpjld.grasp import GraspObject, ObjectSet
 from warpjld.rig import Rig
+from warpjld.skeleton import CHANNELS, Skeleton, poses_from_angles
 from warpjld.study.grasping.choices import HandChoice, ObjectChoice
+from warpjld.study.grasping.plan import Posture
 from warpjld.study.grasping.wrist import Palm, find_palm
 
 __all__ = ["Hand", "Thing", "hand_of", "thing_of"]
@@ -28,6 +30,8 @@ class Hand:
         palm: Where its palm is.
         parts: Segment of every vertex, shape (V,), -1 for the forearm.
         names: Names of the segments, without side.
+        opened: Joint angles that closing starts from [rad], shape (J, 4).
+        skin: Skin in that posture, the root at rest [m], shape (V, 3).
     """
 
     rig: Rig
@@ -35,6 +39,8 @@ class Hand:
     palm: Palm
     parts: NDArray[np.int64]
     names: tuple[str, ...]
+    opened: NDArray[np.float64]
+    skin: NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)
@@ -58,14 +64,33 @@ class Thing:
 
 
 @lru_cache(maxsize=4)
-def hand_of(choice: HandChoice) -> Hand:
-    """Build or read a hand and bind it; kept for the process."""
+def hand_of(choice: HandChoice, posture: Posture) -> Hand:
+    """Build or read a hand and bind it; kept for the process.
+
+    Raises:
+        InputError: It cannot be used, or has no such joint, or the posture is beyond its limits.
+    """
     rig = choice.load()
     covering = bind(rig.skeleton, rig.surface, skin=rig.skin)
     names = tuple(fan.name.removeprefix("left.").removeprefix("right.") for fan in covering.fans)
     parts = covering.domains.argmax(axis=1).astype(np.int64)
     parts[np.isin(parts, [k for k, name in enumerate(names) if name == "forearm"])] = -1
-    return Hand(rig, covering, find_palm(rig.skeleton, rig.surface.vertices), parts, names)
+    opened = _angles(rig.skeleton, posture, choice.name)
+    skin = covering.deform(poses_from_angles(rig.skeleton, opened[None]), threads=1)[0].astype(np.float64)
+    return Hand(rig, covering, find_palm(rig.skeleton, rig.surface.vertices), parts, names, opened, skin)
+
+
+def _angles(skeleton: Skeleton, posture: Posture, name: str) -> NDArray[np.float64]:
+    angles = np.zeros((len(skeleton), len(CHANNELS)))
+    for joint, channel, degrees in posture:
+        j, k = skeleton.index(joint), CHANNELS.index(channel)
+        low, high = np.degrees(skeleton.limits[j, k])
+        if not low - 1e-6 <= degrees <= high + 1e-6:
+            raise InputError(
+                f"hand {name}: posture {joint} {channel} is {degrees:g}°; its limits are {low:.0f}° to {high:.0f}°"
+            )
+        angles[j, k] = np.radians(degrees)
+    return angles
 
 
 @lru_cache(maxsize=32)

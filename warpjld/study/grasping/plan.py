@@ -6,14 +6,15 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any, Literal
 
-from warpjld.skeleton import DIGITS
+from warpjld.skeleton import CHANNELS, DIGITS
+from warpjld.skeleton.hand import HAND_PARENTS
 from warpjld.study.grasping.choices import HandChoice, ObjectChoice, read_hand, read_object
 from warpjld.study.manifest import versions
 from warpjld.study.toml_table import TomlTable, read_toml
 
 __all__ = ["GraspPlan", "Measuring", "WristRange", "load_plan"]
 
-_COMPUTING = ("warpjld", "numpy", "scipy", "warp-lang")
+_COMPUTING = ("warpjld", "numpy", "scipy", "warp-lang")  # another version may give other last digits
 
 
 @dataclass(frozen=True)
@@ -35,6 +36,20 @@ class WristRange:
     tilt: tuple[float, float] = (0.0, 20.0)
     gap: tuple[float, float] = (0.0, 0.02)
     offset: tuple[float, float] = (0.0, 0.3)
+
+
+Posture = tuple[tuple[str, str, float], ...]
+"""Joint without side, channel, and angle [°]."""
+
+OPEN: Posture = (
+    ("index.base", "abduction", 10.0),
+    ("ring.base", "abduction", -8.0),
+    ("pinky.base", "abduction", -18.0),
+    ("thumb.base", "pivot", 30.0),
+    ("thumb.base", "abduction", 20.0),
+    ("thumb.base", "flexion", -10.0),
+)
+"""The open hand, fingers spread and the thumb against them: where closing starts from if a plan says nothing."""
 
 
 @dataclass(frozen=True)
@@ -81,6 +96,7 @@ class GraspPlan:
     scales: tuple[float, ...]
     frictions: tuple[float, ...]
     digits: tuple[str, ...]
+    posture: Posture
     wrist: WristRange
     measuring: Measuring
 
@@ -117,6 +133,7 @@ def load_plan(path: str | Path) -> GraspPlan:
         scales=top.numbers("scales", (1.0,), above=0.0, most=100.0),
         frictions=top.numbers("friction", (0.6,), above=0.0, most=10.0),
         digits=top.texts("digits", tuple(reversed(DIGITS)), known=DIGITS),
+        posture=_read_posture(top.table("posture")) if "posture" in top else OPEN,
         wrist=_read_wrist(top.table("wrist")),
         measuring=_read_measuring(top.table("measuring")),
     )
@@ -126,6 +143,23 @@ def load_plan(path: str | Path) -> GraspPlan:
         if twice:
             top.fail(kind, f"two are called '{twice[0]}'; give them a name each")
     return plan
+
+
+def _read_posture(table: TomlTable) -> Posture:
+    """Tables [posture."thumb.base"] of channels; degrees."""
+    joints = [name for name in HAND_PARENTS if not name.endswith(".tip")]
+    found = []
+    for joint in joints:
+        if joint not in table:
+            continue
+        channels = table.table(joint)
+        for channel in CHANNELS:
+            angle = channels.number(channel, least=-180.0, most=180.0)
+            if angle is not None:
+                found.append((joint, channel, angle))
+        channels.finish()
+    table.finish(joints)
+    return tuple(found)
 
 
 def _read_wrist(table: TomlTable) -> WristRange:

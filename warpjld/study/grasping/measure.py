@@ -1,0 +1,78 @@
+"""All measures of one grasp, as columns of the table."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from warpjld.grasp.intersection import intersection
+from warpjld.grasp.quality import contact_patches, force_closure, gravity_displacement, wrench_space
+from warpjld.skeleton import DIGITS
+from warpjld.study.grasping.load import Hand, Thing
+from warpjld.study.grasping.plan import Measuring
+
+__all__ = ["measure_grasp"]
+
+
+def measure_grasp(
+    hand: Hand, thing: Thing, vertices: NDArray[np.float32], friction: float, how: Measuring
+) -> dict[str, Any]:
+    """Measure a grasp; the definitions are in `warpjld.grasp.quality`, one a measure.
+
+    Args:
+        hand: Whose skin.
+        thing: What is held.
+        vertices: The deformed skin [m], shape (V, 3), in the object's frame.
+        friction: Coulomb coefficient.
+        how: Settings.
+    """
+    body, scale = thing.body, how.torque_scale or thing.radius
+    found = thing.objects.distances(vertices, nearest=True, threads=1)
+    assert found.point is not None
+    patches = contact_patches(
+        vertices,
+        hand.rig.surface.faces,
+        hand.parts,
+        hand.names,
+        found.distance[0],
+        found.point[0],
+        body.normals[found.face[0]],
+        tolerance=how.contact,
+    )
+    contacts, center = patches.contacts(friction), body.centroid
+    closure = force_closure(contacts, center, torque_scale=scale, edges=how.edges)
+    space = wrench_space(contacts, center, torque_scale=scale, norm=how.norm, edges=how.edges)
+    gravity = gravity_displacement(
+        contacts,
+        center,
+        mass=thing.mass,
+        torque_scale=scale,
+        squeeze=how.squeeze,
+        normal_stiffness=how.normal_stiffness,
+        tangential_stiffness=how.tangential_stiffness,
+        edges=how.edges,
+    )
+    inside = intersection(hand.covering, vertices, body)
+    areas = dict.fromkeys((*DIGITS, "palm"), 0.0)
+    for digit, area in zip(patches.digits, patches.areas, strict=True):
+        areas[digit if digit in DIGITS else "palm"] += float(area)
+    firm = how.displacement is None or gravity.worst <= how.displacement
+    return {
+        "contacts": len(patches),
+        "digits": sum(areas[digit] > 0.0 for digit in DIGITS),
+        "area": float(patches.areas.sum()),
+        **{f"area_{part}": area for part, area in areas.items()},
+        "penetration": inside.deepest,
+        "overlap": inside.volume,
+        "closed": closure.closed,
+        "margin": closure.margin,
+        "epsilon": space.epsilon,
+        "volume": space.volume,
+        "torque_scale": scale,
+        "mass": thing.mass,
+        "displacement": gravity.worst if np.isfinite(gravity.worst) else None,
+        "held": int(gravity.held.sum()),
+        "success": bool(closure.closed and inside.deepest <= how.penetration and firm),
+    }
