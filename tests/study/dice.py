@@ -43,6 +43,9 @@ class Dice:
     def identity(self) -> dict[str, Any]:
         return {"seed": self.seed, "game": "dice"}
 
+    def begin(self) -> None:
+        pass
+
     def run(self, trial: int, rng: np.random.Generator) -> Outcome:
         if self.pause:
             time.sleep(self.pause)

@@ -69,6 +69,9 @@ class Experiment(Protocol):
     def identity(self) -> dict[str, Any]:
         """All that determines the results but the number of trials, as JSON: settings, hashes of input files."""
 
+    def begin(self) -> None:
+        """Called once in every worker process, before its first trial."""
+
     def run(self, trial: int, rng: np.random.Generator) -> Outcome:
         """Trial number ``trial``. Exceptions become rows with status "error"."""
 

@@ -16,7 +16,7 @@ from warpjld.errors import InputError, WarpjldError
 from warpjld.study.experiment import Experiment, Outcome
 from warpjld.study.manifest import write_json
 from warpjld.study.run import opened
-from warpjld.study.worker import one_thread, perform
+from warpjld.study.worker import one_thread, perform, start
 
 __all__ = ["Rerun", "rerun_trial"]
 
@@ -71,9 +71,14 @@ def rerun_trial(
     return Rerun(row, tuple(differences), tuple(files))
 
 
+def _pool(experiment: Experiment) -> ProcessPoolExecutor:
+    context = multiprocessing.get_context("spawn")
+    return ProcessPoolExecutor(1, mp_context=context, initializer=start, initargs=(experiment,))
+
+
 def _in_a_worker(experiment: Experiment, trial: int) -> tuple[dict[str, Any], Outcome]:
     # not in this process: its libraries may sum on several threads, in another order
-    with one_thread(), ProcessPoolExecutor(1, mp_context=multiprocessing.get_context("spawn")) as pool:
+    with one_thread(), _pool(experiment) as pool:
         try:
             return pool.submit(perform, experiment, trial).result()
         except BrokenProcessPool as error:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import os
 import signal
-import sys
 import threading
 import time
 import traceback
@@ -54,16 +53,9 @@ def start(experiment: Experiment) -> None:
     """Initialise the process."""
     global _experiment
     _experiment = experiment
-    _silence_warp()
+    experiment.begin()
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C is the parent's business
     threading.Thread(target=_die_with_parent, daemon=True).start()
-
-
-def _silence_warp() -> None:
-    # only if the experiment has it loaded: a study of something else need not wait for it
-    warp = sys.modules.get("warp")
-    if warp is not None:
-        warp.config.log_level = warp.LOG_ERROR
 
 
 def _die_with_parent() -> None:

@@ -12,12 +12,16 @@ from warpjld.covering import Covering, bind
 from warpjld.errors import InputError
 from warpjld.grasp import GraspObject, ObjectSet
 from warpjld.rig import Rig
-from warpjld.skeleton import CHANNELS, Skeleton, poses_from_angles
+from warpjld.skeleton import CHANNELS, DIGITS, Skeleton, poses_from_angles
+from warpjld.skeleton.hand import FINGER_JOINTS
 from warpjld.study.grasping.choices import HandChoice, ObjectChoice
 from warpjld.study.grasping.plan import Posture
 from warpjld.study.grasping.wrist import Palm, find_palm
 
-__all__ = ["Hand", "Thing", "hand_of", "thing_of"]
+__all__ = ["SEGMENTS", "Hand", "Thing", "hand_of", "thing_of"]
+
+SEGMENTS = (*(f"{digit}.{joint}" for digit in reversed(DIGITS) for joint in FINGER_JOINTS[:3]), "palm")
+"""Parts of a hand that touch, each named after the joint it begins at; thumb first, the palm with its carpus last."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -28,8 +32,7 @@ class Hand:
         rig: As built or read.
         covering: Bound.
         palm: Where its palm is.
-        parts: Segment of every vertex, shape (V,), -1 for the forearm.
-        names: Names of the segments, without side.
+        parts: Place in ``SEGMENTS`` of every vertex's segment, shape (V,); -1 for what is no hand.
         opened: Joint angles that closing starts from [rad], shape (J, 4).
         skin: Skin in that posture, the root at rest [m], shape (V, 3).
     """
@@ -38,7 +41,6 @@ class Hand:
     covering: Covering
     palm: Palm
     parts: NDArray[np.int64]
-    names: tuple[str, ...]
     opened: NDArray[np.float64]
     skin: NDArray[np.float64]
 
@@ -72,12 +74,19 @@ def hand_of(choice: HandChoice, posture: Posture) -> Hand:
     """
     rig = choice.load()
     covering = bind(rig.skeleton, rig.surface, skin=rig.skin)
-    names = tuple(fan.name.removeprefix("left.").removeprefix("right.") for fan in covering.fans)
-    parts = covering.domains.argmax(axis=1).astype(np.int64)
-    parts[np.isin(parts, [k for k, name in enumerate(names) if name == "forearm"])] = -1
+    segment = np.array([_segment(fan.name) for fan in covering.fans])
+    parts = segment[covering.domains.argmax(axis=1)]
     opened = _angles(rig.skeleton, posture, choice.name)
     skin = covering.deform(poses_from_angles(rig.skeleton, opened[None]), threads=1)[0].astype(np.float64)
-    return Hand(rig, covering, find_palm(rig.skeleton, rig.surface.vertices), parts, names, opened, skin)
+    return Hand(rig, covering, find_palm(rig.skeleton, rig.surface.vertices), parts, opened, skin)
+
+
+def _segment(fan: str) -> int:
+    """Place in ``SEGMENTS`` of what an operator of the covering moves."""
+    name = fan.removeprefix("left.").removeprefix("right.")
+    if name in SEGMENTS:
+        return SEGMENTS.index(name)
+    return SEGMENTS.index("palm") if name in ("carpus", "wrist") or name.endswith(".carpometacarpal") else -1
 
 
 def _angles(skeleton: Skeleton, posture: Posture, name: str) -> NDArray[np.float64]:

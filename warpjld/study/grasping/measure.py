@@ -8,9 +8,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from warpjld.grasp.intersection import intersection
-from warpjld.grasp.quality import contact_patches, force_closure, gravity_displacement, wrench_space
+from warpjld.grasp.quality import Patches, contact_patches, force_closure, gravity_displacement, wrench_space
 from warpjld.skeleton import DIGITS
-from warpjld.study.grasping.load import Hand, Thing
+from warpjld.study.grasping.load import SEGMENTS, Hand, Thing
 from warpjld.study.grasping.plan import Measuring
 
 __all__ = ["measure_grasp"]
@@ -18,8 +18,8 @@ __all__ = ["measure_grasp"]
 
 def measure_grasp(
     hand: Hand, thing: Thing, vertices: NDArray[np.float32], friction: float, how: Measuring
-) -> dict[str, Any]:
-    """Measure a grasp; the definitions are in `warpjld.grasp.quality`, one a measure.
+) -> tuple[dict[str, Any], Patches]:
+    """Columns of the table, and the patches of contact; definitions are in `warpjld.grasp.quality`, one a measure.
 
     Args:
         hand: Whose skin.
@@ -35,7 +35,7 @@ def measure_grasp(
         vertices,
         hand.rig.surface.faces,
         hand.parts,
-        hand.names,
+        SEGMENTS,
         found.distance[0],
         found.point[0],
         body.normals[found.face[0]],
@@ -59,7 +59,7 @@ def measure_grasp(
     for digit, area in zip(patches.digits, patches.areas, strict=True):
         areas[digit if digit in DIGITS else "palm"] += float(area)
     firm = how.displacement is None or gravity.worst <= how.displacement
-    return {
+    values = {
         "contacts": len(patches),
         "digits": sum(areas[digit] > 0.0 for digit in DIGITS),
         "area": float(patches.areas.sum()),
@@ -76,3 +76,4 @@ def measure_grasp(
         "held": int(gravity.held.sum()),
         "success": bool(closure.closed and inside.deepest <= how.penetration and firm),
     }
+    return values, patches

@@ -11,12 +11,13 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from warpjld.grasp.close import close_hand
+from warpjld.grasp.quality import Patches
 from warpjld.skeleton import Poses, poses_from_angles
 from warpjld.study.columns import Column
 from warpjld.study.experiment import Outcome
 from warpjld.study.grasping.choices import HandChoice, ObjectChoice
 from warpjld.study.grasping.columns import GRASP_COLUMNS
-from warpjld.study.grasping.load import Hand, Thing, hand_of, thing_of
+from warpjld.study.grasping.load import SEGMENTS, Hand, Thing, hand_of, thing_of
 from warpjld.study.grasping.measure import measure_grasp
 from warpjld.study.grasping.plan import GraspPlan
 from warpjld.study.grasping.wrist import Approach, draw_approach, place_palm, touch_along
@@ -74,6 +75,12 @@ class GraspExperiment:
             notes += [f"{wanted.name}: {note}" for note in thing.body.report.notes()]
         return notes
 
+    def begin(self) -> None:
+        """Keep Warp's greeting off the output of a command that runs many workers."""
+        import warp
+
+        warp.config.log_level = warp.LOG_ERROR
+
     def run(self, trial: int, rng: np.random.Generator) -> Outcome:
         """Place, close, measure."""
         choice, wanted, scale, friction = self.settings.combination(trial)
@@ -107,12 +114,10 @@ class GraspExperiment:
         wrist = poses.positions[0, skeleton.index("wrist")]
         values |= dict(zip(("wrist_x", "wrist_y", "wrist_z"), wrist, strict=True))
         vertices = hand.covering.deform(poses, threads=1)[0]
-        values |= measure_grasp(hand, thing, vertices, friction, self.settings.measuring)
-        arrays = {
-            f"{choice.name}/angles": closed.angles[0],
-            f"{choice.name}/root_position": position[0],
-            f"{choice.name}/root_rotation": rotation[0],
-        }
+        measured, patches = measure_grasp(hand, thing, vertices, friction, self.settings.measuring)
+        values |= measured
+        pose = {"angles": closed.angles[0], "root_position": position[0], "root_rotation": rotation[0]}
+        arrays = {f"{choice.name}/{name}": array for name, array in (pose | _by_segment(patches)).items()}
         return Outcome("closed" if closed.touching().any() else "no contact", values, arrays)
 
     def pictures(self, trial: int, outcome: Outcome, folder: Path) -> list[Path]:
@@ -139,3 +144,18 @@ def _room(hand: Hand, thing: Thing, turn: Array, shift: Array, approach: Approac
         # not nearer than this can it be clear: the object is that deep in the hand
         back += max(_CLEAR - nearest, 1e-4)
     return None
+
+
+def _by_segment(patches: Patches) -> dict[str, Array]:
+    """Patches in rows of ``SEGMENTS``, NaN where a segment does not touch."""
+    rows = [SEGMENTS.index(name) for name in patches.names]
+    out = {}
+    for name, values in (
+        ("contact_point", patches.points),
+        ("contact_normal", patches.normals),
+        ("skin_normal", patches.skin_normals),
+        ("contact_area", patches.areas),
+    ):
+        out[name] = np.full((len(SEGMENTS), *values.shape[1:]), np.nan)
+        out[name][rows] = values
+    return out
