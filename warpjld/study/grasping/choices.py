@@ -102,7 +102,7 @@ def read_hand(table: TomlTable) -> HandChoice:
     """A hand from a table [[hands]]."""
     if ("builtin" in table) == ("file" in table):
         table.fail("builtin", 'want either builtin = "left" or "right", or file = "…"')
-    name = table.text("name")
+    name = _name(table)
     if "file" in table:
         file = _path(table, "file")
         choice = HandChoice(
@@ -147,7 +147,7 @@ def read_object(table: TomlTable) -> ObjectChoice:
 
     if ("builtin" in table) == ("file" in table):
         table.fail("builtin", f'want either builtin = one of {", ".join(SHAPES)}, or file = "…"')
-    name, mass = table.text("name"), table.number("mass", above=0.0)
+    name, mass = _name(table), table.number("mass", above=0.0)
     if "file" in table:
         file = _path(table, "file")
         unit, up = table.text("unit", "m", known=tuple(UNITS)), table.text("up", "y", known=("x", "y", "z"))
@@ -167,6 +167,13 @@ def _size_names(build: Any) -> list[str]:
     from inspect import Parameter, signature
 
     return [p.name for p in signature(build).parameters.values() if p.kind is Parameter.POSITIONAL_OR_KEYWORD]
+
+
+def _name(table: TomlTable) -> str | None:
+    name = table.text("name")
+    if name is not None and (not name.strip() or "/" in name):
+        table.fail("name", f"want a word or two without '/', got '{name}'")
+    return name
 
 
 def _path(table: TomlTable, key: str) -> Path:
