@@ -25,6 +25,8 @@ _KNUCKLES = ("base", "knuckle2", "knuckle3")
 _OWN = 0.5  # share of the operators at or beyond a joint from which a vertex counts as moved by it
 _WIDEST = 0.35  # how far a base joint may open again for the sake of swelling skin [rad]
 _HALVINGS = 10
+_ROUNDS = 4  # of bending and opening again
+_TOUCH = 1e-4  # skin this near touches [m]
 
 
 @dataclass(frozen=True, eq=False)
@@ -36,17 +38,19 @@ class Closed:
         digits: Names of the digits that closed, e.g. ``left.index``.
         status: Per digit and joint how its search ended (values of ``Status``), shape (G, D, 3); CONVERGED is a touch,
             NO_CONTACT the limit reached without one.
+        gap: Smallest signed distance of every digit's skin to the object [m], shape (G, D).
         penetration: Deepest vertex of the digits inside the object [m], shape (G,).
     """
 
     angles: NDArray[np.float64]
     digits: tuple[str, ...]
     status: NDArray[np.int32]
+    gap: NDArray[np.float64]
     penetration: NDArray[np.float64]
 
     def touching(self) -> NDArray[np.bool_]:
-        """Digits stopped by a touch at some joint, shape (G, D)."""
-        return np.asarray((self.status == Status.CONVERGED).any(axis=2))
+        """Digits within a tenth of a millimetre of the object, shape (G, D)."""
+        return np.asarray(self.gap < _TOUCH)
 
 
 def digit_chains(skeleton: Skeleton, digits: Sequence[str] = ()) -> dict[str, tuple[int, ...]]:
@@ -77,12 +81,27 @@ def digit_chains(skeleton: Skeleton, digits: Sequence[str] = ()) -> dict[str, tu
 @lru_cache(maxsize=32)
 def _moved(covering: Covering, joint: int) -> NDArray[np.int32]:
     """Vertices of which operators at or beyond a joint hold at least half."""
-    skeleton, anchors = covering.skeleton, covering.anchors
-    beyond = np.zeros(len(skeleton), dtype=bool)
-    for j in range(len(skeleton)):
-        beyond[j] = j == joint or (skeleton.parents[j] >= 0 and beyond[skeleton.parents[j]])
+    anchors = covering.anchors
+    beyond = _beyond(covering.skeleton, joint)
     share = (anchors.weight * beyond[anchors.ends[anchors.segment, 0]]).sum(axis=1)
     return np.flatnonzero(share >= _OWN).astype(np.int32)
+
+
+@lru_cache(maxsize=32)
+def _moving(covering: Covering, bases: tuple[int, ...]) -> NDArray[np.int32]:
+    """Vertices that move at all when digits bend, those of the palm that swell included."""
+    anchors = covering.anchors
+    beyond = np.any([_beyond(covering.skeleton, base) for base in bases], axis=0)
+    touched = beyond[anchors.ends[anchors.segment]].any(axis=2)
+    return np.flatnonzero(((anchors.weight > 0.0) & touched).any(axis=1)).astype(np.int32)
+
+
+def _beyond(skeleton: Skeleton, joint: int) -> NDArray[np.bool_]:
+    """Joints at or beyond a joint, shape (J,)."""
+    out = np.zeros(len(skeleton), dtype=bool)
+    for j, parent in enumerate(skeleton.parents):
+        out[j] = j == joint or (parent >= 0 and out[parent])
+    return out
 
 
 def pad_vertex(covering: Covering, digit: str) -> int:
@@ -153,23 +172,25 @@ def close_hand(
     names = list(chains)
     status = np.full((count, len(names), 3), int(Status.NO_CONTACT), dtype=np.int32)
     joints = np.array([chains[name] for name in names])
-    first = 0
     if coupling is not None:
-        _, ended, at = hand.bend(joints, np.array([1.0, *coupling]))
-        status[..., 0] = ended
-        # the joint whose segment was touched, and those before it, stay
-        hand.free = at
-    for k in range(first, 3):
-        _, ended, _ = hand.bend(joints[:, k:], np.array([1.0, 0.0, 0.0])[: 3 - k], only=k)
-        keep = status[..., k] == int(Status.CONVERGED) if coupling is not None else np.zeros_like(ended, dtype=bool)
-        status[..., k] = np.where(keep, status[..., k], ended)
-    hand.settle(joints)
+        hand.bend(joints, np.array([1.0, *coupling]))
+    for again in range(_ROUNDS):
+        for k in range(1 if again else 0, 3):
+            # a joint with a touch at or beyond its segment finds it at once and stays
+            ended = hand.bend(joints[:, k:], np.array([1.0, 0.0, 0.0])[: 3 - k])
+            # skin left inside by less than twice the tolerance is a touch
+            ended = np.where(ended == int(Status.INSIDE), int(Status.CONVERGED), ended) if again else ended
+            status[..., k] = ended
+        if not hand.settle(joints):
+            break
     if apart:
         for g in range(count):
             hand.angles[g], stopped = keep_apart(covering, partial(hand.poses_of, g), angles[g], hand.angles[g], chains)
             for name in stopped:
                 status[g, names.index(name)] = int(Status.BLOCKED)
-    return Closed(hand.angles, tuple(names), status, np.maximum(0.0, -hand.gap(joints)).max(axis=1))
+    gap = np.stack([hand.distances(_moved(covering, int(chain[0]))).min(axis=1) for chain in joints], axis=1)
+    penetration = -hand.distances(_moving(covering, tuple(joints[:, 0].tolist()))).min(axis=1)
+    return Closed(hand.angles, tuple(names), status, gap, np.maximum(0.0, penetration))
 
 
 class _Hand:
@@ -191,7 +212,6 @@ class _Hand:
         self.objects, self.which, self.places = objects, which, places
         self.tolerance, self.threads = tolerance, threads
         self.search = FlexionSearch(covering, objects)
-        self.free: NDArray[np.int32] | None = None
         rest = poses_from_angles(covering.skeleton, angles)
         turn = Rotation.from_quat(poses.rotations[:, 0]) * Rotation.from_quat(rest.rotations[:, 0]).inv()
         self._turn = turn.as_quat()
@@ -216,29 +236,15 @@ class _Hand:
             root_rotation=np.repeat(self._turn[g : g + 1], count, axis=0),
         )
 
-    def bend(
-        self, joints: NDArray[np.int64], rates: NDArray[np.float64], only: int | None = None
-    ) -> tuple[NDArray[np.float64], NDArray[np.int32], NDArray[np.int32]]:
-        """Bend the joints of every digit (D, k) together until the first touch.
-
-        Returns:
-            Closing (G, D), status (G, D), and which of the joints holds the touch (G, D).
-        """
+    def bend(self, joints: NDArray[np.int64], rates: NDArray[np.float64]) -> NDArray[np.int32]:
+        """Bend the joints of every digit (D, k) at these rates until the first touch; how each ended, shape (G, D)."""
         count = len(self.angles)
         vertices = [_moved(self.covering, int(chain[0])) for chain in joints]
         owner = np.concatenate([np.full(len(v), d) for d, v in enumerate(vertices)])
         vertex = np.concatenate(vertices)
         moving = rates != 0.0
         frame = np.repeat(np.arange(count), len(vertex))
-        digit = np.tile(owner, count)
-        used = joints[:, moving][digit]
-        stop = None
-        if self.free is not None and only is not None:
-            # after a coupled touch on a joint's segment, that joint and those before it stay where they are
-            held = self.free[frame, digit] >= only
-            now = self.angles[frame[:, None], used, _FLEXION]
-            largest = self.covering.skeleton.limits[used, _FLEXION, 1]
-            stop = np.where(held[:, None], now, largest)
+        used = joints[:, moving][np.tile(owner, count)]
         found = self.search.run(
             self.poses(),
             self.angles,
@@ -249,82 +255,67 @@ class _Hand:
                 thing=self.which[frame],
                 place=frame,
                 rate=np.broadcast_to(rates[moving], used.shape),
-                stop=stop,
                 distance=self.tolerance,
             ),
             places=self.places,
             tolerance=self.tolerance,
             threads=self.threads,
         )
-        closing = np.where(found.status == Status.NO_CONTACT, np.inf, found.closing).reshape(count, -1)
         status = found.status.reshape(count, -1)
-        closing = np.where(status == Status.AT_LIMIT, np.inf, closing)
-        best = np.full((count, len(joints)), np.inf)
+        free = (status == Status.NO_CONTACT) | (status == Status.AT_LIMIT)
+        closing = np.where(free, np.inf, found.closing.reshape(count, -1))
         ended = np.empty((count, len(joints)), dtype=np.int32)
-        at = np.full((count, len(joints)), -1, dtype=np.int32)
+        rows = np.arange(count)
         for d, chain in enumerate(joints):
             own = owner == d
-            place = closing[:, own].argmin(axis=1)
-            rows = np.arange(count)
-            best[:, d] = closing[:, own][rows, place]
-            ended[:, d] = np.where(np.isfinite(best[:, d]), status[:, own][rows, place], int(Status.NO_CONTACT))
-            touched = vertex[own][place]
-            for k, joint in enumerate(chain):
-                at[:, d] = np.where(
-                    np.isin(touched, _moved(self.covering, int(joint))) & np.isfinite(best[:, d]), k, at[:, d]
-                )
-            self._go(chain[moving], rates[moving], best[:, d], frozen=self._frozen(d, only))
-        return best, ended, at
+            first = closing[:, own].argmin(axis=1)
+            best = closing[:, own][rows, first]
+            ended[:, d] = np.where(np.isfinite(best), status[:, own][rows, first], int(Status.NO_CONTACT))
+            for joint, rate in zip(chain[moving], rates[moving], strict=True):
+                low, high = self.covering.skeleton.limits[joint, _FLEXION]
+                now = self.angles[:, joint, _FLEXION]
+                far = np.where(np.isfinite(best), now + rate * best, high)
+                self.angles[:, joint, _FLEXION] = np.maximum(now, np.clip(far, low, high))
+        return ended
 
-    def _frozen(self, d: int, only: int | None) -> NDArray[np.bool_]:
-        if self.free is None or only is None:
-            return np.zeros(len(self.angles), dtype=bool)
-        return np.asarray(self.free[:, d] >= only)
+    def distances(self, vertices: NDArray[np.int32], angles: NDArray[np.float64] | None = None) -> NDArray[np.float64]:
+        """Signed distances of some vertices to the object [m], shape (G, n)."""
+        points = self.covering.points(self.poses(angles), vertices)
+        found = self.objects.distances(points, which=self.which, places=self.places, threads=self.threads)
+        return found.distance.astype(np.float64)
 
-    def _go(
-        self,
-        chain: NDArray[np.int64],
-        rates: NDArray[np.float64],
-        closing: NDArray[np.float64],
-        frozen: NDArray[np.bool_],
-    ) -> None:
-        for joint, rate in zip(chain, rates, strict=True):
-            low, high = self.covering.skeleton.limits[joint, _FLEXION]
-            now = self.angles[:, joint, _FLEXION]
-            far = np.where(np.isfinite(closing), now + rate * closing, high)
-            ahead = np.maximum(now, np.clip(far, low, high))
-            self.angles[:, joint, _FLEXION] = np.where(frozen, now, ahead)
+    def settle(self, joints: NDArray[np.int64]) -> bool:
+        """Open base joints where skin that swelled has entered the object; whether any had to.
 
-    def gap(self, joints: NDArray[np.int64], angles: NDArray[np.float64] | None = None) -> NDArray[np.float64]:
-        """Smallest signed distance of every digit's skin to the object [m], shape (G, D)."""
-        poses = self.poses(angles)
-        out = np.empty((len(self.angles), len(joints)))
-        for d, chain in enumerate(joints):
-            points = self.covering.points(poses, _moved(self.covering, int(chain[0])))
-            found = self.objects.distances(points, which=self.which, places=self.places, threads=self.threads)
-            out[:, d] = found.distance.min(axis=1)
-        return out
-
-    def settle(self, joints: NDArray[np.int64]) -> None:
-        """Open base joints where skin that swelled has entered the object, and close again what lies beyond."""
-        allowed = -2.0 * self.tolerance
-        for _ in range(3):
-            deep = self.gap(joints) < allowed
-            if not deep.any():
-                return
-            low = np.where(deep, 1.0, 0.0) * _WIDEST
-            high = np.zeros_like(low)  # opening that is too small … opening that is enough
-            enough = low.copy()
+        What was inside before the hand closed does not count.
+        """
+        bases = joints[:, 0].tolist()
+        vertices = _moving(self.covering, tuple(bases))
+        now = self.distances(vertices)
+        allowed = np.minimum(-2.0 * self.tolerance, self.distances(vertices, self.open) - 1e-6)
+        deep = now < allowed
+        if not deep.any():
+            return False
+        wide = np.full(len(self.angles), _WIDEST)
+        at_widest = np.stack([self.distances(vertices, self._opened(base, wide)) for base in bases])
+        # a vertex is brought out by the digit whose opening moves it most
+        culprit = np.where((at_widest - now).max(axis=0) > 1e-6, (at_widest - now).argmax(axis=0), -1)
+        for d, base in enumerate(bases):
+            own = deep & (culprit == d)
+            if not own.any():
+                continue
+            some = own.any(axis=0)
+            floor = np.where(own, np.minimum(allowed, at_widest[d] - 1e-7), -np.inf)[:, some]
+            short, enough = np.zeros_like(wide), wide.copy()
             for _ in range(_HALVINGS):
-                middle = 0.5 * (high + enough)
-                clear = self.gap(joints, self._opened(joints, middle)) >= allowed
-                enough, high = np.where(clear, middle, enough), np.where(clear, high, middle)
-            self.angles = self._opened(joints, np.where(deep, enough, 0.0))
+                middle = 0.5 * (short + enough)
+                good = (self.distances(vertices[some], self._opened(base, middle)) >= floor).all(axis=1)
+                enough, short = np.where(good, middle, enough), np.where(good, short, middle)
+            self.angles = self._opened(base, np.where(own.any(axis=1), enough, 0.0))
+        return True
 
-    def _opened(self, joints: NDArray[np.int64], by: NDArray[np.float64]) -> NDArray[np.float64]:
+    def _opened(self, base: int, by: NDArray[np.float64]) -> NDArray[np.float64]:
         angles = self.angles.copy()
-        for d, chain in enumerate(joints):
-            base = int(chain[0])
-            now, start = angles[:, base, _FLEXION], self.open[:, base, _FLEXION]
-            angles[:, base, _FLEXION] = np.maximum(now - by[:, d], np.minimum(start, now))
+        now, start = angles[:, base, _FLEXION], self.open[:, base, _FLEXION]
+        angles[:, base, _FLEXION] = np.maximum(now - by, np.minimum(start, now))
         return angles

@@ -63,7 +63,7 @@ def keep_apart(
     gone = dict.fromkeys(order, 1.0)
     before = crossings(np.zeros(1), gone)
     for _ in order:
-        worse = (crossings(_WAY, gone) > before).any(axis=0)
+        worse = np.asarray((crossings(_WAY, gone) > before).any(axis=0))
         crossing = [digit for digit in order if worse[label[digit]].any()]
         if not crossing:
             break

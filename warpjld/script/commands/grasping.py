@@ -196,7 +196,10 @@ def release(scene: Scene, arguments: Arguments) -> None:
     if actor.name not in scene.grips:
         raise arguments.error(f"actor {actor.name} has grasped nothing", arguments.position)
     for channel, value in scene.grips.pop(actor.name).items():
-        actor.set_keys(channel, [first], float(actor.motion.value(channel, first)), scene.spline)
+        keys = actor.motion.tracks[channel].keys
+        # the last key's own value, to the bit: only then do splines hold it
+        held = keys[-1].value if keys[-1].frame <= first else float(actor.motion.value(channel, first))
+        actor.set_keys(channel, [first], held, scene.spline)
         actor.set_keys(channel, [last], value, scene.spline)
 
 

@@ -1,0 +1,224 @@
+"""How fast distances and searches are, beside Open3D, in one run.
+
+    python tests/benchmarks/distance.py [--points 10000] [--repeats 15]
+
+Open3D (pip install open3d) is left out where it is not installed. Rows are measured in turn, so that a machine that
+slows down slows all of them; compare ratios. Half of the points lie within 5 mm of the surface.
+"""
+
+from __future__ import annotations
+
+import importlib
+import time
+from collections import defaultdict
+from collections.abc import Callable
+
+import click
+import numpy as np
+from rich.console import Console
+from rich.table import Table
+
+from warpjld.covering import bind
+from warpjld.grasp import NEAREST, FlexionSearch, GraspObject, ObjectSet, Places, Searches, Status
+from warpjld.grasp.close import close_hand
+from warpjld.grasp.shapes import ball
+from warpjld.hand import build_hand
+from warpjld.skeleton import CHANNELS, Poses, poses_from_angles
+
+FLEXION = CHANNELS.index("flexion")
+
+
+@click.command()
+@click.option("--points", default=10_000, show_default=True)
+@click.option("--repeats", default=15, show_default=True)
+def main(points: int, repeats: int) -> None:
+    """Print throughputs and their ratios as tables."""
+    console = Console()
+    bumpy = bumpy_ball(10_000)
+    console.print(distances(bumpy, points, repeats))
+    console.print(deforming_hand(bumpy, repeats))
+    console.print(searches(repeats))
+    console.print(grasps())
+
+
+def bumpy_ball(triangles: int) -> GraspObject:
+    """An object without symmetries, 10 cm across."""
+    from warpjld.grasp.objects import make_object
+
+    steps = int(round(np.log(triangles / 20) / np.log(4)))
+    smooth = ball(0.1, subdivisions=steps)
+    v = smooth.vertices
+    bumps = 1 + 0.12 * np.sin(90 * v[:, :1]) * np.cos(70 * v[:, 1:2]) + 0.08 * np.sin(110 * v[:, 2:])
+    return make_object("bumpy", v * bumps, smooth.faces)
+
+
+def cloud(thing: GraspObject, count: int) -> np.ndarray:
+    """Points, half of them within 5 mm of the surface."""
+    rng = np.random.default_rng(0)
+    face = rng.integers(len(thing.faces), size=count)
+    on = np.einsum("nk,nki->ni", rng.dirichlet([1, 1, 1], size=count), thing.vertices[thing.faces[face]])
+    near = on + thing.normals[face] * rng.uniform(-0.005, 0.005, size=(count, 1))
+    far = rng.uniform(-0.1, 0.1, size=(count, 3))
+    return np.where(np.arange(count)[:, None] % 2, near, far).astype(np.float32)
+
+
+def distances(thing: GraspObject, count: int, repeats: int) -> Table:
+    """Signed distances of a cloud of points, 1 and 2 threads."""
+    points, ours = cloud(thing, count), ObjectSet(thing)
+    methods: dict[str, Callable[[], object]] = {}
+    for threads in (1, 2):
+        methods[f"warpjld, {threads}"] = lambda t=threads: ours.distances(points, threads=t)
+        methods[f"warpjld within 5 mm, {threads}"] = lambda t=threads: ours.distances(points, limit=0.005, threads=t)
+        if scene := open3d_scene(thing):
+            methods[f"Open3D, {threads}"] = lambda t=threads: scene.signed(points, t)
+    times = in_turn(methods, repeats)
+    table = Table(title=f"signed distance to {len(thing.faces):,} triangles, thousand points per second (median)")
+    for heading in ("", "1 thread", "2 threads"):
+        table.add_column(heading, justify="left" if not heading else "right")
+    for name in ("warpjld", "warpjld within 5 mm", "Open3D"):
+        if f"{name}, 1" in times:
+            table.add_row(name, *(f"{count / 1e3 / np.median(times[f'{name}, {t}']):.0f}" for t in (1, 2)))
+    for name in ("warpjld", "warpjld within 5 mm"):
+        if "Open3D, 1" in times:
+            ratios = [np.median(np.divide(times[f"Open3D, {t}"], times[f"{name}, {t}"])) for t in (1, 2)]
+            table.add_row(f"{name} / Open3D", *(f"{r:.2f} ×" for r in ratios))
+    return table
+
+
+def deforming_hand(thing: GraspObject, repeats: int) -> Table:
+    """Every vertex of a hand that closes round an object, deformation included, frames per second."""
+    rig = build_hand("left", resolution=4600)
+    covering = bind(rig.skeleton, rig.surface)
+    frames, placed = 24, thing.placed((0.0, -0.07, -0.07))
+    poses = fist(rig.skeleton, frames)
+    ours = ObjectSet(placed)
+    skin = np.empty((frames, len(rig.surface.vertices), 3), dtype=np.float32)
+
+    def mine(threads: int) -> None:
+        surfaces = covering.deform(poses, out=skin, threads=threads)
+        ours.distances(surfaces, sets=np.arange(frames), which=np.zeros(frames, int), threads=threads)
+
+    def theirs(scene: Open3DScene, threads: int) -> None:
+        surfaces = covering.deform(poses, out=skin, threads=threads)
+        for surface in surfaces:
+            scene.signed(surface - placed.place.position[0].astype(np.float32), threads)
+
+    methods: dict[str, Callable[[], object]] = {}
+    for threads in (1, 2):
+        methods[f"warpjld, {threads}"] = lambda t=threads: mine(t)
+        if scene := open3d_scene(thing):
+            methods[f"Open3D, {threads}"] = lambda t=threads, s=scene: theirs(s, t)
+    times = in_turn(methods, max(3, repeats // 3))
+    count = len(rig.surface.vertices)
+    table = Table(title=f"hand of {count:,} vertices against {len(thing.faces):,} triangles, frames per second")
+    for heading in ("", "1 thread", "2 threads"):
+        table.add_column(heading, justify="left" if not heading else "right")
+    for name in ("warpjld", "Open3D"):
+        if f"{name}, 1" in times:
+            table.add_row(name, *(f"{frames / np.median(times[f'{name}, {t}']):.0f}" for t in (1, 2)))
+    if "Open3D, 1" in times:
+        ratios = [np.median(np.divide(times[f"Open3D, {t}"], times[f"warpjld, {t}"])) for t in (1, 2)]
+        table.add_row("warpjld / Open3D", *(f"{r:.2f} ×" for r in ratios))
+    return table
+
+
+def searches(repeats: int) -> Table:
+    """Flexion searches that end in a contact, one thread."""
+    rig = build_hand("left", resolution=4600)
+    covering, rng, count = bind(rig.skeleton, rig.surface), np.random.default_rng(0), 10_000
+    joints = [rig.skeleton.index(f"{d}.base") for d in ("index", "middle", "ring", "pinky")]
+    thing = ball(0.09).placed((0.0, -0.075, -0.11))
+    poses, angles = open_hands(rig.skeleton, 1)
+    search = FlexionSearch(covering, ObjectSet(thing))
+    tips = np.concatenate([np.flatnonzero(covering.surface.vertices[:, 2] < -0.12)])
+    vertex, joint = rng.choice(tips, count), rng.choice(joints, count)
+    below = np.flatnonzero(thing.normals[:, 1] > 0.7)
+    table = Table(title="flexion searches, one thread, thousand per second (median)")
+    for heading in ("", "per second", "mappings each", "in contact"):
+        table.add_column(heading, justify="left" if not heading else "right")
+    for name, facet in (("facet", rng.choice(below, count)), ("mesh of 5,120 triangles", NEAREST)):
+        wanted = Searches(vertex=vertex, joint=joint, facet=facet)
+        found = search.run(poses, angles, wanted, threads=1)
+        taken = in_turn({name: lambda w=wanted: search.run(poses, angles, w, threads=1)}, repeats)[name]
+        share = np.mean(found.status == Status.CONVERGED)
+        table.add_row(name, f"{count / np.median(taken):,.0f}", f"{found.evaluations.mean():.1f}", f"{share:.0%}")
+    return table
+
+
+def grasps() -> Table:
+    """Whole hands closed on a ball, one thread."""
+    rig = build_hand("left", resolution=1500)
+    covering = bind(rig.skeleton, rig.surface)
+    objects, count = ObjectSet(ball(0.065)), 32
+    rng = np.random.default_rng(0)
+    places = Places.of(np.array([0.004, -0.052, -0.062]) + rng.uniform(-0.004, 0.004, size=(count, 3)) * [1, 0, 1])
+    poses, angles = open_hands(rig.skeleton, count)
+    times = in_turn(
+        {"close": lambda: close_hand(covering, poses, angles, objects, places=places, apart=False, threads=1)}, 3
+    )
+    table = Table(title=f"hands of {len(covering.surface.vertices):,} vertices closed on a ball, one thread")
+    table.add_column("grasps per second", justify="right")
+    table.add_row(f"{count / np.median(times['close']):.1f}")
+    return table
+
+
+def fist(skeleton, frames: int) -> Poses:
+    """Fingers that curl to 60 % of their limits."""
+    angles = np.zeros((frames, len(skeleton), len(CHANNELS)))
+    for joint, name in enumerate(skeleton.names):
+        if name.endswith(("base", "knuckle2", "knuckle3")):
+            angles[:, joint, FLEXION] = np.linspace(0.0, 0.6, frames) * skeleton.limits[joint, FLEXION, 1]
+    return poses_from_angles(skeleton, angles)
+
+
+def open_hands(skeleton, count: int) -> tuple[Poses, np.ndarray]:
+    """Fingers spread, thumb against them."""
+    angles = np.zeros((count, len(skeleton), len(CHANNELS)))
+    for name, channel, degrees in (
+        ("index.base", "abduction", 10),
+        ("ring.base", "abduction", -8),
+        ("pinky.base", "abduction", -18),
+        ("thumb.base", "pivot", 30),
+        ("thumb.base", "abduction", 20),
+        ("thumb.base", "flexion", -10),
+    ):
+        angles[:, skeleton.index(name), CHANNELS.index(channel)] = np.radians(degrees)
+    return poses_from_angles(skeleton, angles), angles
+
+
+class Open3DScene:
+    """Open3D's ray casting scene of one object."""
+
+    def __init__(self, thing: GraspObject, library) -> None:
+        self._tensor = library.core.Tensor
+        self._scene = library.t.geometry.RaycastingScene()
+        vertices = self._tensor(thing.vertices.astype(np.float32))
+        self._scene.add_triangles(vertices, self._tensor(thing.faces.astype(np.uint32)))
+
+    def signed(self, points: np.ndarray, threads: int) -> np.ndarray:
+        """Signed distances [m]."""
+        return self._scene.compute_signed_distance(self._tensor(points), nthreads=threads).numpy()
+
+
+def open3d_scene(thing: GraspObject) -> Open3DScene | None:
+    """None where Open3D is not installed."""
+    try:
+        return Open3DScene(thing, importlib.import_module("open3d"))
+    except ImportError:
+        return None
+
+
+def in_turn(methods: dict[str, Callable[[], object]], repeats: int) -> dict[str, list[float]]:
+    """Seconds of every repeat, all methods in turn; a first round compiles."""
+    times = defaultdict(list)
+    for repeat in range(repeats + 1):
+        for name, method in methods.items():
+            start = time.perf_counter()
+            method()
+            if repeat:
+                times[name].append(time.perf_counter() - start)
+    return times
+
+
+if __name__ == "__main__":
+    main()

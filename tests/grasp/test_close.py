@@ -1,0 +1,157 @@
+"""Closing a hand: skin touches, nothing goes through the object or other digits; intersections and contacts."""
+
+import numpy as np
+import pytest
+
+from warpjld.covering.intersections import crossing_faces, surface_parts
+from warpjld.errors import InputError
+from warpjld.grasp import ObjectSet, Places, Status
+from warpjld.grasp.close import close_hand, digit_chains, pad_vertex
+from warpjld.grasp.intersection import contacts, intersection, part_vertices
+from warpjld.grasp.separate import keep_apart
+from warpjld.grasp.shapes import ball, box, cylinder
+from warpjld.skeleton import CHANNELS, poses_from_angles
+
+ENTERS = 2.5e-5  # metres: twice the tolerance of a touch, and rounding
+CHANNEL = {name: k for k, name in enumerate(CHANNELS)}
+
+
+@pytest.fixture(scope="module")
+def open_hand(covering):
+    """Fingers spread, thumb opposed; angles (1, J, 4)."""
+    angles = np.zeros((1, len(covering.skeleton), len(CHANNELS)))
+    for joint, channel, degrees in (
+        ("index.base", "abduction", 10),
+        ("ring.base", "abduction", -8),
+        ("pinky.base", "abduction", -18),
+        ("thumb.base", "pivot", 30),
+        ("thumb.base", "abduction", 20),
+        ("thumb.base", "flexion", -10),
+    ):
+        angles[0, covering.skeleton.index(joint), CHANNEL[channel]] = np.radians(degrees)
+    return poses_from_angles(covering.skeleton, angles), angles
+
+
+def below_the_palm(covering, poses, thing) -> Places:
+    """Straight under the knuckles, just clear of the skin."""
+    skin, objects = covering.deform(poses)[0], ObjectSet(thing)
+    under = np.array([0.004, 0.0, -0.062])
+    low, high = 0.0, 0.3
+    for _ in range(40):
+        middle = (low + high) / 2
+        near = objects.distances(skin, places=Places.of(under - [0, middle, 0])).distance.min() < 2e-4
+        low, high = (middle, high) if near else (low, middle)
+    return Places.of(under - [0, high, 0])
+
+
+@pytest.mark.parametrize("coupling", [None, (1.0, 0.7)])
+@pytest.mark.parametrize("make", [lambda: ball(0.065), lambda: cylinder(0.05, 0.2), lambda: box(0.05, 0.05, 0.05)])
+def test_digits_touch_and_do_not_enter(covering, open_hand, make, coupling) -> None:
+    poses, angles = open_hand
+    thing = make()
+    place = below_the_palm(covering, poses, thing)
+    closed = close_hand(covering, poses, angles, ObjectSet(thing), places=place, coupling=coupling, apart=False)
+    assert closed.touching().sum() >= 4
+    assert closed.penetration[0] < ENTERS
+    skin = covering.deform(poses_from_angles(covering.skeleton, closed.angles))[0]
+    inside = intersection(covering, skin, thing, place=place)
+    assert inside.deepest < ENTERS
+    touched = {c.part for c in contacts(covering, skin, thing, place=place)}
+    digits = {name for name, touch in zip(closed.digits, closed.touching()[0], strict=True) if touch}
+    assert digits <= touched
+    others = np.delete(closed.angles, CHANNEL["flexion"], axis=2)
+    np.testing.assert_array_equal(others, np.delete(angles, CHANNEL["flexion"], axis=2))
+    low, high = np.moveaxis(covering.skeleton.limits[:, 0], -1, 0)
+    assert ((closed.angles[0, :, 0] >= low - 1e-9) & (closed.angles[0, :, 0] <= high + 1e-9)).all()
+
+
+def test_batches_are_single_hands(covering, open_hand) -> None:
+    poses, angles = open_hand
+    things = ObjectSet([ball(0.065), ball(0.05)])
+    places = [below_the_palm(covering, poses, thing) for thing in things.objects]
+    both = Places.of(np.concatenate([p.position for p in places]))
+    from warpjld.skeleton import Poses
+
+    two = Poses(*(np.repeat(a, 2, axis=0) for a in (poses.positions, poses.rotations, poses.flexion)))
+    together = close_hand(
+        covering, two, np.repeat(angles, 2, axis=0), things, which=np.array([0, 1]), places=both, apart=False
+    )
+    for k in range(2):
+        alone = close_hand(covering, poses, angles, things, which=k, places=places[k], apart=False)
+        np.testing.assert_array_equal(alone.angles[0], together.angles[k])
+        np.testing.assert_array_equal(alone.status[0], together.status[k])
+
+
+def test_nothing_to_touch_closes_to_the_limits(covering, open_hand) -> None:
+    poses, angles = open_hand
+    far = ObjectSet(ball(0.05).placed((0, 5, 0)))
+    closed = close_hand(covering, poses, angles, far, digits=["index"], apart=False)
+    assert (closed.status == Status.NO_CONTACT).all()
+    joints = list(digit_chains(covering.skeleton, ["index"])["left.index"])
+    np.testing.assert_allclose(closed.angles[0, joints, 0], covering.skeleton.limits[joints, 0, 1])
+
+
+def test_a_digit_that_begins_inside_is_told(covering, open_hand) -> None:
+    poses, angles = open_hand
+    tip = poses.positions[0, covering.skeleton.index("ring.tip")]
+    closed = close_hand(covering, poses, angles, ObjectSet(ball(0.03).placed(tip)), digits=["ring"], apart=False)
+    assert closed.status[0, 0, 0] == Status.INSIDE
+    assert closed.penetration[0] > 5e-3
+
+
+def test_digits_do_not_pass_through_one_another(covering) -> None:
+    """The index is sent across the middle finger by its abduction: its flexion must stop before."""
+    skeleton = covering.skeleton
+    chains = digit_chains(skeleton)
+    start = np.zeros((len(skeleton), len(CHANNELS)))
+    closed = start.copy()
+    for name, joints in chains.items():
+        closed[list(joints), 0] = skeleton.limits[list(joints), 0, 1] * (0.9 if "thumb" in name else 0.75)
+    closed[skeleton.index("thumb.base"), 0] = skeleton.limits[skeleton.index("thumb.base"), 0, 1]
+    start[skeleton.index("thumb.base"), 1] = closed[skeleton.index("thumb.base"), 1] = np.radians(45)
+    parts = surface_parts(covering)
+
+    def between(angles) -> int:
+        skin = covering.deform(poses_from_angles(skeleton, angles[None]))[0]
+        return len(crossing_faces(skin, covering.surface.faces).contact(parts).pairs)
+
+    assert between(start) == 0
+    assert between(closed) > 0
+    apart, stopped = keep_apart(covering, lambda a: poses_from_angles(skeleton, a), start, closed, chains)
+    assert stopped
+    assert between(apart) == 0
+
+
+def test_the_volume_of_a_known_overlap(covering) -> None:
+    """A ball around the tip of a finger, and the same finger as a solid: half-spaces cut from a box."""
+    skin = covering.surface.vertices
+    whole = box(*(np.ptp(skin, axis=0) + 0.02)).placed((skin.min(axis=0) + skin.max(axis=0)) / 2)
+    found = intersection(covering, skin.astype(np.float32), whole, spacing=2e-3)
+    assert len(found.vertices) == len(skin)
+    from warpjld.covering.quality import enclosed_volume
+
+    assert found.volume == pytest.approx(float(enclosed_volume(skin, covering.surface.faces)), rel=0.01)
+    assert "vertices inside, deepest" in str(found)
+    index = intersection(covering, skin.astype(np.float32), whole, part="index", spacing=2e-3)
+    assert 0.03 < index.volume / found.volume < 0.12
+    assert set(index.vertices) == set(part_vertices(covering, "index"))
+    nothing = intersection(covering, skin.astype(np.float32), ball().placed((1, 1, 1)))
+    assert (len(nothing.vertices), nothing.volume, str(nothing)) == (0, 0.0, "no vertex inside")
+
+
+def test_parts_by_name(covering) -> None:
+    last = part_vertices(covering, "index.knuckle3")
+    assert set(last) < set(part_vertices(covering, "left.index")) == set(part_vertices(covering, "INDEX"))
+    assert pad_vertex(covering, "index") in last
+    assert len(part_vertices(covering, None)) == len(covering.surface.vertices)
+    with pytest.raises(InputError, match="did you mean 'index'"):
+        part_vertices(covering, "indx")
+    with pytest.raises(InputError, match="no digit 'toe'"):
+        digit_chains(covering.skeleton, ["toe"])
+
+
+def test_the_pad_lies_on_the_palms_side(covering) -> None:
+    for digit in ("index", "middle", "ring", "pinky"):
+        pad = covering.surface.vertices[pad_vertex(covering, digit)]
+        bone = covering.skeleton.rest[covering.skeleton.index(f"{digit}.knuckle3")]
+        assert pad[1] < bone[1] - 0.003  # the palm looks down
