@@ -67,9 +67,13 @@ def command(
         report("loading hands and objects", 0, 1)
         notes = experiment.check()
         if not check:
-            result = run_study(
-                experiment, out, processes=processes, table=table, fresh=fresh, title=settings.title, report=report
-            )
+            try:
+                result = run_study(
+                    experiment, out, processes=processes, table=table, fresh=fresh, title=settings.title, report=report
+                )
+            except KeyboardInterrupt:
+                click.echo(f"stopped; the same command goes on from what is in {out}", err=True)
+                raise
     if check:
         if not quiet:
             for note in notes:

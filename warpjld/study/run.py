@@ -90,6 +90,7 @@ def run_study(
     began, moment = time.perf_counter(), datetime.now(UTC)
     folder = Path(out)
     shards = opened(experiment, folder, fresh=fresh)
+    shards.sweep()
     missing = shards.missing(experiment.trials)
     workers = min(processes or os.cpu_count() or 1, max(len(missing), 1))
     finished = experiment.trials - len(missing)
@@ -152,9 +153,7 @@ def opened(experiment: Experiment, folder: Path, *, fresh: bool = False) -> Shar
         write_json(known, identity)
     except (OSError, ValueError) as error:
         raise InputError(f"cannot be used as the study's folder: {error}", path=folder) from error
-    shards = Shards(folder / _TRIALS)
-    shards.sweep()
-    return shards
+    return Shards(folder / _TRIALS)
 
 
 def _same_study(before: dict[str, Any], now: dict[str, Any], folder: Path) -> None:

@@ -72,12 +72,19 @@ def ping() -> int:
 
 
 def work(trial: int, folder: Path) -> tuple[int, str]:
-    """Run a trial and keep it; returns its number and status."""
+    """Run a trial and keep it; returns its number and status.
+
+    Raises:
+        WarpjldError: It cannot be written, the disk being full for example.
+    """
     assert _experiment is not None
     began = time.perf_counter()
     row, outcome = perform(_experiment, trial)
     shard = Shard(trial, row, dict(outcome.arrays), time.perf_counter() - began)
-    Shards(folder).write(shard)
+    try:
+        Shards(folder).write(shard)
+    except OSError as error:
+        raise WarpjldError(f"trial {trial} cannot be kept in {folder}: {error}") from error
     return trial, outcome.status
 
 
