@@ -1,12 +1,13 @@
-"""How good a grasp is. One measure a file, each with its formula and its source; NumPy and SciPy only.
+"""How good a grasp is. One measure a file, each with its formula and its source.
 
-All take a `Contacts` set, so grasps from elsewhere can be judged too.
+All but `penetration` take plain arrays or a `Contacts` set, so that grasps from elsewhere can be judged too.
 """
 
 from warpjld.grasp.quality.closure import Closure, force_closure
 from warpjld.grasp.quality.cone import friction_cone
 from warpjld.grasp.quality.contacts import Contacts, patch_spin
 from warpjld.grasp.quality.gravity import SIX_DIRECTIONS, GravityResponse, gravity_displacement
+from warpjld.grasp.quality.penetration import Penetration, depth_inside, penetration
 from warpjld.grasp.quality.resistance import resisted_wrench
 from warpjld.grasp.quality.touch import Patches, contact_patches, vertex_areas
 from warpjld.grasp.quality.wrench_space import WrenchSpace, wrench_space
@@ -18,14 +19,17 @@ __all__ = [
     "Contacts",
     "GravityResponse",
     "Patches",
+    "Penetration",
     "WrenchSpace",
     "contact_patches",
     "contact_wrenches",
+    "depth_inside",
     "force_closure",
     "friction_cone",
     "grasp_matrix",
     "gravity_displacement",
     "patch_spin",
+    "penetration",
     "resisted_wrench",
     "vertex_areas",
     "wrench_space",

@@ -7,8 +7,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from warpjld.grasp.intersection import intersection
-from warpjld.grasp.quality import Patches, contact_patches, force_closure, gravity_displacement, wrench_space
+from warpjld.grasp.quality import (
+    Patches,
+    contact_patches,
+    force_closure,
+    gravity_displacement,
+    penetration,
+    wrench_space,
+)
 from warpjld.skeleton import DIGITS
 from warpjld.study.grasping.load import SEGMENTS, Hand, Thing
 from warpjld.study.grasping.plan import Measuring
@@ -54,7 +60,7 @@ def measure_grasp(
         tangential_stiffness=how.tangential_stiffness,
         edges=how.edges,
     )
-    inside = intersection(hand.covering, vertices, body)
+    inside = penetration(hand.covering, vertices, body)
     areas = dict.fromkeys((*DIGITS, "palm"), 0.0)
     for digit, area in zip(patches.digits, patches.areas, strict=True):
         areas[digit if digit in DIGITS else "palm"] += float(area)
@@ -64,7 +70,9 @@ def measure_grasp(
         "digits": sum(areas[digit] > 0.0 for digit in DIGITS),
         "area": float(patches.areas.sum()),
         **{f"area_{part}": area for part, area in areas.items()},
-        "penetration": inside.deepest,
+        "penetration": inside.depth,
+        "skin_inside": inside.skin,
+        "object_inside": inside.thing,
         "overlap": inside.volume,
         "closed": closure.closed,
         "margin": closure.margin,
@@ -74,6 +82,6 @@ def measure_grasp(
         "mass": thing.mass,
         "displacement": gravity.worst if np.isfinite(gravity.worst) else None,
         "held": int(gravity.held.sum()),
-        "success": bool(closure.closed and inside.deepest <= how.penetration and firm),
+        "success": bool(closure.closed and inside.depth <= how.penetration and firm),
     }
     return values, patches
