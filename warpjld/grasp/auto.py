@@ -22,6 +22,7 @@ __all__ = ["AutoGrasp", "Candidates", "find_grasp", "palm_frame", "sample_wrists
 
 _CLEARANCE = 3e-4  # between the open hand and the object [m]
 _TOUCH = 5e-4  # skin this near counts as a contact in the score [m]
+_FINALISTS = 8  # placements in which digits are kept from crossing one another
 _DEEPEST = 1e-3  # penetration above which a grasp is refused [m]
 
 
@@ -51,6 +52,7 @@ class AutoGrasp:
         posture: Name of the posture it began with.
         position: Displacement of the skeleton's root [m], shape (3,).
         rotation: Rotation of the root about its rest place, shape (4,).
+        approach: Where the palm looks, shape (3,).
         start: Angles of the open hand [rad], shape (J, 4).
         angles: Angles of the closed hand [rad], shape (J, 4).
         score: Larger is better; see :func:`find_grasp`.
@@ -62,6 +64,7 @@ class AutoGrasp:
     posture: str
     position: NDArray[np.float64]
     rotation: NDArray[np.float64]
+    approach: NDArray[np.float64]
     start: NDArray[np.float64]
     angles: NDArray[np.float64]
     score: float
@@ -168,7 +171,8 @@ def find_grasp(
 
     The default score of a hand is Σ over digits 1 − |Σ n̄_d| / D, the number of touching digits times how well their
     mean contact normals n̄_d (of the object, outward, unit) cancel: 0 where all push one way. Grasps without thumb,
-    with one digit, or deeper inside than 1 mm score −1.
+    with one digit, or deeper inside than 1 mm score −1. Crossing digits are looked for in the best eight only; the
+    first of them that keeps its thumb and two more digits on the object is taken.
 
     Args:
         covering: The hand.
@@ -201,18 +205,19 @@ def find_grasp(
     objects = ObjectSet(thing)
     closed = close_hand(covering, poses, many, objects, digits=digits, coupling=coupling, apart=False)
     points = (score or _balance)(covering, thing, candidates, closed)
-    for best in np.argsort(-points, kind="stable"):
-        if points[best] < 0.0:
-            break
+    found = None
+    for best in [int(k) for k in np.argsort(-points, kind="stable")[:_FINALISTS] if points[k] >= 0.0]:
         one = slice(best, best + 1)
         again = close_hand(covering, poses[one], many[one], objects, digits=digits, coupling=coupling)
-        if again.penetration[0] > _DEEPEST or again.touching().sum() < 2:
-            continue
         touching = tuple(name for name, touch in zip(again.digits, again.touching()[0], strict=True) if touch)
-        return AutoGrasp(
+        opposed = len(touching) > 1 and touching[-1].endswith("thumb")
+        if again.penetration[0] > _DEEPEST or not touching:
+            continue
+        grasp = AutoGrasp(
             chosen,
             candidates.position[best],
             candidates.rotation[best],
+            candidates.approach[best],
             start,
             again.angles[0],
             float(points[best]),
@@ -220,7 +225,14 @@ def find_grasp(
             float(again.penetration[0]),
             count,
         )
-    raise InputError(f"object {thing.name}: none of {count} placements ends in a grasp; it may be too large or small")
+        if opposed and len(touching) >= 3:
+            return grasp
+        found = found or (grasp if opposed else None)
+    if found is None:
+        raise InputError(
+            f"object {thing.name}: none of {count} placements ends in a grasp; it may be too large, too small or thin"
+        )
+    return found
 
 
 def _balance(covering: Covering, thing: GraspObject, candidates: Candidates, closed: Closed) -> NDArray[np.float64]:
