@@ -230,18 +230,20 @@ def _ratio(skeleton: Skeleton, p: int, d: int, vertex: np.ndarray) -> float:
 def _shares(
     skeleton: Skeleton, segments: list[tuple[int, int]], vertex: np.ndarray, parameters: Parameters
 ) -> list[float]:
+    """R of every virtual segment, remapped by the proximities; their sum lies between the two that hold the vertex."""
     ratios = [_ratio(skeleton, p, d, vertex) for p, d in segments]
-    feet = [(1 - t) * skeleton.rest[p] + t * skeleton.rest[d] for (p, d), t in zip(segments, ratios, strict=True)]
-    widths = []
-    for (p, d), ratio in zip(segments, ratios, strict=True):
-        t = min(max(ratio, 0.0), 1.0)
-        widths.append((1 - t) * parameters.proximity[p, 0] + t * parameters.proximity[d, 1])
-    lateral = []  # R on every virtual segment: 0 in the columns 1-4-7, 1 in 3-6-9
+    longest = max(np.linalg.norm(skeleton.rest[d] - skeleton.rest[p]) for p, d in segments)
+    passed = 0.0
     for k in range(len(segments) - 1):
-        virtual = feet[k + 1] - feet[k]
-        r = (vertex - feet[k]) @ virtual / (virtual @ virtual) if np.linalg.norm(virtual) > 1e-9 else 0.0
-        lateral.append(min(max((r - 0.9 * widths[k]) / max(1 - 0.9 * (widths[k] + widths[k + 1]), 0.1), 0.0), 1.0))
-    held = [
-        min(lateral[k - 1] if k else 1.0, 1 - lateral[k] if k < len(lateral) else 1.0) for k in range(len(segments))
-    ]
-    return [h / sum(held) for h in held]
+        at = ratios[k : k + 2]
+        if np.linalg.norm(skeleton.rest[segments[k][0]] - skeleton.rest[segments[k + 1][0]]) < 1e-3 * longest:
+            at = [max(min(max(t, 0.0), 1.0) for t in ratios)] * 2
+        feet, widths = [], []
+        for (p, d), t in zip(segments[k : k + 2], at, strict=True):
+            feet.append((1 - t) * skeleton.rest[p] + t * skeleton.rest[d])
+            inner = min(max(t, 0.0), 1.0)
+            widths.append(0.9 * ((1 - inner) * parameters.proximity[p, 0] + inner * parameters.proximity[d, 1]))
+        virtual = feet[1] - feet[0]
+        r = (vertex - feet[0]) @ virtual / (virtual @ virtual) if np.linalg.norm(virtual) > 1e-9 else 0.0
+        passed += min(max((r - widths[0]) / max(1 - sum(widths), 0.1), 0.0), 1.0)
+    return [max(1 - abs(passed - k), 0.0) for k in range(len(segments))]
