@@ -41,9 +41,10 @@ def test_axes_agree_with_those_the_built_in_hand_was_made_with(write_glb, hand_g
     for side in ("left", "right"):
         rig = load_rig(write_glb(hand_glb(side), tmp_path / f"{side}.glb"))
         for name in hand_joint_names(side):
-            cosine = rig.skeleton.axes[rig.skeleton.index(name)] @ built[side].skeleton.axes[
-                built[side].skeleton.index(name)
-            ]
+            cosine = (
+                rig.skeleton.axes[rig.skeleton.index(name)]
+                @ built[side].skeleton.axes[built[side].skeleton.index(name)]
+            )
             assert cosine > np.cos(np.radians(12)), name
 
 
@@ -184,7 +185,7 @@ def test_truncated_file(write_glb, hand_glb, tmp_path):
 def test_not_gltf_at_all(tmp_path):
     path = tmp_path / "a.gltf"
     path.write_text("{]")
-    with pytest.raises(InputError, match="not a glTF 2.0 file"):
+    with pytest.raises(InputError, match=r"not a glTF 2\.0 file"):
         load_rig(path)
 
 

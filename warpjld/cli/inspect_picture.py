@@ -42,7 +42,6 @@ def draw_rig(rig: Rig, path: Path, *, suspicious: Set[str] = frozenset()) -> Non
     for column, (towards, up) in enumerate(views):
         plotter.subplot(0, column)
         plotter.set_background("white")
-        plotter.enable_depth_peeling(8)
         plotter.add_mesh(mesh, color="#d9b8a0", opacity=0.25, lighting=True)
         plotter.add_mesh(mesh, style="wireframe", color="#555555", opacity=0.18, line_width=0.6, lighting=False)
         for segment in skeleton.segments:
