@@ -14,7 +14,7 @@ from warpjld.covering.operators import Fan, segment_ends
 from warpjld.covering.parameters import Parameters
 from warpjld.skeleton.tree import Skeleton
 
-__all__ = ["OPERATORS", "STATIONS", "Anchors", "anchor"]
+__all__ = ["FLOOR", "OPERATORS", "SIDE_BAND", "STATIONS", "Anchors", "SegmentTable", "anchor"]
 
 OPERATORS = 4
 """Segment operators a vertex may hold (the paper has one; the rest make borders soft)."""
@@ -22,8 +22,10 @@ OPERATORS = 4
 STATIONS = 5
 """Places along a pair of neighbouring palm segments where the scale factor λ is evaluated; linear in between."""
 
-_SIDE_BAND = 0.5  # |cosine| below which a vertex is partly external and partly internal
-_FLOOR = 2e-2  # weight below which an operator is dropped, faded so that nothing jumps
+# |cosine| below which a vertex is partly external and partly internal: sections near a joint stand upright outside and
+# lean inside, and a wider band shears the sides less
+SIDE_BAND = 0.75
+FLOOR = 2e-2  # weight below which an operator is dropped, faded so that nothing jumps
 
 
 @dataclass(frozen=True, eq=False)
@@ -83,7 +85,7 @@ def anchor(
         chunk: Vertices placed at a time, which bounds memory.
     """
     ends = segment_ends(skeleton, groups)
-    table = _SegmentTable.build(skeleton, ends)
+    table = SegmentTable.build(skeleton, ends)
     pairs, pair_of_fan = _neighbour_pairs(groups)
     rows = [
         _anchor_some(vertices[i : i + chunk], table, groups, domains[i : i + chunk], parameters, pair_of_fan)
@@ -96,7 +98,9 @@ def anchor(
 
 
 @dataclass(frozen=True, eq=False)
-class _SegmentTable:
+class SegmentTable:
+    """What projecting on S segments at rest needs."""
+
     ends: NDArray[np.int32]
     start: NDArray[np.float64]  # (S, 3)
     along: NDArray[np.float64]  # (S, 3)
@@ -105,7 +109,7 @@ class _SegmentTable:
     open_start: NDArray[np.bool_]  # root: the ratio may fall below 0
 
     @staticmethod
-    def build(skeleton: Skeleton, ends: NDArray[np.int32]) -> _SegmentTable:
+    def build(skeleton: Skeleton, ends: NDArray[np.int32]) -> SegmentTable:
         start = skeleton.rest[ends[:, 0]]
         along = skeleton.rest[ends[:, 1]] - start
         direction = along / np.linalg.norm(along, axis=1, keepdims=True)
@@ -118,7 +122,13 @@ class _SegmentTable:
         normals = np.where(lengths > 1e-3, normals / np.maximum(lengths, 1e-30), fallback[:, None, :])
         leaf = np.array([not skeleton.children[d] for d in ends[:, 1]])
         root = np.array([skeleton.parents[p] < 0 for p in ends[:, 0]])
-        return _SegmentTable(ends, start, along, normals, leaf, root)
+        return SegmentTable(ends, start, along, normals, leaf, root)
+
+    def project(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Ratio of every point on every segment, shape (V, S), clamped except beyond extremities (R37, C1)."""
+        t = (points @ self.along.T - (self.start * self.along).sum(axis=1)) / (self.along**2).sum(axis=1)
+        t = np.where((t < 0.0) & ~self.open_start, 0.0, t)
+        return np.where((t > 1.0) & ~self.open_end, 1.0, t)
 
 
 def _neighbour_pairs(groups: tuple[Fan, ...]) -> tuple[NDArray[np.int32], dict[int, int]]:
@@ -135,16 +145,14 @@ def _neighbour_pairs(groups: tuple[Fan, ...]) -> tuple[NDArray[np.int32], dict[i
 
 def _anchor_some(
     points: NDArray[np.float64],
-    table: _SegmentTable,
+    table: SegmentTable,
     groups: tuple[Fan, ...],
     domains: NDArray[np.float64],
     parameters: Parameters,
     pair_of_fan: dict[int, int],
 ) -> tuple[NDArray, ...]:
     count, segments = len(points), len(table.ends)
-    t = np.einsum("vsk,sk->vs", points[:, None] - table.start, table.along) / (table.along**2).sum(axis=1)
-    t = np.where((t < 0.0) & ~table.open_start, 0.0, t)
-    t = np.where((t > 1.0) & ~table.open_end, 1.0, t)
+    t = table.project(points)
     weight = np.zeros((count, segments))
     pair_count = sum(len(fan.segments) - 1 for fan in groups)
     between = np.zeros((count, max(pair_count, 2)))
@@ -173,14 +181,14 @@ def _anchor_some(
     normal /= np.maximum(np.linalg.norm(normal, axis=2, keepdims=True), 1e-12)
     height = (offset * normal).sum(axis=2)
     cosine = height / np.maximum(np.linalg.norm(offset, axis=2), 1e-12)
-    side = _smoothstep((cosine + _SIDE_BAND) / (2.0 * _SIDE_BAND))
+    side = _smoothstep((cosine + SIDE_BAND) / (2.0 * SIDE_BAND))
     station = np.take_along_axis(along_pair, pair, axis=1)
     return best.astype(np.int32), kept, ratio, side, height[..., None] * normal, pair, pair_kept, station
 
 
 def _share_in_fan(
     points: NDArray[np.float64],
-    table: _SegmentTable,
+    table: SegmentTable,
     t: NDArray[np.float64],
     inside: slice,
     parameters: Parameters,
@@ -217,7 +225,7 @@ def _strongest(weight: NDArray[np.float64]) -> tuple[NDArray[np.int64], NDArray[
     order = np.take_along_axis(order, np.argsort(-np.take_along_axis(weight, order, axis=1), axis=1), axis=1)
     largest = np.take_along_axis(weight, order, axis=1)
     rest = np.partition(weight, -keep - 1, axis=1)[:, -keep - 1] if weight.shape[1] > keep else 0.0
-    threshold = np.maximum(rest, _FLOOR)
+    threshold = np.maximum(rest, FLOOR)
     faded = np.maximum(largest - np.reshape(threshold, (-1, 1)), 0.0)
     faded /= faded.sum(axis=1, keepdims=True)
     if keep < OPERATORS:

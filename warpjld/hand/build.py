@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from difflib import get_close_matches
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,7 +16,7 @@ from warpjld.hand.triangulate import triangulate
 from warpjld.rig import Rig
 from warpjld.skeleton import DIGITS, PALM_SEGMENTS, Skeleton, default_limits, hand_joint_names
 from warpjld.skeleton.hand import FINGER_JOINTS, HAND_PARENTS
-from warpjld.surface import weld_surface
+from warpjld.surface import Part, Surface
 
 __all__ = ["build_hand"]
 
@@ -41,7 +42,8 @@ def build_hand(
         side: "left" or "right"; the right hand is the left one's mirror image, vertex for vertex.
         length: From the wrist's crease to the tip of the middle finger [m].
         breadth: Across the palm at the heads of the metacarpals, without the thumb [m].
-        proportions: Digit → scale of its length, or (scale of its length, scale of its thickness).
+        proportions: Digit → scale of its length, or (scale of its length, scale of its thickness). Length and
+            breadth of the hand stay what was asked for.
         resolution: Wanted number of vertices, about.
 
     Returns:
@@ -50,8 +52,7 @@ def build_hand(
     Raises:
         InputError: An unknown side or digit, or a measure out of range.
     """
-    if side not in ("left", "right"):
-        raise InputError(f"side: want 'left' or 'right', got {side!r}")
+    _check(side, length, breadth, resolution)
     flesh = Flesh(fit_plan(length / _MILLIMETRE, breadth / _MILLIMETRE, _scales(proportions)))
     vertices, faces = triangulate(flesh, resolution)
     skeleton = _skeleton(flesh.plan)
@@ -60,18 +61,43 @@ def build_hand(
     return Rig(
         name=f"{side} hand",
         skeleton=skeleton,
-        surface=weld_surface(vertices * _MILLIMETRE, np.ascontiguousarray(faces)),
+        surface=_surface(vertices * _MILLIMETRE, np.ascontiguousarray(faces, dtype=np.int32)),
         source_joints=skeleton.names,
     )
+
+
+def _check(side: str, length: float, breadth: float, resolution: int) -> None:
+    if side not in ("left", "right"):
+        raise InputError(f"side: want 'left' or 'right', got {side!r}")
+    if not 0.05 <= length <= 0.30:
+        raise InputError(f"length: want metres, between 0.05 and 0.30, got {length!r}")
+    low, high = 0.32 * length, 0.62 * length
+    if not low <= breadth <= high:
+        raise InputError(f"breadth: want metres, {low:.3f}…{high:.3f} for this length, got {breadth!r}")
+    if not 1_500 <= resolution <= 20_000_000:
+        raise InputError(f"resolution: want a number of vertices between 1500 and 20 million, got {resolution!r}")
 
 
 def _scales(proportions: Mapping[str, float | tuple[float, float]] | None) -> dict[str, tuple[float, float]]:
     out = {}
     for digit, scale in (proportions or {}).items():
         if digit not in DIGITS:
-            raise InputError(f"proportions: no digit '{digit}'; want one of {', '.join(DIGITS)}")
-        out[digit] = (float(scale), 1.0) if np.isscalar(scale) else (float(scale[0]), float(scale[1]))
+            close = get_close_matches(digit, DIGITS, n=1)
+            hint = f"; did you mean '{close[0]}'?" if close else f"; want one of {', '.join(DIGITS)}"
+            raise InputError(f"proportions: no digit '{digit}'{hint}")
+        long, thick = scale if isinstance(scale, tuple) else (scale, 1.0)
+        if not (0.5 <= long <= 1.5 and 0.7 <= thick <= 1.3):
+            raise InputError(
+                f"proportions of '{digit}': want a length of 0.5…1.5 and a thickness of 0.7…1.3, got {scale!r}"
+            )
+        out[digit] = (float(long), float(thick))
     return out
+
+
+def _surface(vertices: Array, faces: NDArray[np.int32]) -> Surface:
+    """The surface as it is: no two vertices are at one place, so there is nothing to weld."""
+    whole = Part("hand", slice(0, len(vertices)), slice(0, len(faces)))
+    return Surface(vertices, faces, np.arange(len(vertices), dtype=np.int32), faces, parts=(whole,))
 
 
 def _skeleton(plan: Plan) -> Skeleton:

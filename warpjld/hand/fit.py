@@ -7,8 +7,9 @@ from collections.abc import Mapping
 import numpy as np
 from numpy.typing import NDArray
 
+from warpjld.hand.design import BREADTH, LENGTH
 from warpjld.hand.flesh import Flesh
-from warpjld.hand.plan import BREADTH, LENGTH, Plan, plan_hand
+from warpjld.hand.plan import Plan, plan_hand
 
 __all__ = ["fit_plan", "measure"]
 

@@ -45,9 +45,22 @@ class Flesh:
         assert fingers is not None
         hand = _join(Palm(self.plan.stretch)(points), fingers, _FINGER_ROOT * scale)
         thumb = self.plan.digits["thumb"].flesh(points, self.detail)
-        for part in (thumb, *(muscle(points) for muscle in self.plan.thenar)):
+        for part in (thumb, *(muscle(points) for muscle in self.plan.muscles)):
             hand = _join(hand, part, _THUMB_ROOT * scale)
         return hand
+
+    @property
+    def bounds(self) -> tuple[Array, Array]:
+        """Corners of a box that holds the surface [mm]."""
+        corners = [*Palm(self.plan.stretch).corners]
+        for digit in self.plan.digits.values():
+            flesh = digit.flesh
+            reach = float(flesh.table[:, 2:].max())
+            for end in flesh.ends:
+                tip = flesh.origin + flesh.frame[2] * end
+                corners += [tip - reach, tip + reach]
+        margin = _THUMB_ROOT * float(self.plan.stretch[0])
+        return np.min(corners, axis=0) - margin, np.max(corners, axis=0) + margin
 
     def slope(self, points: Array) -> tuple[Array, Array]:
         """Distance (n,) and its gradient (n, 3), by differences over four corners of a tetrahedron."""

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse import csr_array
 
-__all__ = ["Array", "Edges", "Faces", "face_normals", "mean_over_neighbours", "subdivide"]
+__all__ = ["Array", "Edges", "Faces", "dots", "face_normals", "mean_over_neighbours", "subdivide"]
 
 Array = NDArray[np.float64]
 Faces = NDArray[np.int64]
@@ -37,7 +38,8 @@ class Edges:
         """Edges of triangles (T, 3) over ``count`` vertices."""
         start, end = faces.T.ravel(), np.roll(faces, -1, axis=1).T.ravel()
         key = np.minimum(start, end) * count + np.maximum(start, end)
-        order = np.argsort(key, kind="stable")
+        # a stable sort is several times slower; sorting the two equal keys of each edge serves as well
+        order = np.sort(np.argsort(key).reshape(-1, 2), axis=1).ravel()
         first = key[order[::2]]
         number = np.empty(len(key), dtype=np.int64)
         number[order] = np.arange(len(key)) // 2
@@ -60,11 +62,17 @@ class Edges:
         place = np.minimum(np.searchsorted(known, key), len(known) - 1)
         return known[place] == key
 
+    @cached_property
     def adjacency(self) -> csr_array:
         """Symmetric matrix with a one where two vertices share an edge, shape (V, V)."""
         a, b = self.ends.T
         ones = np.ones(2 * len(a), dtype=np.float64)
         return csr_array((ones, (np.concatenate([a, b]), np.concatenate([b, a]))), shape=(self.count, self.count))
+
+
+def dots(a: Array, b: Array) -> Array:
+    """Scalar products of rows (n, 3), shape (n,): several times faster than a sum over so short an axis."""
+    return a[:, 0] * b[:, 0] + a[:, 1] * b[:, 1] + a[:, 2] * b[:, 2]
 
 
 def face_normals(vertices: Array, faces: Faces) -> Array:
@@ -75,7 +83,7 @@ def face_normals(vertices: Array, faces: Faces) -> Array:
 
 def mean_over_neighbours(edges: Edges, values: Array) -> Array:
     """Mean of per-vertex values over each vertex's neighbours, the shape of ``values``."""
-    total = edges.adjacency() @ values
+    total = edges.adjacency @ values
     valence = edges.valence()
     return total / (valence if values.ndim == 1 else valence[:, None])
 

@@ -17,11 +17,11 @@ Array = NDArray[np.float64]
 # distal place: radial edge, ulnar edge, dorsal face, palmar face, squareness [mm of the design hand]
 _OUTLINE = np.array(
     [
-        (-56, 30.5, -30.0, 19.0, -18.5, 0.10),
-        (-40, 30.0, -29.5, 18.7, -18.0, 0.12),
-        (-20, 28.8, -28.5, 17.8, -16.5, 0.18),
-        (-5, 28.0, -28.0, 16.5, -15.0, 0.25),
-        (10, 28.5, -32.5, 15.8, -14.5, 0.35),
+        (-56, 31.5, -31.0, 20.0, -19.5, 0.06),
+        (-40, 30.5, -30.0, 19.4, -18.8, 0.08),
+        (-20, 28.8, -28.5, 18.0, -16.8, 0.12),
+        (-5, 28.0, -28.0, 16.7, -15.0, 0.20),
+        (10, 28.8, -32.0, 15.8, -14.5, 0.32),
         (25, 30.0, -39.0, 15.0, -14.0, 0.45),
         (45, 33.5, -44.0, 13.5, -12.0, 0.50),
         (65, 36.8, -45.5, 12.0, -11.5, 0.50),
@@ -37,8 +37,8 @@ _CAP = 19.0  # length over which the slab closes towards the webs
 _STUB = (-52.0, -42.0)  # end of the forearm, and where its rounding begins
 # lumps of the palmar and of the dorsal face: radial and distal place, their spreads, height
 _PADS = (
-    (-26.0, 16.0, 12.0, 13.0, -5.0),  # hypothenar: heel
-    (-29.0, 38.0, 11.0, 19.0, -4.5),  # and edge of the hand
+    (-25.0, 17.0, 14.0, 14.0, -4.0),  # hypothenar: heel
+    (-28.0, 42.0, 13.0, 23.0, -4.5),  # and edge of the hand
     (14.0, 19.0, 13.0, 14.0, -6.5),  # thenar
     (-5.0, 60.0, 17.0, 19.0, 3.0),  # hollow
 )
@@ -57,6 +57,16 @@ class Palm:
 
     stretch: Array
 
+    @property
+    def corners(self) -> tuple[Array, Array]:
+        """Two opposite corners of the slab's box [mm]."""
+        low, high = _OUTLINE.min(axis=0), _OUTLINE.max(axis=0)
+        web = float(_WEBS[:, 1].max())
+        return (
+            np.array([low[2], low[4], -web]) * self.stretch,
+            np.array([high[1], high[3], -_STUB[0]]) * self.stretch,
+        )
+
     def __call__(self, points: Array) -> Array:
         """Signed distance of points (n, 3) [mm], negative inside, shape (n,)."""
         x, y, d = (points / self.stretch * (1.0, 1.0, -1.0)).T
@@ -70,7 +80,8 @@ class Palm:
         for px, pd, sx, sd, height in _BONES:
             top = top + height * np.exp(-0.5 * (((x - px) / sx) ** 2 + ((d - pd) / sd) ** 2))
         # the knuckles lie on an arch: the dorsal face falls to both sides, more to the ulnar one
-        top = top - np.clip(d / 60.0, 0.0, 1.0) * (
+        rise = np.clip(d / 70.0, 0.0, 1.0)
+        top = top - rise * rise * (3.0 - 2.0 * rise) * (
             _ARCH[0] * np.clip(x - 18.0, 0.0, 20.0) ** 2 + _ARCH[1] * np.clip(-8.0 - x, 0.0, 38.0) ** 2
         )
         top = np.maximum(top, bottom + 8.0)

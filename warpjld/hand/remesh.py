@@ -11,7 +11,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from warpjld.hand.mesh import Array, Edges, Faces, face_normals, mean_over_neighbours
+from warpjld.hand.mesh import Array, Edges, Faces, dots, face_normals, mean_over_neighbours
 
 __all__ = ["remesh", "settle"]
 
@@ -53,11 +53,11 @@ def settle(vertices: Array, faces: Faces, size: Array, field: Callable[[Array], 
     for k in range(3):
         for c in range(3):
             ring[:, c] += np.bincount(faces[:, k], normals[:, c], minlength=len(vertices))
-    unit = ring / np.maximum(np.linalg.norm(ring, axis=1, keepdims=True), 1e-12)
+    unit = ring / np.maximum(np.sqrt(dots(ring, ring)), 1e-12)[:, None]
     weight = 1.0 / size
     centre = mean_over_neighbours(edges, vertices * weight[:, None]) / mean_over_neighbours(edges, weight)[:, None]
     move = amount * (centre - vertices)
-    move -= unit * np.einsum("ij,ij->i", move, unit)[:, None]
+    move -= unit * dots(move, unit)[:, None]
     moved = vertices + move
     return moved - unit * np.clip(field(moved), -0.5 * size, 0.5 * size)[:, None]
 
@@ -94,7 +94,7 @@ def _collapse(vertices: Array, faces: Faces, size: Array) -> tuple[Array, Faces,
     rank[short[np.argsort(ratio[short], kind="stable")]] = np.arange(len(short))
     chosen = short[_apart(edges, rank)[short]]
     # two ends may share only the two vertices across their edge, or the collapse would pinch the surface
-    ring = edges.adjacency()
+    ring = edges.adjacency
     a, b = edges.ends[chosen].T
     chosen = chosen[(ring[a].multiply(ring[b])).sum(axis=1) == 2]
     if not len(chosen):
@@ -107,12 +107,17 @@ def _collapse(vertices: Array, faces: Faces, size: Array) -> tuple[Array, Faces,
     owner[a] = owner[b] = np.arange(len(chosen))
     dead = np.zeros(len(faces), dtype=bool)
     dead[edges.faces[chosen]] = True
-    old, new = face_normals(vertices, faces), face_normals(moved, faces)
-    lengths = np.linalg.norm(old, axis=1) * np.linalg.norm(new, axis=1)
-    turned = ~dead & (np.einsum("ij,ij->i", old, new) < 0.5 * lengths)
-    stretched = np.linalg.norm(moved[faces] - moved[np.roll(faces, -1, axis=1)], axis=2)
-    too_long = ~dead & (stretched > 1.25 * _LONG * size[faces]).any(axis=1)
-    guilty = owner[faces[turned | too_long]].ravel()
+    touched = np.flatnonzero((owner[faces[:, 0]] & owner[faces[:, 1]] & owner[faces[:, 2]]) != -1)
+    touched = touched[~dead[touched]]
+    around = faces[touched]
+    old, new = face_normals(vertices, around), face_normals(moved, around)
+    turned = dots(old, new) < 0.5 * np.sqrt(dots(old, old) * dots(new, new))
+    limit = (1.25 * _LONG * size) ** 2
+    for k in range(3):
+        here, there = around[:, k], around[:, (k + 1) % 3]
+        side = moved[here] - moved[there]
+        turned |= dots(side, side) > np.minimum(limit[here], limit[there])
+    guilty = owner[around[turned]].ravel()
     fine = np.ones(len(chosen), dtype=bool)
     fine[guilty[guilty >= 0]] = False
     a, b, chosen = a[fine], b[fine], chosen[fine]
@@ -143,8 +148,8 @@ def _flip(vertices: Array, faces: Faces) -> Faces:
     (a, b), (c, d) = edges.ends.T, edges.opposite(faces).T
     surplus = -(_cosine(vertices, c, a, b) + _cosine(vertices, d, a, b))
     normals = face_normals(vertices, faces)
-    normals /= np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-12)
-    flat = np.einsum("ij,ij->i", *normals[edges.faces].transpose(1, 0, 2)) > 0.6
+    normals /= np.maximum(np.sqrt(dots(normals, normals)), 1e-12)[:, None]
+    flat = dots(normals[edges.faces[:, 0]], normals[edges.faces[:, 1]]) > 0.6
     valence = edges.valence()
     wanted = (surplus > 1e-3) & flat & (valence[edges.ends] > 3).all(axis=1) & ~edges.joined(c, d)
     score = np.where(wanted, surplus, -1.0)
@@ -160,9 +165,7 @@ def _flip(vertices: Array, faces: Faces) -> Faces:
     fine = np.ones(len(chosen), dtype=bool)
     for new in (one, two):
         turned = face_normals(vertices, new)
-        fine &= np.einsum("ij,ij->i", turned, facing) > 0.5 * np.linalg.norm(turned, axis=1) * np.linalg.norm(
-            facing, axis=1
-        )
+        fine &= dots(turned, facing) > 0.5 * np.sqrt(dots(turned, turned) * dots(facing, facing))
     pair = np.minimum(up, down) * edges.count + np.maximum(up, down)
     only = np.zeros(len(chosen), dtype=bool)
     only[np.unique(pair, return_index=True)[1]] = True
@@ -177,10 +180,10 @@ def _flip(vertices: Array, faces: Faces) -> Faces:
 
 def _ratios(vertices: Array, size: Array, edges: Edges) -> Array:
     a, b = edges.ends.T
-    return np.linalg.norm(vertices[a] - vertices[b], axis=1) / (0.5 * (size[a] + size[b]))
+    along = vertices[a] - vertices[b]
+    return np.sqrt(dots(along, along)) / (0.5 * (size[a] + size[b]))
 
 
 def _cosine(vertices: Array, apex: Faces, a: Faces, b: Faces) -> Array:
     u, v = vertices[a] - vertices[apex], vertices[b] - vertices[apex]
-    scale = np.sqrt(np.einsum("ij,ij->i", u, u) * np.einsum("ij,ij->i", v, v))
-    return np.einsum("ij,ij->i", u, v) / np.maximum(scale, 1e-12)
+    return dots(u, v) / np.maximum(np.sqrt(dots(u, u) * dots(v, v)), 1e-12)

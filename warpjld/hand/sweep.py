@@ -1,7 +1,7 @@
 """A digit as a swept section: a straight axis, a curved centre line beside it, and half-widths along it.
 
-Sections are cut square to one straight axis and shifted to the centre line. So the section of a point is a dot product,
-smooth everywhere, and a bent digit has none of the creases that projecting on a polyline makes.
+Sections are cut square to one straight axis and shifted to the centre line. So a point's section is found by a dot
+product, smooth everywhere, and a bent digit has none of the creases that projecting on a polyline makes.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ __all__ = ["FAR", "Sweep", "section_distance"]
 Array = NDArray[np.float64]
 
 _ROWS = 512  # of the tables along the axis: errors of the interpolation stay below a micrometre
-FAR = 25.0  # millimetres: beyond every blending radius
+FAR = 40.0  # millimetres: beyond every blending radius, also in a giant's hand
 _CENTROID = 4.0 / (3.0 * np.pi)  # of a half ellipse, in half-heights
 
 
@@ -82,7 +82,8 @@ class Sweep:
         """
         local = (points - self.origin) @ self.frame.T
         low, high = self._box
-        near = np.flatnonzero(((local > low) & (local < high)).all(axis=1))
+        inside = (local > low) & (local < high)
+        near = np.flatnonzero(inside[:, 0] & inside[:, 1] & inside[:, 2])
         out = np.full(len(points), FAR)
         if len(near):
             out[near] = self._distance(local[near], detail)
@@ -119,7 +120,8 @@ class Sweep:
         rim = np.sqrt(np.sqrt((u / half_width) ** 4 + along**4))
         away = (rim - 1.0) * half_width
         upper = np.clip(2.5 * height, 0.0, 1.0)
-        fold = 0.045 * half_width * np.exp(-((away / (0.10 * half_width)) ** 2))
+        free = 0.5 + 0.5 * np.tanh(4.0 * (along - 0.55))  # the nail's free edge has no fold
+        fold = 0.045 * half_width * np.exp(-((away / (0.10 * half_width)) ** 2)) * (1.0 - 0.7 * free)
         plate = 0.02 * half_width / (1.0 + np.exp(np.clip(away / (0.05 * half_width), -30.0, 30.0)))
         return upper * upper * (3.0 - 2.0 * upper) * (fold - plate)
 

@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from warpjld.errors import WarpjldError
+from warpjld.errors import InputError
 from warpjld.hand.contour import contour
 from warpjld.hand.flesh import Flesh
 from warpjld.hand.mesh import Array, Edges, Faces, face_normals, mean_over_neighbours, subdivide
@@ -17,7 +17,6 @@ __all__ = ["triangulate"]
 _LARGEST_REMESHED = 16_000  # vertices; beyond, a remeshed surface is subdivided: far faster, and as even
 _COARSEST, _FINEST = 2.0, 1.0  # grid spacing [mm]: two millimetres still tell neighbouring fingers apart
 _PACKING = 0.96  # wanted length squared times vertices per area, in a remeshed surface (equilateral: 2 / √3 = 1.15)
-_LOW, _HIGH = np.array([-75.0, -75.0, -205.0]), np.array([112.0, 45.0, 60.0])
 
 
 def triangulate(flesh: Flesh, resolution: int) -> tuple[Array, Faces]:
@@ -49,14 +48,13 @@ def triangulate(flesh: Flesh, resolution: int) -> tuple[Array, Faces]:
 
 
 def _closed_contour(flesh: Flesh, base: int) -> tuple[Array, Faces]:
-    stretch = flesh.plan.stretch
-    spacing = float(np.clip(np.sqrt(40_000.0 / base), _FINEST, _COARSEST) * stretch.min())
+    spacing = float(np.clip(np.sqrt(40_000.0 / base), _FINEST, _COARSEST) * flesh.plan.stretch.min())
     for _ in range(3):
-        vertices, faces = contour(flesh, _LOW * stretch, _HIGH * stretch, spacing)
+        vertices, faces = contour(flesh, *flesh.bounds, spacing)
         if len(vertices) - len(faces) // 2 == 2:  # Euler's number of a sphere: in one piece, without holes
             return vertices, faces
         spacing *= 0.7
-    raise WarpjldError("the hand's surface came out in pieces or with holes: are its proportions extreme?")
+    raise InputError("proportions: with these the fingers touch one another, or the hand falls to pieces")
 
 
 def _relative_size(flesh: Flesh, vertices: Array, faces: Faces) -> Array:
