@@ -109,7 +109,7 @@ def pose_frame(
     ratio = np.zeros(len(skeleton))
     for j in range(len(skeleton)):
         largest = skeleton.limits[j, CHANNELS.index("flexion"), 1]
-        if largest > 1e-6:
+        if largest > 1e-6 and skeleton.parents[j] >= 0:
             ratio[j] = min(max(poses.flexion[f, j] / largest, 0.0), 1.0)
     closing = np.zeros((max(len(pairs), 1), len(STATIONS)))
     for n, ((pa, da), (pb, db)) in enumerate(pairs):
