@@ -14,6 +14,7 @@ from scipy.spatial import cKDTree
 __all__ = ["corner_conductivity"]
 
 _REACH = 0.02  # radius around a corner, relative to the surface's size, within which heat is conducted better
+_MARGIN = 1.3  # more than the exponent asks for: cotangents of obtuse triangles are clipped, which spoils it a little
 _SHARP = 1.03  # θ / 2π from which a corner counts: slopes grow by less than this at each halving of the edges otherwise
 _MOST = 4_000  # corners considered, sharpest first: a surface with more of them is noise
 
@@ -36,7 +37,7 @@ def corner_conductivity(vertices: NDArray[np.float64], faces: NDArray[np.int32])
     near = cKDTree(centroids).query_ball_point(vertices[corners], reach)
     for corner, triangles in zip(corners, near, strict=True):
         distance = np.linalg.norm(centroids[triangles] - vertices[corner], axis=1)
-        beta = turns[corner] ** -2.0 - 1.0
+        beta = _MARGIN * (turns[corner] ** -2.0 - 1.0)
         exponent[triangles] += beta * np.log(np.maximum(distance, 1e-6 * reach) / reach)
     return np.exp(exponent)
 
