@@ -14,7 +14,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from warpjld.covering import Covering, Parameters
-from warpjld.covering.binding import FLOOR, SIDE_BAND
+from warpjld.covering.binding import FLOOR, LATERAL, SIDE_BAND
 from warpjld.skeleton import CHANNELS, Poses, Skeleton
 
 STATIONS = np.linspace(0.0, 1.0, 5)  # where along a palm pair its scale factor is evaluated
@@ -109,7 +109,7 @@ def pose_frame(
     ratio = np.zeros(len(skeleton))
     for j in range(len(skeleton)):
         largest = skeleton.limits[j, CHANNELS.index("flexion"), 1]
-        if largest > 1e-6:
+        if skeleton.parents[j] >= 0 and largest > 1e-6:
             ratio[j] = min(max(poses.flexion[f, j] / largest, 0.0), 1.0)
     closing = np.zeros((max(len(pairs), 1), len(STATIONS)))
     for n, ((pa, da), (pb, db)) in enumerate(pairs):
@@ -137,8 +137,8 @@ def evaluate(place: Place, frame: Frame, parameters: Parameters, rest_joints: np
         external = in_p * frame.halfway[p] + (1 - in_p - in_d) * frame.rotations[p] + in_d * frame.halfway[d]
         internal = (1 - t) * frame.halfway[p] + t * frame.halfway[d]
         blend += o.weight * (o.side * external + (1 - o.side) * internal)
-        rounding = parameters.inflation[p] * in_p * frame.ratio[p] + parameters.inflation[d] * in_d * frame.ratio[d]
-        grow += o.weight * o.side * rounding
+        for j, area in ((p, in_p), (d, in_d)):
+            grow += o.weight * o.side * parameters.inflation[j] * area**2 * (3 - 2 * area) * frame.ratio[j]
         if o.muscle:
             driven = (frame.ratio[p] + frame.ratio[d]) / 2
             profile = _profile(t, parameters.peak[p], *parameters.exponents[p])
@@ -235,12 +235,12 @@ def _shares(
     widths = []
     for (p, d), ratio in zip(segments, ratios, strict=True):
         t = min(max(ratio, 0.0), 1.0)
-        widths.append((1 - t) * parameters.proximity[p, 0] + t * parameters.proximity[d, 1])
+        widths.append(LATERAL * ((1 - t) * parameters.proximity[p, 0] + t * parameters.proximity[d, 1]))
     lateral = []  # R on every virtual segment: 0 in the columns 1-4-7, 1 in 3-6-9
     for k in range(len(segments) - 1):
         virtual = feet[k + 1] - feet[k]
         r = (vertex - feet[k]) @ virtual / (virtual @ virtual) if np.linalg.norm(virtual) > 1e-9 else 0.0
-        lateral.append(min(max((r - 0.9 * widths[k]) / max(1 - 0.9 * (widths[k] + widths[k + 1]), 0.1), 0.0), 1.0))
+        lateral.append(min(max((r - widths[k]) / max(1 - widths[k] - widths[k + 1], 0.1), 0.0), 1.0))
     held = [
         min(lateral[k - 1] if k else 1.0, 1 - lateral[k] if k < len(lateral) else 1.0) for k in range(len(segments))
     ]

@@ -41,9 +41,10 @@ def test_axes_agree_with_those_the_built_in_hand_was_made_with(write_glb, hand_g
     for side in ("left", "right"):
         rig = load_rig(write_glb(hand_glb(side), tmp_path / f"{side}.glb"))
         for name in hand_joint_names(side):
-            cosine = rig.skeleton.axes[rig.skeleton.index(name)] @ built[side].skeleton.axes[
-                built[side].skeleton.index(name)
-            ]
+            cosine = (
+                rig.skeleton.axes[rig.skeleton.index(name)]
+                @ built[side].skeleton.axes[built[side].skeleton.index(name)]
+            )
             assert cosine > np.cos(np.radians(12)), name
 
 

@@ -25,6 +25,9 @@ STATIONS = 5
 # |cosine| below which a vertex is partly external and partly internal: sections near a joint stand upright outside and
 # lean inside, and a wider band shears the sides less
 SIDE_BAND = 0.75
+# share of a proximity that counts across the palm: along a segment there is one at either end, across it one side only;
+# what lies in between then shears over a broad strip
+LATERAL = 0.6
 FLOOR = 2e-2  # weight below which an operator is dropped, faded so that nothing jumps
 
 
@@ -207,10 +210,9 @@ def _share_in_fan(
     across = ((points[:, None] - feet[:, :-1]) * virtual).sum(axis=2) / np.maximum((virtual**2).sum(axis=2), 1e-18)
     place = np.clip(ratio, 0.0, 1.0)
     proximal, distal = parameters.proximity[ends[:, 0], 0], parameters.proximity[ends[:, 1], 1]
-    width = (1.0 - place) * proximal + place * distal
-    margins = width[:, :-1] + width[:, 1:]
-    width = width * 0.9  # an in-between area is left even where the proximities sum to one
-    lateral = np.clip((across - width[:, :-1]) / np.maximum(1.0 - 0.9 * margins, 0.1), 0.0, 1.0)
+    width = LATERAL * ((1.0 - place) * proximal + place * distal)
+    strip = np.maximum(1.0 - width[:, :-1] - width[:, 1:], 0.1)  # left even where proximities are as large as can be
+    lateral = np.clip((across - width[:, :-1]) / strip, 0.0, 1.0)
     before = np.concatenate([np.ones((len(points), 1)), lateral], axis=1)
     after = np.concatenate([1.0 - lateral, np.ones((len(points), 1))], axis=1)
     share = np.minimum(before, after)
