@@ -13,7 +13,7 @@ from warpjld.covering import Covering, Parameters
 from warpjld.covering.gradient import Differentiable
 from warpjld.errors import InputError
 
-RELATIVE = 2e-5  # float32 sums over the vertices and frames below
+RELATIVE = 1e-4  # float32: sums of opposite signs over some 400 vertices and frames lose two or three digits
 STEP = 1e-6  # of the differences, in float64
 
 POSE = {
