@@ -25,6 +25,9 @@ STATIONS = 5
 # |cosine| below which a vertex is partly external and partly internal: sections near a joint stand upright outside and
 # lean inside, and a wider band shears the sides less
 SIDE_BAND = 0.75
+# share of a proximity that counts across the palm: along a segment there is one at either end, across it one side only;
+# what lies in between then shears over a broad strip
+LATERAL = 0.6
 FLOOR = 2e-2  # weight below which an operator is dropped, faded so that nothing jumps
 
 
@@ -176,14 +179,24 @@ def _anchor_some(
     pair, pair_kept = _strongest_pairs(between)
     ratio = np.take_along_axis(t, best, axis=1)
     offset = points[:, None] - (table.start[best] + ratio[..., None] * table.along[best])
-    blend = np.clip(ratio, 0.0, 1.0)[..., None]
-    normal = (1.0 - blend) * table.normals[best, 0] + blend * table.normals[best, 1]
-    normal /= np.maximum(np.linalg.norm(normal, axis=2, keepdims=True), 1e-12)
-    height = (offset * normal).sum(axis=2)
-    cosine = height / np.maximum(np.linalg.norm(offset, axis=2), 1e-12)
-    side = _smoothstep((cosine + SIDE_BAND) / (2.0 * SIDE_BAND))
+    side, lift = _side(offset, table.normals[best], np.clip(ratio, 0.0, 1.0))
     station = np.take_along_axis(along_pair, pair, axis=1)
-    return best.astype(np.int32), kept, ratio, side, height[..., None] * normal, pair, pair_kept, station
+    return best.astype(np.int32), kept, ratio, side, lift, pair, pair_kept, station
+
+
+def _side(
+    offset: NDArray[np.float64], normals: NDArray[np.float64], place: NDArray[np.float64]
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """External side (1) or internal (0) by R45's cosine, and the y part of the offset, blended along the segment.
+
+    Judged with the normals of both joints one by one: hip and knee bend in opposite senses, and half-way along a thigh
+    an interpolated normal would vanish and turn over.
+    """
+    length = np.maximum(np.linalg.norm(offset, axis=2), 1e-12)
+    height = np.einsum("vok,voek->voe", offset, normals)
+    sides = _smoothstep((height / length[..., None] + SIDE_BAND) / (2.0 * SIDE_BAND))
+    share = np.stack([1.0 - place, place], axis=2)
+    return (share * sides).sum(axis=2), np.einsum("voe,voe,voek->vok", share, height, normals)
 
 
 def _share_in_fan(
@@ -220,9 +233,9 @@ def _share_in_fan(
             + np.clip(r, 0.0, 1.0) * parameters.proximity[ends[n, 1], 1]
             for n, r in ((k, first), (k + 1, second))
         ]
-        # an in-between area is left even where the proximities sum to one
-        room = np.maximum(1.0 - 0.9 * (widths[0] + widths[1]), 0.1)
-        passed += np.clip((across - 0.9 * widths[0]) / room, 0.0, 1.0)
+        # an in-between area is left even where proximities are as large as can be
+        room = np.maximum(1.0 - LATERAL * (widths[0] + widths[1]), 0.1)
+        passed += np.clip((across - LATERAL * widths[0]) / room, 0.0, 1.0)
     for k in range(len(start)):
         out[:, k] = np.maximum(1.0 - np.abs(passed - k), 0.0)
     return out

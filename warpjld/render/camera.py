@@ -130,9 +130,7 @@ class Camera:
         axis = np.asarray(self.up) / np.linalg.norm(self.up)
         arm = np.subtract(self.position, self.target)
         arm = (
-            arm * math.cos(angle)
-            + np.cross(axis, arm) * math.sin(angle)
-            + axis * (axis @ arm) * (1 - math.cos(angle))
+            arm * math.cos(angle) + np.cross(axis, arm) * math.sin(angle) + axis * (axis @ arm) * (1 - math.cos(angle))
         )
         return replace(self, position=tuple(np.add(self.target, arm)))
 

@@ -122,9 +122,7 @@ def contact_sheet(
         boned = bones is not None and segments is not None and look == "wireframe"
         drawn = segments if boned else None
         with Scene(faces, camera, look=look, size=size, segments=drawn, style=style, quality=quality) as scene:
-            strip = [
-                scene.draw(points, joints=None if bones is None else bones[f]) for f, points in enumerate(frames)
-            ]
+            strip = [scene.draw(points, joints=None if bones is None else bones[f]) for f, points in enumerate(frames)]
         strips.append(strip)
     rows = []
     for first in range(0, len(frames), columns):

@@ -13,9 +13,7 @@ _SIDES = 8
 _COLLAR = 0.16  # share of its length after which a bone is thickest
 
 
-def bone_vertices(
-    joints: NDArray[np.floating], segments: NDArray[np.integer], thickness: float
-) -> NDArray[np.float32]:
+def bone_vertices(joints: NDArray[np.floating], segments: NDArray[np.integer], thickness: float) -> NDArray[np.float32]:
     """Slender double cones from joint to joint: pointed towards the distal end, as animators draw bones.
 
     Args:
