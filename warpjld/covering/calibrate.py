@@ -39,8 +39,8 @@ _BOUNDS = {
     "palm": (0.0, 0.5),
 }
 _MOST = 1.5
-"""Amplitudes are at most so many times those that keep a tube's volume: a joint that bends by 15° cannot make up for the
-others by a lump."""
+"""Amplitudes are at most so many times those that keep a tube's volume: a joint that bends by 15° cannot make up for
+the others by a lump."""
 _SCALES = {"inflation": 0.25, "proximity": 0.15, "muscle": 0.25, "peak": 0.2, "exponents": 0.5, "palm": 0.2}
 _REGULARISER = 5e-3  # of the mean square of the change, in scales
 _SETTLED = 1e-3  # relative gain of a round below which the next is not tried

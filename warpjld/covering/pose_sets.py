@@ -16,7 +16,8 @@ CURL = {"base": 80.0, "knuckle2": 97.0, "knuckle3": 63.0}
 """Flexion [degrees] of a finger's joints in a full curl; the thumb takes no part."""
 
 _FLEXION, _ABDUCTION = CHANNELS.index("flexion"), CHANNELS.index("abduction")
-_WIDEST = np.radians(100.0)  # joints of unknown kind have wide limits that no body uses in full
+_WIDEST = np.radians(100.0)  # shoulders, hips, knees and elbows in full are poses of their own kind
+_UNKNOWN = np.radians(30.0)  # where limits are as wide one way as the other: nothing is known of the joint
 _CURLS = (0.3, 0.6, 0.9)
 
 
@@ -41,7 +42,8 @@ def calibration_poses(skeleton: Skeleton, count: int | None = None, *, seed: int
     """
     if count is not None and count < 1:
         raise InputError(f"count: want at least 1 pose, got {count}")
-    largest = np.minimum(skeleton.limits[:, _FLEXION, 1], _WIDEST)
+    low, high = np.moveaxis(skeleton.limits[:, _FLEXION], -1, 0)
+    largest = np.minimum(high, np.where(low <= -high, _UNKNOWN, _WIDEST))
     inner = (skeleton.parents >= 0) & np.array([bool(c) for c in skeleton.children])
     bends = np.flatnonzero(inner & (largest > 1e-6))
     if not bends.size:
