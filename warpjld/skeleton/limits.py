@@ -26,8 +26,6 @@ _ROLES: dict[str, tuple[tuple[float, float], ...]] = {
     "elbow": ((0, 150), _CLOSED, (-80, 80), _CLOSED),
     "shoulder": ((-60, 180), (0, 180), (-90, 70), (-60, 180)),
     "hip": ((-30, 120), (0, 45), (-45, 45), (-30, 45)),
-    "tip": (_CLOSED,) * 4,
-    "top": (_CLOSED,) * 4,
     "knee": ((0, 135), _CLOSED, _CLOSED, _CLOSED),
     "ankle": ((-20, 50), _CLOSED, (-35, 35), _CLOSED),
 }
