@@ -41,10 +41,6 @@ def test_hard_edges_tear(built: Rig) -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.xfail(
-    reason="1.064 at the last level: triangles at its wrist have edges of 9 mm, so the steepest place between thumb "
-    "and index metacarpals is only resolved there; refined further on its own it converges (1.035, 1.027, 1.013)"
-)
 @pytest.mark.parametrize("side", ["left", "right"])
 def test_webxr_hand_to_300k_vertices(webxr_hands: dict[str, Rig], side: str) -> None:
     assert max(growth(webxr_hands[side], 300_000)) <= GROWTH
