@@ -1,8 +1,11 @@
 """``warpjld run`` from outside: exit codes, what goes to stdout and stderr, commands from a Python file."""
 
 import json
+import os
+import signal
 import subprocess
 import sys
+import time
 
 import pytest
 
@@ -116,6 +119,26 @@ def test_reading_a_script_loads_neither_warp_nor_pyvista() -> None:
 
 
 def _environment() -> dict[str, str]:
-    import os
-
     return os.environ | {"PYTHONPATH": os.pathsep.join(sys.path)}
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(sys.platform == "win32", reason="signals of POSIX")
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_an_interrupted_run_leaves_nothing(tmp_path, number) -> None:
+    script, out = tmp_path / "long.jld", tmp_path / "out"
+    script.write_text(SCRIPT + "FRAMES 0 100000\nFILM 'long.mp4'\n")
+    command = [sys.executable, "-m", "warpjld", "run", str(script), "-o", str(out)]
+    with subprocess.Popen(command, stderr=subprocess.PIPE, text=True, env=_environment()) as process:
+        try:
+            deadline = time.monotonic() + 60
+            while not any(out.glob(".making-*/long*")) and time.monotonic() < deadline:
+                time.sleep(0.05)
+            assert any(out.glob(".making-*/long*")), "the film was begun"
+            process.send_signal(number)
+            error = process.communicate(timeout=30)[1]
+        finally:
+            process.kill()
+    assert process.returncode == 130
+    assert error.rstrip().endswith("interrupted")
+    assert not out.exists()

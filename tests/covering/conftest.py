@@ -15,7 +15,7 @@ from warpjld.rig import Rig
 @pytest.fixture(scope="session")
 def built() -> Rig:
     """The built-in left hand, small."""
-    return build_hand("left", resolution=1000)
+    return build_hand("left", resolution=1500)
 
 
 @pytest.fixture(scope="session")

@@ -3,7 +3,9 @@
 import pytest
 
 from warpjld.errors import InputError
-from warpjld.hand import build_hand, percentile
+from warpjld.hand import percentile
+from warpjld.hand.fit import fit_plan, measure
+from warpjld.hand.flesh import Flesh
 
 
 def test_the_median_is_the_mean_and_sizes_grow() -> None:
@@ -15,9 +17,12 @@ def test_the_median_is_the_mean_and_sizes_grow() -> None:
         assert values[2] - values[1] == pytest.approx(1.645 * (0.010 if name == "length" else 0.004), rel=1e-3)
 
 
-def test_a_size_builds_a_hand() -> None:
-    rig = build_hand(**percentile(5, "female"), resolution=2000)
-    assert -rig.surface.vertices[:, 2].min() == pytest.approx(percentile(5, "female")["length"], rel=0.01)
+@pytest.mark.parametrize("sex", ["male", "female"])
+def test_a_size_makes_a_hand(sex: str) -> None:
+    size = percentile(95, sex)
+    length, breadth = 1000.0 * size["length"], 1000.0 * size["breadth"]
+    measured = measure(Flesh(fit_plan(length, breadth, {})), length)
+    assert measured == pytest.approx((length, breadth), rel=2e-3)
 
 
 @pytest.mark.parametrize(("percent", "sex"), [(0, "male"), (100, "male"), (50, "any")])

@@ -5,8 +5,8 @@ from itertools import pairwise
 import numpy as np
 import pytest
 import trimesh
-from hypothesis import given, settings
-from hypothesis import strategies as st
+from scipy.sparse import coo_array
+from scipy.sparse.csgraph import connected_components
 
 from tests.hand.measuring import centroid_and_radius, loops, self_intersections
 from warpjld.errors import InputError
@@ -37,12 +37,16 @@ def breadth_of(rig: Rig, length: float) -> float:
 
 
 def check_closed(rig: Rig) -> None:
-    mesh = trimesh.Trimesh(rig.surface.vertices, rig.surface.faces, process=False)
-    assert mesh.is_watertight
-    assert mesh.is_winding_consistent
-    assert mesh.volume > 0.0, "faces must look outward"
-    assert mesh.euler_number == 2, "want the topology of a sphere"
-    assert mesh.body_count == 1
+    vertices, faces = mesh_of(rig)
+    start, end = faces.T.ravel().astype(np.int64), np.roll(faces, -1, axis=1).T.ravel()
+    there, back = np.sort(start * len(vertices) + end), np.sort(end * np.int64(len(vertices)) + start)
+    assert (np.diff(there) > 0).all(), "no edge may be run through twice the same way"
+    assert (there == back).all(), "every edge is run through both ways: closed and consistently oriented"
+    assert len(vertices) - len(start) // 2 + len(faces) == 2, "want the topology of a sphere"
+    links = coo_array((np.ones(len(start)), (start, end)), shape=(len(vertices),) * 2)
+    assert connected_components(links, directed=False)[0] == 1
+    a, b, c = vertices[faces.T]
+    assert np.einsum("ij,ij->", a, np.cross(b, c)) > 0.0, "faces must look outward"
     assert len(rig.surface.weld) == len(rig.surface.vertices), "nothing to weld"
 
 
@@ -76,7 +80,8 @@ def test_no_triangle_crosses_another(hand: Rig, coarse: Rig) -> None:
 
 def test_the_crossing_check_sees_a_crossing(coarse: Rig) -> None:
     vertices = coarse.surface.vertices.copy()
-    vertices[np.argmin(vertices[:, 2])] = coarse.skeleton.rest[coarse.skeleton.index("middle.carpometacarpal")]
+    finger = np.abs(vertices - coarse.skeleton.rest[coarse.skeleton.index("middle.knuckle2")]).max(axis=1) < 0.02
+    vertices[np.argmax(np.where(finger, vertices[:, 1], -1.0)), 1] -= 0.03  # from the back through the pulp
     assert self_intersections(vertices, coarse.surface.faces) > 0
 
 
@@ -85,10 +90,9 @@ def test_volume_of_hand_and_stub(hand: Rig) -> None:
     assert 350e-6 < volume < 450e-6
 
 
-@settings(max_examples=3, deadline=None)
-@given(length=st.floats(0.14, 0.23), ratio=st.floats(0.38, 0.52))
+@pytest.mark.parametrize(("length", "ratio"), [(0.15, 0.50), (0.18, 0.39), (0.23, 0.44)])
 def test_length_and_breadth_as_asked(length: float, ratio: float) -> None:
-    rig = build_hand(length=length, breadth=ratio * length, resolution=2500)
+    rig = build_hand(length=length, breadth=ratio * length, resolution=2000)
     assert -rig.surface.vertices[:, 2].min() == pytest.approx(length, rel=SIZE_TOLERANCE)
     assert breadth_of(rig, length) == pytest.approx(ratio * length, rel=SIZE_TOLERANCE)
 
@@ -202,14 +206,12 @@ def test_same_bits_every_time(coarse: Rig) -> None:
 
 @pytest.mark.parametrize("digit", ["index", "thumb"])
 def test_proportions_lengthen_and_thicken_one_digit(digit: str, coarse: Rig) -> None:
-    long = build_hand(resolution=2000, proportions={digit: 1.2})
+    other = build_hand(resolution=2000, proportions={digit: (1.2, 1.15)})
     chain = [coarse.skeleton.index(f"{digit}.{name}") for name in ("base", "knuckle2", "knuckle3")]
-    for rig, scale in ((coarse, 1.0), (long, 1.2)):
-        steps = np.linalg.norm(np.diff(rig.skeleton.rest[chain], axis=0), axis=1)
-        reference = np.linalg.norm(np.diff(coarse.skeleton.rest[chain], axis=0), axis=1)
-        np.testing.assert_allclose(steps, scale * reference, rtol=0.01)
-    thick = build_hand(resolution=2000, proportions={digit: (1.0, 1.15)})
-    assert section_at(thick, digit) == pytest.approx(1.15 * section_at(coarse, digit), rel=0.03)
+    before, after = (np.linalg.norm(np.diff(r.skeleton.rest[chain], axis=0), axis=1) for r in (coarse, other))
+    np.testing.assert_allclose(after, 1.2 * before, rtol=0.01)
+    assert section_at(other, digit) == pytest.approx(1.15 * section_at(coarse, digit), rel=0.03)
+    assert section_at(other, "ring") == pytest.approx(section_at(coarse, "ring"), rel=0.03)
 
 
 def section_at(rig: Rig, digit: str) -> float:

@@ -129,7 +129,9 @@ def test_webxr_axes_agree_with_the_files_own(rigs):
                 assert -rig.skeleton.axes[j] @ rig.source_frames[j, :3, 0] > np.cos(np.radians(15)), joint
 
 
-@pytest.mark.parametrize("family", ["hand_anny", "body_anny/body_104joints.glb", "body_anny/body_lowpoly_163joints.glb"])
+@pytest.mark.parametrize(
+    "family", ["hand_anny", "body_anny/body_104joints.glb", "body_anny/body_lowpoly_163joints.glb"]
+)
 def test_left_and_right_mirror_exactly(rigs, family):
     left, right = (
         (rigs[family].skeleton,) * 2

@@ -33,6 +33,7 @@ def draw_rig(rig: Rig, path: Path, *, suspicious: Set[str] = frozenset()) -> Non
         raise InputError("the folder does not exist", path=path)
     skeleton, surface = rig.skeleton, rig.surface
     views = _views(rig)
+    pyvista.vtk_verbosity("off")  # off-screen it complains about a missing display
     plotter = pyvista.Plotter(
         off_screen=True, shape=(1, len(views)), window_size=(1000 * len(views), 1200), border=False
     )
@@ -42,7 +43,6 @@ def draw_rig(rig: Rig, path: Path, *, suspicious: Set[str] = frozenset()) -> Non
     for column, (towards, up) in enumerate(views):
         plotter.subplot(0, column)
         plotter.set_background("white")
-        plotter.enable_depth_peeling(8)
         plotter.add_mesh(mesh, color="#d9b8a0", opacity=0.25, lighting=True)
         plotter.add_mesh(mesh, style="wireframe", color="#555555", opacity=0.18, line_width=0.6, lighting=False)
         for segment in skeleton.segments:

@@ -15,7 +15,7 @@ from warpjld.skeleton.tree import CHANNELS, Skeleton
 __all__ = ["Parameters", "default_parameters", "load_parameters", "save_parameters"]
 
 # Amplitudes of a 90° joint: a tube of two segments, half as thick as they are long, then keeps its volume within 2 %.
-_INFLATION = 0.22
+_INFLATION = 0.21
 _MUSCLE = 0.20
 _PALM = 3.0
 _WIDEST = np.radians(135.0)  # wider limits say what a joint never does alone

@@ -16,7 +16,7 @@ from warpjld.hand.triangulate import triangulate
 from warpjld.rig import Rig
 from warpjld.skeleton import DIGITS, PALM_SEGMENTS, Skeleton, default_limits, hand_joint_names
 from warpjld.skeleton.hand import FINGER_JOINTS, HAND_PARENTS
-from warpjld.surface import weld_surface
+from warpjld.surface import Part, Surface
 
 __all__ = ["build_hand"]
 
@@ -61,7 +61,7 @@ def build_hand(
     return Rig(
         name=f"{side} hand",
         skeleton=skeleton,
-        surface=weld_surface(vertices * _MILLIMETRE, np.ascontiguousarray(faces)),
+        surface=_surface(vertices * _MILLIMETRE, np.ascontiguousarray(faces, dtype=np.int32)),
         source_joints=skeleton.names,
     )
 
@@ -92,6 +92,12 @@ def _scales(proportions: Mapping[str, float | tuple[float, float]] | None) -> di
             )
         out[digit] = (float(long), float(thick))
     return out
+
+
+def _surface(vertices: Array, faces: NDArray[np.int32]) -> Surface:
+    """The surface as it is: no two vertices are at one place, so there is nothing to weld."""
+    whole = Part("hand", slice(0, len(vertices)), slice(0, len(faces)))
+    return Surface(vertices, faces, np.arange(len(vertices), dtype=np.int32), faces, parts=(whole,))
 
 
 def _skeleton(plan: Plan) -> Skeleton:

@@ -37,8 +37,8 @@ _CAP = 19.0  # length over which the slab closes towards the webs
 _STUB = (-52.0, -42.0)  # end of the forearm, and where its rounding begins
 # lumps of the palmar and of the dorsal face: radial and distal place, their spreads, height
 _PADS = (
-    (-26.0, 16.0, 12.0, 13.0, -5.0),  # hypothenar: heel
-    (-29.0, 38.0, 11.0, 19.0, -4.5),  # and edge of the hand
+    (-25.0, 17.0, 14.0, 14.0, -4.0),  # hypothenar: heel
+    (-28.0, 42.0, 13.0, 23.0, -4.5),  # and edge of the hand
     (14.0, 19.0, 13.0, 14.0, -6.5),  # thenar
     (-5.0, 60.0, 17.0, 19.0, 3.0),  # hollow
 )

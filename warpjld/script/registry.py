@@ -25,11 +25,25 @@ if TYPE_CHECKING:
     from warpjld.script.arguments import Arguments
     from warpjld.script.scene import Scene
 
-__all__ = ["GROUPS", "Command", "Registry", "all_commands", "command", "commands_table"]
+__all__ = ["GROUPS", "NOTES", "RESERVED", "Command", "Registry", "all_commands", "command", "commands_table"]
 
 ENTRY_POINTS = "warpjld.commands"
 GROUPS = ("Actors", "Animation", "Grasping", "Covering", "Output", "Flow")
 """Headings of our own commands, in the order in which the table of commands prints them."""
+
+NOTES = {
+    "Animation": (
+        "`<key1> <key2> <step> <degrees>` sets the angle at key1, key1 + step, … up to key2; "
+        "`AT <key> <degrees>` in its place sets a single key. "
+        "The words of a command may stand in any order before its numbers."
+    ),
+    "Flow": (
+        "`MACRO <name> <parameter> … END` around lines makes a command of them; inside, `$parameter` stands for what "
+        "the call gives, also in quoted texts. Numbers may be arithmetic in parentheses: `($start + 2 * 5)`. "
+        "`#` begins a comment. Capitals and small letters are the same."
+    ),
+}
+"""What the tables of commands say about a group beside its commands."""
 
 RESERVED = (
     *("MACRO", "END"),
@@ -153,7 +167,9 @@ def commands_table(chosen: Iterable[Command] | None = None) -> str:
     for group in dict.fromkeys((*GROUPS, *(c.group for c in everything))):
         members = [c for c in everything if c.group == group]
         if members:
-            rows += [f"**{group}**", "", "| command | what it does |", "|---|---|"]
+            rows += [f"**{group}**", ""]
+            rows += [NOTES[group], ""] if group in NOTES else []
+            rows += ["| command | what it does |", "|---|---|"]
             rows += [f"| `{_cell(c.syntax)}` | {_cell(c.help)} |" for c in members]
             rows.append("")
     return "\n".join(rows)

@@ -79,4 +79,7 @@ def parameters(actor: Actor) -> str:
 def commands(chosen: Iterable[Command]) -> str:
     """One line per command."""
     listed = sorted(chosen, key=lambda c: c.name)
-    return "\n".join(f"{c.name:<12} {c.help}" for c in listed) + "\nHELP <command> shows how one is written."
+    return "\n".join(f"{c.name:<12} {c.help}" for c in listed) + (
+        "\nMACRO        Makes a command of the lines up to END: MACRO <name> <parameter> …"
+        "\nHELP <command> shows how one is written."
+    )

@@ -22,9 +22,7 @@ def test_one_numbered_file_a_frame(export: Callable[[str], Cache], surface: Surf
         np.testing.assert_allclose(mesh.visual.uv, surface.uv, atol=1e-7)
 
 
-def test_refuses_to_mix_with_another_sequence(
-    export: Callable[[str], Cache], surface: Surface, tmp_path: Path
-) -> None:
+def test_refuses_to_mix_with_another_sequence(export: Callable[[str], Cache], surface: Surface, tmp_path: Path) -> None:
     files = export("walk.obj").files
     with (
         pytest.raises(InputError, match=r"walk\.0003\.obj.*of another sequence"),

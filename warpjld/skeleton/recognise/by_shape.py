@@ -12,12 +12,10 @@ __all__ = ["roles_by_shape"]
 
 
 def roles_by_shape(tree: SourceTree) -> Roles:
-    """One hand, or a body with two; empty for anything else. A flat file is first chained by its bone axes."""
+    """Hands, or a body with two; empty for anything else. A flat file is first chained by its bone axes."""
     if tree.flat:
         tree = reconnect(tree)
     hands = [hand_by_shape(tree, wrist) for wrist in hand_roots(tree)]
-    if len(hands) == 2:
+    if len(hands) == 2 and set(tree.ancestors(hands[0]["wrist"])) & set(tree.ancestors(hands[1]["wrist"])):
         return body_by_shape(tree, hands)
-    if len(hands) == 1:
-        return Roles(hands=[HandRoles(None, hands[0])], how="shape")
-    return Roles(how="shape")
+    return Roles(hands=[HandRoles(None, hand) for hand in hands], how="shape")

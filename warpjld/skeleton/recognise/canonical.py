@@ -25,6 +25,7 @@ from warpjld.skeleton.tree import CHANNELS, Skeleton
 
 __all__ = ["Canonical", "canonical_skeleton"]
 
+_STRAIGHT = np.sin(np.radians(10.0))
 _SURE = 0.15  # chirality from which rest pose and thumb tell left from right
 
 
@@ -67,6 +68,7 @@ def canonical_skeleton(
     roles = recognise(tree)
     notes: list[str] = []
     hand_points: dict[str, dict[str, NDArray[np.float64]]] = {}
+    _release_partial_hands(roles, side)
     for hand in roles.hands:
         found = {name: tree.positions[j] for name, j in hand.joints.items()}
         hand.side = _side(hand, found, side if len(roles.hands) == 1 else None, notes)
@@ -83,6 +85,16 @@ def canonical_skeleton(
         _extremities(layout, vertices, faces)
     skeleton = _skeleton(layout, roles, hand_points, axes or {}, limits or {})
     return Canonical(skeleton, tuple(layout.sources), layout.owner, (*notes, *layout.notes))
+
+
+def _release_partial_hands(roles: Roles, side: str | None) -> None:
+    """A few fingers without index and pinky span no palm: their joints stay as they are, in canonical names."""
+    for hand in [h for h in roles.hands if not {"index.base", "pinky.base", "index.knuckle2"} <= set(h.joints)]:
+        roles.hands.remove(hand)
+        prefix = f"{side or hand.side}." if side or hand.side else ""
+        roles.body |= {prefix + name: joint for name, joint in hand.joints.items()}
+        digits = sorted({name.partition(".")[0] for name in hand.joints} - {"wrist"})
+        roles.notes.append(f"{', '.join(digits)}: part of a hand only, nothing was added")
 
 
 def _side(hand: HandRoles, points: Mapping[str, NDArray[np.float64]], given: str | None, notes: list[str]) -> str:
@@ -151,8 +163,10 @@ def _skeleton(
     axes = np.empty((count, 3))
     for j, name in enumerate(layout.names):
         source = layout.sources[j]
-        axis = given_axes.get(source, found.get(name, np.array([1.0, 0.0, 0.0])))
-        axes[j] = perpendicular(axis, blank.directions[j])
+        if source in given_axes:
+            axes[j] = given_axes[source] / np.linalg.norm(given_axes[source])
+        else:
+            axes[j] = perpendicular(found.get(name, _bend(blank, j)), blank.directions[j])
         for channel, pair in given_limits.get(source, {}).items():
             limits[j, CHANNELS.index(channel)] = pair
     palms = tuple(
@@ -164,6 +178,13 @@ def _skeleton(
         for side in hand_points
     )
     return Skeleton(blank.names, blank.parents, blank.rest, axes, limits, palms)
+
+
+def _bend(skeleton: Skeleton, joint: int) -> NDArray[np.float64]:
+    """Axis about which a chain bends at rest; x where it is straight."""
+    parent = int(skeleton.parents[joint])
+    turn = np.cross(skeleton.directions[parent], skeleton.directions[joint]) if parent >= 0 else np.zeros(3)
+    return turn if np.linalg.norm(turn) > _STRAIGHT else np.array([1.0, 0.0, 0.0])
 
 
 def _facing(layout: Layout, number: Mapping[str, int]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:

@@ -84,7 +84,7 @@ def _extremity_name(name: str) -> str | None:
         return "head.top"
     if part == "ball":
         return f"{side}.toe.tip"
-    if part == "wrist":
+    if part == "wrist" and side:
         return f"{side}.hand.tip"
     if part.startswith("toe") and not part.endswith("tip"):
         return f"{side}.{part.partition('.')[0]}.tip"

@@ -156,8 +156,8 @@ def _fallback(name: str, named: Mapping[str, int]) -> str | None:
 
 def _one_root(above: dict[str, str | None], roles: Roles, notes: list[str]) -> None:
     roots = [name for name, parent in above.items() if parent is None]
-    if len(roots) < 2:
-        return
+    if len(roots) < 2 or all(name.endswith(".wrist") for name in roots):
+        return  # two hands without a body move on their own
     main = "pelvis" if "pelvis" in roots else next((r for r in roots if r.endswith(".wrist")), roots[0])
     for name in roots:
         if name != main:

@@ -108,7 +108,7 @@ _HELPERS = {
     "stub",
     "grip",
 }
-_FILLERS = {"finger", "fingers", "phalanx", "joint", "bone", "b", "f", "j", "def", "org", "bip", "xr", "mixamorig"}
+_FILLERS = {"finger", "fingers", "knuckle", "phalanx", "joint", "bone", "def", "org", "bip", "mixamorig"}
 _COMPOUNDS = {
     ("upper", "arm"),
     ("lower", "arm"),
@@ -179,6 +179,8 @@ def _rank(words: list[str]) -> int | None:
             return _RANKS[word]
         if word in _LETTERS and i and words[i - 1] in _DIGITS:
             return _LETTERS[word]
+        if word == "knuckle" and words[i + 1 : i + 2] in (["2"], ["3"]):
+            return int(words[i + 1])
     return None
 
 

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
-from warpjld.skeleton.recognise.section import first_hits, nearby, winding_numbers
+from warpjld.skeleton.recognise.section import first_hits, winding_numbers
 from warpjld.skeleton.tree import Skeleton
 
 __all__ = ["Finding", "check_placing"]
@@ -144,11 +144,8 @@ def _sections(
     bone, axis = skeleton.directions[joints], skeleton.axes[joints]
     normal = np.cross(bone, axis)
     rays = np.stack([normal, -normal, axis, -axis, bone], axis=1)
-    radius = 0.15 * float(np.linalg.norm(np.ptp(vertices, axis=0)))  # thicker than any limb
-    reach = np.empty(rays.shape[:2])
-    for row, j in enumerate(joints):
-        close = nearby(vertices, faces, skeleton.rest[j], radius)
-        reach[row] = first_hits(vertices, close, np.tile(skeleton.rest[j], (5, 1)), rays[row])
+    origins = np.repeat(skeleton.rest[joints], 5, axis=0)
+    reach = first_hits(vertices, faces, origins, rays.reshape(-1, 3)).reshape(-1, 5)
     out = []
     for j, (up, down, left, right, ahead) in zip(joints, reach, strict=True):
         name = skeleton.names[j]

@@ -21,11 +21,13 @@ def reconnect(tree: SourceTree) -> SourceTree:
     Every joint's bone points at the next joint of its digit, on the same axis of all frames. The joint that is
     furthest from the ends of the digits is the wrist, on which all chains hang.
     """
-    best = max((_followers(tree, sign * axis) for axis in np.eye(3) for sign in (1.0, -1.0)), key=_links)
+    ways = [_followers(tree, sign * axis) for axis in np.eye(3) for sign in (1.0, -1.0)]
+    # straight fingers can be followed both ways: outwards they spread
+    ways = [way for way in ways if _spread(tree, _ends(way)) > _spread(tree, _heads(way))]
+    best = max(ways, key=_links, default=[])
     if _links(best) < 0.6 * len(tree):
         return tree
-    ends = [j for j in range(len(tree)) if best[j] < 0]
-    heads = [j for j in range(len(tree)) if j not in best]
+    ends, heads = _ends(best), _heads(best)
     middle = tree.positions[ends].mean(axis=0)
     wrist = max(heads, key=lambda j: float(np.linalg.norm(tree.positions[j] - middle)))
     parents = np.full(len(tree), wrist)
@@ -49,6 +51,18 @@ def _followers(tree: SourceTree, axis: NDArray[np.float64]) -> list[int]:
         rivals = np.flatnonzero(after == joint)
         after[rivals[rivals != rivals[reach[rivals, joint].argmin()]]] = -1
     return [int(j) for j in after]
+
+
+def _ends(after: list[int]) -> list[int]:
+    return [j for j, following in enumerate(after) if following < 0]
+
+
+def _heads(after: list[int]) -> list[int]:
+    return [j for j in range(len(after)) if j not in after]
+
+
+def _spread(tree: SourceTree, joints: list[int]) -> float:
+    return float(np.linalg.norm(tree.positions[joints].std(axis=0))) if joints else 0.0
 
 
 def _links(after: list[int]) -> int:

@@ -30,9 +30,11 @@ class CrossSection:
 def nearby(
     vertices: NDArray[np.float64], faces: NDArray[np.int32], centre: NDArray[np.float64], radius: float
 ) -> NDArray[np.int32]:
-    """Faces with a corner within ``radius`` of ``centre``: what a hand needs of a body."""
-    close = np.linalg.norm(vertices - centre, axis=1) < radius
-    return faces[close[faces].any(axis=1)]
+    """Faces that may reach within ``radius`` of ``centre``: what a hand needs of a body."""
+    corners = vertices[faces]
+    middle = corners.mean(axis=1)
+    extent = np.linalg.norm(corners - middle[:, None], axis=2).max(axis=1)
+    return faces[np.linalg.norm(middle - centre, axis=1) < radius + extent]
 
 
 def first_hits(
@@ -41,27 +43,42 @@ def first_hits(
     origins: NDArray[np.float64],
     directions: NDArray[np.float64],
 ) -> NDArray[np.float64]:
-    """Distance along each ray to the first triangle (Möller–Trumbore), ``inf`` where there is none, shape (R,)."""
+    """Distance along each ray of unit direction to its first triangle (Möller–Trumbore), ``inf`` where there is none,
+    shape (R,)."""
     out = np.full(len(origins), np.inf)
     if not len(faces):
         return out
-    corner = vertices[faces[:, 0]]
-    edge1, edge2 = vertices[faces[:, 1]] - corner, vertices[faces[:, 2]] - corner
+    corners = vertices[faces]
+    middle = corners.mean(axis=1)
+    extent = np.linalg.norm(corners - middle[:, None], axis=2).max(axis=1) * (1 + 1e-9)
     rows = max(1, _CHUNK // len(faces))
     for start in range(0, len(origins), rows):
-        origin, direction = origins[start : start + rows, None], directions[start : start + rows, None]
-        p = np.cross(direction, edge2)
-        determinant = np.einsum("rtk,tk->rt", p, edge1)
-        with np.errstate(divide="ignore", invalid="ignore"):
-            inverse = 1.0 / determinant
-            s = origin - corner
-            u = np.einsum("rtk,rtk->rt", s, p) * inverse
-            q = np.cross(s, edge1)
-            v = np.einsum("rtk,rtk->rt", np.broadcast_to(direction, q.shape), q) * inverse
-            t = np.einsum("tk,rtk->rt", edge2, q) * inverse
-            met = (u >= -1e-9) & (v >= -1e-9) & (u + v <= 1 + 1e-9) & (t > 1e-9) & np.isfinite(t)
-        out[start : start + rows] = np.where(met, t, np.inf).min(axis=1)
+        origin, direction = origins[start : start + rows], directions[start : start + rows]
+        # only triangles whose bounding sphere a ray meets are looked at closely
+        away = middle - origin[:, None]
+        along = np.einsum("rtk,rk->rt", away, direction)
+        aside = np.einsum("rtk,rtk->rt", away, away) - along**2
+        ray, triangle = np.nonzero((aside <= extent**2) & (along >= -extent))
+        distance = _distances(corners[triangle], origin[ray], direction[ray])
+        np.minimum.at(out, start + ray, distance)
     return out
+
+
+def _distances(
+    corners: NDArray[np.float64], origin: NDArray[np.float64], direction: NDArray[np.float64]
+) -> NDArray[np.float64]:
+    """Distance of one ray to one triangle each, ``inf`` where they miss."""
+    edge1, edge2 = corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
+    p = np.cross(direction, edge2)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        inverse = 1.0 / (p * edge1).sum(axis=1)
+        s = origin - corners[:, 0]
+        u = (s * p).sum(axis=1) * inverse
+        q = np.cross(s, edge1)
+        v = (q * direction).sum(axis=1) * inverse
+        t = (q * edge2).sum(axis=1) * inverse
+        met = (u >= -1e-9) & (v >= -1e-9) & (u + v <= 1 + 1e-9) & (t > 1e-9) & np.isfinite(t)
+    return np.where(met, t, np.inf)
 
 
 def winding_numbers(
