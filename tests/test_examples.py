@@ -80,3 +80,21 @@ def test_the_main_example_whole(tmp_path) -> None:
     assert ended.value.code == 0
     made = {path.name for path in (tmp_path / "out").iterdir()}
     assert made == {"surface.npz", "film.mp4", "contact.png", "summary.json"}
+
+
+def test_methods_are_compared(data: Path, tmp_path: Path) -> None:
+    from warpjld.covering import default_parameters, save_parameters
+    from warpjld.io import load_rig
+
+    rig = data / "hand_webxr_generic" / "left.glb"
+    skeleton = load_rig(rig).skeleton
+    save_parameters(tmp_path / "p.json", skeleton, default_parameters(skeleton))
+    compare = runpy.run_path(str(EXAMPLES / "compare_methods.py"))["main"]
+    text = compare([str(rig), "-o", str(tmp_path), "--parameters", str(tmp_path / "p.json"), "--tables-only"])
+    rows = [[cell.strip() for cell in line.split("|")[1:-1]] for line in text.splitlines()[2:]]
+    assert len(rows) == 6 * 4
+    assert {row[1] for row in rows} == {"LBS", "DQS", "JLD default", "JLD calibrated"}
+    folded = {(row[0], row[1]): int(row[4]) for row in rows}
+    for pose in {row[0] for row in rows}:
+        assert folded[pose, "JLD default"] <= min(folded[pose, "LBS"], folded[pose, "DQS"])
+    assert (tmp_path / "table.md").read_text(encoding="utf-8").strip() == text

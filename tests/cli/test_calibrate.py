@@ -46,7 +46,7 @@ def test_a_table_for_people(hand: Path, tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
-        (["builtin:middle"], "there are builtin:left and builtin:right"),
+        (["builtin:middle"], "want builtin:left or builtin:right"),
         (["missing.glb"], "no such file"),
         (["builtin:left", "-o", "nowhere/at/all.json"], "no such folder"),
     ],

@@ -31,7 +31,7 @@ class Pose:
     @staticmethod
     def of(skeleton: Skeleton, poses: Poses, frame: int) -> Pose:
         turns = Rotation.from_quat(poses.rotations[frame]).as_matrix()
-        largest = skeleton.limits[:, CHANNELS.index("flexion"), 1]
+        largest = np.where(skeleton.parents >= 0, skeleton.limits[:, CHANNELS.index("flexion"), 1], 0.0)
         ratio = [
             min(max(flexion / limit, 0.0), 1.0) if limit > 1e-6 else 0.0
             for flexion, limit in zip(poses.flexion[frame], largest, strict=True)

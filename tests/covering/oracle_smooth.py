@@ -14,7 +14,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from warpjld.covering import Covering, Parameters
-from warpjld.covering.binding import FLOOR, SIDE_BAND
+from warpjld.covering.binding import FLOOR, LATERAL, SIDE_BAND
 from warpjld.skeleton import CHANNELS, Poses, Skeleton
 
 STATIONS = np.linspace(0.0, 1.0, 5)  # where along a palm pair its scale factor is evaluated
@@ -109,7 +109,7 @@ def pose_frame(
     ratio = np.zeros(len(skeleton))
     for j in range(len(skeleton)):
         largest = skeleton.limits[j, CHANNELS.index("flexion"), 1]
-        if largest > 1e-6:
+        if skeleton.parents[j] >= 0 and largest > 1e-6:
             ratio[j] = min(max(poses.flexion[f, j] / largest, 0.0), 1.0)
     closing = np.zeros((max(len(pairs), 1), len(STATIONS)))
     for n, ((pa, da), (pb, db)) in enumerate(pairs):
@@ -137,8 +137,8 @@ def evaluate(place: Place, frame: Frame, parameters: Parameters, rest_joints: np
         external = in_p * frame.halfway[p] + (1 - in_p - in_d) * frame.rotations[p] + in_d * frame.halfway[d]
         internal = (1 - t) * frame.halfway[p] + t * frame.halfway[d]
         blend += o.weight * (o.side * external + (1 - o.side) * internal)
-        rounding = parameters.inflation[p] * in_p * frame.ratio[p] + parameters.inflation[d] * in_d * frame.ratio[d]
-        grow += o.weight * o.side * rounding
+        for j, area in ((p, in_p), (d, in_d)):
+            grow += o.weight * o.side * parameters.inflation[j] * area**2 * (3 - 2 * area) * frame.ratio[j]
         if o.muscle:
             driven = (frame.ratio[p] + frame.ratio[d]) / 2
             profile = _profile(t, parameters.peak[p], *parameters.exponents[p])
@@ -199,12 +199,14 @@ def _operator(skeleton: Skeleton, p: int, d: int, muscle: bool, weight: float, v
     ratio = _ratio(skeleton, p, d, vertex)
     offset = vertex - ((1 - ratio) * skeleton.rest[p] + ratio * skeleton.rest[d])
     t = min(max(ratio, 0.0), 1.0)
-    normal = (1 - t) * _normal(skeleton, p, d, p, d) + t * _normal(skeleton, p, d, d, p)
-    normal /= np.linalg.norm(normal)
-    height = offset @ normal
-    cosine = height / np.linalg.norm(offset)
-    x = min(max((cosine + SIDE_BAND) / (2 * SIDE_BAND), 0.0), 1.0)
-    return Operator(p, d, muscle, weight, ratio, 3 * x**2 - 2 * x**3, height * normal)
+    side, height = 0.0, np.zeros(3)
+    for share, joint, other in ((1 - t, p, d), (t, d, p)):
+        normal = _normal(skeleton, p, d, joint, other)
+        cosine = offset @ normal / np.linalg.norm(offset)
+        x = min(max((cosine + SIDE_BAND) / (2 * SIDE_BAND), 0.0), 1.0)
+        side += share * (3 * x**2 - 2 * x**3)
+        height += share * (offset @ normal) * normal
+    return Operator(p, d, muscle, weight, ratio, side, height)
 
 
 def _normal(skeleton: Skeleton, p: int, d: int, joint: int, other: int) -> np.ndarray:
@@ -230,18 +232,20 @@ def _ratio(skeleton: Skeleton, p: int, d: int, vertex: np.ndarray) -> float:
 def _shares(
     skeleton: Skeleton, segments: list[tuple[int, int]], vertex: np.ndarray, parameters: Parameters
 ) -> list[float]:
+    """R of every virtual segment, remapped by the proximities; their sum lies between the two that hold the vertex."""
     ratios = [_ratio(skeleton, p, d, vertex) for p, d in segments]
-    feet = [(1 - t) * skeleton.rest[p] + t * skeleton.rest[d] for (p, d), t in zip(segments, ratios, strict=True)]
-    widths = []
-    for (p, d), ratio in zip(segments, ratios, strict=True):
-        t = min(max(ratio, 0.0), 1.0)
-        widths.append((1 - t) * parameters.proximity[p, 0] + t * parameters.proximity[d, 1])
-    lateral = []  # R on every virtual segment: 0 in the columns 1-4-7, 1 in 3-6-9
+    longest = max(np.linalg.norm(skeleton.rest[d] - skeleton.rest[p]) for p, d in segments)
+    passed = 0.0
     for k in range(len(segments) - 1):
-        virtual = feet[k + 1] - feet[k]
-        r = (vertex - feet[k]) @ virtual / (virtual @ virtual) if np.linalg.norm(virtual) > 1e-9 else 0.0
-        lateral.append(min(max((r - 0.9 * widths[k]) / max(1 - 0.9 * (widths[k] + widths[k + 1]), 0.1), 0.0), 1.0))
-    held = [
-        min(lateral[k - 1] if k else 1.0, 1 - lateral[k] if k < len(lateral) else 1.0) for k in range(len(segments))
-    ]
-    return [h / sum(held) for h in held]
+        at = ratios[k : k + 2]
+        if np.linalg.norm(skeleton.rest[segments[k][0]] - skeleton.rest[segments[k + 1][0]]) < 1e-3 * longest:
+            at = [max(min(max(t, 0.0), 1.0) for t in ratios)] * 2
+        feet, widths = [], []
+        for (p, d), t in zip(segments[k : k + 2], at, strict=True):
+            feet.append((1 - t) * skeleton.rest[p] + t * skeleton.rest[d])
+            inner = min(max(t, 0.0), 1.0)
+            widths.append(LATERAL * ((1 - inner) * parameters.proximity[p, 0] + inner * parameters.proximity[d, 1]))
+        virtual = feet[1] - feet[0]
+        r = (vertex - feet[0]) @ virtual / (virtual @ virtual) if np.linalg.norm(virtual) > 1e-9 else 0.0
+        passed += min(max((r - widths[0]) / max(1 - sum(widths), 0.1), 0.0), 1.0)
+    return [max(1 - abs(passed - k), 0.0) for k in range(len(segments))]

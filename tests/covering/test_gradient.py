@@ -13,8 +13,8 @@ from warpjld.covering import Covering, Parameters
 from warpjld.covering.gradient import Differentiable
 from warpjld.errors import InputError
 
-RELATIVE = 2e-5  # float32 sums over the vertices and frames below
-STEP = 1e-6  # of the differences, in float64
+RELATIVE = 1e-4  # float32: sums of opposite signs over some 200 vertices and frames lose two or three digits
+STEP = 1e-5  # of the differences, in float64: rounding 1e-10, truncation below that
 
 POSE = {
     "positions": "positions",
@@ -26,13 +26,13 @@ POSE = {
 
 
 class Case:
-    """Twelve vertices of every operator, two poses, a random adjoint and the oracle's value of their product."""
+    """Six vertices of every operator, two poses, a random adjoint and the oracle's value of their product."""
 
     def __init__(self, covering: Covering) -> None:
         rng = np.random.default_rng(4)
         strongest = covering.domains.argmax(axis=1)
         pools = [np.flatnonzero(strongest == f) for f in range(len(covering.fans))]
-        self.vertices = np.concatenate([rng.choice(p, min(len(p), 12), replace=False) for p in pools if len(p)])
+        self.vertices = np.concatenate([rng.choice(p, min(len(p), 6), replace=False) for p in pools if len(p)])
         self.covering = covering
         self.poses = random_poses(covering.skeleton, 2, 7)
         self.places = oracle.places(covering, self.vertices.tolist())

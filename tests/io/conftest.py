@@ -155,7 +155,7 @@ def write_glb() -> Callable[[Glb, Path], Path]:
 @pytest.fixture(scope="session")
 def built() -> dict[str, Rig]:
     """The built-in hands, coarse."""
-    return {side: build_hand(side, resolution=1000) for side in ("left", "right")}
+    return {side: build_hand(side, resolution=1500) for side in ("left", "right")}
 
 
 @pytest.fixture(scope="session")

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import json
+import struct
 from dataclasses import replace
 
 import numpy as np
@@ -187,6 +189,41 @@ def test_not_gltf_at_all(tmp_path):
     path.write_text("{]")
     with pytest.raises(InputError, match=r"not a glTF 2\.0 file"):
         load_rig(path)
+
+
+def edited(path, change):
+    """The file with its JSON changed."""
+    data = path.read_bytes()
+    size = struct.unpack_from("<I", data, 12)[0]
+    content = json.loads(data[20 : 20 + size])
+    change(content)
+    text = json.dumps(content).encode()
+    text += b" " * (-len(text) % 4)
+    rest = data[20 + size :]
+    head = struct.pack("<4sIII4s", b"glTF", 2, 20 + len(text) + len(rest), len(text), b"JSON")
+    path.write_bytes(head + text + rest)
+    return path
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        (lambda g: g["nodes"][3].update(children=[0]), "is its own ancestor|has two parents"),
+        (lambda g: g["nodes"][0].update(children=[999]), "child 999 does not exist"),
+        (lambda g: g["nodes"][0].update(rotation=[0, 0, 0, 0]), "rotation is not a quaternion"),
+        (lambda g: g["nodes"][0].update(translation=["a", 0, 0]), "is not a glTF 2.0 file|breaks the glTF schema"),
+        (lambda g: g["accessors"][0].update(count=10**7), "needs bytes up to"),
+        (lambda g: g["meshes"][0]["primitives"][0]["attributes"].update(POSITION="x"), "not a glTF|breaks the glTF"),
+        (lambda g: g["accessors"][0].update(componentType=1), "unknown type"),
+        (lambda g: g["skins"][0].update(joints=[0, 77]), "joint node 77 does not exist"),
+        (lambda g: g["bufferViews"][0].update(buffer=4), "buffer 4 does not exist"),
+        (lambda g: g["nodes"][2].update(scale=[1e300, 1e300, 1e300]), "not finite or too large"),
+        (lambda g: g.update(extensionsRequired=["KHR_draco_mesh_compression"]), "export it without compression"),
+    ],
+)
+def test_a_broken_document_is_named(write_glb, hand_glb, tmp_path, change, message):
+    with pytest.raises(InputError, match=message):
+        load_rig(edited(write_glb(hand_glb(), tmp_path / "a.glb"), change))
 
 
 def test_no_skin(write_glb, hand_glb, tmp_path):

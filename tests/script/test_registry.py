@@ -27,7 +27,7 @@ def test_a_decorator_adds_a_command(run, added) -> None:
     def snap(scene, arguments) -> None:
         key = arguments.number("the key")
         scene.say(f"snap {key:g} {arguments.keyword('LOUD')}")
-        arguments.interpreter.run_text(f"FINGER23 LEFT MIDDLE KNUCKLES2 AT {key} 60", "SNAP")
+        arguments.interpreter.run_text(f"FINGER23 LEFT MIDDLE KNUCKLES2 AT {key} 60", "<SNAP>")
 
     added.append("SNAP")
     scene = run("snap 7 loud")
@@ -35,6 +35,8 @@ def test_a_decorator_adds_a_command(run, added) -> None:
     assert scene.actor().key_frames == [7]
     with pytest.raises(InputError, match=r"1:5: expected the key here; the command is SNAP <key> \[LOUD\]"):
         run("SNAP")
+    with pytest.raises(InputError, match=r"^<script>:2:1: <SNAP>:1:\d+: flexion of left.middle.knuckle2 goes from"):
+        run("LIMIT middle.knuckle2 FLEXION 0 50\nSNAP 3")
     assert "| `SNAP <key> [LOUD]` | Snap. |" in commands_table()
 
 

@@ -87,6 +87,15 @@ def test_parameters_changed_between_runs_are_used_without_a_new_binding(run, tmp
     assert np.abs(first - second)[3].max() > 1e-4
 
 
+def test_the_method_is_the_one_chosen(run, tmp_path) -> None:
+    run_scene(run(BENT + "EXPORT 'a.npz'"), tmp_path / "1")
+    run_scene(run("METHOD PAPER"), tmp_path / "2")
+    assert json.loads((tmp_path / "2" / "summary.json").read_text())["actors"][0]["method"] == "paper"
+    first, second = (np.load(tmp_path / k / "a.npz")["vertices"] for k in "12")
+    np.testing.assert_allclose(first[0], second[0], atol=1e-5)
+    assert np.abs(first - second)[3].max() > 1e-4
+
+
 def test_a_dry_run_names_what_would_be_made_and_makes_nothing(run, tmp_path) -> None:
     summary = run_scene(run(BENT + "FILM 'a.gif'\nEXPORT 'a.obj'"), tmp_path / "out", dry=True)
     assert [file["name"] for file in summary["files"]] == ["a.gif", "a.obj"]

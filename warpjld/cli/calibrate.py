@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import signal
 from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
@@ -25,8 +26,10 @@ __all__ = ["command"]
     show_default=True,
     help="Parameter file to write.",
 )
-@click.option("--skeleton", type=click.Path(path_type=Path), help="Skeleton file of a surface without joints.")
-@click.option("--side", type=click.Choice(["left", "right"]), help="Of a hand whose file leaves it open.")
+@click.option("--skeleton", type=click.Path(path_type=Path), help="Skeleton file for a RIG without joints.")
+@click.option("--side", type=click.Choice(["left", "right"]), help="Which hand RIG is, if the file leaves it open.")
+@click.option("--unit", type=click.Choice(["m", "cm", "mm"]), help="RIG's unit; guessed by default.")
+@click.option("--up", type=click.Choice(["y", "z"]), help="RIG's up axis.")
 @click.option(
     "--start", type=click.Path(path_type=Path, dir_okay=False), help="Parameter file to begin with; else the defaults."
 )
@@ -48,6 +51,8 @@ def command(
     out: Path,
     skeleton: Path | None,
     side: str | None,
+    unit: str | None,
+    up: str | None,
     start: Path | None,
     domains: Literal["geometry", "skin"],
     poses: int | None,
@@ -60,7 +65,7 @@ def command(
     RIG is a rig file (.glb, .gltf), a surface with --skeleton, or builtin:left, builtin:right. Scripts load the file
     written with PARAMETERS. The result is never worse than the start."""
     from warpjld.cli.progress import progress, silence_warp
-    from warpjld.cli.rigs import open_rig
+    from warpjld.cli.rig_argument import open_rig
     from warpjld.covering import bind
     from warpjld.covering.calibrate import calibrate
     from warpjld.covering.parameters import load_parameters, save_parameters
@@ -68,9 +73,11 @@ def command(
     from warpjld.errors import InputError
 
     silence_warp()
+    # a polite kill cleans up as Ctrl-C does
+    signal.signal(signal.SIGTERM, signal.default_int_handler)
     if not out.absolute().parent.is_dir():
         raise InputError("cannot write the parameter file: no such folder", path=out.parent)
-    opened = open_rig(rig, skeleton=skeleton, side=side)
+    opened = open_rig(rig, skeleton=skeleton, side=side, unit=unit, up=up)
     begin = None if start is None else load_parameters(start, opened.skeleton)
     with progress(quiet) as report:
         covering = bind(opened.skeleton, opened.surface, parameters=begin, skin=opened.skin, domains=domains)

@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import json
-import sys
-from contextlib import redirect_stdout
 from pathlib import Path
 from typing import Any
 
@@ -19,18 +17,20 @@ __all__ = ["command"]
 
 
 @click.command("inspect")
-@click.argument("file", type=click.Path(path_type=Path))
-@click.option("--skeleton", type=click.Path(path_type=Path), help="Skeleton file for a surface without joints.")
-@click.option("--side", type=click.Choice(["left", "right"]), help="Which hand it is, if the file leaves it open.")
-@click.option("--unit", type=click.Choice(["m", "cm", "mm"]), help="The file's unit; guessed by default.")
-@click.option("--up", type=click.Choice(["y", "z"]), help="The file's up axis.")
-@click.option("-o", "--output", type=click.Path(path_type=Path), help="Picture to write; FILE's stem.png by default.")
+@click.argument("rig")
+@click.option("--skeleton", type=click.Path(path_type=Path), help="Skeleton file for a RIG without joints.")
+@click.option("--side", type=click.Choice(["left", "right"]), help="Which hand RIG is, if the file leaves it open.")
+@click.option("--unit", type=click.Choice(["m", "cm", "mm"]), help="RIG's unit; guessed by default.")
+@click.option("--up", type=click.Choice(["y", "z"]), help="RIG's up axis.")
+@click.option(
+    "-o", "--output", type=click.Path(path_type=Path), help="Picture to write; the rig's name.png by default."
+)
 @click.option("--no-picture", is_flag=True, help="Write no picture.")
 @click.option("--write-skeleton", type=click.Path(path_type=Path), help="Skeleton file to write, for editing.")
 @click.option("--json", "as_json", is_flag=True, help="Print the report as JSON.")
 @click.option("-q", "--quiet", is_flag=True, help="Print only what looks suspicious.")
 def command(
-    file: Path,
+    rig: str,
     skeleton: Path | None,
     side: str | None,
     unit: str | None,
@@ -41,23 +41,26 @@ def command(
     as_json: bool,
     quiet: bool,
 ) -> None:
-    """Report what was recognised in a rig: joints, domains, limits, and joints that look misplaced (R14).
+    """Report what was recognised in RIG: joints, domains, limits, and joints that look misplaced (R14).
 
-    A picture of the surface's wire-frame with the named skeleton in it is written beside, unless --no-picture.
+    RIG is a rig file (.glb, .gltf), a surface with --skeleton, or builtin:left, builtin:right. A picture of the
+    surface's wire-frame with the named skeleton in it is written beside, unless --no-picture.
     """
-    from warpjld.io import load_rig
+    from warpjld.cli.progress import silence_warp
+    from warpjld.cli.rig_argument import open_rig
 
-    rig = load_rig(file, skeleton=skeleton, side=side, unit=unit, up=up)
-    report = _report(rig)
+    silence_warp()
+    opened = open_rig(rig, skeleton=skeleton, side=side, unit=unit, up=up)
+    report = _report(opened)
     if write_skeleton is not None:
         from warpjld.io.skeleton_file import write_skeleton_file
 
-        write_skeleton_file(write_skeleton, rig.skeleton)
-    picture = None if no_picture else output or Path(f"{file.stem}.png")
+        write_skeleton_file(write_skeleton, opened.skeleton)
+    picture = None if no_picture else output or Path(f"{opened.name.replace(' ', '-')}.png")
     if picture is not None:
         from warpjld.cli.inspect_picture import draw_rig
 
-        draw_rig(rig, picture, suspicious={finding["joint"] for finding in report["placing"]})
+        draw_rig(opened, picture, suspicious={finding["joint"] for finding in report["placing"]})
         report["picture"] = str(picture)
     if as_json:
         click.echo(json.dumps(report, indent=1, ensure_ascii=False))
@@ -111,8 +114,7 @@ def _domains(rig: Rig) -> NDArray[np.int64]:
     """Vertices in the domain of each segment, counted at the joint the segment ends at, shape (J,) (R16)."""
     from warpjld.covering import bind
 
-    with redirect_stdout(sys.stderr):  # where kernels are compiled, Warp says so
-        anchors = bind(rig.skeleton, rig.surface).anchors
+    anchors = bind(rig.skeleton, rig.surface).anchors
     strongest = anchors.segment[np.arange(len(anchors)), anchors.weight.argmax(axis=1)]
     return np.bincount(anchors.ends[strongest, 1], minlength=len(rig.skeleton))
 

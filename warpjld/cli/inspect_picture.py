@@ -33,6 +33,7 @@ def draw_rig(rig: Rig, path: Path, *, suspicious: Set[str] = frozenset()) -> Non
         raise InputError("the folder does not exist", path=path)
     skeleton, surface = rig.skeleton, rig.surface
     views = _views(rig)
+    pyvista.vtk_verbosity("off")  # off-screen it complains about a missing display
     plotter = pyvista.Plotter(
         off_screen=True, shape=(1, len(views)), window_size=(1000 * len(views), 1200), border=False
     )

@@ -25,6 +25,9 @@ STATIONS = 5
 # |cosine| below which a vertex is partly external and partly internal: sections near a joint stand upright outside and
 # lean inside, and a wider band shears the sides less
 SIDE_BAND = 0.75
+# share of a proximity that counts across the palm: along a segment there is one at either end, across it one side only;
+# what lies in between then shears over a broad strip
+LATERAL = 0.6
 FLOOR = 2e-2  # weight below which an operator is dropped, faded so that nothing jumps
 
 
@@ -176,14 +179,24 @@ def _anchor_some(
     pair, pair_kept = _strongest_pairs(between)
     ratio = np.take_along_axis(t, best, axis=1)
     offset = points[:, None] - (table.start[best] + ratio[..., None] * table.along[best])
-    blend = np.clip(ratio, 0.0, 1.0)[..., None]
-    normal = (1.0 - blend) * table.normals[best, 0] + blend * table.normals[best, 1]
-    normal /= np.maximum(np.linalg.norm(normal, axis=2, keepdims=True), 1e-12)
-    height = (offset * normal).sum(axis=2)
-    cosine = height / np.maximum(np.linalg.norm(offset, axis=2), 1e-12)
-    side = _smoothstep((cosine + SIDE_BAND) / (2.0 * SIDE_BAND))
+    side, lift = _side(offset, table.normals[best], np.clip(ratio, 0.0, 1.0))
     station = np.take_along_axis(along_pair, pair, axis=1)
-    return best.astype(np.int32), kept, ratio, side, height[..., None] * normal, pair, pair_kept, station
+    return best.astype(np.int32), kept, ratio, side, lift, pair, pair_kept, station
+
+
+def _side(
+    offset: NDArray[np.float64], normals: NDArray[np.float64], place: NDArray[np.float64]
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """External side (1) or internal (0) by R45's cosine, and the y part of the offset, blended along the segment.
+
+    Judged with the normals of both joints one by one: hip and knee bend in opposite senses, and half-way along a thigh
+    an interpolated normal would vanish and turn over.
+    """
+    length = np.maximum(np.linalg.norm(offset, axis=2), 1e-12)
+    height = np.einsum("vok,voek->voe", offset, normals)
+    sides = _smoothstep((height / length[..., None] + SIDE_BAND) / (2.0 * SIDE_BAND))
+    share = np.stack([1.0 - place, place], axis=2)
+    return (share * sides).sum(axis=2), np.einsum("voe,voe,voek->vok", share, height, normals)
 
 
 def _share_in_fan(
@@ -193,28 +206,38 @@ def _share_in_fan(
     inside: slice,
     parameters: Parameters,
 ) -> NDArray[np.float64]:
-    """Weights of side-by-side segments: each holds a vertex as far as both of its virtual segments say so.
+    """Weights of side-by-side segments, of which at most two neighbours hold a vertex, shape (V, segments).
 
     R_k, the ratio on the virtual segment from segment k to k + 1, is remapped to 0 within the first's proximity and to
-    1 within the second's (areas 1-4-7, 2-5-8 and 3-6-9 of A Fig. 7). Segment k then gets min(R_{k-1}, 1 − R_k): between
-    two neighbours that is the paper's 1 − R and R; it stays continuous where the nearest segment changes, and never
-    vanishes for all segments at once.
+    1 within the second's (areas 1-4-7, 2-5-8 and 3-6-9 of A Fig. 7). The sum of all R counts the neighbours passed:
+    between two of them it gives the paper's 1 − R and R, and it stays continuous where the nearest segment changes and
+    where the virtual segments contradict each other.
+
+    Virtual segments of neighbours that begin at one joint, as in the carpus, join points at the fan's largest ratio:
+    the projections themselves would fall together at that joint and R lose its sense while other segments still differ.
     """
     start, along, ends = table.start[inside], table.along[inside], table.ends[inside]
-    ratio = t[:, inside]
-    feet = start + ratio[..., None] * along
-    virtual = feet[:, 1:] - feet[:, :-1]
-    across = ((points[:, None] - feet[:, :-1]) * virtual).sum(axis=2) / np.maximum((virtual**2).sum(axis=2), 1e-18)
-    place = np.clip(ratio, 0.0, 1.0)
-    proximal, distal = parameters.proximity[ends[:, 0], 0], parameters.proximity[ends[:, 1], 1]
-    width = (1.0 - place) * proximal + place * distal
-    margins = width[:, :-1] + width[:, 1:]
-    width = width * 0.9  # an in-between area is left even where the proximities sum to one
-    lateral = np.clip((across - width[:, :-1]) / np.maximum(1.0 - 0.9 * margins, 0.1), 0.0, 1.0)
-    before = np.concatenate([np.ones((len(points), 1)), lateral], axis=1)
-    after = np.concatenate([1.0 - lateral, np.ones((len(points), 1))], axis=1)
-    share = np.minimum(before, after)
-    out: NDArray[np.float64] = share / share.sum(axis=1, keepdims=True)
+    place = np.clip(t[:, inside], 0.0, 1.0)
+    farthest = place.max(axis=1, keepdims=True)
+    apart = np.linalg.norm(np.diff(start, axis=0), axis=1)
+    joined = apart < 1e-3 * np.linalg.norm(along, axis=1).max()
+    out = np.zeros_like(place)
+    passed = np.zeros(len(points))
+    for k in range(len(start) - 1):
+        first, second = (farthest[:, 0] if joined[k] else t[:, inside][:, n] for n in (k, k + 1))
+        foot = start[k] + first[:, None] * along[k]
+        virtual = start[k + 1] + second[:, None] * along[k + 1] - foot
+        across = ((points - foot) * virtual).sum(axis=1) / np.maximum((virtual**2).sum(axis=1), 1e-18)
+        widths = [
+            (1.0 - np.clip(r, 0.0, 1.0)) * parameters.proximity[ends[n, 0], 0]
+            + np.clip(r, 0.0, 1.0) * parameters.proximity[ends[n, 1], 1]
+            for n, r in ((k, first), (k + 1, second))
+        ]
+        # an in-between area is left even where proximities are as large as can be
+        room = np.maximum(1.0 - LATERAL * (widths[0] + widths[1]), 0.1)
+        passed += np.clip((across - LATERAL * widths[0]) / room, 0.0, 1.0)
+    for k in range(len(start)):
+        out[:, k] = np.maximum(1.0 - np.abs(passed - k), 0.0)
     return out
 
 

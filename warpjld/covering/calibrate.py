@@ -18,7 +18,7 @@ from warpjld.covering.calibration_loss import DeformationLoss, LossWeights
 from warpjld.covering.covering import Covering
 from warpjld.covering.gradient import Differentiable
 from warpjld.covering.intersections import crossing_faces, surface_parts
-from warpjld.covering.parameters import Parameters
+from warpjld.covering.parameters import Parameters, default_parameters
 from warpjld.covering.pose_sets import calibration_poses
 from warpjld.covering.quality import Stretch, edge_stretch, enclosed_volume, unique_edges
 from warpjld.errors import InputError
@@ -31,13 +31,16 @@ _ROUNDS = 3
 as fixed."""
 
 _BOUNDS = {
-    "inflation": (0.0, 1.0),
+    "inflation": (0.0, 1.0),  # and _MOST
     "proximity": (0.05, 0.5),  # two of at most one half sum to at most one (C21)
-    "muscle": (0.0, 1.5),
+    "muscle": (0.0, 1.0),  # and _MOST
     "peak": (0.1, 0.9),
     "exponents": (0.2, 3.0),
-    "palm": (0.0, 1.0),
+    "palm": (0.0, 0.5),
 }
+_MOST = 1.5
+"""Amplitudes are at most so many times those that keep a tube's volume: a joint that bends by 15° cannot make up for
+the others by a lump."""
 _SCALES = {"inflation": 0.25, "proximity": 0.15, "muscle": 0.25, "peak": 0.2, "exponents": 0.5, "palm": 0.2}
 _REGULARISER = 5e-3  # of the mean square of the change, in scales
 _SETTLED = 1e-3  # relative gain of a round below which the next is not tried
@@ -135,7 +138,7 @@ def calibrate(
         raise InputError("poses: want at least one to calibrate on")
     started = time.perf_counter()
     loss = DeformationLoss(covering.surface, weights)
-    variables = _Variables(covering.parameters)
+    variables = _Variables(covering.parameters, default_parameters(covering.skeleton))
     before = pose_quality(covering, poses, loss)
     best, best_quality, best_x = covering.parameters, before, variables.start
     done = evaluations = 0
@@ -210,11 +213,16 @@ def pose_quality(covering: Covering, poses: Poses, loss: DeformationLoss | None 
 class _Variables:
     """All parameters as one vector of numbers near 1: value / scale."""
 
-    def __init__(self, start: Parameters) -> None:
+    def __init__(self, start: Parameters, defaults: Parameters) -> None:
         self._shapes = {f.name: getattr(start, f.name).shape for f in fields(Parameters)}
         self._scale = np.concatenate([np.full(np.prod(s), _SCALES[n]) for n, s in self._shapes.items()])
         values = np.concatenate([getattr(start, n).ravel() for n in self._shapes])
         limits = np.concatenate([np.tile(_BOUNDS[n], (int(np.prod(s)), 1)) for n, s in self._shapes.items()])
+        for name in ("inflation", "muscle"):
+            rows = np.flatnonzero(
+                np.concatenate([np.full(int(np.prod(s)), n == name) for n, s in self._shapes.items()])
+            )
+            limits[rows, 1] = np.minimum(limits[rows, 1], _MOST * getattr(defaults, name))
         # a start outside the bounds stays where it is: what the animator chose is not taken back
         low, high = np.minimum(limits[:, 0], values), np.maximum(limits[:, 1], values)
         self.start: NDArray[np.float64] = values / self._scale

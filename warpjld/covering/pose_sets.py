@@ -15,8 +15,9 @@ __all__ = ["CURL", "calibration_poses", "curled"]
 CURL = {"base": 80.0, "knuckle2": 97.0, "knuckle3": 63.0}
 """Flexion [degrees] of a finger's joints in a full curl; the thumb takes no part."""
 
-_FLEXION = CHANNELS.index("flexion")
-_WIDEST = np.radians(100.0)  # joints of unknown kind have wide limits that no body uses in full
+_FLEXION, _ABDUCTION = CHANNELS.index("flexion"), CHANNELS.index("abduction")
+_WIDEST = np.radians(100.0)  # shoulders, hips, knees and elbows in full are poses of their own kind
+_UNKNOWN = np.radians(30.0)  # where limits are as wide one way as the other: nothing is known of the joint
 _CURLS = (0.3, 0.6, 0.9)
 
 
@@ -28,8 +29,8 @@ def curled(skeleton: Skeleton, amounts: NDArray[np.float64] | list[float] | tupl
 def calibration_poses(skeleton: Skeleton, count: int | None = None, *, seed: int = 0) -> Poses:
     """Poses over the joint ranges of a skeleton, in the order in which they matter.
 
-    Curls of 0.3, 0.6 and 0.9 first, then fists (every joint of every digit at 0.5 and 0.8 of its flexion), random
-    poses within the limits, and every joint alone at its full and half flexion.
+    Curls of 0.3, 0.6 and 0.9 first, then fists (every joint of index to pinky at 0.5 and 0.8 of its flexion) and the
+    thumb opposed and spread, random poses within the limits, and every joint alone at its full and half flexion.
 
     Args:
         skeleton: The rest skeleton.
@@ -41,7 +42,8 @@ def calibration_poses(skeleton: Skeleton, count: int | None = None, *, seed: int
     """
     if count is not None and count < 1:
         raise InputError(f"count: want at least 1 pose, got {count}")
-    largest = np.minimum(skeleton.limits[:, _FLEXION, 1], _WIDEST)
+    low, high = np.moveaxis(skeleton.limits[:, _FLEXION], -1, 0)
+    largest = np.minimum(high, np.where(low <= -high, _UNKNOWN, _WIDEST))
     inner = (skeleton.parents >= 0) & np.array([bool(c) for c in skeleton.children])
     bends = np.flatnonzero(inner & (largest > 1e-6))
     if not bends.size:
@@ -75,17 +77,17 @@ def _curls(skeleton: Skeleton, amounts: NDArray[np.float64] | list[float] | tupl
 
 
 def _fists(skeleton: Skeleton, bends: NDArray[np.int64], largest: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Metacarpals, fingers and thumb together, half and nearly closed; the thumb opposed in the second."""
-    joints = [j for j in bends if _digit(skeleton.names[j])]
-    if not joints:
-        return np.zeros((0, len(skeleton), len(CHANNELS)))
-    angles = np.zeros((2, len(skeleton), len(CHANNELS)))
+    """Metacarpals and fingers half and nearly closed; then thumbs opposed and spread, by themselves: their large roots
+    lose what no parameter gives back, and fingers must not make up for them."""
+    fingers = [j for j in bends if _digit(skeleton.names[j]) in DIGITS[:-1]]
+    roots = [j for j in bends if skeleton.names[j].endswith("thumb.base")]
+    angles = np.zeros((4, len(skeleton), len(CHANNELS)))
     for frame, amount in enumerate((0.5, 0.8)):
-        angles[frame, joints, _FLEXION] = amount * largest[joints]
-    for j in joints:
-        if skeleton.names[j].endswith("thumb.base"):
-            angles[1, j, CHANNELS.index("abduction")] = 0.5 * skeleton.limits[j, CHANNELS.index("abduction"), 0]
-    return angles
+        angles[frame, fingers, _FLEXION] = amount * largest[fingers]
+    for frame, end in ((2, 0), (3, 1)):
+        angles[frame, roots, _ABDUCTION] = 0.5 * skeleton.limits[roots, _ABDUCTION, end]
+    angles[2, roots, _FLEXION] = largest[roots]
+    return angles[[bool(fingers)] * 2 + [bool(roots)] * 2]
 
 
 def _random(
@@ -95,9 +97,8 @@ def _random(
     generator = np.random.default_rng(seed)
     angles = np.zeros((frames, len(skeleton), len(CHANNELS)))
     angles[:, bends, _FLEXION] = generator.uniform(0.0, 1.0, (frames, len(bends))) * largest[bends]
-    side = CHANNELS.index("abduction")
-    low, high = (np.clip(skeleton.limits[bends, side, k], -_WIDEST / 4, _WIDEST / 4) for k in (0, 1))
-    angles[:, bends, side] = generator.uniform(0.5 * low, 0.5 * high, (frames, len(bends)))
+    low, high = (np.clip(skeleton.limits[bends, _ABDUCTION, k], -_WIDEST / 4, _WIDEST / 4) for k in (0, 1))
+    angles[:, bends, _ABDUCTION] = generator.uniform(0.5 * low, 0.5 * high, (frames, len(bends)))
     return angles
 
 

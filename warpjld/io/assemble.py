@@ -14,6 +14,8 @@ from warpjld.surface import Surface, weld_surface
 
 __all__ = ["assemble_rig"]
 
+_FURTHEST = 1e12
+
 
 def assemble_rig(source: SourceRig, *, side: str | None = None, unit: str | None = None, up: str | None = None) -> Rig:
     """Recognise what ``source`` holds and bring it to the canonical form; arguments as in ``load_rig``."""
@@ -26,6 +28,9 @@ def assemble_rig(source: SourceRig, *, side: str | None = None, unit: str | None
 
 
 def _assemble(source: SourceRig, side: str | None, unit: str | None, up: str | None) -> Rig:
+    reach = max(np.abs(source.vertices).max(initial=0.0), np.abs(source.tree.frames).max(initial=0.0))
+    if not reach < _FURTHEST:
+        raise InputError(f"vertices or joints lie at {reach:.3g}: beyond anything that can be computed with")
     source = place(source, unit=unit, up=up)
     surface = weld_surface(source.vertices, source.faces, uv=source.uv, parts=source.parts)
     found = canonical_skeleton(

@@ -2,22 +2,14 @@
 
 from __future__ import annotations
 
-import inspect
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from warpjld.script.scene import Actor
 
 if TYPE_CHECKING:
     from warpjld.covering import Covering
 
-__all__ = ["cover", "has_paper_method"]
-
-
-def has_paper_method() -> bool:
-    """Whether the covering knows the method as published beside the smooth one."""
-    from warpjld.covering import bind
-
-    return "method" in inspect.signature(bind).parameters
+__all__ = ["cover"]
 
 
 def cover(actor: Actor) -> Covering:
@@ -30,9 +22,13 @@ def cover(actor: Actor) -> Covering:
             actor.covering = old.with_parameters(actor.parameters)
     else:
         rig = actor.rig
-        method: dict[str, Any] = {} if actor.method == "smooth" else {"method": actor.method}
         actor.covering = bind(
-            actor.skeleton, rig.surface, parameters=actor.parameters, skin=rig.skin, domains=actor.domains, **method
+            actor.skeleton,
+            rig.surface,
+            parameters=actor.parameters,
+            skin=rig.skin,
+            domains=actor.domains,
+            method=actor.method,
         )
         actor.covered = (actor.method, actor.domains)
     assert actor.covering is not None

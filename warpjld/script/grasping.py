@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from warpjld.script.props import Prop
     from warpjld.script.scene import Actor, Scene
 
-__all__ = ["Attempt", "close_digits", "contact_reports", "placed_at", "posture", "search_flexion"]
+__all__ = ["Attempt", "close_digits", "contact_reports", "grasp_by_itself", "placed_at", "posture", "search_flexion"]
 
 
 @dataclass(frozen=True)
@@ -135,6 +135,56 @@ def close_digits(
     status = "INSIDE" if begun else ("CONVERGED" if touching.any() else "NO_CONTACT")
     values = {"digits": rows, "penetration_mm": round(1e3 * inside.deepest, 4)}
     return Attempt(f"GRASP {prop.name}", last, actor.name, prop.name, status, message, values)
+
+
+def grasp_by_itself(
+    scene: Scene, actor: Actor, prop: Prop, side: str, first: float, last: float, tries: int, posture_name: str | None
+) -> Attempt:
+    """Find a grasp, and set keys: the open hand away from the object at ``first``, on it half-way, closed at ``last``.
+
+    Raises:
+        InputError: Nothing was found; another object is in the way is not looked at.
+    """
+    from scipy.spatial.transform import Rotation
+
+    from warpjld.grasp.auto import find_grasp
+    from warpjld.grasp.intersection import intersection
+    from warpjld.motion import Key
+    from warpjld.skeleton import CHANNELS
+
+    if actor.recorded is not None:
+        raise InputError(f"actor {actor.name} is driven by a MOTION file: no angle can be searched")
+    covering = cover(actor)
+    thing = placed_at(scene, prop, last)
+    found = find_grasp(covering, thing, side=side, count=tries, posture=posture_name)
+    middle, away = (first + last) / 2.0, found.position - 0.12 * found.approach
+    turn = Rotation.from_quat(found.rotation).as_euler("xyz")
+    spline = asdict(scene.spline)
+    for k, axis in enumerate("xyz"):
+        for key, value in ((first, away[k]), (middle, found.position[k]), (last, found.position[k])):
+            actor.placement.set_key(f"move.{axis}", Key(key, float(value), **spline))
+        for key in (first, middle, last):
+            actor.placement.set_key(f"turn.{axis}", Key(key, float(turn[k]), **spline))
+    grip = {}
+    changed = np.argwhere((found.start != 0.0) | (found.angles != 0.0))
+    for joint, column in changed.tolist():
+        channel = f"{actor.skeleton.names[joint]}.{CHANNELS[column]}"
+        start, closed = float(found.start[joint, column]), float(found.angles[joint, column])
+        grip[channel] = start
+        actor.set_keys(channel, [first, middle], start, scene.spline)
+        actor.set_keys(channel, [last], closed, scene.spline)
+    scene.grips[actor.name] = scene.grips.get(actor.name, {}) | grip
+    inside = intersection(covering, covering.deform(stage(actor, np.array([last]), scene.rate))[0], thing)
+    message = (
+        f"the best of {found.tried} placements, posture {found.posture}: {len(found.touching)} digits touch; {inside}"
+    )
+    values = {
+        "posture": found.posture,
+        "score": round(found.score, 4),
+        "digits": list(found.touching),
+        "penetration_mm": round(1e3 * inside.deepest, 4),
+    }
+    return Attempt(f"GRASP {prop.name} AUTO", last, actor.name, prop.name, "CONVERGED", message, values)
 
 
 def contact_reports(scene: Scene, crowd: Crowd) -> list[dict[str, Any]]:

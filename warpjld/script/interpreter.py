@@ -194,7 +194,9 @@ def _placed(command: Command, position: Position) -> Iterator[None]:
     try:
         yield
     except InputError as error:
-        if error.line is not None and error.column is not None:
+        # a line that a user's command made up is no place its author could look at
+        made_up = str(error.path).startswith("<") and str(error.path) != position.path
+        if error.line is not None and error.column is not None and not made_up:
             raise
         raise position.error(str(error)) from error
     except WarpjldError:

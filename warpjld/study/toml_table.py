@@ -46,6 +46,10 @@ class TomlTable:
     def __contains__(self, key: str) -> bool:
         return key in self._content
 
+    def is_table(self, key: str) -> bool:
+        """Whether a key is there and holds a table."""
+        return isinstance(self._content.get(key), dict)
+
     @property
     def folder(self) -> Path:
         """Folder of the file, which its relative paths start from."""

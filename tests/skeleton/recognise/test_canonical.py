@@ -18,7 +18,7 @@ from warpjld.skeleton.recognise.tree import SourceTree
 
 @cache
 def coarse(side: str) -> Rig:
-    return build_hand(side, resolution=1000)
+    return build_hand(side, resolution=1500)
 
 
 def tree(names: list[str], parents: list[int], places: np.ndarray) -> SourceTree:

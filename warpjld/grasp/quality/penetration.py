@@ -45,9 +45,9 @@ def penetration(covering: Covering, vertices: NDArray[np.floating], thing: Grasp
 
         skin = max(0, −min d_O(skin vertices)),   thing = max(0, −min d_S(object vertices)),
 
-    the two halves of the vertex-based penetration depth (Zhang, Kim, Varadhan & Manocha 2007 compute the exact one): a finger
-    with few vertices does not hide the edge of a box that cuts into it. What lies between vertices on both sides only
-    the volume sees.
+    the two halves of a depth by vertices (Zhang, Kim, Varadhan & Manocha 2007 compute the exact one): a finger with
+    few vertices does not hide the edge of a box that cuts into it. What lies between the vertices of both only the
+    volume sees.
 
     Args:
         covering: The hand; its skin may be open, as at the wrist.

@@ -17,6 +17,8 @@ from warpjld.io.gltf.accessor import read_accessor
 
 __all__ = ["Document", "open_document"]
 
+_FURTHEST = 1e12
+
 
 class Document:
     """An open file: ``gltf`` is pygltflib's tree of plain objects; arrays and transforms come from the methods."""
@@ -53,6 +55,14 @@ class Document:
                 if parents[child] >= 0:
                     raise InputError(f"node '{self.name(child)}' has two parents", path=self.path)
                 parents[child] = i
+        for i in range(count):
+            above = int(parents[i])
+            for _ in range(count):
+                if above < 0:
+                    break
+                above = int(parents[above])
+            else:
+                raise InputError(f"node '{self.name(i)}' is its own ancestor", path=self.path)
         return parents
 
     @cached_property
@@ -65,16 +75,15 @@ class Document:
             node = i
             while node >= 0 and not done[node]:
                 chain.append(node)
-                if len(chain) > len(worlds):
-                    raise InputError(f"node '{self.name(i)}' is its own ancestor", path=self.path)
                 node = int(self.parents[node])
             for node in reversed(chain):
                 above = self.parents[node]
                 worlds[node] = (worlds[above] if above >= 0 else np.eye(4)) @ self.local(node)
                 done[node] = True
-        if not np.isfinite(worlds).all():
-            bad = int(np.argwhere(~np.isfinite(worlds))[0][0])
-            raise InputError(f"node '{self.name(bad)}': its transform is not finite", path=self.path)
+        sane = np.abs(worlds) < _FURTHEST
+        if not sane.all():
+            bad = int(np.argwhere(~sane)[0][0])
+            raise InputError(f"node '{self.name(bad)}': its transform is not finite or too large", path=self.path)
         return worlds
 
     def local(self, node: int) -> NDArray[np.float64]:

@@ -43,6 +43,14 @@ def read_gltf_rig(path: str | Path) -> SourceRig:
         InputError: Not glTF, no skin, or broken skin data.
     """
     document = open_document(path)
+    try:
+        return _read(document)
+    except (TypeError, AttributeError, KeyError, IndexError, ValueError, OverflowError) as error:
+        # pygltflib takes any JSON: a string where the schema wants a number shows only here
+        raise InputError(f"breaks the glTF schema: {error}", path=document.path) from error
+
+
+def _read(document: Document) -> SourceRig:
     gltf = document.gltf
     if not gltf.skins:
         raise InputError(

@@ -6,7 +6,6 @@ from dataclasses import fields, replace
 
 from warpjld.errors import InputError
 from warpjld.script.arguments import Arguments
-from warpjld.script.binding import has_paper_method
 from warpjld.script.commands.animation import SIDES
 from warpjld.script.keys import read_joint
 from warpjld.script.registry import command
@@ -66,8 +65,6 @@ def method(scene: Scene, arguments: Arguments) -> None:
     """R16."""
     actor = scene.actor()
     chosen = arguments.choice("the method", ("SMOOTH", "PAPER"))
-    if chosen == "PAPER" and not has_paper_method():
-        raise arguments.error("this version covers by METHOD SMOOTH only")
     actor.method = "paper" if chosen == "PAPER" else "smooth"
 
 

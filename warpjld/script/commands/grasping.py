@@ -151,7 +151,8 @@ def auto_f_2_3(scene: Scene, arguments: Arguments) -> None:
     "GRASP",
     syntax=(
         "GRASP <key1> <key2> [LEFT/RIGHT] <object> [THUMB/INDEX/MIDDLE/RING/PINKY …] "
-        "[COUPLING <second joint> <third joint>]"
+        "[COUPLING <second joint> <third joint>], or GRASP <key1> <key2> [LEFT/RIGHT] <object> AUTO "
+        "[TRIES <placements>] [POSTURE <SPHERE/CYLINDER/PLATE>]"
     ),
     help="Digits close from key1 on and touch the object at key2; COUPLING bends their joints together at these rates.",
     group="Grasping",
@@ -166,6 +167,9 @@ def grasp(scene: Scene, arguments: Arguments) -> None:
         raise arguments.error(f"key2 must come after key1 ({first:g}), got {last:g}")
     side = _side(scene, arguments)
     prop = _prop(scene, arguments)
+    if arguments.keyword("AUTO"):
+        _grasp_auto(scene, arguments, side, prop, first, last)
+        return
     digits = []
     while digit := arguments.keyword(*FINGERS):
         digits.append(f"{side}.{digit.lower()}")
@@ -178,6 +182,21 @@ def grasp(scene: Scene, arguments: Arguments) -> None:
     coupling = cast("tuple[float, float] | None", options.get("coupling"))
     actor = scene.actor_with(side)
     scene.attempts.append(close_digits(scene, actor, prop, side, first, last, digits, coupling))
+
+
+def _grasp_auto(  # type: ignore[no-untyped-def]
+    scene: Scene, arguments: Arguments, side: str, prop, first: float, last: float
+) -> None:
+    from warpjld.grasp.postures import POSTURES
+    from warpjld.script.grasping import grasp_by_itself
+
+    options = arguments.options(
+        tries=lambda: arguments.integer("the number of placements to try", minimum=1, maximum=100_000),
+        posture=lambda: arguments.choice("the posture", [name.upper() for name in POSTURES]).lower(),
+    )
+    tries, posture = int(cast(int, options.get("tries", 48))), cast("str | None", options.get("posture"))
+    actor = scene.actor_with(side)
+    scene.attempts.append(grasp_by_itself(scene, actor, prop, side, first, last, tries, posture))
 
 
 @command(

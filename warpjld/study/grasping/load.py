@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import lru_cache
+from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,6 +12,7 @@ from numpy.typing import NDArray
 from warpjld.covering import Covering, bind
 from warpjld.errors import InputError
 from warpjld.grasp import GraspObject, ObjectSet
+from warpjld.grasp.postures import posture_angles
 from warpjld.rig import Rig
 from warpjld.skeleton import CHANNELS, DIGITS, Skeleton, poses_from_angles
 from warpjld.skeleton.hand import FINGER_JOINTS
@@ -18,7 +20,7 @@ from warpjld.study.grasping.choices import HandChoice, ObjectChoice
 from warpjld.study.grasping.plan import Posture
 from warpjld.study.grasping.wrist import Palm, find_palm
 
-__all__ = ["SEGMENTS", "Hand", "Thing", "hand_of", "thing_of"]
+__all__ = ["SEGMENTS", "Hand", "Opened", "Thing", "hand_of", "opened_hand", "thing_of"]
 
 SEGMENTS = (*(f"{digit}.{joint}" for digit in reversed(DIGITS) for joint in FINGER_JOINTS[:3]), "palm")
 """Parts of a hand that touch, each named after the joint it begins at; thumb first, the palm with its carpus last."""
@@ -31,17 +33,28 @@ class Hand:
     Attributes:
         rig: As built or read.
         covering: Bound.
+        side: Which hand it is.
         palm: Where its palm is.
         parts: Place in ``SEGMENTS`` of every vertex's segment, shape (V,); -1 for what is no hand.
-        opened: Joint angles that closing starts from [rad], shape (J, 4).
-        skin: Skin in that posture, the root at rest [m], shape (V, 3).
     """
 
     rig: Rig
     covering: Covering
+    side: Literal["left", "right"]
     palm: Palm
     parts: NDArray[np.int64]
-    opened: NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class Opened:
+    """A hand about to close.
+
+    Attributes:
+        angles: Joint angles [rad], shape (J, 4).
+        skin: Its skin, the root at rest [m], shape (V, 3).
+    """
+
+    angles: NDArray[np.float64]
     skin: NDArray[np.float64]
 
 
@@ -66,19 +79,38 @@ class Thing:
 
 
 @lru_cache(maxsize=4)
-def hand_of(choice: HandChoice, posture: Posture) -> Hand:
+def hand_of(choice: HandChoice) -> Hand:
     """Build or read a hand and bind it; kept for the process.
 
     Raises:
-        InputError: It cannot be used, or has no such joint, or the posture is beyond its limits.
+        InputError: It cannot be used, or is not one hand.
     """
     rig = choice.load()
+    sides: list[Literal["left", "right"]] = ["left", "right"]
+    sides = [side for side in sides if f"{side}.middle.base" in rig.skeleton.names]
+    if len(sides) != 1:
+        raise InputError(f"hand {choice.name}: want a rig of one hand, this one has {len(sides)}", path=rig.path)
     covering = bind(rig.skeleton, rig.surface, skin=rig.skin)
     segment = np.array([_segment(fan.name) for fan in covering.fans])
     parts = segment[covering.domains.argmax(axis=1)]
-    opened = _angles(rig.skeleton, posture, choice.name)
-    skin = covering.deform(poses_from_angles(rig.skeleton, opened[None]), threads=1)[0].astype(np.float64)
-    return Hand(rig, covering, find_palm(rig.skeleton, rig.surface.vertices), parts, opened, skin)
+    return Hand(rig, covering, sides[0], find_palm(rig.skeleton, rig.surface.vertices), parts)
+
+
+@lru_cache(maxsize=32)
+def opened_hand(choice: HandChoice, posture: Posture) -> Opened:
+    """A hand in the posture closing starts from; kept for the process.
+
+    Raises:
+        InputError: A posture beyond the joints' limits.
+    """
+    hand = hand_of(choice)
+    skeleton = hand.rig.skeleton
+    if isinstance(posture, str):
+        angles = posture_angles(skeleton, hand.side, posture)
+    else:
+        angles = _angles(skeleton, posture, choice.name)
+    skin = hand.covering.deform(poses_from_angles(skeleton, angles[None]), threads=1)[0]
+    return Opened(angles, skin.astype(np.float64))
 
 
 def _segment(fan: str) -> int:
@@ -89,7 +121,7 @@ def _segment(fan: str) -> int:
     return SEGMENTS.index("palm") if name in ("carpus", "wrist") or name.endswith(".carpometacarpal") else -1
 
 
-def _angles(skeleton: Skeleton, posture: Posture, name: str) -> NDArray[np.float64]:
+def _angles(skeleton: Skeleton, posture: tuple[tuple[str, str, float], ...], name: str) -> NDArray[np.float64]:
     angles = np.zeros((len(skeleton), len(CHANNELS)))
     for joint, channel, degrees in posture:
         j, k = skeleton.index(joint), CHANNELS.index(channel)

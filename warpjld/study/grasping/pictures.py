@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Literal
 
 import numpy as np
 from scipy.spatial.transform import Rotation
@@ -44,14 +43,13 @@ def draw_grasp(hand: Hand, body: GraspObject, trial: int, outcome: Outcome, fold
     vertices = hand.covering.deform(poses)[0]
     turn = Rotation.from_quat(pose["root_rotation"][0])
     axes = {"forward": turn.apply(hand.palm.normal), "up": turn.apply(hand.palm.fingers)}
-    side: Literal["left", "right"] = "left" if "left.wrist" in skeleton.names else "right"
     cloud = np.concatenate([vertices, body.vertices])
     rows = []
     for opacity in (1.0, 0.3):
         solid = Solid(body.vertices, body.faces, opacity=opacity)
         row = []
         for view in _VIEWS:
-            camera = Camera.view(view, cloud, **axes, side=side, size=_SIZE)
+            camera = Camera.view(view, cloud, **axes, side=hand.side, size=_SIZE)
             with Scene(faces, camera, size=_SIZE, solids=[solid]) as scene:
                 row.append(scene.draw(vertices))
         rows.append(row)

@@ -28,6 +28,8 @@ class WristRange:
         tilt: Angle between the palm's normal and the direction of approach [°].
         gap: Distance from palm to object along the approach [m].
         offset: How far beside the object's centre the palm aims, as a share of the object's half extent.
+        best_of: 0 draws one placement from these ranges; n takes the best of n as `warpjld.grasp.auto.find_grasp` (the
+            script's GRASP … AUTO) finds it, and the ranges say nothing.
     """
 
     elevation: tuple[float, float] = (-90.0, 90.0)
@@ -36,20 +38,11 @@ class WristRange:
     tilt: tuple[float, float] = (0.0, 20.0)
     gap: tuple[float, float] = (0.0, 0.02)
     offset: tuple[float, float] = (0.0, 0.3)
+    best_of: int = 0
 
 
-Posture = tuple[tuple[str, str, float], ...]
-"""Joint without side, channel, and angle [°]."""
-
-OPEN: Posture = (
-    ("index.base", "abduction", 10.0),
-    ("ring.base", "abduction", -8.0),
-    ("pinky.base", "abduction", -18.0),
-    ("thumb.base", "pivot", 30.0),
-    ("thumb.base", "abduction", 20.0),
-    ("thumb.base", "flexion", -10.0),
-)
-"""The open hand, fingers spread and the thumb against them: where closing starts from if a plan says nothing."""
+Posture = str | tuple[tuple[str, str, float], ...]
+"""Name of a posture, "auto" for one that suits the object's shape; or joints without side, channels, and angles [°]."""
 
 
 @dataclass(frozen=True)
@@ -97,6 +90,7 @@ class GraspPlan:
     frictions: tuple[float, ...]
     digits: tuple[str, ...]
     posture: Posture
+    coupling: tuple[float, float]
     wrist: WristRange
     measuring: Measuring
 
@@ -133,11 +127,14 @@ def load_plan(path: str | Path) -> GraspPlan:
         scales=top.numbers("scales", (1.0,), above=0.0, most=100.0),
         frictions=top.numbers("friction", (0.6,), above=0.0, most=10.0),
         digits=top.texts("digits", tuple(reversed(DIGITS)), known=DIGITS),
-        posture=_read_posture(top.table("posture")) if "posture" in top else OPEN,
+        posture=_read_posture(top),
+        coupling=_read_coupling(top),
         wrist=_read_wrist(top.table("wrist")),
         measuring=_read_measuring(top.table("measuring")),
     )
     top.finish()
+    if plan.wrist.best_of and (len(plan.digits) < len(DIGITS) or not isinstance(plan.posture, str)):
+        top.fail("posture" if len(plan.digits) == len(DIGITS) else "digits", "cannot be chosen with wrist.best_of")
     for kind, names in (("hands", [h.name for h in plan.hands]), ("objects", [o.name for o in plan.objects])):
         twice = [name for name in names if names.count(name) > 1]
         if twice:
@@ -145,9 +142,13 @@ def load_plan(path: str | Path) -> GraspPlan:
     return plan
 
 
-def _read_posture(table: TomlTable) -> Posture:
-    """Tables [posture."thumb.base"] of channels; degrees."""
-    joints = [name for name in HAND_PARENTS if not name.endswith(".tip")]
+def _read_posture(top: TomlTable) -> Posture:
+    """A name, or tables [posture."thumb.base"] of channels in degrees."""
+    from warpjld.grasp.postures import POSTURES
+
+    if not top.is_table("posture"):
+        return top.text("posture", "auto", known=("auto", *POSTURES)) or "auto"
+    table, joints = top.table("posture"), [name for name in HAND_PARENTS if not name.endswith(".tip")]
     found = []
     for joint in joints:
         if joint not in table:
@@ -162,6 +163,11 @@ def _read_posture(table: TomlTable) -> Posture:
     return tuple(found)
 
 
+def _read_coupling(top: TomlTable) -> tuple[float, float]:
+    second, third = top.numbers("coupling", (1.0, 0.7), least=0.0, most=10.0, count=2)
+    return second, third
+
+
 def _read_wrist(table: TomlTable) -> WristRange:
     default = WristRange()
     found = WristRange(
@@ -171,6 +177,7 @@ def _read_wrist(table: TomlTable) -> WristRange:
         tilt=_range(table, "tilt", default.tilt, 0.0, 90.0),
         gap=_range(table, "gap", default.gap, 0.0, 1.0),
         offset=_range(table, "offset", default.offset, 0.0, 1.0),
+        best_of=table.integer("best_of", default.best_of),
     )
     table.finish()
     return found

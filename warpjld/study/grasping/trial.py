@@ -10,14 +10,17 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
+from warpjld.errors import InputError
+from warpjld.grasp.auto import find_grasp
 from warpjld.grasp.close import close_hand
+from warpjld.grasp.postures import posture_for
 from warpjld.grasp.quality import Patches
-from warpjld.skeleton import Poses, poses_from_angles
+from warpjld.skeleton import poses_from_angles
 from warpjld.study.columns import Column
 from warpjld.study.experiment import Outcome
 from warpjld.study.grasping.choices import HandChoice, ObjectChoice
 from warpjld.study.grasping.columns import GRASP_COLUMNS
-from warpjld.study.grasping.load import SEGMENTS, Hand, Thing, hand_of, thing_of
+from warpjld.study.grasping.load import SEGMENTS, Hand, Thing, hand_of, opened_hand, thing_of
 from warpjld.study.grasping.measure import measure_grasp
 from warpjld.study.grasping.plan import GraspPlan
 from warpjld.study.grasping.wrist import Approach, draw_approach, place_palm, touch_along
@@ -28,6 +31,17 @@ Array = NDArray[np.float64]
 
 _CLEAR = 5e-4  # the open hand starts at least this far from the object [m]
 _BACKED_OFF = 0.25  # a palm that cannot come nearer than this is not beside the object [m]
+
+
+@dataclass(frozen=True, eq=False)
+class _Tried:
+    """A hand that has closed: angles (J, 4), displacement and rotation of its root, whether it touches, columns."""
+
+    angles: Array
+    position: Array
+    rotation: Array
+    touches: bool
+    values: dict[str, Any]
 
 
 @dataclass(frozen=True)
@@ -68,7 +82,9 @@ class GraspExperiment:
         """
         notes = []
         for choice in self.settings.hands:
-            notes += [f"{choice.name}: {note}" for note in self._hand(choice).rig.notes]
+            notes += [f"{choice.name}: {note}" for note in hand_of(choice).rig.notes]
+            if self.settings.posture != "auto":
+                opened_hand(choice, self.settings.posture)
         for wanted in self.settings.objects:
             for scale in self.settings.scales:
                 thing = self._thing(wanted, scale)
@@ -84,59 +100,88 @@ class GraspExperiment:
     def run(self, trial: int, rng: np.random.Generator) -> Outcome:
         """Place, close, measure."""
         choice, wanted, scale, friction = self.settings.combination(trial)
-        hand, thing = self._hand(choice), self._thing(wanted, scale)
+        hand, thing = hand_of(choice), self._thing(wanted, scale)
+        best_of = self.settings.wrist.best_of
+        tried = self._best_of(best_of, hand, thing, rng) if best_of else self._one(choice, thing, rng)
+        if isinstance(tried, Outcome):
+            return tried
+        poses = poses_from_angles(
+            hand.rig.skeleton,
+            tried.angles[None],
+            root_position=tried.position[None],
+            root_rotation=tried.rotation[None],
+        )
+        wrist = poses.positions[0, hand.rig.skeleton.index("wrist")]
+        placed = dict(zip(("wrist_x", "wrist_y", "wrist_z"), wrist, strict=True))
+        vertices = hand.covering.deform(poses, threads=1)[0]
+        measured, patches = measure_grasp(hand, thing, vertices, friction, self.settings.measuring)
+        kept = {"angles": tried.angles, **root, **_by_segment(patches)}
+        arrays = {f"{choice.name}/{name}": array for name, array in kept.items()}
+        return Outcome("closed" if tried.touches else "no contact", {**tried.values, **placed, **measured}, arrays)
+
+    def _one(self, choice: HandChoice, thing: Thing, rng: np.random.Generator) -> _Tried | Outcome:
+        """One placement drawn from the plan's ranges."""
+        hand = hand_of(choice)
         approach = draw_approach(self.settings.wrist, rng, thing.body.size)
-        values: dict[str, Any] = dict(zip(("approach_x", "approach_y", "approach_z"), approach.direction, strict=True))
-        values |= {"gap": approach.gap, "tilt": approach.tilt}
+        values = {**_direction(approach.direction), "gap": approach.gap, "tilt": approach.tilt}
         start = approach.aim + 4.0 * thing.radius * approach.direction
         way = touch_along(thing.objects, start, -approach.direction, 8.0 * thing.radius)
         if way is None:
             return Outcome("missed", values, message="the line of approach passes beside the object")
         turn, shift = place_palm(hand.palm, approach, start + (approach.gap - way) * approach.direction)
-        back = _room(hand, thing, turn, shift, approach)
+        posture = self.settings.posture
+        opened = opened_hand(choice, posture_for(thing.body.size) if posture == "auto" else posture)
+        back = _room(opened.skin, thing, turn, shift, approach)
         if back is None:
             return Outcome("no room", values, message="the open hand does not fit beside the object")
         values["gap"] = approach.gap + back
-        shift = shift + back * approach.direction
-
-        skeleton = hand.rig.skeleton
-        root = skeleton.rest[0]
-        position, rotation = (turn @ root + shift - root)[None], Rotation.from_matrix(turn).as_quat()[None]
-
-        def posed(angles: Array) -> Poses:
-            return poses_from_angles(skeleton, angles, root_position=position, root_rotation=rotation)
-
-        open_hand = hand.opened[None]
+        root = hand.rig.skeleton.rest[0]
+        position = turn @ root + shift + back * approach.direction - root
+        rotation = Rotation.from_matrix(turn).as_quat()
+        angles = opened.angles[None]
+        poses = poses_from_angles(hand.rig.skeleton, angles, root_position=position[None], root_rotation=rotation[None])
+        coupling = self.settings.coupling if any(self.settings.coupling) else None
         closed = close_hand(
-            hand.covering, posed(open_hand), open_hand, thing.objects, digits=self.settings.digits, threads=1
+            hand.covering, poses, angles, thing.objects, digits=self.settings.digits, coupling=coupling, threads=1
         )
-        poses = posed(closed.angles)
-        wrist = poses.positions[0, skeleton.index("wrist")]
-        values |= dict(zip(("wrist_x", "wrist_y", "wrist_z"), wrist, strict=True))
-        vertices = hand.covering.deform(poses, threads=1)[0]
-        measured, patches = measure_grasp(hand, thing, vertices, friction, self.settings.measuring)
-        values |= measured
-        pose = {"angles": closed.angles[0], "root_position": position[0], "root_rotation": rotation[0]}
-        arrays = {f"{choice.name}/{name}": array for name, array in (pose | _by_segment(patches)).items()}
-        return Outcome("closed" if closed.touching().any() else "no contact", values, arrays)
+        return _Tried(closed.angles[0], position, rotation, bool(closed.touching().any()), values)
+
+    def _best_of(self, count: int, hand: Hand, thing: Thing, rng: np.random.Generator) -> _Tried | Outcome:
+        """The best of some placements, as the script's GRASP … AUTO takes it."""
+        posture = self.settings.posture
+        assert isinstance(posture, str)
+        try:
+            found = find_grasp(
+                hand.covering,
+                thing.body,
+                count=count,
+                posture=None if posture == "auto" else posture,
+                coupling=self.settings.coupling if any(self.settings.coupling) else None,
+                seed=int(rng.integers(2**31)),
+            )
+        except InputError as error:
+            return Outcome("no grasp", message=str(error))
+        values = _direction(-found.approach)
+        return _Tried(found.angles, found.position, found.rotation, bool(found.touching), values)
 
     def pictures(self, trial: int, outcome: Outcome, folder: Path) -> list[Path]:
         """Three views of the closed hand on its object, see `draw_grasp`."""
         from warpjld.study.grasping.pictures import draw_grasp
 
         choice, wanted, scale, _ = self.settings.combination(trial)
-        return draw_grasp(self._hand(choice), self._thing(wanted, scale).body, trial, outcome, folder)
-
-    def _hand(self, choice: HandChoice) -> Hand:
-        return hand_of(choice, self.settings.posture)
+        return draw_grasp(hand_of(choice), self._thing(wanted, scale).body, trial, outcome, folder)
 
     def _thing(self, choice: ObjectChoice, scale: float) -> Thing:
         return thing_of(choice, scale, self.settings.measuring.density)
 
 
-def _room(hand: Hand, thing: Thing, turn: Array, shift: Array, approach: Approach) -> float | None:
+def _direction(away: Array) -> dict[str, Any]:
+    return dict(zip(("approach_x", "approach_y", "approach_z"), away, strict=True))
+
+
+def _room(opened: Array, thing: Thing, turn: Array, shift: Array, approach: Approach) -> float | None:
     """How far the open hand must be moved back until it is clear of the object [m]; None if too far."""
-    skin, back = hand.skin @ turn.T + shift, 0.0
+    skin, back = opened @ turn.T + shift, 0.0
     while back <= _BACKED_OFF:
         nearest = float(thing.objects.distances(skin + back * approach.direction, threads=1).distance.min())
         if nearest >= _CLEAR:
