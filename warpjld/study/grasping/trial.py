@@ -105,12 +105,9 @@ class GraspExperiment:
         tried = self._best_of(best_of, hand, thing, rng) if best_of else self._one(choice, thing, rng)
         if isinstance(tried, Outcome):
             return tried
-        poses = poses_from_angles(
-            hand.rig.skeleton,
-            tried.angles[None],
-            root_position=tried.position[None],
-            root_rotation=tried.rotation[None],
-        )
+        root = {"root_position": tried.position, "root_rotation": tried.rotation}
+        one_frame = {name: array[None] for name, array in root.items()}
+        poses = poses_from_angles(hand.rig.skeleton, tried.angles[None], **one_frame)
         wrist = poses.positions[0, hand.rig.skeleton.index("wrist")]
         placed = dict(zip(("wrist_x", "wrist_y", "wrist_z"), wrist, strict=True))
         vertices = hand.covering.deform(poses, threads=1)[0]
