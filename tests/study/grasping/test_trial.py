@@ -180,6 +180,14 @@ def test_killed_and_resumed_gives_the_same_bytes(tmp_path: Path) -> None:
         assert (tmp_path / "killed" / name).read_bytes() == (tmp_path / "whole" / name).read_bytes()
 
 
+def test_the_example_is_a_study_of_a_minute() -> None:
+    example = load_plan(_ROOT / "examples" / "study.toml")
+    assert all(hand.file is None for hand in example.hands)
+    assert all(thing.file is None for thing in example.objects)
+    combinations = len(example.hands) * len(example.objects) * len(example.scales) * len(example.frictions)
+    assert combinations <= example.trials <= 40
+
+
 def test_the_docs_name_every_column_and_key(experiment: GraspExperiment) -> None:
     from warpjld.study.run import table_columns
 
