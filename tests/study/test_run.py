@@ -14,7 +14,7 @@ import numpy as np
 import pytest
 
 from tests.study.dice import Dice
-from warpjld.errors import InputError
+from warpjld.errors import InputError, MissingExtraError
 from warpjld.study import rerun_trial, run_study
 from warpjld.study.table import read_table
 
@@ -161,6 +161,14 @@ def test_rerun_tells_what_differs(tmp_path: Path) -> None:
     content["row"]["thrown"] += 1e-16 + np.spacing(content["row"]["thrown"])
     shard.write_text(json.dumps(content))
     assert rerun_trial(Dice(trials=2), tmp_path, 1).differences == ("thrown",)
+
+
+def test_a_missing_extra_is_told_before_the_first_trial(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(sys.modules, "pyarrow", None)
+    with pytest.raises(MissingExtraError, match=r"warpjld\[study\]"):
+        run_study(Dice(trials=1), tmp_path / "out")
+    assert not (tmp_path / "out").exists()
+    assert run_study(Dice(trials=1), tmp_path / "out", processes=1, table="csv").ran == 1
 
 
 def test_bad_arguments_are_named(tmp_path: Path) -> None:
