@@ -45,7 +45,7 @@ def bumpy_ball(triangles: int) -> GraspObject:
     """An object without symmetries, 10 cm across."""
     from warpjld.grasp.objects import make_object
 
-    steps = int(round(np.log(triangles / 20) / np.log(4)))
+    steps = round(np.log(triangles / 20) / np.log(4))
     smooth = ball(0.1, subdivisions=steps)
     v = smooth.vertices
     bumps = 1 + 0.12 * np.sin(90 * v[:, :1]) * np.cos(70 * v[:, 1:2]) + 0.08 * np.sin(110 * v[:, 2:])

@@ -23,6 +23,7 @@ __all__ = ["AutoGrasp", "Candidates", "find_grasp", "palm_frame", "sample_wrists
 _CLEARANCE = 3e-4  # between the open hand and the object [m]
 _TOUCH = 5e-4  # skin this near counts as a contact in the score [m]
 _FINALISTS = 8  # placements in which digits are kept from crossing one another
+_HOLDS = 0.5  # score below which digits push one way rather than against one another
 _DEEPEST = 1e-3  # penetration above which a grasp is refused [m]
 
 
@@ -170,8 +171,8 @@ def find_grasp(
     """Sample placements, choose a posture by the object's shape, close, score, keep the best.
 
     The default score of a hand is Σ over digits 1 − |Σ n̄_d| / D, the number of touching digits times how well their
-    mean contact normals n̄_d (of the object, outward, unit) cancel: 0 where all push one way. Grasps without thumb,
-    with one digit, or deeper inside than 1 mm score −1. Crossing digits are looked for in the best eight only; the
+    mean contact normals n̄_d (of the object, outward, unit) cancel: 0 where all push one way; ½ is wanted. Grasps
+    without thumb, with one digit, or deeper inside than 1 mm score −1. Crossing digits are looked for in the best eight only; the
     first of them that keeps its thumb and two more digits on the object is taken.
 
     Args:
@@ -206,7 +207,7 @@ def find_grasp(
     closed = close_hand(covering, poses, many, objects, digits=digits, coupling=coupling, apart=False)
     points = (score or _balance)(covering, thing, candidates, closed)
     found = None
-    for best in [int(k) for k in np.argsort(-points, kind="stable")[:_FINALISTS] if points[k] >= 0.0]:
+    for best in [int(k) for k in np.argsort(-points, kind="stable")[:_FINALISTS] if points[k] > _HOLDS]:
         one = slice(best, best + 1)
         again = close_hand(covering, poses[one], many[one], objects, digits=digits, coupling=coupling)
         touching = tuple(name for name, touch in zip(again.digits, again.touching()[0], strict=True) if touch)
