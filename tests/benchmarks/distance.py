@@ -21,7 +21,7 @@ from rich.table import Table
 from warpjld.covering import bind
 from warpjld.grasp import NEAREST, FlexionSearch, GraspObject, ObjectSet, Places, Searches, Status
 from warpjld.grasp.close import close_hand
-from warpjld.grasp.shapes import ball
+from warpjld.grasp.shapes import ball, cylinder
 from warpjld.hand import build_hand
 from warpjld.skeleton import CHANNELS, Poses, poses_from_angles
 
@@ -45,8 +45,7 @@ def bumpy_ball(triangles: int) -> GraspObject:
     """An object without symmetries, 10 cm across."""
     from warpjld.grasp.objects import make_object
 
-    steps = round(np.log(triangles / 20) / np.log(4))
-    smooth = ball(0.1, subdivisions=steps)
+    smooth = cylinder(0.09, 0.09, segments=triangles // 88)
     v = smooth.vertices
     bumps = 1 + 0.12 * np.sin(90 * v[:, :1]) * np.cos(70 * v[:, 1:2]) + 0.08 * np.sin(110 * v[:, 2:])
     return make_object("bumpy", v * bumps, smooth.faces)

@@ -164,7 +164,7 @@ def test_wrong_lines(run, line: str, says: str) -> None:
 
 
 def test_grasp_auto(run) -> None:
-    scene = run("OBJECT apple BALL 0.06 AT 0.5 0 0\nGRASP 5 15 LEFT apple AUTO TRIES 12\nRELEASE 20 30 LEFT")
+    scene = run("OBJECT apple BALL 0.06 AT 0.5 0 0\nGRASP 5 15 LEFT apple AUTO TRIES 8\nRELEASE 20 30 LEFT")
     attempt = scene.attempts[0]
     assert attempt.values["posture"] == "sphere"
     assert attempt.values["penetration_mm"] < 1

@@ -172,8 +172,8 @@ def find_grasp(
 
     The default score of a hand is Σ over digits 1 − |Σ n̄_d| / D, the number of touching digits times how well their
     mean contact normals n̄_d (of the object, outward, unit) cancel: 0 where all push one way; ½ is wanted. Grasps
-    without thumb, with one digit, or deeper inside than 1 mm score −1. Crossing digits are looked for in the best eight only; the
-    first of them that keeps its thumb and two more digits on the object is taken.
+    without thumb, with one digit, or deeper inside than 1 mm score −1. Crossing digits are looked for in the best
+    eight only; the first of them that keeps its thumb and two more digits on the object is taken.
 
     Args:
         covering: The hand.
