@@ -15,8 +15,8 @@ from warpjld.errors import InputError
 from warpjld.grasp.close import Closed, close_hand, digit_chains
 from warpjld.grasp.distance import ObjectSet
 from warpjld.grasp.objects import GraspObject
-from warpjld.grasp.postures import posture_angles, posture_for
-from warpjld.skeleton import Poses, Skeleton, poses_from_angles
+from warpjld.grasp.postures import CLOSING, posture_angles, posture_for
+from warpjld.skeleton import DIGITS, Poses, Skeleton, poses_from_angles
 
 __all__ = ["AutoGrasp", "Candidates", "find_grasp", "palm_frame", "sample_wrists"]
 
@@ -173,7 +173,7 @@ def find_grasp(
     The default score of a hand is Σ over digits 1 − |Σ n̄_d| / D, the number of touching digits times how well their
     mean contact normals n̄_d (of the object, outward, unit) cancel: 0 where all push one way; ½ is wanted. Grasps
     without thumb, with one digit, or deeper inside than 1 mm score −1. Crossing digits are looked for in the best
-    eight only; the first of them that keeps its thumb and two more digits on the object is taken.
+    eight only; the first of them that keeps its thumb and two more digits (of a pinch one more) on the object is taken.
 
     Args:
         covering: The hand.
@@ -202,7 +202,8 @@ def find_grasp(
     poses = poses_from_angles(
         covering.skeleton, many, root_position=candidates.position, root_rotation=candidates.rotation
     )
-    digits = [name for name in digit_chains(covering.skeleton) if name.startswith(f"{side}.")]
+    closing = CLOSING.get(chosen, DIGITS)
+    digits = [f"{side}.{name}" for name in closing if f"{side}.{name}" in digit_chains(covering.skeleton)]
     objects = ObjectSet(thing)
     closed = close_hand(covering, poses, many, objects, digits=digits, coupling=coupling, apart=False)
     points = (score or _balance)(covering, thing, candidates, closed)
@@ -226,7 +227,7 @@ def find_grasp(
             float(again.penetration[0]),
             count,
         )
-        if opposed and len(touching) >= 3:
+        if opposed and len(touching) >= min(3, len(digits) - 1):
             return grasp
         found = found or (grasp if opposed else None)
     if found is None:
