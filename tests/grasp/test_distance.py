@@ -42,7 +42,7 @@ def samples(thing, count: int, seed: int = 0) -> np.ndarray:
     size = np.linalg.norm(high - low)
     near = on + rng.normal(size=(count, 3)) * size * 0.01
     around = rng.uniform(low - 0.2 * size, high + 0.2 * size, size=(count, 3))
-    far = rng.normal(size=(count // 10, 3)) * size * 3
+    far = rng.normal(size=(count // 10, 3)) * min(3 * size, 1.0)  # float32 tells 1e-6 m up to 8 m
     return np.concatenate([near, around, far]).astype(np.float32).astype(np.float64)
 
 

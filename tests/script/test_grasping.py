@@ -70,7 +70,7 @@ def test_searches_set_a_key_where_the_skin_touches(run, line: str, joint: str, d
     scene = run("FINGER1 LEFT MIDDLE FLEXION AT 7 20")
     actor = scene.actor()
     covering = cover(actor)
-    poses, angles = posture(scene, actor, 7)
+    _, angles = posture(scene, actor, 7)
     angles[0, actor.skeleton.index(joint), 0] = np.radians(degrees)
     pad = pad_vertex(covering, "index" if "ndex" in joint else "middle")
     x, y, z = covering.points(poses_from_angles(actor.skeleton, angles), [pad])[0, 0]
@@ -161,3 +161,16 @@ def test_the_summary_tells_objects_searches_and_contacts(run, tmp_path: Path) ->
 def test_wrong_lines(run, line: str, says: str) -> None:
     with pytest.raises(InputError, match=says):
         run(line)
+
+
+def test_grasp_auto(run) -> None:
+    scene = run("OBJECT apple BALL 0.06 AT 0.5 0 0\nGRASP 5 15 LEFT apple AUTO TRIES 8\nRELEASE 20 30 LEFT")
+    attempt = scene.attempts[0]
+    assert attempt.values["posture"] == "sphere"
+    assert attempt.values["penetration_mm"] < 1
+    assert "left.thumb" in attempt.values["digits"]
+    actor = scene.actor()
+    away, there = stage(actor, np.array([5.0, 15.0]), 30).positions[:, 0]
+    assert np.linalg.norm(away - there) == pytest.approx(0.12, abs=1e-6)
+    with pytest.raises(InputError, match="did you mean PLATE"):
+        run("GRASP 35 45 LEFT apple AUTO POSTURE PLATES")

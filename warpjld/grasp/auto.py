@@ -15,14 +15,15 @@ from warpjld.errors import InputError
 from warpjld.grasp.close import Closed, close_hand, digit_chains
 from warpjld.grasp.distance import ObjectSet
 from warpjld.grasp.objects import GraspObject
-from warpjld.grasp.postures import posture_angles, posture_for
-from warpjld.skeleton import Poses, Skeleton, poses_from_angles
+from warpjld.grasp.postures import CLOSING, posture_angles, posture_for
+from warpjld.skeleton import DIGITS, Poses, Skeleton, poses_from_angles
 
 __all__ = ["AutoGrasp", "Candidates", "find_grasp", "palm_frame", "sample_wrists"]
 
 _CLEARANCE = 3e-4  # between the open hand and the object [m]
 _TOUCH = 5e-4  # skin this near counts as a contact in the score [m]
 _FINALISTS = 8  # placements in which digits are kept from crossing one another
+_HOLDS = 0.5  # score below which digits push one way rather than against one another
 _DEEPEST = 1e-3  # penetration above which a grasp is refused [m]
 
 
@@ -170,9 +171,9 @@ def find_grasp(
     """Sample placements, choose a posture by the object's shape, close, score, keep the best.
 
     The default score of a hand is Σ over digits 1 − |Σ n̄_d| / D, the number of touching digits times how well their
-    mean contact normals n̄_d (of the object, outward, unit) cancel: 0 where all push one way. Grasps without thumb,
-    with one digit, or deeper inside than 1 mm score −1. Crossing digits are looked for in the best eight only; the
-    first of them that keeps its thumb and two more digits on the object is taken.
+    mean contact normals n̄_d (of the object, outward, unit) cancel: 0 where all push one way; ½ is wanted. Grasps
+    without thumb, with one digit, or deeper inside than 1 mm score −1. Crossing digits are looked for in the best
+    eight only; the first of them that keeps its thumb and two more digits (of a pinch one more) on the object is taken.
 
     Args:
         covering: The hand.
@@ -201,12 +202,13 @@ def find_grasp(
     poses = poses_from_angles(
         covering.skeleton, many, root_position=candidates.position, root_rotation=candidates.rotation
     )
-    digits = [name for name in digit_chains(covering.skeleton) if name.startswith(f"{side}.")]
+    closing = CLOSING.get(chosen, DIGITS)
+    digits = [f"{side}.{name}" for name in closing if f"{side}.{name}" in digit_chains(covering.skeleton)]
     objects = ObjectSet(thing)
     closed = close_hand(covering, poses, many, objects, digits=digits, coupling=coupling, apart=False)
     points = (score or _balance)(covering, thing, candidates, closed)
     found = None
-    for best in [int(k) for k in np.argsort(-points, kind="stable")[:_FINALISTS] if points[k] >= 0.0]:
+    for best in [int(k) for k in np.argsort(-points, kind="stable")[:_FINALISTS] if points[k] > _HOLDS]:
         one = slice(best, best + 1)
         again = close_hand(covering, poses[one], many[one], objects, digits=digits, coupling=coupling)
         touching = tuple(name for name, touch in zip(again.digits, again.touching()[0], strict=True) if touch)
@@ -225,7 +227,7 @@ def find_grasp(
             float(again.penetration[0]),
             count,
         )
-        if opposed and len(touching) >= 3:
+        if opposed and len(touching) >= min(3, len(digits) - 1):
             return grasp
         found = found or (grasp if opposed else None)
     if found is None:

@@ -24,7 +24,7 @@ _FLEXION = CHANNELS.index("flexion")
 _KNUCKLES = ("base", "knuckle2", "knuckle3")
 _OWN = 0.5  # share of the operators at or beyond a joint from which a vertex counts as moved by it
 _WIDEST = 0.35  # how far a base joint may open again for the sake of swelling skin [rad]
-_HALVINGS = 10
+_CUTS, _PIECES = 3, 8  # the opening is found to a 512th of that
 _ROUNDS = 4  # of bending and opening again
 _TOUCH = 1e-4  # skin this near touches [m]
 
@@ -212,18 +212,21 @@ class _Hand:
         self.objects, self.which, self.places = objects, which, places
         self.tolerance, self.threads = tolerance, threads
         self.search = FlexionSearch(covering, objects)
+        self._floor: NDArray[np.float64] | None = None
         rest = poses_from_angles(covering.skeleton, angles)
         turn = Rotation.from_quat(poses.rotations[:, 0]) * Rotation.from_quat(rest.rotations[:, 0]).inv()
         self._turn = turn.as_quat()
         self._shift = poses.positions[:, 0] - covering.skeleton.rest[0]
 
     def poses(self, angles: NDArray[np.float64] | None = None) -> Poses:
-        """Poses of the present, or of other angles."""
+        """Poses of the present, or of k times G hands with other angles."""
+        wanted = self.angles if angles is None else angles
+        again = len(wanted) // len(self.angles)
         return poses_from_angles(
             self.covering.skeleton,
-            self.angles if angles is None else angles,
-            root_position=self._shift,
-            root_rotation=self._turn,
+            wanted,
+            root_position=np.tile(self._shift, (again, 1)),
+            root_rotation=np.tile(self._turn, (again, 1)),
         )
 
     def poses_of(self, g: int, angles: NDArray[np.float64]) -> Poses:
@@ -279,9 +282,11 @@ class _Hand:
         return ended
 
     def distances(self, vertices: NDArray[np.int32], angles: NDArray[np.float64] | None = None) -> NDArray[np.float64]:
-        """Signed distances of some vertices to the object [m], shape (G, n)."""
+        """Signed distances of some vertices to the object [m], shape (G, n); of k times G hands with other angles."""
         points = self.covering.points(self.poses(angles), vertices)
-        found = self.objects.distances(points, which=self.which, places=self.places, threads=self.threads)
+        again = len(points) // len(self.which)
+        places = Places(np.tile(self.places.position, (again, 1)), np.tile(self.places.rotation, (again, 1)))
+        found = self.objects.distances(points, which=np.tile(self.which, again), places=places, threads=self.threads)
         return found.distance.astype(np.float64)
 
     def settle(self, joints: NDArray[np.int64]) -> bool:
@@ -292,10 +297,13 @@ class _Hand:
         bases = joints[:, 0].tolist()
         vertices = _moving(self.covering, tuple(bases))
         now = self.distances(vertices)
-        allowed = np.minimum(-2.0 * self.tolerance, self.distances(vertices, self.open) - 1e-6)
-        deep = now < allowed
-        if not deep.any():
+        if self._floor is None:
+            self._floor = np.minimum(-2.0 * self.tolerance, self.distances(vertices, self.open) - 1e-6)
+        some = (now < self._floor).any(axis=0)
+        if not some.any():
             return False
+        vertices, now, allowed = vertices[some], now[:, some], self._floor[:, some]
+        deep = now < allowed
         wide = np.full(len(self.angles), _WIDEST)
         at_widest = np.stack([self.distances(vertices, self._opened(base, wide)) for base in bases])
         # a vertex is brought out by the digit whose opening moves it most
@@ -306,11 +314,16 @@ class _Hand:
                 continue
             some = own.any(axis=0)
             floor = np.where(own, np.minimum(allowed, at_widest[d] - 1e-7), -np.inf)[:, some]
-            short, enough = np.zeros_like(wide), wide.copy()
-            for _ in range(_HALVINGS):
-                middle = 0.5 * (short + enough)
-                good = (self.distances(vertices[some], self._opened(base, middle)) >= floor).all(axis=1)
-                enough, short = np.where(good, middle, enough), np.where(good, short, middle)
+            short, enough, rows = np.zeros_like(wide), wide.copy(), np.arange(len(wide))
+            for _ in range(_CUTS):
+                parts = np.linspace(0.0, 1.0, _PIECES + 1)[1:, None]
+                by = short + parts * (enough - short)
+                angles = np.concatenate([self._opened(base, row) for row in by])
+                gap = self.distances(vertices[some], angles).reshape(_PIECES, len(wide), -1)
+                good = (gap >= floor).all(axis=2)
+                first = np.where(good.any(axis=0), good.argmax(axis=0), _PIECES - 1)
+                before = np.where(first > 0, by[first - 1, rows], short)
+                enough, short = by[first, rows], before
             self.angles = self._opened(base, np.where(own.any(axis=1), enough, 0.0))
         return True
 

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from warpjld.errors import InputError
 from warpjld.skeleton import CHANNELS, Skeleton
 
-__all__ = ["POSTURES", "posture_angles", "posture_for"]
+__all__ = ["CLOSING", "POSTURES", "posture_angles", "posture_for"]
 
 _FINGERS = ("index", "middle", "ring", "pinky")
 
@@ -29,6 +29,14 @@ POSTURES: dict[str, dict[str, dict[str, float]]] = {
         "ring.base": {"abduction": -4},
         "pinky.base": {"abduction": -10},
     },
+    # small things: thumb, index and middle finger only
+    "pinch": {
+        "thumb.base": {"pivot": 35, "abduction": 15, "flexion": -15},
+        "index.base": {"abduction": 3, "flexion": 15},
+        "middle.base": {"flexion": 15},
+        "ring.base": {"abduction": -6},
+        "pinky.base": {"abduction": -14},
+    },
     # thin things: fingers flat on one side, bent at their bases only, thumb on the other
     "plate": {
         "thumb.base": {"pivot": 40, "abduction": 25, "flexion": -15},
@@ -41,15 +49,21 @@ POSTURES: dict[str, dict[str, dict[str, float]]] = {
 """Angles [degrees] of joints by posture; what is not named is straight."""
 
 
+CLOSING: dict[str, tuple[str, ...]] = {"pinch": ("middle", "index", "thumb")}
+"""Digits that close in a posture, where not all do."""
+
+
 def posture_for(size: NDArray[np.float64]) -> str:
     """The posture for an object's extents [m], shape (3,).
 
-    With sides a ≤ b ≤ c: ``plate`` where a is thinner than a third of b and than 3 cm, ``cylinder`` where c is longer
-    than 1.6 b, else ``sphere``.
+    With sides a ≤ b ≤ c: ``plate`` where a is thinner than a third of b and than 3 cm, ``pinch`` where c is shorter
+    than 5 cm, ``cylinder`` where c is longer than 1.6 b, else ``sphere``.
     """
     a, b, c = np.sort(np.asarray(size, dtype=np.float64))
     if a < 0.03 and a < b / 3.0:
         return "plate"
+    if c < 0.05:
+        return "pinch"
     return "cylinder" if c > 1.6 * b else "sphere"
 
 

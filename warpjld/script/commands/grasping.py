@@ -152,7 +152,7 @@ def auto_f_2_3(scene: Scene, arguments: Arguments) -> None:
     syntax=(
         "GRASP <key1> <key2> [LEFT/RIGHT] <object> [THUMB/INDEX/MIDDLE/RING/PINKY …] "
         "[COUPLING <second joint> <third joint>], or GRASP <key1> <key2> [LEFT/RIGHT] <object> AUTO "
-        "[TRIES <placements>] [POSTURE <SPHERE/CYLINDER/PLATE>]"
+        "[TRIES <placements>] [POSTURE <SPHERE/CYLINDER/PINCH/PLATE>]"
     ),
     help="Digits close from key1 on and touch the object at key2; COUPLING bends their joints together at these rates.",
     group="Grasping",

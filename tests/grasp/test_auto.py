@@ -1,0 +1,80 @@
+"""Grasps found without help: postures by shape, wrist placements, the best hand."""
+
+import numpy as np
+import pytest
+
+from warpjld.errors import InputError
+from warpjld.grasp import ObjectSet
+from warpjld.grasp.auto import find_grasp, palm_frame, sample_wrists
+from warpjld.grasp.intersection import intersection
+from warpjld.grasp.postures import POSTURES, posture_angles, posture_for
+from warpjld.grasp.shapes import ball, box, cylinder, glass, plate
+from warpjld.skeleton import poses_from_angles
+
+
+def test_a_plate_is_not_held_as_a_glass() -> None:
+    wanted = {plate: "plate", glass: "cylinder", ball: "sphere", cylinder: "cylinder"}
+    assert {make: posture_for(make().size) for make in wanted} == wanted
+    assert posture_for(np.array([0.2, 0.004, 0.15])) == "plate"
+
+
+@pytest.mark.parametrize("name", POSTURES)
+def test_postures_are_within_the_limits(rig, name: str) -> None:
+    angles = posture_angles(rig.skeleton, "left", name)
+    low, high = np.moveaxis(rig.skeleton.limits, -1, 0)
+    assert ((angles >= low - 1e-12) & (angles <= high + 1e-12) | (angles == 0)).all()
+    assert angles[rig.skeleton.index("thumb.base")].any()
+
+
+def test_the_palm_looks_down_at_rest(rig) -> None:
+    _, frame = palm_frame(rig.skeleton, "left")
+    np.testing.assert_allclose(frame @ frame.T, np.eye(3), atol=1e-12)
+    assert frame[0, 1] < -0.9
+    assert frame[1, 2] < -0.9
+
+
+def test_sampled_hands_are_next_to_the_object_and_not_in_it(covering) -> None:
+    thing = box().placed((0.3, 0.2, 0.1), (0.3, 0.1, 0.2, 0.9))
+    angles = posture_angles(covering.skeleton, "left", "cylinder")
+    found = sample_wrists(covering, angles, thing, "left", 12, np.random.default_rng(0))
+    poses = poses_from_angles(
+        covering.skeleton,
+        np.repeat(angles[None], 12, axis=0),
+        root_position=found.position,
+        root_rotation=found.rotation,
+    )
+    gap = ObjectSet(thing).distances(covering.deform(poses), which=np.zeros(12, int)).distance.min(axis=1)
+    assert (gap > 0).all()
+    assert (gap < 1e-3).sum() >= 9  # a few pass by
+    np.testing.assert_allclose(np.linalg.norm(found.approach, axis=1), 1, atol=1e-12)
+
+
+def test_finding_a_grasp(covering) -> None:
+    thing = ball(0.06).placed((1.0, 0.5, 0.0))
+    found = find_grasp(covering, thing, count=8, seed=1)
+    assert found.posture == "sphere"
+    assert any(name.endswith("thumb") for name in found.touching)
+    assert len(found.touching) >= 3
+    skin = covering.deform(found.poses(covering.skeleton))[0]
+    assert intersection(covering, skin, thing).deepest < 1e-3
+    again = find_grasp(covering, thing, count=8, seed=1)
+    np.testing.assert_array_equal(found.angles, again.angles)
+    np.testing.assert_array_equal(found.position, again.position)
+
+
+@pytest.mark.parametrize(
+    ("options", "says"),
+    [
+        ({"count": 0}, "want 1 or more"),
+        ({"side": "right"}, "want one of left"),
+        ({"posture": "fist"}, "no posture 'fist'"),
+    ],
+)
+def test_wrong_wishes(covering, options: dict, says: str) -> None:
+    with pytest.raises(InputError, match=says):
+        find_grasp(covering, ball(), **options)
+
+
+def test_what_no_hand_can_hold_is_told(covering) -> None:
+    with pytest.raises(InputError, match="none of 6 placements ends in a grasp"):
+        find_grasp(covering, ball(2.0, subdivisions=3), count=6)
