@@ -15,7 +15,7 @@ from warpjld.errors import InputError
 from warpjld.grasp.close import Closed, close_hand, digit_chains
 from warpjld.grasp.distance import ObjectSet
 from warpjld.grasp.objects import GraspObject
-from warpjld.grasp.postures import CLOSING, posture_angles, posture_for
+from warpjld.grasp.postures import AHEAD, CLOSING, posture_angles, posture_for
 from warpjld.skeleton import DIGITS, Poses, Skeleton, poses_from_angles
 
 __all__ = ["AutoGrasp", "Candidates", "find_grasp", "palm_frame", "sample_wrists"]
@@ -101,14 +101,19 @@ def sample_wrists(
     side: str,
     count: int,
     rng: np.random.Generator,
+    *,
+    ahead: float = 0.0,
 ) -> Candidates:
     """Placements of an open hand with its palm on the object.
 
     The palm looks against a direction out of the object's centre, evenly spread over the sphere; the fingers point
     anywhere about it; the palm's middle is aimed at the centre, off by up to a fifth of the object's size. The hand
-    then comes as near as it can without touching: its skin's distance bounds each step.
+    then comes as near as it can without touching: its skin's distance bounds each step. With ``ahead`` [m] the object
+    is met up to that far before the palm's middle towards the fingers, and the palm stays as far away from it.
     """
     middle, frame = palm_frame(covering.skeleton, side)
+    part = rng.uniform(0.0, 1.0, size=(count, 1)) if ahead else np.zeros((count, 1))
+    middle = middle + ahead * part * frame[1]
     golden = np.pi * (3.0 - 5.0**0.5)
     k = np.arange(count) + 0.5
     high = 1.0 - 2.0 * k / count
@@ -127,7 +132,9 @@ def sample_wrists(
     aim = centre + rng.uniform(-0.2, 0.2, size=(count, 3)) * thing.size
     position = aim - look * reach - (root + rotation.apply(middle - root))
     return Candidates(
-        _approach(covering, angles, thing, position, rotation.as_quat(), look, 2 * reach), rotation.as_quat(), look
+        -look * ahead * part + _approach(covering, angles, thing, position, rotation.as_quat(), look, 2 * reach),
+        rotation.as_quat(),
+        look,
     )
 
 
@@ -197,7 +204,7 @@ def find_grasp(
     chosen = posture or posture_for(thing.size)
     start = posture_angles(covering.skeleton, side, chosen)
     rng = np.random.default_rng(seed)
-    candidates = sample_wrists(covering, start, thing, side, count, rng)
+    candidates = sample_wrists(covering, start, thing, side, count, rng, ahead=AHEAD.get(chosen, 0.0))
     many = np.repeat(start[None], count, axis=0)
     poses = poses_from_angles(
         covering.skeleton, many, root_position=candidates.position, root_rotation=candidates.rotation

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from warpjld.errors import InputError
 from warpjld.skeleton import CHANNELS, Skeleton
 
-__all__ = ["CLOSING", "POSTURES", "posture_angles", "posture_for"]
+__all__ = ["AHEAD", "CLOSING", "POSTURES", "posture_angles", "posture_for"]
 
 _FINGERS = ("index", "middle", "ring", "pinky")
 
@@ -51,6 +51,10 @@ POSTURES: dict[str, dict[str, dict[str, float]]] = {
 
 CLOSING: dict[str, tuple[str, ...]] = {"pinch": ("middle", "index", "thumb")}
 """Digits that close in a posture, where not all do."""
+
+
+AHEAD: dict[str, float] = {"pinch": 0.05}
+"""How far before the palm's middle an object is met [m], where it is not the palm that meets it."""
 
 
 def posture_for(size: NDArray[np.float64]) -> str:
