@@ -3,9 +3,12 @@
 from __future__ import annotations
 
 import os
+from functools import cache
 from pathlib import Path
 
 import pytest
+
+from warpjld.rig import Rig
 
 _DATA = Path(__file__).resolve().parents[2] / "shared" / "data"
 
@@ -21,3 +24,18 @@ def data() -> Path:
     if not _DATA.is_dir():
         pytest.skip("third-party assets (../shared/data) are not here")
     return _DATA
+
+
+@pytest.fixture
+def quick_hands(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Built-in hands are built once a session: what a test does with them is not what building them costs."""
+    from warpjld import hand
+
+    monkeypatch.setattr(hand, "build_hand", _built)
+
+
+@cache
+def _built(side: str, **options: float) -> Rig:
+    from warpjld.hand.build import build_hand
+
+    return build_hand(side, **options)

@@ -31,7 +31,8 @@ class Surface:
         faces: Triangles over the welded vertices, shape (T, 3), anticlockwise seen from outside.
         weld: Welded vertex of every source vertex, shape (W,).
         source_faces: Triangles over the source vertices, shape (S, 3), in the source's order.
-        uv: Texture coordinates of the source vertices, shape (W, 2), or None.
+        uv: Texture coordinates of the source vertices, shape (W, 2), or None. Their origin is the picture's lower
+            left corner, as OBJ, USD and Blender count; glTF counts from the upper left.
         parts: The source's meshes.
     """
 

@@ -1,10 +1,10 @@
-"""Operators evaluated straight from a vertex's anchors: for gradients, for few points, and to pack coefficients."""
+"""Operators evaluated straight from a vertex's anchors: for few points, and to pack coefficients."""
 
 import warp as wp
 
 from warpjld_kernels.coefficients import muscle_profile, rotation_weights, rounding
 
-wp.set_module_options({"max_unroll": 1})
+wp.set_module_options({"max_unroll": 1, "enable_backward": False})
 
 
 @wp.struct
@@ -98,9 +98,114 @@ def pack_coefficients(
         muscle_out[v, k] = swell(anchors, parameters, v, k)
 
 
+# The sums below are functions of their own for the sake of their derivatives: in the body of a kernel Warp's backward
+# pass does not replay a loop, and what follows it, such as a normalisation, would see the sum before its first term.
+
+
+@wp.func
+def hang(anchors: Anchors, positions: wp.array2d(dtype=wp.vec3), f: int, v: int) -> wp.vec3:
+    """Σ c_j J_j': the place on the segments from which a vertex is offset."""
+    foot = wp.vec3(0.0)
+    for k in range(anchors.weight.shape[1]):
+        s = anchors.segment[v, k]
+        start = positions[f, anchors.ends[s, 0]]
+        end = positions[f, anchors.ends[s, 1]]
+        foot += anchors.weight[v, k] * (start + anchors.ratio[v, k] * (end - start))
+    return foot
+
+
 @wp.func
 def blend(weight: float, q: wp.quat) -> wp.quat:
     return wp.quat(weight * q[0], weight * q[1], weight * q[2], weight * q[3])
+
+
+@wp.func
+def turn(
+    anchors: Anchors,
+    parameters: Parameters,
+    halfway: wp.array2d(dtype=wp.quat),
+    rotations: wp.array2d(dtype=wp.quat),
+    f: int,
+    v: int,
+) -> wp.quat:
+    """Σ w_k q_k, not normalised."""
+    total = wp.quat(0.0, 0.0, 0.0, 0.0)
+    for k in range(anchors.weight.shape[1]):
+        s = anchors.segment[v, k]
+        p = anchors.ends[s, 0]
+        d = anchors.ends[s, 1]
+        w = anchors.weight[v, k] * rotation_weights(
+            anchors.ratio[v, k], anchors.side[v, k], parameters.proximity[p, 0], parameters.proximity[d, 1]
+        )
+        total += blend(w[0], halfway[f, p]) + blend(w[1], rotations[f, p]) + blend(w[2], halfway[f, d])
+    return total
+
+
+@wp.func
+def roundings(
+    anchors: Anchors, parameters: Parameters, flexion_ratio: wp.array2d(dtype=float), f: int, v: int
+) -> float:
+    """What the flexed joints add to the offset's length, as a portion of it (R58–R62)."""
+    total = float(0.0)
+    for k in range(anchors.weight.shape[1]):
+        s = anchors.segment[v, k]
+        rounded = round_up(anchors, parameters, v, k)
+        total += rounded[0] * flexion_ratio[f, anchors.ends[s, 0]] + rounded[1] * flexion_ratio[f, anchors.ends[s, 1]]
+    return total
+
+
+@wp.func
+def muscles(
+    anchors: Anchors, parameters: Parameters, flexion_ratio: wp.array2d(dtype=float), f: int, v: int
+) -> wp.vec3:
+    """What the muscles add to the offset; each of a segment's joints drives half of its muscle (R63)."""
+    total = wp.vec3(0.0)
+    for k in range(anchors.weight.shape[1]):
+        s = anchors.segment[v, k]
+        driven = 0.5 * (flexion_ratio[f, anchors.ends[s, 0]] + flexion_ratio[f, anchors.ends[s, 1]])
+        total += driven * swell(anchors, parameters, v, k)
+    return total
+
+
+@wp.func
+def palm_inflation(anchors: Anchors, parameters: Parameters, closing: wp.array3d(dtype=float), f: int, v: int) -> float:
+    """What approaching palm segments add to the offset's length, as a portion of it: λ^(−k) − 1 (R44, C3)."""
+    total = float(0.0)
+    for k in range(anchors.between.shape[1]):
+        n = anchors.pair[v, k]
+        amount = anchors.between[v, k]
+        if amount > 0.0:
+            place = anchors.station[v, k]
+            low = wp.min(int(place), closing.shape[2] - 2)
+            part = place - float(low)
+            a = anchors.ends[anchors.pairs[n, 0], 0]
+            b = anchors.ends[anchors.pairs[n, 1], 0]
+            exponent = 0.5 * (parameters.palm[a] + parameters.palm[b])
+            before = wp.exp(-exponent * closing[f, n, low]) - 1.0
+            beyond = wp.exp(-exponent * closing[f, n, low + 1]) - 1.0
+            total += amount * ((1.0 - part) * before + part * beyond)
+    return total
+
+
+@wp.func
+def deformed(
+    anchors: Anchors,
+    parameters: Parameters,
+    positions: wp.array2d(dtype=wp.vec3),
+    halfway: wp.array2d(dtype=wp.quat),
+    rotations: wp.array2d(dtype=wp.quat),
+    flexion_ratio: wp.array2d(dtype=float),
+    closing: wp.array3d(dtype=float),
+    f: int,
+    v: int,
+) -> wp.vec3:
+    """S' = Σ c_j J_j' + rot(normalise(Σ w_k q_k), g d + Σ m_s e_s); ``closing`` holds log λ of palm pairs (C3)."""
+    scale = (
+        1.0 + roundings(anchors, parameters, flexion_ratio, f, v) + palm_inflation(anchors, parameters, closing, f, v)
+    )
+    offset = scale * rest_offset(anchors, v) + muscles(anchors, parameters, flexion_ratio, f, v)
+    q = wp.normalize(turn(anchors, parameters, halfway, rotations, f, v))
+    return hang(anchors, positions, f, v) + wp.quat_rotate(q, offset)
 
 
 @wp.kernel
@@ -118,43 +223,8 @@ def deform_points(
     # out
     points_out: wp.array2d(dtype=wp.vec3),
 ):
-    """The covering formula at chosen vertices, differentiable in parameters and pose.
-
-    S' = Σ c_j J_j' + rot(normalise(Σ w_k q_k), g d + Σ m_s e_s); ``closing`` holds log λ of palm pairs (C3).
-    """
+    """The covering formula at chosen vertices."""
     f, i = wp.tid()
-    v = chosen[i]
-    foot = wp.vec3(0.0)
-    turn = wp.quat(0.0, 0.0, 0.0, 0.0)
-    scale = float(1.0)
-    muscles = wp.vec3(0.0)
-    for k in range(anchors.weight.shape[1]):
-        weight = anchors.weight[v, k]
-        if weight > 0.0:
-            s = anchors.segment[v, k]
-            p = anchors.ends[s, 0]
-            d = anchors.ends[s, 1]
-            ratio = anchors.ratio[v, k]
-            foot += weight * (positions[f, p] + ratio * (positions[f, d] - positions[f, p]))
-            w = weight * rotation_weights(
-                ratio, anchors.side[v, k], parameters.proximity[p, 0], parameters.proximity[d, 1]
-            )
-            turn += blend(w[0], halfway[f, p]) + blend(w[1], rotations[f, p]) + blend(w[2], halfway[f, d])
-            rounded = round_up(anchors, parameters, v, k)
-            scale += rounded[0] * flexion_ratio[f, p] + rounded[1] * flexion_ratio[f, d]
-            # each of a segment's joints drives half of its muscle
-            muscles += 0.5 * (flexion_ratio[f, p] + flexion_ratio[f, d]) * swell(anchors, parameters, v, k)
-    for k in range(2):
-        if anchors.between[v, k] > 0.0:
-            n = anchors.pair[v, k]
-            place = anchors.station[v, k]
-            low = wp.min(int(place), closing.shape[2] - 2)
-            part = place - float(low)
-            a = anchors.ends[anchors.pairs[n, 0], 0]
-            b = anchors.ends[anchors.pairs[n, 1], 0]
-            exponent = 0.5 * (parameters.palm[a] + parameters.palm[b])
-            grown = (1.0 - part) * (wp.exp(-exponent * closing[f, n, low]) - 1.0)
-            grown += part * (wp.exp(-exponent * closing[f, n, low + 1]) - 1.0)
-            scale += anchors.between[v, k] * grown
-    offset = scale * rest_offset(anchors, v) + muscles
-    points_out[f, i] = foot + wp.quat_rotate(wp.normalize(turn), offset)
+    points_out[f, i] = deformed(
+        anchors, parameters, positions, halfway, rotations, flexion_ratio, closing, f, chosen[i]
+    )

@@ -22,11 +22,14 @@ def rotation_weights(ratio: float, side: float, proximal: float, distal: float) 
 
 @wp.func
 def rounding(ratio: float, side: float, proximal: float, distal: float) -> wp.vec2:
-    """How far the roundings of the proximal and the distal joint reach (A §6.1, R58–R62)."""
+    """How far the roundings of the proximal and the distal joint reach (A §6.1, R58–R62): 1 at the joint, 0 where its
+    area ends, with a slope of zero at both, so that no ridge shows there."""
     t = wp.clamp(ratio, 0.0, 1.0)
     at_proximal = wp.max(1.0 - t / wp.max(proximal, 1.0e-6), 0.0)
     at_distal = wp.max(1.0 - (1.0 - t) / wp.max(distal, 1.0e-6), 0.0)
-    return side * wp.vec2(at_proximal, at_distal)
+    smooth_proximal = at_proximal * at_proximal * (3.0 - 2.0 * at_proximal)
+    smooth_distal = at_distal * at_distal * (3.0 - 2.0 * at_distal)
+    return side * wp.vec2(smooth_proximal, smooth_distal)
 
 
 @wp.func

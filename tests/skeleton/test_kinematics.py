@@ -7,7 +7,14 @@ from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
 from warpjld.errors import InputError
-from warpjld.skeleton import CHANNELS, Skeleton, default_limits, poses_from_angles, rest_poses
+from warpjld.skeleton import (
+    CHANNELS,
+    Skeleton,
+    default_limits,
+    poses_from_angles,
+    poses_from_world,
+    rest_poses,
+)
 
 
 def chain(side: str = "right") -> Skeleton:
@@ -79,3 +86,19 @@ def test_joint_names_may_leave_the_side_out_and_are_suggested() -> None:
     assert chain().index("INDEX.base") == 0
     with pytest.raises(InputError, match=r"did you mean 'index.knuckle2'"):
         chain().index("index.knukle2")
+
+
+@given(
+    st.lists(st.floats(-170, 170), min_size=3, max_size=3),
+    st.lists(st.sampled_from([-1.0, 1.0]), min_size=3, max_size=3),
+)
+def test_world_transforms_of_either_sign_give_the_same_poses(values: list[float], signs: list[float]) -> None:
+    flexions = np.zeros((1, 3, 4))
+    flexions[0, :, 0] = np.radians(values)
+    poses = poses_from_angles(chain(), flexions)
+    again = poses_from_world(chain(), poses.positions, poses.rotations * np.array(signs)[:, None])
+    np.testing.assert_allclose(again.flexion, poses.flexion, atol=1e-12)
+    np.testing.assert_allclose(again.positions, poses.positions, atol=1e-12)
+    rotations = again.rotations[0]
+    assert (rotations[:-1] * rotations[1:]).sum(-1).min() > -1e-12
+    np.testing.assert_allclose(np.abs((rotations * poses.rotations[0]).sum(-1)), 1, atol=1e-12)

@@ -16,6 +16,7 @@ _COMMANDS = {
     "run": "Run a command script: animation, pictures, film, exports.",
     "deform": "Deform a rig by a motion file.",
     "inspect": "Report what was recognised in a rig.",
+    "fem": "Load a deformable body and solve for its shape, stresses and reactions.",
     "calibrate": "Fit the covering's parameters to a rig.",
     "shell": "Type commands of the language and look at the result.",
 }

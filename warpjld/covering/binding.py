@@ -14,7 +14,7 @@ from warpjld.covering.operators import Fan, segment_ends
 from warpjld.covering.parameters import Parameters
 from warpjld.skeleton.tree import Skeleton
 
-__all__ = ["OPERATORS", "STATIONS", "Anchors", "anchor"]
+__all__ = ["FLOOR", "OPERATORS", "SIDE_BAND", "STATIONS", "Anchors", "SegmentTable", "anchor"]
 
 OPERATORS = 4
 """Segment operators a vertex may hold (the paper has one; the rest make borders soft)."""
@@ -22,8 +22,13 @@ OPERATORS = 4
 STATIONS = 5
 """Places along a pair of neighbouring palm segments where the scale factor λ is evaluated; linear in between."""
 
-_SIDE_BAND = 0.5  # |cosine| below which a vertex is partly external and partly internal
-_FLOOR = 2e-2  # weight below which an operator is dropped, faded so that nothing jumps
+# |cosine| below which a vertex is partly external and partly internal: sections near a joint stand upright outside and
+# lean inside, and a wider band shears the sides less
+SIDE_BAND = 0.75
+# share of a proximity that counts across the palm: along a segment there is one at either end, across it one side only;
+# what lies in between then shears over a broad strip
+LATERAL = 0.6
+FLOOR = 2e-2  # weight below which an operator is dropped, faded so that nothing jumps
 
 
 @dataclass(frozen=True, eq=False)
@@ -83,7 +88,7 @@ def anchor(
         chunk: Vertices placed at a time, which bounds memory.
     """
     ends = segment_ends(skeleton, groups)
-    table = _SegmentTable.build(skeleton, ends)
+    table = SegmentTable.build(skeleton, ends)
     pairs, pair_of_fan = _neighbour_pairs(groups)
     rows = [
         _anchor_some(vertices[i : i + chunk], table, groups, domains[i : i + chunk], parameters, pair_of_fan)
@@ -96,7 +101,9 @@ def anchor(
 
 
 @dataclass(frozen=True, eq=False)
-class _SegmentTable:
+class SegmentTable:
+    """What projecting on S segments at rest needs."""
+
     ends: NDArray[np.int32]
     start: NDArray[np.float64]  # (S, 3)
     along: NDArray[np.float64]  # (S, 3)
@@ -105,7 +112,7 @@ class _SegmentTable:
     open_start: NDArray[np.bool_]  # root: the ratio may fall below 0
 
     @staticmethod
-    def build(skeleton: Skeleton, ends: NDArray[np.int32]) -> _SegmentTable:
+    def build(skeleton: Skeleton, ends: NDArray[np.int32]) -> SegmentTable:
         start = skeleton.rest[ends[:, 0]]
         along = skeleton.rest[ends[:, 1]] - start
         direction = along / np.linalg.norm(along, axis=1, keepdims=True)
@@ -118,7 +125,13 @@ class _SegmentTable:
         normals = np.where(lengths > 1e-3, normals / np.maximum(lengths, 1e-30), fallback[:, None, :])
         leaf = np.array([not skeleton.children[d] for d in ends[:, 1]])
         root = np.array([skeleton.parents[p] < 0 for p in ends[:, 0]])
-        return _SegmentTable(ends, start, along, normals, leaf, root)
+        return SegmentTable(ends, start, along, normals, leaf, root)
+
+    def project(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Ratio of every point on every segment, shape (V, S), clamped except beyond extremities (R37, C1)."""
+        t = (points @ self.along.T - (self.start * self.along).sum(axis=1)) / (self.along**2).sum(axis=1)
+        t = np.where((t < 0.0) & ~self.open_start, 0.0, t)
+        return np.where((t > 1.0) & ~self.open_end, 1.0, t)
 
 
 def _neighbour_pairs(groups: tuple[Fan, ...]) -> tuple[NDArray[np.int32], dict[int, int]]:
@@ -135,16 +148,14 @@ def _neighbour_pairs(groups: tuple[Fan, ...]) -> tuple[NDArray[np.int32], dict[i
 
 def _anchor_some(
     points: NDArray[np.float64],
-    table: _SegmentTable,
+    table: SegmentTable,
     groups: tuple[Fan, ...],
     domains: NDArray[np.float64],
     parameters: Parameters,
     pair_of_fan: dict[int, int],
 ) -> tuple[NDArray, ...]:
     count, segments = len(points), len(table.ends)
-    t = np.einsum("vsk,sk->vs", points[:, None] - table.start, table.along) / (table.along**2).sum(axis=1)
-    t = np.where((t < 0.0) & ~table.open_start, 0.0, t)
-    t = np.where((t > 1.0) & ~table.open_end, 1.0, t)
+    t = table.project(points)
     weight = np.zeros((count, segments))
     pair_count = sum(len(fan.segments) - 1 for fan in groups)
     between = np.zeros((count, max(pair_count, 2)))
@@ -168,45 +179,65 @@ def _anchor_some(
     pair, pair_kept = _strongest_pairs(between)
     ratio = np.take_along_axis(t, best, axis=1)
     offset = points[:, None] - (table.start[best] + ratio[..., None] * table.along[best])
-    blend = np.clip(ratio, 0.0, 1.0)[..., None]
-    normal = (1.0 - blend) * table.normals[best, 0] + blend * table.normals[best, 1]
-    normal /= np.maximum(np.linalg.norm(normal, axis=2, keepdims=True), 1e-12)
-    height = (offset * normal).sum(axis=2)
-    cosine = height / np.maximum(np.linalg.norm(offset, axis=2), 1e-12)
-    side = _smoothstep((cosine + _SIDE_BAND) / (2.0 * _SIDE_BAND))
+    side, lift = _side(offset, table.normals[best], np.clip(ratio, 0.0, 1.0))
     station = np.take_along_axis(along_pair, pair, axis=1)
-    return best.astype(np.int32), kept, ratio, side, height[..., None] * normal, pair, pair_kept, station
+    return best.astype(np.int32), kept, ratio, side, lift, pair, pair_kept, station
+
+
+def _side(
+    offset: NDArray[np.float64], normals: NDArray[np.float64], place: NDArray[np.float64]
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """External side (1) or internal (0) by R45's cosine, and the y part of the offset, blended along the segment.
+
+    Judged with the normals of both joints one by one: hip and knee bend in opposite senses, and half-way along a thigh
+    an interpolated normal would vanish and turn over.
+    """
+    length = np.maximum(np.linalg.norm(offset, axis=2), 1e-12)
+    height = np.einsum("vok,voek->voe", offset, normals)
+    sides = _smoothstep((height / length[..., None] + SIDE_BAND) / (2.0 * SIDE_BAND))
+    share = np.stack([1.0 - place, place], axis=2)
+    return (share * sides).sum(axis=2), np.einsum("voe,voe,voek->vok", share, height, normals)
 
 
 def _share_in_fan(
     points: NDArray[np.float64],
-    table: _SegmentTable,
+    table: SegmentTable,
     t: NDArray[np.float64],
     inside: slice,
     parameters: Parameters,
 ) -> NDArray[np.float64]:
-    """Weights of side-by-side segments: each holds a vertex as far as both of its virtual segments say so.
+    """Weights of side-by-side segments, of which at most two neighbours hold a vertex, shape (V, segments).
 
     R_k, the ratio on the virtual segment from segment k to k + 1, is remapped to 0 within the first's proximity and to
-    1 within the second's (areas 1-4-7, 2-5-8 and 3-6-9 of A Fig. 7). Segment k then gets min(R_{k-1}, 1 − R_k): between
-    two neighbours that is the paper's 1 − R and R; it stays continuous where the nearest segment changes, and never
-    vanishes for all segments at once.
+    1 within the second's (areas 1-4-7, 2-5-8 and 3-6-9 of A Fig. 7). The sum of all R counts the neighbours passed:
+    between two of them it gives the paper's 1 − R and R, and it stays continuous where the nearest segment changes and
+    where the virtual segments contradict each other.
+
+    Virtual segments of neighbours that begin at one joint, as in the carpus, join points at the fan's largest ratio:
+    the projections themselves would fall together at that joint and R lose its sense while other segments still differ.
     """
     start, along, ends = table.start[inside], table.along[inside], table.ends[inside]
-    ratio = t[:, inside]
-    feet = start + ratio[..., None] * along
-    virtual = feet[:, 1:] - feet[:, :-1]
-    across = ((points[:, None] - feet[:, :-1]) * virtual).sum(axis=2) / np.maximum((virtual**2).sum(axis=2), 1e-18)
-    place = np.clip(ratio, 0.0, 1.0)
-    proximal, distal = parameters.proximity[ends[:, 0], 0], parameters.proximity[ends[:, 1], 1]
-    width = (1.0 - place) * proximal + place * distal
-    margins = width[:, :-1] + width[:, 1:]
-    width = width * 0.9  # an in-between area is left even where the proximities sum to one
-    lateral = np.clip((across - width[:, :-1]) / np.maximum(1.0 - 0.9 * margins, 0.1), 0.0, 1.0)
-    before = np.concatenate([np.ones((len(points), 1)), lateral], axis=1)
-    after = np.concatenate([1.0 - lateral, np.ones((len(points), 1))], axis=1)
-    share = np.minimum(before, after)
-    out: NDArray[np.float64] = share / share.sum(axis=1, keepdims=True)
+    place = np.clip(t[:, inside], 0.0, 1.0)
+    farthest = place.max(axis=1, keepdims=True)
+    apart = np.linalg.norm(np.diff(start, axis=0), axis=1)
+    joined = apart < 1e-3 * np.linalg.norm(along, axis=1).max()
+    out = np.zeros_like(place)
+    passed = np.zeros(len(points))
+    for k in range(len(start) - 1):
+        first, second = (farthest[:, 0] if joined[k] else t[:, inside][:, n] for n in (k, k + 1))
+        foot = start[k] + first[:, None] * along[k]
+        virtual = start[k + 1] + second[:, None] * along[k + 1] - foot
+        across = ((points - foot) * virtual).sum(axis=1) / np.maximum((virtual**2).sum(axis=1), 1e-18)
+        widths = [
+            (1.0 - np.clip(r, 0.0, 1.0)) * parameters.proximity[ends[n, 0], 0]
+            + np.clip(r, 0.0, 1.0) * parameters.proximity[ends[n, 1], 1]
+            for n, r in ((k, first), (k + 1, second))
+        ]
+        # an in-between area is left even where proximities are as large as can be
+        room = np.maximum(1.0 - LATERAL * (widths[0] + widths[1]), 0.1)
+        passed += np.clip((across - LATERAL * widths[0]) / room, 0.0, 1.0)
+    for k in range(len(start)):
+        out[:, k] = np.maximum(1.0 - np.abs(passed - k), 0.0)
     return out
 
 
@@ -217,7 +248,7 @@ def _strongest(weight: NDArray[np.float64]) -> tuple[NDArray[np.int64], NDArray[
     order = np.take_along_axis(order, np.argsort(-np.take_along_axis(weight, order, axis=1), axis=1), axis=1)
     largest = np.take_along_axis(weight, order, axis=1)
     rest = np.partition(weight, -keep - 1, axis=1)[:, -keep - 1] if weight.shape[1] > keep else 0.0
-    threshold = np.maximum(rest, _FLOOR)
+    threshold = np.maximum(rest, FLOOR)
     faded = np.maximum(largest - np.reshape(threshold, (-1, 1)), 0.0)
     faded /= faded.sum(axis=1, keepdims=True)
     if keep < OPERATORS:

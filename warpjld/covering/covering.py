@@ -9,7 +9,7 @@ from functools import cached_property
 from typing import Any, Literal
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from warpjld.covering.binding import Anchors, anchor
 from warpjld.covering.device import anchors_on, checked_device, drivers_on, parameters_on
@@ -62,7 +62,7 @@ class Covering:
         """The same binding with other parameters; domains are not computed again."""
         parameters.check(self.skeleton)
         anchors = anchor(self.surface.vertices, self.skeleton, self.fans, self.domains, parameters)
-        return Covering(self.skeleton, self.surface, parameters, self.fans, self.domains, anchors)
+        return type(self)(self.skeleton, self.surface, parameters, self.fans, self.domains, anchors)
 
     @cached_property
     def runs(self) -> Runs:
@@ -148,18 +148,14 @@ class Covering:
             some = poses[start : start + frames]
             yield start, self.deform(some, device=device, threads=threads, out=buffer[: len(some)], order=order)
 
-    def points(
-        self, poses: Poses, vertices: NDArray[np.int32] | list[int], *, device: str = "cpu"
-    ) -> NDArray[np.float32]:
+    def points(self, poses: Poses, vertices: ArrayLike, *, device: str = "cpu") -> NDArray[np.float32]:
         """Final positions of chosen vertices only [m], shape (F, n, 3) (R74)."""
         import warp as wp
         from warpjld_kernels.anchored import deform_points
 
         where = checked_device(device)
-        chosen = np.asarray(vertices, dtype=np.int32)
-        if chosen.size and (chosen.min() < 0 or chosen.max() >= len(self.surface.vertices)):
-            raise InputError(f"vertices: indices must lie in 0…{len(self.surface.vertices) - 1}")
-        self._check(poses)
+        chosen = self.chosen(vertices)
+        self.check(poses)
         out = wp.empty((len(poses), len(chosen)), dtype=wp.vec3, device=where)
         model = self._on(where, "anchored", self._anchored)
         pose = drivers_on(where, drive(self.skeleton, self.anchors, poses))
@@ -168,20 +164,29 @@ class Covering:
         result: NDArray[np.float32] = out.numpy()
         return result
 
-    def _palette(self, poses: Poses) -> NDArray[np.float32]:
-        self._check(poses)
+    def chosen(self, vertices: ArrayLike) -> NDArray[np.int32]:
+        """Vertex numbers as an array; InputError where one does not exist."""
+        chosen = np.asarray(vertices, dtype=np.int32)
+        if chosen.size and (chosen.min() < 0 or chosen.max() >= len(self.surface.vertices)):
+            raise InputError(f"vertices: indices must lie in 0…{len(self.surface.vertices) - 1}")
+        return chosen
+
+    def _palette(self, poses: Poses) -> Any:
+        self.check(poses)
         drivers = drive(self.skeleton, self.anchors, poses)
         return palette(self.runs.columns, self.anchors, self.parameters, drivers)
 
-    def _check(self, poses: Poses) -> None:
+    def check(self, poses: Poses) -> None:
+        """Raise InputError where poses do not fit the skeleton or are not finite."""
         if poses.positions.shape[1:] != (len(self.skeleton), 3):
             raise InputError(f"poses: want {len(self.skeleton)} joints, got {poses.positions.shape[1]}")
         finite = np.isfinite(poses.positions).all(axis=2) & np.isfinite(poses.rotations).all(axis=2)
+        finite &= np.isfinite(poses.flexion)
         if not finite.all():
             frame, joint = np.argwhere(~finite)[0]
             raise InputError(f"poses: joint '{self.skeleton.names[joint]}' is not finite at frame {frame}")
 
-    def _launch(self, rows: NDArray[np.float32], points: Any, device: Any, threads: int, order: str) -> None:
+    def _launch(self, rows: Any, points: Any, device: Any, threads: int, order: str) -> None:
         import warp as wp
         from warpjld_kernels.covering_runs import CPU_FRAMES, deform_runs
 
@@ -234,6 +239,7 @@ def bind(
     parameters: Parameters | None = None,
     skin: Skin | None = None,
     domains: Literal["geometry", "skin"] | NDArray[np.float64] = "geometry",
+    method: Literal["smooth", "paper"] = "smooth",
 ) -> Covering:
     """Bind a surface to a skeleton (A §4): find domains and place every vertex on its segments.
 
@@ -243,10 +249,13 @@ def bind(
         parameters: The animator's parameters; by default those that keep volume.
         skin: Painted weights, wanted by ``domains="skin"``.
         domains: "geometry" (bone heat), "skin" (painted weights), or weights of every operator, shape (V, fans).
+        method: "smooth" (soft borders, rotations) or "paper" (its own hard-edged operators, to compare).
 
     Raises:
         InputError: A skeleton without segments, missing painted weights, or parameters out of range.
     """
+    if method not in ("smooth", "paper"):
+        raise InputError(f"method: want 'smooth' or 'paper', got {method!r}")
     groups = fans(skeleton)
     if not groups:
         raise InputError("skeleton: it has no segment to cover")
@@ -263,4 +272,8 @@ def bind(
     else:
         raise InputError(f"domains: want 'geometry' or 'skin', got {domains!r}")
     anchors = anchor(surface.vertices, skeleton, groups, weights, chosen)
+    if method == "paper":
+        from warpjld.covering.paper import PaperCovering
+
+        return PaperCovering(skeleton, surface, chosen, groups, weights, anchors)
     return Covering(skeleton, surface, chosen, groups, weights, anchors)

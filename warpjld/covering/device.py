@@ -14,7 +14,7 @@ from warpjld.errors import InputError
 if TYPE_CHECKING:
     import warp as wp
 
-__all__ = ["anchors_on", "checked_device", "drivers_on", "parameters_on"]
+__all__ = ["anchors_on", "array_on", "checked_device", "drivers_on", "parameters_on"]
 
 
 def checked_device(name: str) -> wp.Device:
@@ -49,8 +49,8 @@ def anchors_on(device: wp.Device, anchors: Anchors, rest_joints: np.ndarray) -> 
         ("between", float),
         ("station", float),
     ):
-        setattr(out, name, _array(getattr(anchors, name), kind, device))
-    out.rest_joints = _array(rest_joints, wp.vec3, device)
+        setattr(out, name, array_on(device, getattr(anchors, name), kind))
+    out.rest_joints = array_on(device, rest_joints, wp.vec3)
     return out
 
 
@@ -60,7 +60,7 @@ def parameters_on(device: wp.Device, parameters: Parameters, *, requires_grad: b
 
     out = anchored.Parameters()
     for name in ("inflation", "proximity", "muscle", "peak", "exponents", "palm"):
-        setattr(out, name, _array(getattr(parameters, name), float, device, requires_grad=requires_grad))
+        setattr(out, name, array_on(device, getattr(parameters, name), float, requires_grad=requires_grad))
     return out
 
 
@@ -75,10 +75,11 @@ def drivers_on(device: wp.Device, drivers: Drivers, *, requires_grad: bool = Fal
         ("flexion_ratio", float),
         ("closing", float),
     )
-    return [_array(getattr(drivers, name), kind, device, requires_grad=requires_grad) for name, kind in kinds]
+    return [array_on(device, getattr(drivers, name), kind, requires_grad=requires_grad) for name, kind in kinds]
 
 
-def _array(values: np.ndarray, kind: Any, device: Any, *, requires_grad: bool = False) -> Any:
+def array_on(device: Any, values: np.ndarray, kind: Any, *, requires_grad: bool = False) -> Any:
+    """An array of float32 or int32 on a device."""
     import warp as wp
 
     plain = np.ascontiguousarray(values, dtype=np.int32 if kind is wp.int32 else np.float32)

@@ -11,6 +11,7 @@ import scipy.sparse as sp
 from numpy.typing import NDArray
 from scipy.sparse.linalg import cg, splu
 
+from warpjld.covering.corners import corner_conductivity
 from warpjld.covering.operators import Fan
 from warpjld.errors import InputError
 from warpjld.rig import Skin
@@ -18,7 +19,7 @@ from warpjld.skeleton.tree import Skeleton
 
 __all__ = ["domains_from_geometry", "domains_from_skin"]
 
-_DIRECT_LIMIT = 40_000  # vertices up to which a sparse factorisation is quicker than conjugate gradients
+_DIRECT_LIMIT = 100_000  # vertices up to which a sparse factorisation is quicker than conjugate gradients
 
 
 def domains_from_geometry(
@@ -135,9 +136,11 @@ def _cotangent_laplacian(
 ) -> tuple[sp.csr_array, NDArray[np.float64]]:
     """Positive semidefinite cotangent Laplacian and barycentric vertex areas.
 
-    Cotangents are kept within (0, 1e3): a weight of the wrong sign would let heat run uphill.
+    Cotangents are kept within (0, 1e3): a weight of the wrong sign would let heat run uphill. Around saddle corners
+    heat is conducted better, so that weights have no spike there.
     """
     count = len(vertices)
+    conductivity = corner_conductivity(vertices, faces)
     rows, columns, values = [], [], []
     area = np.zeros(count)
     for k in range(3):
@@ -145,6 +148,7 @@ def _cotangent_laplacian(
         u, v = vertices[i] - vertices[apex], vertices[j] - vertices[apex]
         twice = np.linalg.norm(np.cross(u, v), axis=1)
         cotangent = np.clip((u * v).sum(axis=1) / np.maximum(twice, 1e-30), 1e-3, 1e3) / 2.0
+        cotangent *= conductivity
         rows += [i, j]
         columns += [j, i]
         values += [-cotangent, -cotangent]

@@ -52,9 +52,12 @@ def halfway_rotations(skeleton: Skeleton, rotations: NDArray[np.float64]) -> NDA
 
 
 def flexion_ratio(skeleton: Skeleton, flexion: NDArray[np.float64]) -> NDArray[np.float64]:
-    """FR = vertical flexion / maximal flexion, clamped to 0 … 1, shape (F, J) (A §6.1, C18)."""
+    """FR = vertical flexion / maximal flexion, clamped to 0 … 1, shape (F, J) (A §6.1, C18).
+
+    Zero at roots: an angle lies between two segments (R1), and a root turns all there is.
+    """
     largest = skeleton.limits[:, CHANNELS.index("flexion"), 1]
-    moves = largest > 1e-6
+    moves = (largest > 1e-6) & (skeleton.parents >= 0)
     return np.where(moves, np.clip(flexion / np.where(moves, largest, 1.0), 0.0, 1.0), 0.0)
 
 

@@ -10,9 +10,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from warpjld.errors import InputError
-from warpjld.skeleton.tree import Skeleton
+from warpjld.skeleton.tree import CHANNELS, Skeleton
 
 __all__ = ["Parameters", "default_parameters", "load_parameters", "save_parameters"]
+
+# Amplitudes of a 90° joint: a tube of two segments, half as thick as they are long, then keeps its volume within 2 %.
+_INFLATION = 0.21
+_MUSCLE = 0.20
+_PALM = 3.0
+_WIDEST = np.radians(135.0)  # wider limits say what a joint never does alone
 
 
 @dataclass(frozen=True, eq=False)
@@ -57,16 +63,42 @@ class Parameters:
 
 
 def default_parameters(skeleton: Skeleton) -> Parameters:
-    """Defaults that keep the volume of a bent tube (proximities from A Fig. 6)."""
-    ones = np.ones(len(skeleton))
+    """Defaults that keep the volume of a bent tube, whatever the limit of its joint.
+
+    A section turned by φ against its segment loses 1 − cos φ of its volume. The bisector turns sections by up to θ/2,
+    so a joint bent by θ costs 1 − sin(θ/2)/(θ/2) of what lies around it. Inflation is relative to the maximal flexion
+    (R59), so its amplitudes follow that loss at the maximal flexion: a 20° metacarpal joint gets a twentieth of a
+    knuckle. Growing with θ where the loss grows with θ², they gain a little on the way and end near zero.
+
+    Where a finger meets the palm both amplitudes are three times as large: the palm loses volume at that joint too,
+    but has no internal inflation to make up for it (R50). A joint that cannot bend leaves its segment's muscle to the
+    joint at the other end.
+    """
+    count = len(skeleton)
+    largest = np.minimum(skeleton.limits[:, CHANNELS.index("flexion"), 1], _WIDEST)
+    bends = (largest > 1e-6) & (skeleton.parents >= 0) & np.array([bool(c) for c in skeleton.children])
+    loss = np.where(bends, _volume_loss(largest) / _volume_loss(np.array(np.pi / 2.0)), 0.0)
+    loss[[s.distal for s in skeleton.segments if s.palm]] *= _PALM
+    muscle = np.zeros(count)
+    flat = {end for palm in skeleton.palms for segment in palm for end in segment}  # metacarpals and carpus
+    for segment in skeleton.segments:
+        ends = [j for j in (segment.proximal, segment.distal) if bends[j]]
+        if ends and segment.distal not in flat:
+            muscle[segment.proximal] = max(muscle[segment.proximal], loss[ends].mean())
+    ones = np.ones(count)
     return Parameters(
-        inflation=0.25 * ones,
-        proximity=np.column_stack([0.3 * ones, 0.2 * ones]),
-        muscle=0.20 * ones,
+        inflation=_INFLATION * loss,
+        proximity=np.column_stack([0.3 * ones, 0.3 * ones]),
+        muscle=_MUSCLE * muscle,
         peak=0.5 * ones,
         exponents=np.column_stack([0.6 * ones, 0.6 * ones]),
         palm=0.2 * ones,
     )
+
+
+def _volume_loss(angle: NDArray[np.float64]) -> NDArray[np.float64]:
+    half = np.maximum(angle / 2.0, 1e-3)
+    return 1.0 - np.sin(half) / half
 
 
 def save_parameters(path: str | Path, skeleton: Skeleton, parameters: Parameters) -> None:

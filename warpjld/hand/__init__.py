@@ -1,1 +1,6 @@
-"""."""
+"""The built-in hand, made by the program itself (R7, R13)."""
+
+from warpjld.hand.anthropometry import percentile
+from warpjld.hand.build import build_hand
+
+__all__ = ["build_hand", "percentile"]

@@ -1,1 +1,30 @@
-"""."""
+"""Pictures and films of a moving surface and its skeleton, off screen, from plain arrays.
+
+Importing this starts nothing: pyvista is loaded when the first picture is drawn.
+"""
+
+from warpjld.render.camera import VIEWS, Camera
+from warpjld.render.colors import ColorScale
+from warpjld.render.files import save_picture
+from warpjld.render.film import Film
+from warpjld.render.pictures import shaded, wireframe
+from warpjld.render.scene import Image, Scene, Solid
+from warpjld.render.sheet import contact_sheet, grid
+from warpjld.render.style import Quality, Style
+
+__all__ = [
+    "VIEWS",
+    "Camera",
+    "ColorScale",
+    "Film",
+    "Image",
+    "Quality",
+    "Scene",
+    "Solid",
+    "Style",
+    "contact_sheet",
+    "grid",
+    "save_picture",
+    "shaded",
+    "wireframe",
+]

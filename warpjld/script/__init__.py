@@ -1,1 +1,22 @@
-"""."""
+"""The command language: scripts of key angles, read and run (A §9, R79–R88)."""
+
+from warpjld.script.arguments import Arguments
+from warpjld.script.interpreter import Interpreter
+from warpjld.script.parser import parse, parse_file
+from warpjld.script.registry import Command, Registry, all_commands, command, commands_table
+from warpjld.script.scene import Actor, Camera, Scene
+
+__all__ = [
+    "Actor",
+    "Arguments",
+    "Camera",
+    "Command",
+    "Interpreter",
+    "Registry",
+    "Scene",
+    "all_commands",
+    "command",
+    "commands_table",
+    "parse",
+    "parse_file",
+]

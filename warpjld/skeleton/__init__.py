@@ -5,6 +5,7 @@ from warpjld.skeleton.kinematics import (
     Poses,
     poses_from_angles,
     poses_from_rotations,
+    poses_from_world,
     rest_poses,
     vertical_flexion,
 )
@@ -23,6 +24,7 @@ __all__ = [
     "hand_joint_names",
     "poses_from_angles",
     "poses_from_rotations",
+    "poses_from_world",
     "rest_poses",
     "vertical_flexion",
 ]

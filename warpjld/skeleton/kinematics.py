@@ -11,7 +11,7 @@ from scipy.spatial.transform import Rotation
 from warpjld.errors import InputError
 from warpjld.skeleton.tree import CHANNELS, Skeleton
 
-__all__ = ["Poses", "poses_from_angles", "poses_from_rotations", "rest_poses", "vertical_flexion"]
+__all__ = ["Poses", "poses_from_angles", "poses_from_rotations", "poses_from_world", "rest_poses", "vertical_flexion"]
 
 
 @dataclass(frozen=True, eq=False)
@@ -95,6 +95,31 @@ def poses_from_rotations(
     if local.ndim != 3 or local.shape[1:] != (len(skeleton), 4):
         raise InputError(f"local: want shape (frames, {len(skeleton)}, 4), got {local.shape}")
     return _compose(skeleton, local, root_position, None)
+
+
+def poses_from_world(skeleton: Skeleton, positions: NDArray[np.float64], rotations: NDArray[np.float64]) -> Poses:
+    """Poses of joints that a motion file places itself, so that bones may change their length.
+
+    Args:
+        skeleton: The rest skeleton.
+        positions: Joint positions [m], shape (F, J, 3).
+        rotations: Rotation of each joint's bone from the rest pose, in world axes, unit quaternions x, y, z, w of
+            either sign, shape (F, J, 4).
+    """
+    count = len(skeleton)
+    for name, array, last in (("positions", positions, 3), ("rotations", rotations, 4)):
+        if array.ndim != 3 or array.shape[1:] != (count, last):
+            raise InputError(f"{name}: want shape (frames, {count}, {last}), got {array.shape}")
+    local = rotations.copy()
+    for j, parent in enumerate(skeleton.parents):
+        if parent >= 0:
+            local[:, j] = _multiply(rotations[:, parent] * np.array([-1.0, -1.0, -1.0, 1.0]), rotations[:, j])
+    local *= np.where(local[..., 3:] < 0.0, -1.0, 1.0)
+    aligned = local.copy()
+    for j, parent in enumerate(skeleton.parents):
+        if parent >= 0:
+            aligned[:, j] = _multiply(aligned[:, parent], local[:, j])
+    return Poses(np.array(positions, dtype=np.float64), aligned, vertical_flexion(skeleton, local))
 
 
 def rest_poses(skeleton: Skeleton, frames: int = 1) -> Poses:

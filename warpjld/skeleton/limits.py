@@ -20,6 +20,7 @@ _ROLES: dict[str, tuple[tuple[float, float], ...]] = {
     "thumb.base": ((-20, 15), (-45, 45), _CLOSED, (-45, 45)),
     "thumb.knuckle2": ((0, 55), _CLOSED, _CLOSED, _CLOSED),
     "thumb.knuckle3": ((0, 80), _CLOSED, _CLOSED, _CLOSED),
+    "tip": (_CLOSED,) * 4,  # an extremity carries nothing
     "index.carpometacarpal": (_CLOSED,) * 4,
     "middle.carpometacarpal": (_CLOSED,) * 4,
     "elbow": ((0, 150), _CLOSED, (-80, 80), _CLOSED),

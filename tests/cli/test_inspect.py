@@ -1,0 +1,63 @@
+"""``warpjld inspect``."""
+
+from __future__ import annotations
+
+import json
+
+import pytest
+from click.testing import CliRunner
+
+from warpjld.cli.inspect import command
+
+
+def run(*arguments: object):
+    result = CliRunner().invoke(command, [str(a) for a in arguments])
+    if result.exception and not isinstance(result.exception, SystemExit):
+        raise result.exception
+    return result
+
+
+@pytest.fixture(scope="module")
+def hand(data):
+    return data / "hand_anny/left.glb"
+
+
+def test_the_report_names_joints_domains_limits_and_doubts(hand):
+    out = run(hand, "--no-picture").stdout
+    assert "left.index.knuckle2" in out
+    assert "finger2-2.L" in out
+    assert "flexion 0…100°" in out
+    assert "note: left hand: recognised by names, 20 of 25 joints in the file" in out
+    assert "suspicious: left.middle.base is off-centre" in out
+
+
+def test_json_holds_the_same(hand, tmp_path):
+    report = json.loads(run(hand, "--no-picture", "--json").stdout)
+    assert len(report["joints"]) == 25
+    joint = next(j for j in report["joints"] if j["name"] == "left.index.knuckle2")
+    assert joint["parent"] == "left.index.base"
+    assert joint["limits"] == {"flexion": [0.0, 100.0]}
+    assert sum(j["domain"] for j in report["joints"]) == report["surface"]["vertices"]
+    assert {f["kind"] for f in report["placing"]} == {"off-centre"}
+
+
+def test_quiet_prints_doubts_only(data):
+    assert run(data / "hand_webxr_generic/left.glb", "--no-picture", "-q").stdout == ""
+
+
+def test_the_picture_is_written(hand, tmp_path):
+    from PIL import Image
+
+    path = tmp_path / "hand.png"
+    assert f"picture: {path}" in run(hand, "-o", path).stdout
+    picture = Image.open(path).convert("L")
+    drawn = sum(picture.histogram()[:250]) / (picture.width * picture.height)
+    assert 0.1 < drawn < 0.9
+    assert [p.name for p in tmp_path.iterdir()] == ["hand.png"]
+
+
+def test_the_skeleton_can_be_written_for_editing(hand, tmp_path):
+    run(hand, "--no-picture", "-q", "--write-skeleton", tmp_path / "s.json")
+    joints = json.loads((tmp_path / "s.json").read_text())["joints"]
+    assert joints[0]["name"] == "left.wrist"
+    assert len(joints) == 25

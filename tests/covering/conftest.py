@@ -1,0 +1,29 @@
+"""Rigs and poses that the tests of the covering share."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from warpjld.covering import Covering, bind
+from warpjld.hand import build_hand
+from warpjld.io import load_rig
+from warpjld.rig import Rig
+
+
+@pytest.fixture(scope="session")
+def built() -> Rig:
+    """The built-in left hand, small."""
+    return build_hand("left", resolution=1500)
+
+
+@pytest.fixture(scope="session")
+def bound(built: Rig) -> Covering:
+    return bind(built.skeleton, built.surface)
+
+
+@pytest.fixture(scope="session")
+def webxr_hands(data: Path) -> dict[str, Rig]:
+    """Both WebXR generic hands."""
+    return {side: load_rig(data / "hand_webxr_generic" / f"{side}.glb") for side in ("left", "right")}

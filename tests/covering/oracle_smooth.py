@@ -1,0 +1,251 @@
+"""The covering formula in float64, one vertex at a time: an oracle that shares no code with what it checks.
+
+Places are found from the skeleton, the parameters and a vertex's domain weights alone. Rotations become matrices as
+soon as they are blended. Which column of the domains is which operator is the only thing asked of the covering.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from warpjld.covering import Covering, Parameters
+from warpjld.covering.binding import FLOOR, LATERAL, SIDE_BAND
+from warpjld.skeleton import CHANNELS, Poses, Skeleton
+
+STATIONS = np.linspace(0.0, 1.0, 5)  # where along a palm pair its scale factor is evaluated
+POWER_OFFSET = 0.05  # what keeps the slope of a^b finite
+
+
+@dataclass
+class Operator:
+    """A vertex on one segment."""
+
+    proximal: int
+    distal: int
+    muscle: bool
+    weight: float
+    ratio: float
+    side: float
+    height: np.ndarray
+
+
+@dataclass
+class Between:
+    """A vertex between two palm segments that begin at joints a and b."""
+
+    pair: int
+    a: int
+    b: int
+    amount: float
+    place: float
+
+
+@dataclass
+class Place:
+    rest: np.ndarray
+    operators: list[Operator]
+    between: list[Between]
+
+
+@dataclass
+class Frame:
+    """Inputs of one frame."""
+
+    positions: np.ndarray
+    halfway: np.ndarray
+    rotations: np.ndarray
+    ratio: np.ndarray
+    closing: np.ndarray
+
+
+def places(covering: Covering, vertices: list[int]) -> list[Place]:
+    """Where vertices lie on the segments of their operators."""
+    fans = [[(s.proximal, s.distal) for s in fan.segments] for fan in covering.fans]
+    muscled = [fan.muscle for fan in covering.fans]
+    return [
+        _place(
+            covering.skeleton,
+            fans,
+            muscled,
+            covering.surface.vertices[v],
+            covering.domains[v],
+            covering.parameters,
+        )
+        for v in vertices
+    ]
+
+
+def palm_pairs(covering: Covering) -> list[tuple[tuple[int, int], tuple[int, int]]]:
+    """Neighbouring segments, fan by fan."""
+    out = []
+    for fan in covering.fans:
+        ends = [(s.proximal, s.distal) for s in fan.segments]
+        out += list(pairwise(ends))
+    return out
+
+
+def frames(covering: Covering, poses: Poses) -> list[Frame]:
+    """What each pose gives the operators."""
+    return [pose_frame(covering.skeleton, poses, f, palm_pairs(covering)) for f in range(len(poses))]
+
+
+def pose_frame(
+    skeleton: Skeleton, poses: Poses, f: int, pairs: Sequence[tuple[tuple[int, int], tuple[int, int]]] = ()
+) -> Frame:
+    """What pose f gives them."""
+    q = poses.rotations[f]
+    halfway = q.copy()
+    for j, parent in enumerate(skeleton.parents):
+        if parent >= 0:
+            start = Rotation.from_quat(q[parent])
+            turn = (start.inv() * Rotation.from_quat(q[j])).as_rotvec()
+            half = (start * Rotation.from_rotvec(turn / 2.0)).as_quat()
+            halfway[j] = half if half @ q[parent] > 0.0 else -half
+    ratio = np.zeros(len(skeleton))
+    for j in range(len(skeleton)):
+        largest = skeleton.limits[j, CHANNELS.index("flexion"), 1]
+        if skeleton.parents[j] >= 0 and largest > 1e-6:
+            ratio[j] = min(max(poses.flexion[f, j] / largest, 0.0), 1.0)
+    closing = np.zeros((max(len(pairs), 1), len(STATIONS)))
+    for n, ((pa, da), (pb, db)) in enumerate(pairs):
+        for i, t in enumerate(STATIONS):
+            lengths = [
+                np.linalg.norm((1 - t) * (x[pb] - x[pa]) + t * (x[db] - x[da]))
+                for x in (skeleton.rest, poses.positions[f])
+            ]
+            if lengths[0] > 1e-9:
+                closing[n, i] = min(np.log(lengths[1] / lengths[0]), 0.0)
+    return Frame(poses.positions[f], halfway, q, ratio, closing)
+
+
+def evaluate(place: Place, frame: Frame, parameters: Parameters, rest_joints: np.ndarray) -> np.ndarray:
+    """S' = Σ c J' + rot(normalise(Σ w q), g d + Σ m e)."""
+    before, after, blend = np.zeros(3), np.zeros(3), np.zeros(4)
+    grow, bulge = 1.0, np.zeros(3)
+    for o in place.operators:
+        p, d, t = o.proximal, o.distal, min(max(o.ratio, 0.0), 1.0)
+        before += o.weight * ((1 - o.ratio) * rest_joints[p] + o.ratio * rest_joints[d])
+        after += o.weight * ((1 - o.ratio) * frame.positions[p] + o.ratio * frame.positions[d])
+        prox_p, prox_d = parameters.proximity[p, 0], parameters.proximity[d, 1]
+        in_p = 1 - t / prox_p if t < prox_p else 0.0  # area 1, 1 at the joint
+        in_d = 1 - (1 - t) / prox_d if 1 - t < prox_d else 0.0  # area 2
+        external = in_p * frame.halfway[p] + (1 - in_p - in_d) * frame.rotations[p] + in_d * frame.halfway[d]
+        internal = (1 - t) * frame.halfway[p] + t * frame.halfway[d]
+        blend += o.weight * (o.side * external + (1 - o.side) * internal)
+        for j, area in ((p, in_p), (d, in_d)):
+            grow += o.weight * o.side * parameters.inflation[j] * area**2 * (3 - 2 * area) * frame.ratio[j]
+        if o.muscle:
+            driven = (frame.ratio[p] + frame.ratio[d]) / 2
+            profile = _profile(t, parameters.peak[p], *parameters.exponents[p])
+            bulge += o.weight * (1 - o.side) * parameters.muscle[p] * driven * profile * o.height
+    for b in place.between:
+        exponent = (parameters.palm[b.a] + parameters.palm[b.b]) / 2
+        inflation = np.exp(-exponent * frame.closing[b.pair]) - 1
+        grow += b.amount * np.interp(b.place, STATIONS, inflation)
+    turn = Rotation.from_quat(blend).as_matrix()  # normalises
+    return after + turn @ (grow * (place.rest - before) + bulge)
+
+
+def _profile(t: float, peak: float, before: float, beyond: float) -> float:
+    a, b = (t / peak, before) if t <= peak else ((1 - t) / (1 - peak), beyond)
+    rounded = a * (2 - a)
+    low, high = POWER_OFFSET**b, (1 + POWER_OFFSET) ** b
+    return ((rounded + POWER_OFFSET) ** b - low) / (high - low)
+
+
+def _place(
+    skeleton: Skeleton,
+    fans: list[list[tuple[int, int]]],
+    muscled: list[bool],
+    vertex: np.ndarray,
+    domain: np.ndarray,
+    parameters: Parameters,
+) -> Place:
+    candidates: list[tuple[float, int, int, bool]] = []
+    between: list[Between] = []
+    pair = 0
+    for fan, segments in enumerate(fans):
+        share = _shares(skeleton, segments, vertex, parameters)
+        for (p, d), part in zip(segments, share, strict=True):
+            candidates.append((domain[fan] * part, p, d, muscled[fan]))
+        for k in range(len(segments) - 1):
+            (pa, da), (pb, db) = segments[k], segments[k + 1]
+            ta, tb = _ratio(skeleton, pa, da, vertex), _ratio(skeleton, pb, db, vertex)
+            amount = domain[fan] * 4 * share[k] * share[k + 1]
+            between.append(Between(pair, pa, pb, amount, min(max((ta + tb) / 2, 0.0), 1.0)))
+            pair += 1
+    # the strongest four, faded by what the fifth has, so that an exchange is not seen
+    candidates.sort(key=lambda c: -c[0])
+    threshold = max(candidates[4][0] if len(candidates) > 4 else 0.0, FLOOR)
+    total = sum(max(c[0] - threshold, 0.0) for c in candidates[:4])
+    operators = [
+        _operator(skeleton, p, d, muscle, (weight - threshold) / total, vertex)
+        for weight, p, d, muscle in candidates[:4]
+        if weight > threshold
+    ]
+    between.sort(key=lambda b: -b.amount)
+    third = between[2].amount if len(between) > 2 else 0.0
+    for b in between[:2]:
+        b.amount -= third
+    return Place(vertex, operators, between[:2])
+
+
+def _operator(skeleton: Skeleton, p: int, d: int, muscle: bool, weight: float, vertex: np.ndarray) -> Operator:
+    ratio = _ratio(skeleton, p, d, vertex)
+    offset = vertex - ((1 - ratio) * skeleton.rest[p] + ratio * skeleton.rest[d])
+    t = min(max(ratio, 0.0), 1.0)
+    side, height = 0.0, np.zeros(3)
+    for share, joint, other in ((1 - t, p, d), (t, d, p)):
+        normal = _normal(skeleton, p, d, joint, other)
+        cosine = offset @ normal / np.linalg.norm(offset)
+        x = min(max((cosine + SIDE_BAND) / (2 * SIDE_BAND), 0.0), 1.0)
+        side += share * (3 * x**2 - 2 * x**3)
+        height += share * (offset @ normal) * normal
+    return Operator(p, d, muscle, weight, ratio, side, height)
+
+
+def _normal(skeleton: Skeleton, p: int, d: int, joint: int, other: int) -> np.ndarray:
+    """Segment × flexion axis; where an axis lies along the segment, the other joint's (R20)."""
+    along = skeleton.rest[d] - skeleton.rest[p]
+    for j in (joint, other):
+        normal = np.cross(along / np.linalg.norm(along), skeleton.axes[j])
+        if np.linalg.norm(normal) > 1e-3:
+            return normal / np.linalg.norm(normal)
+    raise AssertionError("an oracle's skeleton has axes across its segments")
+
+
+def _ratio(skeleton: Skeleton, p: int, d: int, vertex: np.ndarray) -> float:
+    along = skeleton.rest[d] - skeleton.rest[p]
+    t = (vertex - skeleton.rest[p]) @ along / (along @ along)
+    if t < 0.0 and skeleton.parents[p] >= 0:
+        return 0.0
+    if t > 1.0 and d in skeleton.parents:
+        return 1.0
+    return t
+
+
+def _shares(
+    skeleton: Skeleton, segments: list[tuple[int, int]], vertex: np.ndarray, parameters: Parameters
+) -> list[float]:
+    """R of every virtual segment, remapped by the proximities; their sum lies between the two that hold the vertex."""
+    ratios = [_ratio(skeleton, p, d, vertex) for p, d in segments]
+    longest = max(np.linalg.norm(skeleton.rest[d] - skeleton.rest[p]) for p, d in segments)
+    passed = 0.0
+    for k in range(len(segments) - 1):
+        at = ratios[k : k + 2]
+        if np.linalg.norm(skeleton.rest[segments[k][0]] - skeleton.rest[segments[k + 1][0]]) < 1e-3 * longest:
+            at = [max(min(max(t, 0.0), 1.0) for t in ratios)] * 2
+        feet, widths = [], []
+        for (p, d), t in zip(segments[k : k + 2], at, strict=True):
+            feet.append((1 - t) * skeleton.rest[p] + t * skeleton.rest[d])
+            inner = min(max(t, 0.0), 1.0)
+            widths.append(LATERAL * ((1 - inner) * parameters.proximity[p, 0] + inner * parameters.proximity[d, 1]))
+        virtual = feet[1] - feet[0]
+        r = (vertex - feet[0]) @ virtual / (virtual @ virtual) if np.linalg.norm(virtual) > 1e-9 else 0.0
+        passed += min(max((r - widths[0]) / max(1 - sum(widths), 0.1), 0.0), 1.0)
+    return [max(1 - abs(passed - k), 0.0) for k in range(len(segments))]

@@ -1,0 +1,32 @@
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+import trimesh
+
+from warpjld.errors import InputError
+from warpjld.io.caches import Cache, open_cache
+from warpjld.surface import Surface
+
+
+def test_one_numbered_file_a_frame(export: Callable[[str], Cache], surface: Surface, clip: np.ndarray) -> None:
+    files = export("walk.obj").files
+    assert [path.name for path in files] == [f"walk.{number:04d}.obj" for number in range(3, 10)]
+    for path, vertices in zip(files, clip, strict=True):
+        mesh = trimesh.load(path, process=False, maintain_order=True)
+        np.testing.assert_array_equal(mesh.vertices.astype(np.float32), vertices[surface.weld])
+        np.testing.assert_array_equal(mesh.faces, surface.source_faces)
+        np.testing.assert_allclose(mesh.visual.uv, surface.uv, atol=1e-7)
+
+
+def test_refuses_to_mix_with_another_sequence(export: Callable[[str], Cache], surface: Surface, tmp_path: Path) -> None:
+    files = export("walk.obj").files
+    with (
+        pytest.raises(InputError, match=r"walk\.0003\.obj.*of another sequence"),
+        open_cache(tmp_path / "walk.obj", surface, frames=2, rate=24, start_frame=5),
+    ):
+        pass
+    assert all(path.exists() for path in files)

@@ -1,0 +1,112 @@
+"""BVH files: analytic positions of known rotations, channel orders, and mistakes with their lines."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+
+from warpjld.errors import InputError
+from warpjld.motion.bvh import read_bvh
+
+ARM = """HIERARCHY
+ROOT Hips
+{
+  OFFSET 1 2 3
+  CHANNELS 6 Xposition Yposition Zposition Zrotation Xrotation Yrotation
+  JOINT Arm
+  {
+    OFFSET 10 0 0
+    CHANNELS 3 Yrotation Zrotation Xrotation
+    End Site
+    {
+      OFFSET 5 0 0
+    }
+  }
+}
+MOTION
+Frames: 3
+Frame Time: 0.0333333
+0 0 0 0 0 0 0 0 0
+1 2 3 90 0 0 0 0 0
+0 0 0 0 0 90 30 20 -40
+"""
+
+
+def write(folder: Path, text: str) -> Path:
+    path = folder / "motion.bvh"
+    path.write_text(text)
+    return path
+
+
+def test_known_rotations_give_known_positions(tmp_path: Path) -> None:
+    clip = read_bvh(write(tmp_path, ARM))
+    assert clip.names == ("Hips", "Arm", "Arm end")
+    assert clip.rate == 30.0
+    np.testing.assert_array_equal(clip.rest, [[1, 2, 3], [11, 2, 3], [16, 2, 3]])
+    np.testing.assert_allclose(clip.positions[0], [[0, 0, 0], [10, 0, 0], [15, 0, 0]], atol=1e-12)
+    np.testing.assert_allclose(clip.positions[1], [[1, 2, 3], [1, 12, 3], [1, 17, 3]], atol=1e-12)
+    root = Rotation.from_euler("Y", 90, degrees=True)
+    arm = root * Rotation.from_euler("YZX", [30, 20, -40], degrees=True)
+    np.testing.assert_allclose(clip.positions[2, 1], root.apply([10, 0, 0]), atol=1e-12)
+    np.testing.assert_allclose(clip.positions[2, 2], root.apply([10, 0, 0]) + arm.apply([5, 0, 0]), atol=1e-12)
+
+
+def test_case_spaces_and_position_channels_of_inner_joints(tmp_path: Path) -> None:
+    text = ARM.replace("\n", "\r\n").replace("End Site", "END SITE").replace("Frames:", "FRAMES:")
+    text = text.replace("CHANNELS 3 Y", "CHANNELS 4 Xposition Y").replace("0 0 0 0 0 0 0 0 0", "0 0 0 0 0 0 7 0 0 0")
+    text = text.replace("90 0 0 0 0 0", "90 0 0 7 0 0 0").replace("0 90 30 20 -40", "0 90 7 30 20 -40")
+    clip = read_bvh(write(tmp_path, text))
+    np.testing.assert_allclose(clip.positions[0, 1], [7, 0, 0], atol=1e-12)
+
+
+def test_another_rate_keeps_the_ends(tmp_path: Path) -> None:
+    clip = read_bvh(write(tmp_path, ARM))
+    double = clip.at_rate(60.0)
+    assert len(double) == 5
+    np.testing.assert_allclose(double.positions[::2], clip.positions, atol=1e-9)
+    half = Rotation.from_quat(double.rotations[1, 0]).as_rotvec(degrees=True)
+    np.testing.assert_allclose(half, [0, 0, 45], atol=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "line", "message"),
+    [
+        ("HIERARCHY", "HIERARCHIE", 1, "expected 'HIERARCHY'"),
+        ("OFFSET 10 0 0", "OFFSET 10 0", 8, "OFFSET of 'Arm': want 3 numbers, got 2"),
+        ("OFFSET 10 0 0", "OFFSET 10 o 0", 8, "'o' is not a number"),
+        ("OFFSET 10 0 0", "", 14, "'Arm' of line 6 has no OFFSET"),
+        ("CHANNELS 3 Yrotation", "CHANNELS 4 Yrotation", 9, "want their number"),
+        ("CHANNELS 3 Yrotation", "CHANNELS 3 Yrotatoin", 9, "no channel 'Yrotatoin'"),
+        ("    End Site", "    Offset 1 1 1\n    Site", 11, "unexpected 'Site'"),
+        ("ROOT Hips", "JOINT Hips", 2, "JOINT stands outside a ROOT"),
+        ("Frames: 3", "Frames: many", 17, "want 'Frames:'"),
+        ("Frames: 3", "Frames: 2", 21, "more than the 2 frames"),
+        ("Frames: 3", "Frames: 4", 21, "frame 3 of 4"),
+        ("Frame Time: 0.0333333", "Frame Time: 0", 18, "above 0"),
+        ("1 2 3 90 0 0 0 0 0", "1 2 3 90 0 0 0 0", 20, "frame 1: want 9 numbers, got 8"),
+        ("1 2 3 90 0 0 0 0 0", "1 2 3 nan 0 0 0 0 0", 20, "'nan' is not finite"),
+        ("  }\n}\nMOTION", "  }\nMOTION", 15, "'Hips' of line 2 is not closed"),
+    ],
+)
+def test_mistakes_are_named_with_their_line(tmp_path: Path, old: str, new: str, line: int, message: str) -> None:
+    assert old in ARM
+    with pytest.raises(InputError, match=message) as caught:
+        read_bvh(write(tmp_path, ARM.replace(old, new, 1)))
+    assert caught.value.line == line
+
+
+def test_empty_and_missing_files(tmp_path: Path) -> None:
+    with pytest.raises(InputError, match="the file ends here"):
+        read_bvh(write(tmp_path, ""))
+    with pytest.raises(InputError, match="cannot read motion"):
+        read_bvh(tmp_path / "none.bvh")
+
+
+def test_real_recording(data: Path) -> None:
+    clip = read_bvh(data / "motion_cmu_walk_bvh" / "cmu_12_01_walk.bvh")
+    assert clip.positions.shape == (524, 38, 3)
+    assert clip.rate == pytest.approx(120, abs=0.01)
+    lengths = np.linalg.norm(clip.positions[:, 1:] - clip.positions[:, clip.parents[1:]], axis=-1)
+    rest = np.linalg.norm(clip.rest[1:] - clip.rest[clip.parents[1:]], axis=-1)
+    np.testing.assert_allclose(lengths, np.broadcast_to(rest, lengths.shape), atol=1e-9)

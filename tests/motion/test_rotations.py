@@ -1,0 +1,55 @@
+"""Quaternion arithmetic against SciPy's, and its corner cases."""
+
+import numpy as np
+from hypothesis import given
+from hypothesis import strategies as st
+from scipy.spatial.transform import Rotation, Slerp
+
+from warpjld.motion.rotations import conjugate, minimal_rotation, multiply, rotate, slerp, unit
+
+EXACT = 1e-12
+
+seeds = st.integers(0, 2**31)
+
+
+def turns(seed: int, count: int) -> np.ndarray:
+    return Rotation.random(count, np.random.default_rng(seed)).as_quat()
+
+
+@given(seeds)
+def test_products_are_those_of_scipy(seed: int) -> None:
+    a, b = turns(seed, 8).reshape(2, 4, 4)
+    got = Rotation.from_quat(multiply(a, b)).as_matrix()
+    np.testing.assert_allclose(got, (Rotation.from_quat(a) * Rotation.from_quat(b)).as_matrix(), atol=EXACT)
+    np.testing.assert_allclose(multiply(a, conjugate(a)), np.tile([0, 0, 0, 1.0], (4, 1)), atol=EXACT)
+    vectors = np.random.default_rng(seed).normal(size=(4, 3))
+    np.testing.assert_allclose(rotate(a, vectors), Rotation.from_quat(a).apply(vectors), atol=EXACT)
+
+
+@given(seeds)
+def test_minimal_rotation_turns_one_into_the_other_without_twist(seed: int) -> None:
+    a, b = unit(np.random.default_rng(seed).normal(size=(2, 5, 3)))
+    turn = minimal_rotation(a, b)
+    np.testing.assert_allclose(rotate(turn, a), b, atol=1e-9)
+    np.testing.assert_allclose((turn[:, :3] * (a + b)).sum(-1), 0, atol=1e-9)
+
+
+def test_minimal_rotation_of_opposite_and_of_equal_directions() -> None:
+    for axis in np.eye(3):
+        np.testing.assert_allclose(rotate(minimal_rotation(axis, -axis), axis), -axis, atol=EXACT)
+        np.testing.assert_allclose(minimal_rotation(axis, axis), [0, 0, 0, 1], atol=EXACT)
+
+
+@given(seeds)
+def test_slerp_is_that_of_scipy(seed: int) -> None:
+    keys = turns(seed, 4)
+    times, at = np.array([0.0, 1.0, 3.0, 3.5]), np.linspace(0, 3.5, 23)
+    got = Rotation.from_quat(slerp(times, keys, at)).as_matrix()
+    np.testing.assert_allclose(got, Slerp(times, Rotation.from_quat(keys))(at).as_matrix(), atol=1e-9)
+
+
+def test_slerp_holds_outside_and_takes_one_key() -> None:
+    keys = turns(3, 6).reshape(2, 3, 4)
+    got = slerp(np.array([1.0, 2.0]), keys, np.array([-1.0, 5.0]))
+    np.testing.assert_allclose(np.abs((got * keys).sum(-1)), 1, atol=EXACT)
+    assert slerp(np.array([1.0]), keys[:1], np.zeros(4)).shape == (4, 3, 4)

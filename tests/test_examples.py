@@ -1,0 +1,100 @@
+"""Every example, drawn small and of a few frames; the main one whole under the mark ``slow``."""
+
+import runpy
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from warpjld.cli import main
+from warpjld.script import Interpreter, Scene, all_commands
+from warpjld.script.plugin import load_commands
+from warpjld.script.runner import run_scene
+from warpjld.skeleton import DIGITS
+
+pytestmark = pytest.mark.usefixtures("quick_hands")
+
+EXAMPLES = Path(__file__).resolve().parents[1] / "examples"
+SCRIPTS = sorted(path.name for path in EXAMPLES.glob("*.jld"))
+
+
+def run_small(name: str, out: Path, frames: tuple[int, int] | None = None) -> dict:
+    """Run a script of the examples in small pictures, and these frames only."""
+    scene = Scene(folder=out, say=lambda text: None)
+    Interpreter(scene).run_file(EXAMPLES / name)
+    scene.size = (120, 90)
+    if frames is not None:
+        scene.first, scene.last = frames
+    return run_scene(scene, out)
+
+
+@pytest.fixture
+def grip():
+    """The example of a user's command, forgotten afterwards."""
+    load_commands(EXAMPLES / "user_command.py")
+    yield
+    all_commands().remove("GRIP")
+
+
+@pytest.mark.parametrize("name", SCRIPTS)
+def test_scripts(name: str, tmp_path, grip) -> None:
+    summary = run_small(name, tmp_path, frames=(20, 22))
+    assert summary["notes"] == []
+    assert {Path(file["name"]).suffix for file in summary["files"]} >= {".mp4", ".png"}
+
+
+def test_the_fist_closes_thumb_last_and_opens_again() -> None:
+    scene = Scene()
+    Interpreter(scene).run_file(EXAMPLES / "fist.jld")
+    actor = scene.actor()
+    frames = np.arange(scene.first, scene.last + 1.0)
+    assert len(frames) == 60
+    assert scene.rate == 30
+    poses = actor.motion.poses(actor.skeleton, frames)
+    tip = {f: poses.positions[:, actor.skeleton.index(f"{f}.tip")] for f in DIGITS}
+    base = {f: poses.positions[:, actor.skeleton.index(f"{f}.base")] for f in DIGITS}
+    reach = {f: np.linalg.norm(tip[f] - base[f], axis=1) for f in DIGITS if f != "thumb"}
+    for finger, distance in reach.items():
+        assert distance[30] < 0.6 * distance[0], f"{finger} is folded in the fist"
+        assert distance[59] == pytest.approx(distance[0], abs=0.004), f"{finger} ends as it began"
+    moved = {f: int(np.argmax(np.linalg.norm(t - t[0], axis=1) > 0.02)) for f, t in tip.items()}
+    assert max(moved, key=moved.get) == "thumb"
+    middle = poses.positions[30, actor.skeleton.index("middle.knuckle3")]
+    assert tip["thumb"][30, 1] < middle[1], "the thumb lies on the palm's side of the folded fingers"
+    assert np.linalg.norm(tip["thumb"][30] - middle) < 0.035
+
+
+def test_python_api(tmp_path, capsys) -> None:
+    names = runpy.run_path(str(EXAMPLES / "python_api.py"))
+    path = names["main"](tmp_path)
+    with np.load(path) as file:
+        assert file["vertices"].shape[0] == 31
+        assert np.isfinite(file["vertices"]).all()
+    assert "31 frames" in capsys.readouterr().out
+
+
+@pytest.mark.slow
+def test_the_main_example_whole(tmp_path) -> None:
+    with pytest.raises(SystemExit) as ended:
+        main(["run", str(EXAMPLES / "fist.jld"), "-o", str(tmp_path / "out")])
+    assert ended.value.code == 0
+    made = {path.name for path in (tmp_path / "out").iterdir()}
+    assert made == {"surface.npz", "film.mp4", "contact.png", "summary.json"}
+
+
+def test_methods_are_compared(data: Path, tmp_path: Path) -> None:
+    from warpjld.covering import default_parameters, save_parameters
+    from warpjld.io import load_rig
+
+    rig = data / "hand_webxr_generic" / "left.glb"
+    skeleton = load_rig(rig).skeleton
+    save_parameters(tmp_path / "p.json", skeleton, default_parameters(skeleton))
+    compare = runpy.run_path(str(EXAMPLES / "compare_methods.py"))["main"]
+    text = compare([str(rig), "-o", str(tmp_path), "--parameters", str(tmp_path / "p.json"), "--tables-only"])
+    rows = [[cell.strip() for cell in line.split("|")[1:-1]] for line in text.splitlines()[2:]]
+    assert len(rows) == 6 * 4
+    assert {row[1] for row in rows} == {"LBS", "DQS", "JLD default", "JLD calibrated"}
+    folded = {(row[0], row[1]): int(row[4]) for row in rows}
+    for pose in {row[0] for row in rows}:
+        assert folded[pose, "JLD default"] <= min(folded[pose, "LBS"], folded[pose, "DQS"])
+    assert (tmp_path / "table.md").read_text(encoding="utf-8").strip() == text

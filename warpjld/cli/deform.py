@@ -1,0 +1,138 @@
+"""``warpjld deform``: a rig moved by a motion file, its surface written as a vertex cache."""
+
+from __future__ import annotations
+
+import json
+import signal
+import time
+from pathlib import Path
+
+import click
+
+from warpjld.errors import InputError
+
+__all__ = ["command"]
+
+_BLOCK = 16  # frames deformed at once: memory does not grow with the length of the motion
+
+
+@click.command("deform")
+@click.argument("rig")
+@click.option("--motion", required=True, type=click.Path(path_type=Path), help="Motion: CSV, BVH, glTF/GLB, JSON.")
+@click.option("-o", "--out", required=True, type=click.Path(path_type=Path), help="Cache to write; its suffix counts.")
+@click.option("--skeleton", type=click.Path(path_type=Path), help="Skeleton file for a RIG without joints.")
+@click.option("--side", type=click.Choice(["left", "right"]), help="Which hand RIG is, if the file leaves it open.")
+@click.option("--unit", type=click.Choice(["m", "cm", "mm"]), help="RIG's unit; guessed by default.")
+@click.option("--up", type=click.Choice(["y", "z"]), help="RIG's up axis.")
+@click.option("--frames", "span", metavar="A:B", help="Only frames A to B, both included, the motion's first being 0.")
+@click.option("--rate", type=float, help="Frames a second; the motion's own by default, 25 for CSV.")
+@click.option(
+    "--limits",
+    type=click.Choice(["error", "clamp", "ignore"]),
+    default="error",
+    show_default=True,
+    help="CSV angles beyond a joint's limit.",
+)
+@click.option("--parameters", type=click.Path(path_type=Path), help="Covering parameters, as calibrate writes them.")
+@click.option(
+    "--domains",
+    type=click.Choice(["geometry", "skin"]),
+    default="geometry",
+    show_default=True,
+    help="Where a vertex's domain comes from: the surface alone, or painted weights.",
+)
+@click.option("--device", default="cpu", show_default=True, help="Where to compute: cpu, cuda:0, …")
+@click.option("--threads", type=click.IntRange(min=1), help="CPU threads; as many as pay by default.")
+@click.option("--json", "as_json", is_flag=True, help="Write the summary to stdout as JSON.")
+@click.option("-q", "--quiet", is_flag=True, help="Say nothing but errors.")
+def command(
+    rig: str,
+    motion: Path,
+    out: Path,
+    skeleton: Path | None,
+    side: str | None,
+    unit: str | None,
+    up: str | None,
+    span: str | None,
+    rate: float | None,
+    limits: str,
+    parameters: Path | None,
+    domains: str,
+    device: str,
+    threads: int | None,
+    as_json: bool,
+    quiet: bool,
+) -> None:
+    """Deform RIG by a motion and write the surface, frame after frame, in the vertex order of RIG's file.
+
+    RIG is a rig file, or builtin:left or builtin:right for the built-in hand.
+    """
+    from warpjld.cli.progress import progress, silence_warp
+    from warpjld.cli.rig_argument import open_rig
+    from warpjld.covering import bind, load_parameters
+    from warpjld.io.caches import open_cache
+    from warpjld.motion import open_motion
+
+    silence_warp()
+    # a polite kill cleans up as Ctrl-C does
+    signal.signal(signal.SIGTERM, signal.default_int_handler)
+    began = time.perf_counter()
+    driven = open_rig(rig, skeleton=skeleton, side=side, unit=unit, up=up)
+    moved = open_motion(motion, driven, rate=rate, limits=limits)  # type: ignore[arg-type]
+    first, last = _span(span, len(moved.poses))
+    poses = moved.poses[slice(first, last + 1)]
+    chosen = None if parameters is None else load_parameters(parameters, driven.skeleton)
+    # opened first: an unknown suffix or a forbidden folder must not cost the work of binding
+    writing = open_cache(out, driven.surface, frames=len(poses), rate=moved.rate, start_frame=first, name=driven.name)
+    with progress(quiet) as report, writing as cache:
+        report("binding", 0, len(poses))
+        covering = bind(driven.skeleton, driven.surface, parameters=chosen, skin=driven.skin, domains=domains)  # type: ignore[arg-type]
+        for start, block in covering.blocks(poses, frames=_BLOCK, device=device, threads=threads):
+            cache.write(block)
+            report("deforming", start + len(block), len(poses))
+    summary = {
+        "rig": rig,
+        "motion": str(motion),
+        "files": [str(file) for file in cache.files],
+        "frames": len(poses),
+        "first_frame": first,
+        "rate": moved.rate,
+        "joints": len(driven.skeleton),
+        "vertices": len(driven.surface.weld),
+        "triangles": len(driven.surface.source_faces),
+        "seconds": round(time.perf_counter() - began, 3),
+        "notes": [*moved.notes, *([cache.note] if cache.note else [])],
+    }
+    if as_json:
+        click.echo(json.dumps(summary, indent=1, ensure_ascii=False))
+    elif not quiet:
+        _tell(summary)
+
+
+def _span(text: str | None, count: int) -> tuple[int, int]:
+    """First and last frame of ``A:B``; either may be left out."""
+    if text is None:
+        return 0, count - 1
+    left, colon, right = text.partition(":")
+    try:
+        first, last = int(left or 0), int(right) if right else (count - 1 if colon else int(left))
+    except ValueError:
+        raise InputError(f"--frames '{text}': want two frame numbers, such as 10:60") from None
+    if not 0 <= first <= last < count:
+        raise InputError(f"--frames '{text}': the motion has frames 0 to {count - 1}")
+    return first, last
+
+
+def _tell(summary: dict[str, object]) -> None:
+    files = summary["files"]
+    assert isinstance(files, list)
+    more = f" … {files[-1]} ({len(files)} files)" if len(files) > 1 else ""
+    click.echo(f"{files[0]}{more}")
+    click.echo(
+        f"{summary['frames']} frames at {summary['rate']:g} a second, {summary['vertices']} vertices, "
+        f"{summary['triangles']} triangles, {summary['joints']} joints; {summary['seconds']} s"
+    )
+    notes = summary["notes"]
+    assert isinstance(notes, list)
+    for note in notes:
+        click.echo(f"note: {note}")

@@ -1,0 +1,155 @@
+"""``warpjld inspect``: what was recognised in a rig, how it is placed, and a picture of it."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+import click
+import numpy as np
+from numpy.typing import NDArray
+
+from warpjld.rig import Rig
+from warpjld.skeleton.tree import CHANNELS
+
+__all__ = ["command"]
+
+
+@click.command("inspect")
+@click.argument("rig")
+@click.option("--skeleton", type=click.Path(path_type=Path), help="Skeleton file for a RIG without joints.")
+@click.option("--side", type=click.Choice(["left", "right"]), help="Which hand RIG is, if the file leaves it open.")
+@click.option("--unit", type=click.Choice(["m", "cm", "mm"]), help="RIG's unit; guessed by default.")
+@click.option("--up", type=click.Choice(["y", "z"]), help="RIG's up axis.")
+@click.option(
+    "-o", "--output", type=click.Path(path_type=Path), help="Picture to write; the rig's name.png by default."
+)
+@click.option("--no-picture", is_flag=True, help="Write no picture.")
+@click.option("--write-skeleton", type=click.Path(path_type=Path), help="Skeleton file to write, for editing.")
+@click.option("--json", "as_json", is_flag=True, help="Print the report as JSON.")
+@click.option("-q", "--quiet", is_flag=True, help="Print only what looks suspicious.")
+def command(
+    rig: str,
+    skeleton: Path | None,
+    side: str | None,
+    unit: str | None,
+    up: str | None,
+    output: Path | None,
+    no_picture: bool,
+    write_skeleton: Path | None,
+    as_json: bool,
+    quiet: bool,
+) -> None:
+    """Report what was recognised in RIG: joints, domains, limits, and joints that look misplaced (R14).
+
+    RIG is a rig file (.glb, .gltf), a surface with --skeleton, or builtin:left, builtin:right. A picture of the
+    surface's wire-frame with the named skeleton in it is written beside, unless --no-picture.
+    """
+    from warpjld.cli.progress import silence_warp
+    from warpjld.cli.rig_argument import open_rig
+
+    silence_warp()
+    opened = open_rig(rig, skeleton=skeleton, side=side, unit=unit, up=up)
+    report = _report(opened)
+    if write_skeleton is not None:
+        from warpjld.io.skeleton_file import write_skeleton_file
+
+        write_skeleton_file(write_skeleton, opened.skeleton)
+    picture = None if no_picture else output or Path(f"{opened.name.replace(' ', '-')}.png")
+    if picture is not None:
+        from warpjld.cli.inspect_picture import draw_rig
+
+        draw_rig(opened, picture, suspicious={finding["joint"] for finding in report["placing"]})
+        report["picture"] = str(picture)
+    if as_json:
+        click.echo(json.dumps(report, indent=1, ensure_ascii=False))
+    else:
+        _print(report, quiet)
+
+
+def _report(rig: Rig) -> dict[str, Any]:
+    from warpjld.skeleton.recognise.placing import check_placing
+
+    skeleton, surface = rig.skeleton, rig.surface
+    domains = _domains(rig)
+    joints = []
+    for j, name in enumerate(skeleton.names):
+        parent = int(skeleton.parents[j])
+        joints.append(
+            {
+                "name": name,
+                "parent": skeleton.names[parent] if parent >= 0 else None,
+                "source": rig.source_joints[j] if rig.source_joints else "",
+                "position": _round(skeleton.rest[j], 6),
+                "axis": _round(skeleton.axes[j], 4),
+                "limits": {
+                    channel: _round(np.degrees(pair), 1)
+                    for channel, pair in zip(CHANNELS, skeleton.limits[j], strict=True)
+                    if np.ptp(pair) > 0 and skeleton.children[j]
+                },
+                "domain": int(domains[j]),
+            }
+        )
+    return {
+        "file": str(rig.path or rig.name),
+        "surface": {
+            "vertices": len(surface.vertices),
+            "source vertices": len(surface.weld),
+            "triangles": len(surface.faces),
+            "parts": [part.name for part in surface.parts],
+            "size": _round(np.ptp(surface.vertices, axis=0), 4),
+        },
+        "joints": joints,
+        "palms": [[[skeleton.names[a], skeleton.names[b]] for a, b in palm] for palm in skeleton.palms],
+        "placing": [
+            vars(finding) | {"message": finding.message}
+            for finding in check_placing(skeleton, surface.vertices, surface.faces)
+        ],
+        "notes": list(rig.notes),
+    }
+
+
+def _domains(rig: Rig) -> NDArray[np.int64]:
+    """Vertices in the domain of each segment, counted at the joint the segment ends at, shape (J,) (R16)."""
+    from warpjld.covering import bind
+
+    anchors = bind(rig.skeleton, rig.surface).anchors
+    strongest = anchors.segment[np.arange(len(anchors)), anchors.weight.argmax(axis=1)]
+    return np.bincount(anchors.ends[strongest, 1], minlength=len(rig.skeleton))
+
+
+def _print(report: dict[str, Any], quiet: bool) -> None:
+    if not quiet:
+        surface = report["surface"]
+        size = " × ".join(f"{1e3 * x:.0f}" for x in surface["size"])
+        click.echo(
+            f"{report['file']}\n"
+            f"surface: {surface['vertices']} vertices ({surface['source vertices']} in the file), "
+            f"{surface['triangles']} triangles, {size} mm, parts: {', '.join(surface['parts'])}\n"
+            f"joints: {len(report['joints'])}; domain: vertices of the segment that ends at a joint\n"
+        )
+        rows = [("joint", "in the file", "domain", "limits")]
+        rows += [_row(joint) for joint in report["joints"]]
+        widths = [max(len(row[k]) for row in rows) for k in range(3)]
+        for name, source, count, limits in rows:
+            click.echo(f"{name:<{widths[0]}}  {source:<{widths[1]}}  {count:>{widths[2]}}  {limits}".rstrip())
+        click.echo()
+        for note in report["notes"]:
+            click.echo(f"note: {note}")
+    for finding in report["placing"]:
+        click.echo(f"suspicious: {finding['message']}")
+    if not quiet:
+        if not report["placing"]:
+            click.echo("placing: nothing suspicious")
+        if "picture" in report:
+            click.echo(f"picture: {report['picture']}")
+
+
+def _row(joint: dict[str, Any]) -> tuple[str, str, str, str]:
+    limits = ", ".join(f"{channel} {low:g}…{high:g}°" for channel, (low, high) in joint["limits"].items())
+    return joint["name"], joint["source"] or "(added)", str(joint["domain"] or ""), limits
+
+
+def _round(values: NDArray[np.float64], digits: int) -> list[float]:
+    return [round(float(x), digits) for x in values]

@@ -1,0 +1,60 @@
+"""``warpjld run``: a script from a file, and everything it asks for made."""
+
+from __future__ import annotations
+
+import json
+import signal
+from pathlib import Path
+
+import click
+
+__all__ = ["command"]
+
+
+@click.command("run")
+@click.argument("script", type=click.Path(path_type=Path))
+@click.option("-o", "--out", type=click.Path(path_type=Path), default="out", show_default=True, help="Output folder.")
+@click.option("--device", default="cpu", show_default=True, help="Where to compute: cpu, cuda:0, …")
+@click.option("--threads", type=click.IntRange(min=1), help="CPU threads; all by default.")
+@click.option(
+    "--commands", multiple=True, type=click.Path(path_type=Path), help="Python file that adds commands; repeatable."
+)
+@click.option("--check", is_flag=True, help="Read the script and say what it would make; compute nothing.")
+@click.option("--json", "as_json", is_flag=True, help="Write the summary to stdout as JSON.")
+@click.option("-q", "--quiet", is_flag=True, help="Say nothing but errors.")
+def command(
+    script: Path,
+    out: Path,
+    device: str,
+    threads: int | None,
+    commands: tuple[Path, ...],
+    check: bool,
+    as_json: bool,
+    quiet: bool,
+) -> None:
+    """Run SCRIPT and make the pictures, films and exports it asks for; if it asks for none, an animated surface (NPZ),
+    a film and a contact sheet. A summary goes to summary.json in the output folder."""
+    from warpjld.cli.progress import progress, silence_warp
+    from warpjld.script import Interpreter, Scene
+    from warpjld.script.plugin import load_commands
+    from warpjld.script.runner import run_scene
+    from warpjld.script.summary import table
+
+    silence_warp()
+    # a polite kill cleans up as Ctrl-C does
+    signal.signal(signal.SIGTERM, signal.default_int_handler)
+
+    def say(text: str) -> None:
+        if not quiet:
+            click.echo(text, err=as_json)
+
+    for path in commands:
+        load_commands(path)
+    scene = Scene(folder=out, say=say)
+    Interpreter(scene).run_file(script)
+    with progress(quiet) as report:
+        summary = run_scene(scene, out, script=script, device=device, threads=threads, dry=check, progress=report)
+    if as_json:
+        click.echo(json.dumps(summary, indent=1))
+    elif not quiet:
+        table(summary, click.echo)

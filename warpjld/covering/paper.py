@@ -1,0 +1,179 @@
+"""The paper's own hard-edged variant, to compare: normals, cross products, one segment or one palm pair a vertex."""
+
+from __future__ import annotations
+
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass, fields
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from scipy.spatial.transform import Rotation
+
+from warpjld.covering.binding import Anchors, SegmentTable
+from warpjld.covering.covering import Covering
+from warpjld.covering.device import array_on, checked_device, parameters_on
+from warpjld.covering.drivers import flexion_ratio
+from warpjld.covering.operators import Fan
+from warpjld.covering.paper_places import paper_places
+from warpjld.covering.parameters import Parameters
+from warpjld.skeleton.kinematics import Poses
+from warpjld.skeleton.tree import Skeleton
+from warpjld.surface import Surface
+
+__all__ = ["Normals", "PaperCovering", "paper_normals"]
+
+
+@dataclass(frozen=True, eq=False)
+class Normals:
+    """Normals of F frames.
+
+    Attributes:
+        original: N_o of every segment at its proximal and distal joint, with that joint straight, shape (F, S, 2, 3):
+            segment × flexion axis, both carried by the segment (R20, Fig. 3b).
+        modified: N_m of every joint, the bisector that the segments meeting there share, shape (F, J, 3) (C22, C23).
+    """
+
+    original: NDArray[np.float64]
+    modified: NDArray[np.float64]
+
+
+def paper_normals(skeleton: Skeleton, ends: NDArray[np.int32], rotations: NDArray[np.float64]) -> Normals:
+    """Normals of every joint and segment: the rest ones, turned by the bones that carry them (A §4 Fig. 3, R31, R32).
+
+    Args:
+        skeleton: The rest skeleton.
+        ends: Proximal and distal joint of every segment, shape (S, 2).
+        rotations: Rotations of the bones from rest, quaternions x, y, z, w, shape (F, J, 4).
+    """
+    matrices = Rotation.from_quat(rotations.reshape(-1, 4)).as_matrix().reshape(*rotations.shape[:2], 3, 3)
+    table = SegmentTable.build(skeleton, ends)
+    original = np.einsum("fsij,skj->fski", matrices[:, ends[:, 0]], table.normals)
+
+    # what the segment that ends at a joint and the bone that begins there carry
+    after = np.cross(skeleton.directions, skeleton.axes)
+    clear = np.linalg.norm(after, axis=1) > 1e-3
+    before = after.copy()
+    before[ends[:, 1]] = table.normals[:, 1]
+    after = np.where(clear[:, None], after, before)
+    parents = np.where(skeleton.parents < 0, np.arange(len(skeleton)), skeleton.parents)
+    total = np.einsum("fjik,jk->fji", matrices[:, parents], _unit(before))
+    total += np.einsum("fjik,jk->fji", matrices, _unit(after))
+    return Normals(original, _unit(total))
+
+
+class PaperCovering(Covering):
+    """A surface bound by the paper's hard-edged operators; made by ``bind(…, method="paper")``.
+
+    The surface tears and folds where domains and areas meet; it is there to be compared with. It deforms through the
+    same methods as :class:`~warpjld.covering.covering.Covering`.
+    """
+
+    def __init__(
+        self,
+        skeleton: Skeleton,
+        surface: Surface,
+        parameters: Parameters,
+        groups: tuple[Fan, ...],
+        domains: NDArray[np.float64],
+        anchors: Anchors,
+    ) -> None:
+        super().__init__(skeleton, surface, parameters, groups, domains, anchors)
+        self.places = paper_places(surface.vertices, skeleton, groups, domains, parameters)
+
+    def points(self, poses: Poses, vertices: ArrayLike, *, device: str = "cpu") -> NDArray[np.float32]:
+        import warp as wp
+
+        where = checked_device(device)
+        chosen = self.chosen(vertices)
+        out = wp.empty((len(poses), len(chosen)), dtype=wp.vec3, device=where)
+        self._emit(self._palette(poses), chosen, out, where, 1)
+        result: NDArray[np.float32] = out.numpy()
+        return result
+
+    def _palette(self, poses: Poses) -> Any:
+        self.check(poses)
+        normals = paper_normals(self.skeleton, self.places.ends, poses.rotations)
+        return PaperPose(
+            poses.positions, normals.original, normals.modified, flexion_ratio(self.skeleton, poses.flexion)
+        )
+
+    @property
+    def run_surface(self) -> Surface:
+        """The surface itself: these operators are not packed into runs."""
+        return self.surface
+
+    def _launch(self, rows: Any, points: Any, device: Any, threads: int, order: str) -> None:
+        self._emit(rows, np.arange(len(self.surface.vertices), dtype=np.int32), points, device, threads)
+
+    def _emit(self, pose: PaperPose, chosen: NDArray[np.int32], points: Any, device: Any, threads: int) -> None:
+        import warp as wp
+        from warpjld_kernels.paper import deform_paper
+
+        model = self._on(device, "paper", self._expressed)
+        picked = wp.array(chosen, dtype=wp.int32, device=device)
+        inputs = pose.on(device)
+
+        def span(begin: int, end: int) -> None:
+            wp.launch(
+                deform_paper,
+                dim=(end - begin, len(chosen)),
+                inputs=[*model, picked, *(a[begin:end] for a in inputs)],
+                outputs=[points[begin:end]],
+                device=device,
+            )
+
+        wp.load_module(deform_paper.module, device=device)  # compiling is not safe from several threads
+        cuts = np.linspace(0, points.shape[0], min(threads, max(points.shape[0], 1)) + 1).astype(int).tolist()
+        with ThreadPoolExecutor(len(cuts) - 1) as pool:
+            list(pool.map(span, cuts[:-1], cuts[1:]))
+
+    def _expressed(self, device: Any) -> list[Any]:
+        """Places, parameters, and the coordinates of the vertices in their initial bases, on a device."""
+        import warp as wp
+        from warpjld_kernels import paper
+
+        places = paper.Places()
+        for field in fields(self.places):
+            kind = float if field.name in ("muscle", "ratio", "across") else wp.int32
+            setattr(places, field.name, array_on(device, getattr(self.places, field.name), kind))
+        parameters = parameters_on(device, self.parameters)
+        still = np.tile([0.0, 0.0, 0.0, 1.0], (1, len(self.skeleton), 1))
+        normals = paper_normals(self.skeleton, self.places.ends, still)
+        count = len(self.surface.vertices)
+        outputs = [wp.empty(count, dtype=wp.vec3, device=device), wp.empty(count, dtype=float, device=device)]
+        pose = PaperPose(self.skeleton.rest[None], normals.original, normals.modified, np.zeros((1, 1)))
+        rest = array_on(device, self.surface.vertices, wp.vec3)
+        wp.launch(
+            paper.express,
+            dim=count,
+            inputs=[places, parameters, rest, *pose.on(device)[:3]],
+            outputs=outputs,
+            device=device,
+        )
+        return [places, parameters, *outputs]
+
+
+@dataclass(frozen=True, eq=False)
+class PaperPose:
+    """What F poses give the paper's operators: positions (F, J, 3), normals, and flexion ratios (F, J)."""
+
+    positions: NDArray[np.float64]
+    original: NDArray[np.float64]
+    modified: NDArray[np.float64]
+    flexion_ratio: NDArray[np.float64]
+
+    def __len__(self) -> int:
+        return len(self.positions)
+
+    def on(self, device: Any) -> list[Any]:
+        """Pose arguments of the kernel, in its order."""
+        import warp as wp
+
+        vectors = (self.positions, self.original, self.modified)
+        return [*(array_on(device, a, wp.vec3) for a in vectors), array_on(device, self.flexion_ratio, float)]
+
+
+def _unit(vectors: NDArray[np.float64]) -> NDArray[np.float64]:
+    out: NDArray[np.float64] = vectors / np.maximum(np.linalg.norm(vectors, axis=-1, keepdims=True), 1e-12)
+    return out

@@ -1,0 +1,146 @@
+"""The paper's hard-edged assignment: every vertex on one segment, or between two palm neighbours (A §4–§5.2)."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from warpjld.covering.binding import SegmentTable
+from warpjld.covering.operators import Fan, segment_ends
+from warpjld.covering.parameters import Parameters
+from warpjld.skeleton.tree import Skeleton
+
+__all__ = ["PaperPlaces", "paper_places"]
+
+
+@dataclass(frozen=True, eq=False)
+class PaperPlaces:
+    """Places of V vertices.
+
+    Attributes:
+        ends: Proximal and distal joint of every segment, shape (S, 2).
+        muscle: Whether a segment's internal muscle inflates, shape (S,).
+        segment: The segment a vertex lies on, and the neighbour towards which it lies in between, shape (V, 2).
+        ratio: Its projections on both, shape (V, 2) (R37, C1).
+        across: Its projection on the virtual segment from the one to the other, shape (V,) (R53).
+        between: Whether it lies in areas 2, 5, 8 of the palm, shape (V,) (R49).
+        external: Whether it lies on the external side, shape (V,) (R45).
+    """
+
+    ends: NDArray[np.int32]
+    muscle: NDArray[np.bool_]
+    segment: NDArray[np.int32]
+    ratio: NDArray[np.float64]
+    across: NDArray[np.float64]
+    between: NDArray[np.bool_]
+    external: NDArray[np.bool_]
+
+
+def paper_places(
+    vertices: NDArray[np.float64],
+    skeleton: Skeleton,
+    groups: tuple[Fan, ...],
+    domains: NDArray[np.float64],
+    parameters: Parameters,
+) -> PaperPlaces:
+    """Give every vertex to its strongest operator, and inside the palm to one of the nine areas (A Fig. 7).
+
+    Inside the palm the nearest segment is the one to cover; the neighbour is the one on whose side the vertex lies.
+    External vertices within the proximity of either segment belong to it (columns 1-4-7 and 3-6-9), else they lie in
+    between. Internal vertices lie in between where they project on the virtual segment: no proximities there (C10).
+
+    Args:
+        vertices: Rest positions [m], shape (V, 3).
+        skeleton: The rest skeleton.
+        groups: Operators, from :func:`~warpjld.covering.operators.fans`.
+        domains: Weight of every fan, shape (V, fans).
+        parameters: Their proximities bound the areas.
+    """
+    ends = segment_ends(skeleton, groups)
+    table = SegmentTable.build(skeleton, ends)
+    count = len(vertices)
+    ratio = table.project(vertices)
+    segment = np.zeros((count, 2), dtype=np.int32)
+    across, between = np.zeros(count), np.zeros(count, dtype=bool)
+    owner = domains.argmax(axis=1)
+    first = 0
+    for f, fan in enumerate(groups):
+        size = len(fan.segments)
+        mine = np.flatnonzero(owner == f)
+        segment[mine] = first
+        if size > 1 and mine.size:
+            inside = slice(first, first + size)
+            chosen = _palm_place(vertices[mine], table, ratio[mine, inside], inside, parameters)
+            segment[mine], across[mine], between[mine] = first + chosen[0], chosen[1], chosen[2]
+        first += size
+    both = np.take_along_axis(ratio, segment, axis=1)
+    external = _height(vertices, table, segment, both, np.where(between, across, 0.0)) >= 0.0
+    muscle = np.array([fan.muscle for fan in groups for _ in fan.segments])
+    return PaperPlaces(ends, muscle, segment, both, across, between, external)
+
+
+def _palm_place(
+    points: NDArray[np.float64],
+    table: SegmentTable,
+    ratio: NDArray[np.float64],
+    inside: slice,
+    parameters: Parameters,
+) -> tuple[NDArray[np.int64], NDArray[np.float64], NDArray[np.bool_]]:
+    """Segment and neighbour counted from the fan's first, the ratio across, and whether in between."""
+    rows = np.arange(len(points))
+    feet = table.start[inside] + ratio[..., None] * table.along[inside]
+    size = feet.shape[1]
+    nearest = np.linalg.norm(points[:, None] - feet, axis=2).argmin(axis=1)
+
+    def towards(neighbour: NDArray[np.int64]) -> NDArray[np.float64]:
+        virtual = feet[rows, neighbour] - feet[rows, nearest]
+        squared = (virtual**2).sum(axis=1)
+        apart = squared > (1e-3 * np.linalg.norm(table.along[inside], axis=1).max()) ** 2
+        r = ((points - feet[rows, nearest]) * virtual).sum(axis=1) / np.where(apart, squared, 1.0)
+        return np.where((neighbour != nearest) & apart, r, -np.inf)
+
+    before, after = np.maximum(nearest - 1, 0), np.minimum(nearest + 1, size - 1)
+    back, forth = towards(before), towards(after)
+    neighbour = np.where(back > forth, before, after)
+    across = np.maximum(back, forth)
+
+    place = np.clip(ratio, 0.0, 1.0)
+    joints = table.ends[inside]
+    width = (1.0 - place) * parameters.proximity[joints[:, 0], 0] + place * parameters.proximity[joints[:, 1], 1]
+    here, there = width[rows, nearest], width[rows, neighbour]
+    total = np.maximum(here + there, 1.0)  # wide proximities leave nothing in between
+    alone = np.isneginf(across)
+    normal = _blended(table, inside.start + nearest, place[rows, nearest])
+    external = ((points - feet[rows, nearest]) * normal).sum(axis=1) >= 0.0
+    low = np.where(external, here / total, 0.0)
+    high = np.where(external, 1.0 - there / total, 1.0)
+    between = ~alone & (across > low) & (across < high)
+    on_neighbour = ~alone & (across >= high)  # a wrong assignment is mended here (R68)
+    segment = np.where(on_neighbour, neighbour, nearest)
+    other = np.where(on_neighbour, nearest, neighbour)
+    return np.column_stack([segment, other]), np.where(between, across, 0.0), between
+
+
+def _height(
+    points: NDArray[np.float64],
+    table: SegmentTable,
+    segment: NDArray[np.int32],
+    ratio: NDArray[np.float64],
+    across: NDArray[np.float64],
+) -> NDArray[np.float64]:
+    """(vertex − projection) · normal, whose sign is that of R45's cosine."""
+    feet = table.start[segment] + ratio[..., None] * table.along[segment]
+    normals = [_blended(table, segment[:, k], np.clip(ratio[:, k], 0.0, 1.0)) for k in (0, 1)]
+    part = across[:, None]
+    foot = (1.0 - part) * feet[:, 0] + part * feet[:, 1]
+    normal = (1.0 - part) * normals[0] + part * normals[1]
+    height: NDArray[np.float64] = ((points - foot) * normal).sum(axis=1)
+    return height
+
+
+def _blended(table: SegmentTable, segment: NDArray, ratio: NDArray[np.float64]) -> NDArray[np.float64]:
+    blend = ratio[:, None]
+    normal: NDArray[np.float64] = (1.0 - blend) * table.normals[segment, 0] + blend * table.normals[segment, 1]
+    return normal

@@ -1,0 +1,144 @@
+"""Where everything in a hand of given size lies: joints, digit frames, flesh."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from warpjld.hand import design
+from warpjld.hand.sweep import Sweep
+
+__all__ = ["Digit", "Plan", "plan_hand"]
+
+Array = NDArray[np.float64]
+
+_ROOT = 30.0  # how far a digit's flesh reaches back beyond its base joint
+_FINGER_SQUARENESS, _THUMB_SQUARENESS = 0.12, 0.10
+_CAP = 0.62  # fraction of the last phalanx where the tip's rounding begins
+_TIP = 0.62  # depth of the extremity's centre under the skin, in half-widths
+_NAIL = (0.61, 0.26, 0.58)  # middle and half-length in last phalanges, half-width in half-widths
+
+
+@dataclass(frozen=True, eq=False)
+class Digit:
+    """Joints of a digit (base, knuckle 2, knuckle 3, tip; shape (4, 3)), its dorsal direction at each, its flesh."""
+
+    joints: Array
+    dorsal: Array
+    flesh: Sweep
+
+
+@dataclass(frozen=True, eq=False)
+class Plan:
+    """Joints [mm] of a left hand and the flesh around them; ``stretch`` scales the design's axes."""
+
+    forearm: Array
+    wrist: Array
+    carpometacarpal: dict[str, Array]
+    digits: dict[str, Digit]
+    muscles: tuple[Sweep, ...]
+    stretch: Array
+
+
+def plan_hand(along: float, across: float, proportions: Mapping[str, tuple[float, float]]) -> Plan:
+    """Lay out a left hand in the rig's axes: radial +x, dorsal +y, distal -z.
+
+    Args:
+        along: Scale of distal measures.
+        across: Scale of radial and dorsal ones, thicknesses included.
+        proportions: Digit → (scale of its length, scale of its thickness).
+    """
+    stretch = np.array([across, across, along])
+
+    def place(point: design.Point) -> Array:
+        return np.array(point) * stretch * (1.0, 1.0, -1.0)
+
+    digits = {}
+    for name, finger in design.FINGERS.items():
+        long, thick = proportions.get(name, (1.0, 1.0))
+        turn = np.radians(finger.splay)
+        heading = np.array([np.sin(turn), 0.0, -np.cos(turn)])
+        lean = np.radians(finger.roll)
+        up = _square(np.array([np.sin(lean), np.cos(lean), 0.0]), heading)
+        bend = np.radians(np.cumsum(design.CURL))
+        steps = np.cos(bend)[:, None] * heading - np.sin(bend)[:, None] * up
+        digits[name] = _digit(
+            place(finger.base), steps, np.array(finger.lengths) * along * long, up,
+            finger.half_width * across * thick, design.FINGER_PROFILE, _ROOT * along, _FINGER_SQUARENESS,
+        )  # fmt: skip
+    long, thick = proportions.get("thumb", (1.0, 1.0))
+    side, down = np.radians(design.THUMB_ABDUCTION), np.radians(design.THUMB_DEPTH)
+    steps = np.column_stack([np.sin(side) * np.cos(down), -np.sin(down), -np.cos(side) * np.cos(down)])
+    mean = steps.sum(axis=0) / np.linalg.norm(steps.sum(axis=0))
+    up = _square(np.array([0.0, 1.0, 0.0]), mean)
+    roll = np.radians(design.THUMB_ROLL)
+    up = np.cos(roll) * up + np.sin(roll) * np.cross(up, mean) * np.sign(np.cross(up, mean)[0])
+    digits["thumb"] = _digit(
+        place(design.THUMB_BASE), steps, np.array(design.THUMB_LENGTHS) * along * long, up,
+        design.THUMB_HALF_WIDTH * across * thick, design.THUMB_PROFILE, _ROOT * along, _THUMB_SQUARENESS,
+    )  # fmt: skip
+    return Plan(
+        forearm=place(design.FOREARM),
+        wrist=place(design.WRIST),
+        carpometacarpal={name: place(point) for name, point in design.CARPOMETACARPAL.items()},
+        digits=digits,
+        muscles=tuple(_spindle(place(m.start), place(m.end), m.profile, across) for m in design.MUSCLES),
+        stretch=stretch,
+    )
+
+
+def _digit(
+    base: Array, steps: Array, lengths: Array, up: Array, half: float,
+    profile: tuple[tuple[float, ...], ...], root: float, squareness: float,
+) -> Digit:  # fmt: skip
+    joints = base + np.vstack([np.zeros(3), np.cumsum(steps * lengths[:, None], axis=0)])
+    skin = joints[3].copy()
+    joints[3] = skin - steps[2] * _TIP * half  # the extremity's centre lies inside the skin
+    axis = (skin - base) / np.linalg.norm(skin - base)
+    dorsal = _square(up, axis)
+    frame = np.vstack([np.cross(dorsal, axis), dorsal, axis])
+    local = (np.vstack([joints[:3], skin]) - base) @ frame.T
+    stops = np.concatenate([[-root], local[:, 2]])  # of joint numbers -1, 0, 1, 2, 3
+    sizes = [
+        (stops[int(j) + 1] + f * (stops[int(j) + 2] - stops[int(j) + 1]), half * w, half * d, half * p)
+        for j, f, w, d, p in profile
+    ]
+    last = stops[4] - stops[3]
+    first = local[1] - local[0]
+    before = -root * first / first[2]
+    flesh = Sweep.through(
+        base,
+        frame,
+        (-root, local[3, 2]),
+        (-0.1 * root, stops[3] + _CAP * last),
+        squareness,
+        [(p[2], p[0], p[1]) for p in (before, *local)],
+        sizes,
+        (stops[3] + _NAIL[0] * last, _NAIL[1] * last, _NAIL[2] * half),
+    )
+    per_joint = np.vstack([_square(dorsal, d) for d in (*steps, steps[2])])
+    return Digit(joints, per_joint, flesh)
+
+
+def _spindle(start: Array, end: Array, profile: tuple[tuple[float, ...], ...], across: float) -> Sweep:
+    length = float(np.linalg.norm(end - start))
+    axis = (end - start) / length
+    palmar = _square(np.array([0.0, -1.0, 0.0]), axis)
+    return Sweep.through(
+        start,
+        np.vstack([np.cross(palmar, axis), palmar, axis]),
+        (0.0, length),
+        (0.3 * length, 0.7 * length),
+        0.0,
+        [(0.0, 0.0, 0.0), (length, 0.0, 0.0)],
+        [(f * length, w * across, a * across, b * across) for f, w, a, b in profile],
+    )
+
+
+def _square(vector: Array, axis: Array) -> Array:
+    """The part of a vector square to an axis, of length one."""
+    out = vector - axis * (vector @ axis) / (axis @ axis)
+    return out / np.linalg.norm(out)

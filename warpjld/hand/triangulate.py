@@ -1,0 +1,76 @@
+"""The hand's flesh as even triangles, from about two thousand vertices to millions."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from warpjld.errors import InputError
+from warpjld.hand.contour import contour
+from warpjld.hand.flesh import Flesh
+from warpjld.hand.mesh import Array, Edges, Faces, face_normals, mean_over_neighbours, subdivide
+from warpjld.hand.remesh import remesh, settle
+
+__all__ = ["triangulate"]
+
+_LARGEST_REMESHED = 16_000  # vertices; beyond, a remeshed surface is subdivided: far faster, and as even
+_COARSEST, _FINEST = 2.0, 1.0  # grid spacing [mm]: two millimetres still tell neighbouring fingers apart
+_PACKING = 0.96  # wanted length squared times vertices per area, in a remeshed surface (equilateral: 2 / √3 = 1.15)
+
+
+def triangulate(flesh: Flesh, resolution: int) -> tuple[Array, Faces]:
+    """Vertices [mm] on the surface and its triangles, about ``resolution`` vertices; closed, of genus 0."""
+    base, halvings = resolution, 0
+    while base > _LARGEST_REMESHED:
+        base, halvings = base // 4, halvings + 1
+    vertices, faces = _closed_contour(flesh, base)
+    vertices = flesh.project(vertices, steps=1)
+    shape = _relative_size(flesh, vertices, faces)
+    areas = 0.5 * np.linalg.norm(face_normals(vertices, faces), axis=1)
+    density = (areas / (shape[faces] ** 2).mean(axis=1)).sum()
+    size = shape * np.sqrt(_PACKING * density / base)
+    for rounds in (6, 2, 2, 2):
+        vertices, faces, size = remesh(vertices, faces, size, flesh, rounds)
+        excess = len(vertices) / base
+        if rounds == 2 and abs(excess - 1.0) < 0.03:
+            break
+        size = size * np.sqrt(excess)
+    for _ in range(3):
+        vertices = settle(vertices, faces, size, flesh)
+    # details finer than the triangles would only be noise
+    flesh = replace(flesh, detail=float(np.clip((resolution - 8_000) / 24_000, 0.0, 1.0)))
+    vertices = flesh.project(vertices, steps=2)
+    for halving in range(halvings):
+        vertices, faces = subdivide(vertices, faces)
+        vertices = flesh.project(vertices, steps=2 if halving == 0 else 1)  # later midpoints lie on it almost
+    return vertices, faces
+
+
+def _closed_contour(flesh: Flesh, base: int) -> tuple[Array, Faces]:
+    spacing = float(np.clip(np.sqrt(40_000.0 / base), _FINEST, _COARSEST) * flesh.plan.stretch.min())
+    for _ in range(3):
+        vertices, faces = contour(flesh, *flesh.bounds, spacing)
+        if len(vertices) - len(faces) // 2 == 2:  # Euler's number of a sphere: in one piece, without holes
+            return vertices, faces
+        spacing *= 0.7
+    raise InputError("proportions: with these the fingers touch one another, or the hand falls to pieces")
+
+
+def _relative_size(flesh: Flesh, vertices: Array, faces: Faces) -> Array:
+    """Wanted edge lengths up to a factor: shorter where the surface bends more, shape (V,)."""
+    normal = flesh.slope(vertices)[1]
+    normal /= np.linalg.norm(normal, axis=1, keepdims=True)
+    edges = Edges.of(faces, len(vertices))
+    a, b = edges.ends.T
+    lengths = np.linalg.norm(vertices[a] - vertices[b], axis=1)
+    turns = np.linalg.norm(normal[a] - normal[b], axis=1)
+    bend = np.zeros(len(vertices))
+    total = np.zeros(len(vertices))
+    for end in (a, b):
+        bend += np.bincount(end, turns, minlength=len(vertices))
+        total += np.bincount(end, lengths, minlength=len(vertices))
+    bend /= np.maximum(total, 1e-9)
+    for _ in range(12):
+        bend = 0.5 * (bend + mean_over_neighbours(edges, bend))
+    return 1.0 / np.sqrt(np.clip(bend, 0.02, 0.16) / 0.06)

@@ -1,0 +1,68 @@
+"""A rig file's raw content → :class:`~warpjld.rig.Rig`: units, recognition, completion, axes, weights."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from warpjld.errors import InputError
+from warpjld.io.placement import place
+from warpjld.io.source import SourceRig
+from warpjld.rig import Rig, Skin
+from warpjld.skeleton.recognise.canonical import canonical_skeleton
+from warpjld.surface import Surface, weld_surface
+
+__all__ = ["assemble_rig"]
+
+_FURTHEST = 1e12
+
+
+def assemble_rig(source: SourceRig, *, side: str | None = None, unit: str | None = None, up: str | None = None) -> Rig:
+    """Recognise what ``source`` holds and bring it to the canonical form; arguments as in ``load_rig``."""
+    try:
+        return _assemble(source, side, unit, up)
+    except InputError as error:
+        if error.path is not None:
+            raise
+        raise InputError(error.message, path=source.path) from None
+
+
+def _assemble(source: SourceRig, side: str | None, unit: str | None, up: str | None) -> Rig:
+    reach = max(np.abs(source.vertices).max(initial=0.0), np.abs(source.tree.frames).max(initial=0.0))
+    if not reach < _FURTHEST:
+        raise InputError(f"vertices or joints lie at {reach:.3g}: beyond anything that can be computed with")
+    source = place(source, unit=unit, up=up)
+    surface = weld_surface(source.vertices, source.faces, uv=source.uv, parts=source.parts)
+    found = canonical_skeleton(
+        source.tree, surface.vertices, surface.faces, side=side, axes=source.axes, limits=source.limits
+    )
+    skin = None
+    if source.joints is not None and source.weights is not None:
+        skin = _skin(source.joints, source.weights, found.owner, len(found.skeleton), surface)
+    frames = np.tile(np.eye(4), (len(found.skeleton), 1, 1))
+    frames[:, :3, 3] = found.skeleton.rest
+    known = np.array(found.sources) >= 0
+    frames[known] = source.tree.frames[np.array(found.sources)[known]]
+    return Rig(
+        name=source.path.stem,
+        skeleton=found.skeleton,
+        surface=surface,
+        skin=skin,
+        path=source.path,
+        source_joints=tuple(source.tree.names[j] if j >= 0 else "" for j in found.sources),
+        source_frames=frames,
+        notes=(*source.notes, *found.notes),
+    )
+
+
+def _skin(
+    joints: NDArray[np.int64], weights: NDArray[np.float64], owner: NDArray[np.int64], count: int, surface: Surface
+) -> Skin:
+    """Painted weights over welded vertices and canonical joints; vertices welded into one share their mean."""
+    dense = np.zeros((len(surface.vertices), count))
+    np.add.at(dense, (surface.weld[:, None], owner[joints]), weights)
+    dense /= dense.sum(axis=1, keepdims=True)
+    width = int((dense > 0).sum(axis=1).max())
+    strongest = np.argsort(-dense, axis=1, kind="stable")[:, :width]
+    chosen = np.take_along_axis(dense, strongest, axis=1)
+    return Skin(np.where(chosen > 0, strongest, strongest[:, :1]).astype(np.int32), chosen)

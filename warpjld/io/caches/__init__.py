@@ -1,0 +1,85 @@
+"""Vertex caches: a deformed surface, frame after frame, in the files that animation and science tools read.
+
+The surface is computed welded and exported in the vertex order of its source: faces, texture coordinates and
+materials made for the source's mesh fit the cache.
+"""
+
+from __future__ import annotations
+
+from importlib import import_module
+from pathlib import Path
+
+from warpjld.errors import InputError
+from warpjld.io.caches.cache import Cache, Clip
+from warpjld.surface import Surface
+
+__all__ = ["FORMATS", "Cache", "open_cache"]
+
+#: What each suffix is, for help texts.
+FORMATS = {
+    ".usd": "USD, binary: a mesh with time-sampled points",
+    ".usda": "USD as text",
+    ".usdc": "USD, binary",
+    ".pc2": "point cache 2 (Blender, Maya, 3ds Max), with its rest mesh as OBJ",
+    ".mdd": "MDD point cache (Blender, Maya, LightWave), with its rest mesh as OBJ",
+    ".obj": "one Wavefront OBJ a frame, numbered",
+    ".npz": "NumPy arrays: vertices, faces, uv, rest, rate, frames",
+    ".glb": "glTF binary with a morph target a frame, for short clips",
+}
+
+_WRITERS = {
+    ".usd": ("usd", "UsdCache"),
+    ".usda": ("usd_text", "UsdTextCache"),
+    ".usdc": ("usd", "UsdCache"),
+    ".pc2": ("pc2", "Pc2Cache"),
+    ".mdd": ("mdd", "MddCache"),
+    ".obj": ("obj", "ObjCache"),
+    ".npz": ("npz", "NpzCache"),
+    ".glb": ("glb", "GlbCache"),
+}
+
+
+def open_cache(
+    path: str | Path,
+    surface: Surface,
+    *,
+    frames: int,
+    rate: float,
+    start_frame: int = 0,
+    name: str = "surface",
+) -> Cache:
+    """Open a cache for writing; the suffix chooses the format (see `FORMATS`).
+
+    Use it in a ``with`` statement. Nothing is left on disk when the statement ends with an exception, or when
+    another number of frames was written than announced. Memory does not grow with the number of frames, except
+    for ``.glb``, which is limited to short clips.
+
+    >>> with open_cache("hand.usdc", surface, frames=len(poses), rate=25) as cache:   # doctest: +SKIP
+    ...     for _, block in covering.blocks(poses):
+    ...         cache.write(block)
+    >>> cache.files                                                                     # doctest: +SKIP
+    (PosixPath('hand.usdc'),)
+
+    Args:
+        path: File to write; its folder is made if missing. For ``.obj`` the name of the sequence: ``hand.obj``
+            becomes ``hand.0000.obj``, ``hand.0001.obj``, … Beside ``hand.pc2`` and ``hand.mdd``, which hold
+            positions only, ``hand.rest.obj`` is written: the rest mesh in the same vertex order.
+        surface: The surface that moves.
+        frames: How many frames will be written.
+        rate: Frames per second.
+        start_frame: Number of the first frame.
+        name: Name of the mesh inside the file.
+
+    Raises:
+        InputError: Unknown suffix, no frames, a clip too long for the format, or a place that cannot be written.
+        MissingExtraError: USD without the extra ``usd``.
+    """
+    path = Path(path)
+    writer = _WRITERS.get(path.suffix.lower())
+    if writer is None:
+        listed = "\n".join(f"  {suffix:6} {what}" for suffix, what in FORMATS.items())
+        raise InputError(f"unknown kind of cache '{path.suffix}'; known are\n{listed}", path=path)
+    module, kind = writer
+    make = getattr(import_module(f"{__name__}.{module}"), kind)
+    cache: Cache = make(path, surface, Clip(frames=frames, rate=rate, start=start_frame, name=name))
+    return cache

@@ -1,0 +1,65 @@
+"""Wavefront OBJ: one file a frame, and the rest mesh that accompanies pure point caches."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from warpjld.errors import InputError
+from warpjld.io.caches.cache import Cache
+from warpjld.surface import Surface
+
+__all__ = ["ObjCache", "ObjText"]
+
+
+class ObjText:
+    """A surface as OBJ text in source order; all but the positions is formatted once."""
+
+    def __init__(self, surface: Surface, name: str) -> None:
+        count = len(surface.weld)
+        # nine digits give a float32 back unchanged
+        self._positions = "v %.9g %.9g %.9g\n" * count
+        corners = surface.source_faces + 1
+        if surface.uv is None:
+            texture = ""
+            faces = "f %d %d %d\n" * len(corners) % tuple(corners.ravel().tolist())
+        else:
+            texture = "vt %.9g %.9g\n" * count % tuple(np.asarray(surface.uv, float).ravel().tolist())
+            faces = "f %d/%d %d/%d %d/%d\n" * len(corners) % tuple(np.repeat(corners.ravel(), 2).tolist())
+        self._head = f"# metres, Y up\no {name}\n"
+        self._tail = f"{texture}s 1\n{faces}"
+
+    def format(self, vertices: NDArray[np.float32]) -> bytes:
+        """The whole file for positions (W, 3)."""
+        return (self._head + self._positions % tuple(vertices.ravel().tolist()) + self._tail).encode()
+
+
+class ObjCache(Cache):
+    """``hand.obj`` stands for ``hand.0000.obj``, ``hand.0001.obj``, …, numbered from the clip's first frame."""
+
+    note = "one file a frame, in the source's vertex order"
+
+    def _begin(self) -> None:
+        first, last = self.clip.start, self.clip.start + self.clip.frames - 1
+        numbered = re.compile(re.escape(self.path.stem) + r"\.(-?\d{4,})\.obj", re.IGNORECASE)
+        for place in sorted(self.path.parent.iterdir()):
+            match = numbered.fullmatch(place.name)
+            if match and not first <= int(match[1]) <= last:
+                # tools read a sequence by its name: older frames would silently become part of this one
+                raise InputError(f"is of another sequence than frames {first}…{last}: remove it first", path=place)
+        self._text = ObjText(self.surface, self.clip.name)
+
+    def _append(self, vertices: NDArray[np.float32]) -> None:
+        self._part(self._numbered()).write_bytes(self._text.format(vertices))
+
+    def _finish(self) -> None:
+        self._close()
+
+    def _close(self) -> None:
+        pass  # every frame closed its own file
+
+    def _numbered(self) -> Path:
+        return self.path.with_name(f"{self.path.stem}.{self.clip.start + self.written:04d}{self.path.suffix}")

@@ -1,0 +1,102 @@
+"""USD: one mesh whose points and extent are time samples; a time code is a frame number."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from warpjld.errors import MissingExtraError
+from warpjld.io.caches.cache import Cache
+
+__all__ = ["UsdCache", "build_stage", "extent_of"]
+
+_FLUSH_BYTES = 32 << 20
+
+
+class UsdCache(Cache):
+    """Binary USD. The layer is saved every 32 MB, after which it holds no samples in memory, only their places."""
+
+    note = "Y up, metres, subdivisionScheme none, no normals; faces and points in the source's vertex order"
+
+    _stage: Any = None
+
+    def _begin(self) -> None:
+        self._stage, self._mesh = build_stage(self, self._part(self.path, keep_suffix=True))
+        self._pending = 0
+
+    def _append(self, vertices: NDArray[np.float32]) -> None:
+        from pxr import Vt
+
+        time = self.clip.start + self.written
+        self._mesh.GetPointsAttr().Set(Vt.Vec3fArray.FromNumpy(vertices), time)
+        self._mesh.GetExtentAttr().Set(extent_of(vertices), time)
+        self._pending += vertices.nbytes
+        if self._pending > _FLUSH_BYTES:
+            self._save()
+
+    def _finish(self) -> None:
+        self._save()
+        self._close()
+
+    def _save(self) -> None:
+        if not self._stage.GetRootLayer().Save():
+            raise OSError("USD could not save the layer")
+        self._pending = 0
+
+    def _close(self) -> None:
+        self._stage = self._mesh = None
+
+
+def build_stage(cache: Cache, file: Path | None) -> tuple[Any, Any]:
+    """A stage (in memory without a file) with the mesh at rest, and its ``UsdGeom.Mesh``.
+
+    Raises:
+        MissingExtraError: OpenUSD is not installed.
+    """
+    try:
+        from pxr import Sdf, Tf, Usd, UsdGeom, Vt
+    except ImportError as error:
+        raise MissingExtraError("USD", "usd") from error
+    surface, clip = cache.surface, cache.clip
+    stage = Usd.Stage.CreateInMemory() if file is None else _create(file)
+    UsdGeom.SetStageUpAxis(stage, UsdGeom.Tokens.y)
+    UsdGeom.SetStageMetersPerUnit(stage, 1.0)
+    stage.SetTimeCodesPerSecond(clip.rate)
+    stage.SetFramesPerSecond(clip.rate)
+    stage.SetStartTimeCode(clip.start)
+    stage.SetEndTimeCode(clip.start + clip.frames - 1)
+
+    mesh = UsdGeom.Mesh.Define(stage, f"/{Tf.MakeValidIdentifier(clip.name)}")
+    stage.SetDefaultPrim(mesh.GetPrim())
+    mesh.CreateSubdivisionSchemeAttr(UsdGeom.Tokens.none)
+    mesh.CreateOrientationAttr(UsdGeom.Tokens.rightHanded)
+    mesh.CreateFaceVertexCountsAttr(Vt.IntArray(len(surface.source_faces), 3))
+    mesh.CreateFaceVertexIndicesAttr(Vt.IntArray.FromNumpy(np.ascontiguousarray(surface.source_faces.ravel())))
+    mesh.CreatePointsAttr(Vt.Vec3fArray.FromNumpy(cache.rest))
+    mesh.CreateExtentAttr(extent_of(cache.rest))
+    if surface.uv is not None:
+        primvar = UsdGeom.PrimvarsAPI(mesh).CreatePrimvar(
+            "st", Sdf.ValueTypeNames.TexCoord2fArray, UsdGeom.Tokens.vertex
+        )
+        primvar.Set(Vt.Vec2fArray.FromNumpy(np.ascontiguousarray(surface.uv, np.float32)))
+    return stage, mesh
+
+
+def _create(file: Path) -> Any:
+    from pxr import Tf, Usd
+
+    file.unlink(missing_ok=True)
+    try:
+        return Usd.Stage.CreateNew(str(file))
+    except Tf.ErrorException as error:
+        raise OSError(str(error).strip().splitlines()[-1]) from error
+
+
+def extent_of(vertices: NDArray[np.float32]) -> Any:
+    """Corners of the bounding box of positions (n, 3), as USD wants them."""
+    from pxr import Vt
+
+    return Vt.Vec3fArray.FromNumpy(np.stack([vertices.min(axis=0), vertices.max(axis=0)]))

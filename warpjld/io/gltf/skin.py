@@ -1,0 +1,253 @@
+"""glTF skins → :class:`SourceRig`: joints of all skins, skinned meshes placed as the file shows them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from warpjld.errors import InputError
+from warpjld.io.gltf.document import Document, open_document
+from warpjld.io.source import SourceRig
+from warpjld.skeleton.recognise.tree import SourceTree
+from warpjld.surface import Part
+
+__all__ = ["read_gltf_rig"]
+
+_TRIANGLES, _STRIP, _FAN = 4, 5, 6
+_BIND_TOLERANCE = 1e-4  # of the surface's size: where bind and shown pose count as one
+
+
+@dataclass
+class _Primitive:
+    """One primitive in world space, joints numbered as in the tree."""
+
+    vertices: NDArray[np.float64]
+    faces: NDArray[np.int64]
+    uv: NDArray[np.float32] | None
+    joints: NDArray[np.int64]
+    weights: NDArray[np.float64]
+    moved: float
+
+
+def read_gltf_rig(path: str | Path) -> SourceRig:
+    """Read the skinned meshes of a glTF file.
+
+    Vertices are placed by joint · inverse bind matrix: a skinned mesh's own node transform does not count (glTF 2.0
+    §3.7.3.3). Meshes without a skin that hang on a joint follow it rigidly; others are left out, with a note.
+
+    Raises:
+        InputError: Not glTF, no skin, or broken skin data.
+    """
+    document = open_document(path)
+    try:
+        return _read(document)
+    except (TypeError, AttributeError, KeyError, IndexError, ValueError, OverflowError) as error:
+        # pygltflib takes any JSON: a string where the schema wants a number shows only here
+        raise InputError(f"breaks the glTF schema: {error}", path=document.path) from error
+
+
+def _read(document: Document) -> SourceRig:
+    gltf = document.gltf
+    if not gltf.skins:
+        raise InputError(
+            "has no skin (no joints): give a rigged file, or a skeleton file for this surface", path=document.path
+        )
+    nodes = _joint_nodes(document)
+    number = {node: j for j, node in enumerate(nodes)}
+    tree = _tree(document, nodes, number)
+    primitives: list[_Primitive] = []
+    parts: list[Part] = []
+    notes: list[str] = []
+    vertex_count = face_count = 0
+    for node, record in enumerate(gltf.nodes):
+        if record.mesh is None:
+            continue
+        name = gltf.meshes[record.mesh].name or document.name(node)
+        read = _mesh(document, node, number, name, notes)
+        for primitive in read:
+            primitive.faces += vertex_count
+            first = (vertex_count, face_count)
+            vertex_count += len(primitive.vertices)
+            face_count += len(primitive.faces)
+            parts.append(Part(name, slice(first[0], vertex_count), slice(first[1], face_count)))
+            primitives.append(primitive)
+    if not primitives:
+        raise InputError("no mesh uses the skin", path=document.path)
+    vertices = np.concatenate([p.vertices for p in primitives])
+    if max(p.moved for p in primitives) > _BIND_TOLERANCE * np.linalg.norm(np.ptp(vertices, axis=0)):
+        notes.append("bind pose differs from the pose the file shows: the shown pose is used as rest pose")
+    influences = max(p.joints.shape[1] for p in primitives)
+    return SourceRig(
+        path=document.path,
+        tree=tree,
+        vertices=vertices,
+        faces=np.concatenate([p.faces for p in primitives]),
+        uv=_uv(primitives),
+        parts=tuple(parts),
+        joints=np.concatenate([_widen(p.joints, influences) for p in primitives]),
+        weights=np.concatenate([_widen(p.weights, influences) for p in primitives]),
+        notes=tuple(notes),
+    )
+
+
+def _joint_nodes(document: Document) -> list[int]:
+    nodes: dict[int, None] = {}
+    for i, skin in enumerate(document.gltf.skins):
+        if not skin.joints:
+            raise InputError(f"skin {i} has no joints", path=document.path)
+        for node in skin.joints:
+            if not 0 <= node < len(document.gltf.nodes):
+                raise InputError(f"skin {i}: joint node {node} does not exist", path=document.path)
+            nodes[node] = None
+    return list(nodes)
+
+
+def _tree(document: Document, nodes: list[int], number: dict[int, int]) -> SourceTree:
+    parents = np.full(len(nodes), -1)
+    for j, node in enumerate(nodes):
+        above = int(document.parents[node])
+        while above >= 0 and above not in number:
+            above = int(document.parents[above])
+        parents[j] = number.get(above, -1)
+    return SourceTree(tuple(document.name(n) for n in nodes), parents, document.worlds[nodes])
+
+
+def _mesh(document: Document, node: int, number: dict[int, int], name: str, notes: list[str]) -> list[_Primitive]:
+    gltf = document.gltf
+    record = gltf.nodes[node]
+    if record.skin is not None:
+        skin = gltf.skins[record.skin]
+        joints = np.array([number[n] for n in skin.joints])
+        transforms = document.worlds[skin.joints] @ _inverse_binds(document, record.skin)
+    else:
+        above = node
+        while above >= 0 and above not in number:
+            above = int(document.parents[above])
+        if above < 0:
+            notes.append(f"mesh '{name}' has no skin and hangs on no joint: left out")
+            return []
+        notes.append(f"mesh '{name}' has no skin: it follows joint '{document.name(above)}' rigidly")
+        joints, transforms = np.array([number[above]]), document.worlds[[node]]
+    out = []
+    for primitive in gltf.meshes[record.mesh].primitives:
+        mode = _TRIANGLES if primitive.mode is None else primitive.mode
+        if mode not in (_TRIANGLES, _STRIP, _FAN):
+            notes.append(f"mesh '{name}': points or lines left out")
+            continue
+        out.append(_primitive(document, primitive, mode, joints, transforms, name, record.skin is not None, notes))
+    return out
+
+
+def _primitive(
+    document: Document,
+    primitive: Any,
+    mode: int,
+    joints: NDArray[np.int64],
+    transforms: NDArray[np.float64],
+    name: str,
+    skinned: bool,
+    notes: list[str],
+) -> _Primitive:
+    attributes = vars(primitive.attributes)
+    if attributes.get("POSITION") is None:
+        raise InputError(f"mesh '{name}' has no positions", path=document.path)
+    points = document.accessor(attributes["POSITION"]).astype(np.float64)
+    if not np.isfinite(points).all():
+        bad = int(np.argwhere(~np.isfinite(points))[0][0])
+        raise InputError(f"mesh '{name}': vertex {bad} is not finite", path=document.path)
+    faces = _triangles(document, primitive, mode, len(points), name)
+    if skinned:
+        indices, weights = _influences(document, attributes, len(points), len(joints), name, notes)
+    else:
+        indices, weights = np.zeros((len(points), 1), dtype=np.int64), np.ones((len(points), 1))
+    blended = np.einsum("vk,vkij->vij", weights, transforms[indices])
+    placed = np.einsum("vij,vj->vi", blended[:, :3, :3], points) + blended[:, :3, 3]
+    uv = document.accessor(attributes["TEXCOORD_0"]) if attributes.get("TEXCOORD_0") is not None else None
+    # one rigid motion of the whole mesh is a placement; several mean that the file shows another pose
+    rigid = transforms[0]
+    moved = float(np.abs(placed - (points @ rigid[:3, :3].T + rigid[:3, 3])).max())
+    return _Primitive(placed, faces, None if uv is None else uv.astype(np.float32), joints[indices], weights, moved)
+
+
+def _triangles(document: Document, primitive: Any, mode: int, count: int, name: str) -> NDArray[np.int64]:
+    if primitive.indices is None:
+        corners = np.arange(count)
+    else:
+        corners = document.accessor(primitive.indices).astype(np.int64).ravel()
+    if corners.size and corners.max() >= count:
+        raise InputError(
+            f"mesh '{name}': face index {corners.max()} is beyond its {count} vertices", path=document.path
+        )
+    if mode == _TRIANGLES:
+        if len(corners) % 3:
+            raise InputError(f"mesh '{name}': {len(corners)} indices are not whole triangles", path=document.path)
+        return corners.reshape(-1, 3)
+    steps = np.arange(len(corners) - 2)
+    if mode == _FAN:
+        return np.stack([np.full_like(steps, corners[0]), corners[steps + 1], corners[steps + 2]], axis=1)
+    odd = steps % 2
+    return np.stack([corners[steps], corners[steps + 1 + odd], corners[steps + 2 - odd]], axis=1)
+
+
+def _influences(
+    document: Document, attributes: dict[str, Any], vertices: int, joints: int, name: str, notes: list[str]
+) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
+    """All JOINTS_n and WEIGHTS_n side by side, unused slots on joint 0 with weight 0, rows summing to one."""
+    indices, weights = [], []
+    for n in range(8):
+        if attributes.get(f"JOINTS_{n}") is None or attributes.get(f"WEIGHTS_{n}") is None:
+            break
+        indices.append(document.accessor(attributes[f"JOINTS_{n}"]).astype(np.int64))
+        weights.append(document.accessor(attributes[f"WEIGHTS_{n}"]).astype(np.float64))
+    if not indices:
+        raise InputError(f"mesh '{name}' uses a skin but has no JOINTS_0 and WEIGHTS_0", path=document.path)
+    index, weight = np.concatenate(indices, axis=1), np.concatenate(weights, axis=1)
+    if index.shape != weight.shape or len(index) != vertices:
+        raise InputError(f"mesh '{name}': joints and weights do not match its {vertices} vertices", path=document.path)
+    if not np.isfinite(weight).all() or (weight < 0).any():
+        bad = int(np.argwhere(~(np.isfinite(weight) & (weight >= 0)))[0][0])
+        raise InputError(f"mesh '{name}': vertex {bad} has a negative or non-finite weight", path=document.path)
+    used = np.where(weight > 0, index, 0)
+    if used.max() >= joints:
+        bad = int(np.argwhere(used >= joints)[0][0])
+        raise InputError(
+            f"mesh '{name}': vertex {bad} follows joint {used[bad].max()}, the skin has {joints}", path=document.path
+        )
+    total = weight.sum(axis=1)
+    if (total <= 0).any():
+        bad = int(np.flatnonzero(total <= 0)[0])
+        raise InputError(f"mesh '{name}': vertex {bad} has no weight at all", path=document.path)
+    off = np.abs(total - 1) > 0.01
+    if off.any():
+        notes.append(f"mesh '{name}': weights of {int(off.sum())} vertices did not sum to one, normalised")
+    return used, weight / total[:, None]
+
+
+def _inverse_binds(document: Document, index: int) -> NDArray[np.float64]:
+    skin = document.gltf.skins[index]
+    if skin.inverseBindMatrices is None:
+        return np.tile(np.eye(4), (len(skin.joints), 1, 1))
+    matrices = document.accessor(skin.inverseBindMatrices).astype(np.float64)
+    if matrices.shape[1:] != (4, 4) or len(matrices) < len(skin.joints):
+        raise InputError(
+            f"skin {index}: {len(skin.joints)} joints need as many inverse bind matrices, got {len(matrices)}",
+            path=document.path,
+        )
+    if not np.isfinite(matrices).all():
+        raise InputError(f"skin {index}: an inverse bind matrix is not finite", path=document.path)
+    return matrices[: len(skin.joints)]
+
+
+def _uv(primitives: list[_Primitive]) -> NDArray[np.float32] | None:
+    if all(p.uv is None for p in primitives):
+        return None
+    blank = [np.zeros((len(p.vertices), 2), np.float32) if p.uv is None else p.uv for p in primitives]
+    return np.concatenate(blank)
+
+
+def _widen(array: NDArray[Any], width: int) -> NDArray[Any]:
+    return np.pad(array, ((0, 0), (0, width - array.shape[1])))

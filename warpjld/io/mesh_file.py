@@ -1,0 +1,80 @@
+"""Surfaces without joints: OBJ, PLY, STL, OFF, glTF and whatever else trimesh reads."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from warpjld.errors import InputError
+from warpjld.surface import Part
+
+__all__ = ["MeshFile", "read_mesh"]
+
+
+@dataclass(frozen=True, eq=False)
+class MeshFile:
+    """A surface in the file's own vertex order, unit and axes.
+
+    Attributes:
+        path: The file.
+        vertices: Positions, shape (W, 3).
+        faces: Triangles, shape (S, 3); larger polygons are split.
+        uv: Texture coordinates, shape (W, 2), or None.
+        parts: The file's meshes.
+    """
+
+    path: Path
+    vertices: NDArray[np.float64]
+    faces: NDArray[np.int64]
+    uv: NDArray[np.float32] | None
+    parts: tuple[Part, ...]
+
+
+def read_mesh(path: str | Path) -> MeshFile:
+    """Read all triangle meshes of a file, placed as its scene says.
+
+    Raises:
+        InputError: Unreadable, of an unknown kind, without triangles, or not finite.
+    """
+    import trimesh
+
+    path = Path(path)
+    if not path.is_file():
+        raise InputError("no such file", path=path)
+    if path.suffix.lower().lstrip(".") not in trimesh.available_formats():
+        raise InputError(f"'{path.suffix}' is not a kind of surface file that can be read", path=path)
+    try:
+        scene = trimesh.load_scene(path, process=False)
+    except Exception as error:  # trimesh raises whatever its many readers raise
+        raise InputError(f"cannot be read as {path.suffix.lstrip('.').upper()}: {error}", path=path) from None
+    vertices, faces, uvs, parts = [], [], [], []
+    points = triangles = 0
+    for node in scene.graph.nodes_geometry:
+        transform, key = scene.graph[node]
+        mesh = scene.geometry[key]
+        if not isinstance(mesh, trimesh.Trimesh) or not len(mesh.faces):
+            continue
+        vertices.append(mesh.vertices @ transform[:3, :3].T + transform[:3, 3])
+        turned = np.linalg.det(transform[:3, :3]) < 0  # a mirrored node turns its triangles inside out
+        faces.append((mesh.faces[:, ::-1] if turned else mesh.faces) + points)
+        uvs.append(getattr(mesh.visual, "uv", None))
+        ends = points + len(mesh.vertices), triangles + len(mesh.faces)
+        parts.append(Part(str(key), slice(points, ends[0]), slice(triangles, ends[1])))
+        points, triangles = ends
+    if not parts:
+        raise InputError("has no triangles", path=path)
+    everything = np.concatenate(vertices).astype(np.float64)
+    if not np.isfinite(everything).all():
+        raise InputError(f"vertex {int(np.argwhere(~np.isfinite(everything))[0][0])} is not finite", path=path)
+    return MeshFile(path, everything, np.concatenate(faces).astype(np.int64), _uv(uvs, parts), tuple(parts))
+
+
+def _uv(uvs: list[NDArray[np.float64] | None], parts: list[Part]) -> NDArray[np.float32] | None:
+    if all(uv is None for uv in uvs):
+        return None
+    sizes = [part.vertices.stop - part.vertices.start for part in parts]
+    filled = [np.zeros((n, 2)) if uv is None or len(uv) != n else uv for uv, n in zip(uvs, sizes, strict=True)]
+    return np.concatenate(filled).astype(np.float32)

@@ -1,0 +1,61 @@
+"""Loading rigs of any kind: the reader is chosen by the file's suffix."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from warpjld.errors import InputError
+from warpjld.io.source import SourceRig
+from warpjld.rig import Rig
+
+__all__ = ["load_rig"]
+
+
+def load_rig(
+    path: str | Path,
+    *,
+    skeleton: str | Path | None = None,
+    side: str | None = None,
+    unit: str | None = None,
+    up: str | None = None,
+) -> Rig:
+    """Load a rig: a skinned .glb or .gltf, or any surface (OBJ, PLY, STL, …) with a skeleton file.
+
+    Args:
+        path: The file.
+        skeleton: Skeleton file (JSON, see :mod:`warpjld.io.skeleton_file`); needed where the surface has no joints.
+        side: ``left`` or ``right`` for a single hand, where the file leaves it open or is wrong.
+        unit: ``m``, ``cm`` or ``mm``; by default guessed from a hand's or body's plausible size, with a note.
+        up: ``y`` or ``z``: the file's up axis; turned to Y.
+
+    Returns:
+        Skeleton in canonical names, metres; each hand has its 25 joints, those the file lacks added.
+
+    Raises:
+        InputError: Unreadable, no joints, broken data, or a bad argument.
+    """
+    from warpjld.io.assemble import assemble_rig
+
+    for name, value, allowed in (
+        ("side", side, ("left", "right")),
+        ("unit", unit, ("m", "cm", "mm")),
+        ("up", up, ("y", "z")),
+    ):
+        if value is not None and value not in allowed:
+            raise InputError(f"{name}: want {' or '.join(repr(a) for a in allowed)}, got {value!r}")
+    return assemble_rig(_read(Path(path), skeleton), side=side, unit=unit, up=up)
+
+
+def _read(path: Path, skeleton: str | Path | None) -> SourceRig:
+    if not path.is_file():
+        raise InputError("is a folder" if path.is_dir() else "no such file", path=path)
+    if path.suffix.lower() in (".glb", ".gltf") and skeleton is None:
+        from warpjld.io.gltf.skin import read_gltf_rig
+
+        return read_gltf_rig(path)
+    if skeleton is None:
+        raise InputError("has no joints: give a skeleton file for this surface", path=path)
+    from warpjld.io.mesh_file import read_mesh
+    from warpjld.io.skeleton_file import read_skeleton_file
+
+    return read_skeleton_file(skeleton, read_mesh(path))

@@ -1,0 +1,167 @@
+"""Skeleton files: the joints of a surface that has none of its own, as JSON.
+
+::
+
+    {
+      "joints": [
+        {"name": "left.wrist", "parent": null, "position": [0, 0, 0]},
+        {"name": "left.index.base", "parent": "left.wrist", "position": [0, 0, -0.09],
+         "axis": [-1, 0, 0], "limits": {"flexion": [-45, 90]}}
+      ]
+    }
+
+Positions are in the surface's own unit and axes. Names may be canonical or of any convention that is recognised;
+``axis`` (the flexion axis) and ``limits`` (degrees, per channel) are optional and overrule what is worked out.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from difflib import get_close_matches
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from warpjld.errors import InputError
+from warpjld.io.mesh_file import MeshFile
+from warpjld.io.source import SourceRig
+from warpjld.skeleton.recognise.tree import SourceTree
+from warpjld.skeleton.tree import CHANNELS, Skeleton
+
+__all__ = ["read_skeleton_file", "write_skeleton_file"]
+
+_KEYS = ("name", "parent", "position", "axis", "limits")
+
+
+def read_skeleton_file(path: str | Path, mesh: MeshFile) -> SourceRig:
+    """Put the joints of a skeleton file into a surface.
+
+    Raises:
+        InputError: Unreadable, or an entry that is not as described above.
+    """
+    path = Path(path)
+    try:
+        content = json.loads(path.read_text("utf-8"))
+    except OSError as error:
+        raise InputError(f"cannot be read: {error.strerror}", path=path) from None
+    except UnicodeDecodeError:
+        raise InputError("is not a text file: a skeleton file is JSON", path=path) from None
+    except json.JSONDecodeError as error:
+        raise InputError(f"is not JSON: {error.msg}", path=path, line=error.lineno, column=error.colno) from None
+    try:
+        return _rig(path, content, mesh)
+    except InputError as error:
+        raise InputError(error.message, path=path) from None
+
+
+def _rig(path: Path, content: Any, mesh: MeshFile) -> SourceRig:
+    entries = content.get("joints") if isinstance(content, dict) else None
+    if not isinstance(entries, list) or not entries:
+        raise InputError('want {"joints": [{"name": …, "parent": …, "position": [x, y, z]}, …]}')
+    names: list[str] = []
+    for i, entry in enumerate(entries):
+        if not isinstance(entry, dict) or not isinstance(entry.get("name"), str) or not entry["name"]:
+            raise InputError(f"joint {i} has no name")
+        unknown = next((key for key in entry if key not in _KEYS), None)
+        if unknown is not None:
+            raise InputError(f"joint '{entry['name']}': no key '{unknown}'{_hint(unknown, _KEYS)}")
+        if entry["name"] in names:
+            raise InputError(f"two joints are called '{entry['name']}'")
+        names.append(entry["name"])
+    frames = np.tile(np.eye(4), (len(names), 1, 1))
+    parents = np.full(len(names), -1)
+    axes: dict[int, NDArray[np.float64]] = {}
+    limits: dict[int, dict[str, tuple[float, float]]] = {}
+    for j, entry in enumerate(entries):
+        frames[j, :3, 3] = _vector(entry.get("position"), names[j], "position")
+        above = entry.get("parent")
+        if above is not None:
+            if above not in names:
+                raise InputError(f"joint '{names[j]}': no joint '{above}' to be its parent{_hint(str(above), names)}")
+            parents[j] = names.index(above)
+        if entry.get("axis") is not None:
+            axes[j] = _vector(entry["axis"], names[j], "axis")
+            if not np.linalg.norm(axes[j]) > 0:
+                raise InputError(f"joint '{names[j]}': its axis has no length")
+        if entry.get("limits") is not None:
+            limits[j] = _limits(entry["limits"], names[j])
+    _check_loops(names, parents)
+    return SourceRig(
+        path=mesh.path,
+        tree=SourceTree(tuple(names), parents, frames),
+        vertices=mesh.vertices,
+        faces=mesh.faces,
+        uv=mesh.uv,
+        parts=mesh.parts,
+        axes=axes,
+        limits=limits,
+        notes=(f"joints from {path.name}",),
+    )
+
+
+def _vector(value: Any, name: str, key: str) -> NDArray[np.float64]:
+    if isinstance(value, list) and len(value) == 3 and all(isinstance(x, int | float) for x in value):
+        vector = np.array(value, dtype=np.float64)
+        if np.isfinite(vector).all():
+            return vector
+    raise InputError(f"joint '{name}': {key} wants three finite numbers, got {value!r}")
+
+
+def _limits(value: Any, name: str) -> dict[str, tuple[float, float]]:
+    if not isinstance(value, Mapping):
+        raise InputError(f"joint '{name}': limits want {{\"flexion\": [smallest, largest], …}} in degrees")
+    out = {}
+    for channel, pair in value.items():
+        if channel not in CHANNELS:
+            raise InputError(f"joint '{name}': no channel '{channel}'{_hint(channel, CHANNELS)}")
+        good = isinstance(pair, list) and len(pair) == 2 and all(isinstance(x, int | float) for x in pair)
+        if not good or not pair[0] <= pair[1]:
+            raise InputError(f"joint '{name}': limits of {channel} want [smallest, largest] in degrees, got {pair!r}")
+        out[channel] = (float(np.radians(pair[0])), float(np.radians(pair[1])))
+    return out
+
+
+def _check_loops(names: list[str], parents: NDArray[np.int64]) -> None:
+    for j in range(len(names)):
+        above = j
+        for _ in names:
+            above = int(parents[above])
+            if above < 0:
+                break
+        else:
+            raise InputError(f"joint '{names[j]}' is its own ancestor")
+
+
+def _hint(word: str, pool: Any) -> str:
+    close = get_close_matches(word, list(pool), n=1)
+    return f"; did you mean '{close[0]}'?" if close else ""
+
+
+def write_skeleton_file(path: str | Path, skeleton: Skeleton) -> None:
+    """Write a skeleton as a skeleton file that reads back as the same one."""
+    joints = []
+    for j, name in enumerate(skeleton.names):
+        parent = int(skeleton.parents[j])
+        joints.append(
+            {
+                "name": name,
+                "parent": skeleton.names[parent] if parent >= 0 else None,
+                "position": [round(float(x), 7) for x in skeleton.rest[j]],
+                "axis": [round(float(x), 7) for x in skeleton.axes[j]],
+                "limits": {
+                    channel: [round(float(x), 3) for x in np.degrees(pair)]
+                    for channel, pair in zip(CHANNELS, skeleton.limits[j], strict=True)
+                },
+            }
+        )
+    path = Path(path)
+    part = path.with_name(path.name + ".part")
+    lines = ",\n".join("    " + json.dumps(joint) for joint in joints)
+    try:
+        part.write_text(f'{{\n  "joints": [\n{lines}\n  ]\n}}\n', "utf-8")
+        part.replace(path)
+    except OSError as error:
+        raise InputError(f"cannot be written: {error.strerror}", path=path) from None

@@ -1,0 +1,45 @@
+"""What a rig file says, before anything is recognised in it: the common form every reader fills."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from warpjld.skeleton.recognise.tree import SourceTree
+from warpjld.surface import Part
+
+__all__ = ["SourceRig"]
+
+
+@dataclass(frozen=True, eq=False)
+class SourceRig:
+    """A surface with joints in the file's own names, order, units and axes.
+
+    Attributes:
+        path: The file.
+        tree: Its joints.
+        vertices: Rest positions, shape (W, 3).
+        faces: Triangles, shape (S, 3).
+        uv: Texture coordinates, shape (W, 2), or None.
+        parts: The file's meshes.
+        joints: Influencing joints of ``tree`` per vertex, shape (W, K), or None where no skin is painted.
+        weights: Their weights, rows summing to one, shape (W, K).
+        axes: Flexion axes the file states, by joint number.
+        limits: Channel limits [rad] the file states, by joint number then channel.
+        notes: What was mended on the way.
+    """
+
+    path: Path
+    tree: SourceTree
+    vertices: NDArray[np.float64]
+    faces: NDArray[np.int64]
+    uv: NDArray[np.float32] | None = None
+    parts: tuple[Part, ...] = ()
+    joints: NDArray[np.int64] | None = None
+    weights: NDArray[np.float64] | None = None
+    axes: dict[int, NDArray[np.float64]] = field(default_factory=dict)
+    limits: dict[int, dict[str, tuple[float, float]]] = field(default_factory=dict)
+    notes: tuple[str, ...] = ()

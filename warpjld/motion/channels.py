@@ -1,0 +1,61 @@
+"""Names of channels: ``joint.channel`` or ``root.x``; the paper's joint numbers and the metacarpus as aliases."""
+
+from __future__ import annotations
+
+import re
+from difflib import get_close_matches
+
+from warpjld.errors import InputError
+from warpjld.skeleton import CHANNELS, PAPER_NUMBERS, Skeleton
+
+__all__ = ["ROOT_CHANNELS", "canonical_channels", "resolve_channel"]
+
+ROOT_CHANNELS = ("root.x", "root.y", "root.z")
+"""Displacement of the root from rest [m]."""
+
+_NUMBER = re.compile(r"joint\s*(\d+)")
+_METACARPUS = ("ring.carpometacarpal", "pinky.carpometacarpal")
+
+
+def canonical_channels(channel: str) -> tuple[str, ...]:
+    """The channels a name stands for, in lower case.
+
+    ``joint 14.flexion`` is ``index.knuckle3.flexion`` by the paper's numbers (A Fig. 2); ``metacarpus.flexion`` is
+    the flexion of its joints 1 and 2, the ring's and the pinky's carpometacarpals (R8). A side may stand before each.
+
+    Raises:
+        InputError: Not of the form ``joint.channel``, or no such channel or joint number.
+    """
+    name = channel.strip().lower()
+    if name in ROOT_CHANNELS:
+        return (name,)
+    joint, dot, kind = name.rpartition(".")
+    if not dot or not joint:
+        raise InputError(f"channel '{channel}': want 'joint.channel', such as 'index.base.flexion', or 'root.x'")
+    if joint == "root" and len(kind) == 1:
+        raise InputError(f"channel '{channel}': the root moves along x, y or z")
+    if kind not in CHANNELS:
+        close = get_close_matches(kind, CHANNELS, n=1)
+        hint = f"; did you mean '{close[0]}'?" if close else ""
+        raise InputError(f"channel '{channel}': no angle '{kind}'; known: {', '.join(CHANNELS)}{hint}")
+    side, dot, rest = joint.partition(".")
+    prefix, bare = (f"{side}.", rest) if dot and side in ("left", "right") else ("", joint)
+    if bare == "metacarpus":
+        if kind != "flexion":
+            raise InputError(f"channel '{channel}': the metacarpus has flexion only")
+        return tuple(f"{prefix}{metacarpal}.flexion" for metacarpal in _METACARPUS)
+    if number := _NUMBER.fullmatch(bare):
+        if int(number[1]) not in PAPER_NUMBERS:
+            raise InputError(f"channel '{channel}': joints are numbered 0 to {max(PAPER_NUMBERS)}")
+        bare = PAPER_NUMBERS[int(number[1])]
+    return (f"{prefix}{bare}.{kind}",)
+
+
+def resolve_channel(channel: str, skeleton: Skeleton) -> tuple[int, int]:
+    """Joint and channel number of a canonical ``joint.channel`` name in a skeleton.
+
+    Raises:
+        InputError: The skeleton has no such joint, or several.
+    """
+    joint, _, kind = channel.rpartition(".")
+    return skeleton.index(joint), CHANNELS.index(kind)

@@ -1,0 +1,143 @@
+"""A tracked hand, joint positions only, drives a rig's hand."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from itertools import pairwise
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial.transform import Rotation
+
+from warpjld.errors import InputError
+from warpjld.motion.frame_times import frame_times
+from warpjld.motion.rotations import conjugate, minimal_rotation, multiply, rotate, slerp
+from warpjld.skeleton import DIGITS, Poses, Skeleton, poses_from_rotations
+from warpjld.skeleton.hand import FINGER_JOINTS
+
+__all__ = ["HandTrack", "poses_of_hand"]
+
+_PALM = ("wrist", *(f"{digit}.{joint}" for digit in DIGITS for joint in ("carpometacarpal", "base")))
+_MOBILE = ("ring.base", "pinky.base")
+"""Palm points that the mobile metacarpals carry (R8): left out of the palm's fit where enough others are known."""
+_IDENTITY = np.array([0.0, 0.0, 0.0, 1.0])
+
+
+@dataclass(frozen=True, eq=False)
+class HandTrack:
+    """Positions of a hand's joints at K times.
+
+    Attributes:
+        side: ``left`` or ``right``.
+        times: Times [s], increasing, shape (K,).
+        points: Joint, such as ``index.base`` → its positions in any unit, shape (K, 3).
+        moves: Whether the hand's place and orientation count, or its fingers only.
+    """
+
+    side: str
+    times: NDArray[np.float64]
+    points: dict[str, NDArray[np.float64]]
+    moves: bool = True
+
+    def mirrored(self) -> HandTrack:
+        """The other hand doing the same."""
+        points = {name: place * np.array([-1.0, 1.0, 1.0]) for name, place in self.points.items()}
+        return replace(self, side="right" if self.side == "left" else "left", points=points)
+
+
+def poses_of_hand(track: HandTrack, skeleton: Skeleton, rate: float) -> Poses:
+    """Poses of a rig whose hand follows a tracked one; a track of the other side is mirrored.
+
+    The palms are laid upon one another by the least-squares rotation of wrist, metacarpals and finger bases. Then
+    every phalanx turns, in its parent's frame, by the smallest rotation that gives it the tracked direction: without
+    twist about itself, so that knuckles keep their flexion axes. Bone lengths are the rig's. Where a recording has
+    metacarpals, the ring's and the pinky's flex within their limits; index and middle are fixed to the wrist.
+
+    A rig that is just a hand, with a forearm or without, starts where it rests and from there moves as a whole with
+    the tracked palm, seen from the palm's first orientation; other skeletons move their fingers only.
+
+    Args:
+        track: What was recorded.
+        skeleton: What is driven.
+        rate: Frames a second of the result.
+
+    Raises:
+        InputError: The rig has no hand, or the track too few joints.
+    """
+    if f"{track.side}.wrist" not in skeleton.names:
+        track = track.mirrored()
+    if f"{track.side}.wrist" not in skeleton.names:
+        raise InputError("this rig has no hand for a recording of one to drive")
+    own = {name.partition(".")[2]: j for j, name in enumerate(skeleton.names) if name.startswith(f"{track.side}.")}
+    palm = [name for name in _PALM if name in own and name in track.points]
+    if len(palm) < 4:
+        raise InputError(f"the recording has {len(palm)} joints of the palm; 4 are needed to see how the hand lies")
+    fixed = [name for name in palm if name not in _MOBILE]
+    palm = fixed if len(fixed) > 4 else palm
+    rest = skeleton.rest[[own[name] for name in palm]]
+    places = np.stack([track.points[name] for name in palm], axis=1)
+    palm_turn, scale = _fit(rest, places)
+    local = np.tile(_IDENTITY, (len(track.times), len(skeleton), 1))
+    for digit in DIGITS:
+        _drive_digit(digit, track, skeleton, own, conjugate(palm_turn), local)
+    displacement = np.zeros((len(track.times), 3))
+    if track.moves and len(own) == len(skeleton) and "shoulder" not in own:
+        turn = multiply(conjugate(palm_turn[0]), palm_turn)
+        centre = rest.mean(axis=0) - skeleton.rest[0]
+        moved = rotate(conjugate(palm_turn[0]), places.mean(axis=1) - places[0].mean(axis=0)) / scale
+        local[:, 0] = turn
+        displacement = centre + moved - rotate(turn, centre)
+    at = frame_times(track.times[0], track.times[-1], rate)
+    root = np.stack([np.interp(at, track.times, column) for column in displacement.T], axis=-1)
+    return poses_from_rotations(skeleton, slerp(track.times, local, at), root_position=root)
+
+
+def _fit(rest: NDArray[np.float64], places: NDArray[np.float64]) -> tuple[NDArray[np.float64], float]:
+    """Least-squares rotations of the rest points onto the places (Kabsch), and how much larger the places are."""
+    a = rest - rest.mean(axis=0)
+    b = places - places.mean(axis=1, keepdims=True)
+    u, _, vt = np.linalg.svd(np.einsum("fpi,pj->fij", b, a))
+    proper = np.ones(u.shape[:2])
+    proper[:, 2] = np.sign(np.linalg.det(u) * np.linalg.det(vt))
+    turn = Rotation.from_matrix((u * proper[:, None, :]) @ vt).as_quat()
+    return turn, float(np.linalg.norm(b, axis=(1, 2)).mean() / np.linalg.norm(a))
+
+
+def _drive_digit(
+    digit: str,
+    track: HandTrack,
+    skeleton: Skeleton,
+    own: dict[str, int],
+    to_rest: NDArray[np.float64],
+    local: NDArray[np.float64],
+) -> None:
+    """Fill in the local rotations of one digit, from the wrist outwards."""
+    turned = np.tile(_IDENTITY, (len(track.times), 1))
+    for joint, following in _pairs(digit):
+        if not {joint, following} <= own.keys() or not {joint, following} <= track.points.keys():
+            continue
+        j = own[joint]
+        bone = skeleton.rest[own[following]] - skeleton.rest[j]
+        tracked = rotate(to_rest, track.points[following] - track.points[joint])
+        lengths = np.linalg.norm(tracked, axis=-1)
+        wanted = np.where(lengths[:, None] > 0.0, rotate(conjugate(turned), tracked), bone)
+        if joint.endswith("carpometacarpal"):
+            local[:, j] = _flex(skeleton, j, bone, wanted)
+        else:
+            local[:, j] = minimal_rotation(bone, wanted)
+        turned = multiply(turned, local[:, j])
+
+
+def _pairs(digit: str) -> list[tuple[str, str]]:
+    joints = [f"{digit}.{joint}" for joint in (*(() if digit == "thumb" else ("carpometacarpal",)), *FINGER_JOINTS)]
+    return list(pairwise(joints))
+
+
+def _flex(
+    skeleton: Skeleton, joint: int, bone: NDArray[np.float64], wanted: NDArray[np.float64]
+) -> NDArray[np.float64]:
+    """Rotation about the flexion axis, within the limits, that brings a bone nearest to the wanted direction."""
+    axis = skeleton.axes[joint]
+    a, b = bone - axis * (axis @ bone), wanted - np.outer(wanted @ axis, axis)
+    angle = np.arctan2(np.cross(a, b) @ axis, b @ a).clip(*skeleton.limits[joint, 0])
+    return np.concatenate([np.sin(angle / 2.0)[:, None] * axis, np.cos(angle / 2.0)[:, None]], axis=-1)

@@ -1,0 +1,120 @@
+"""Landmarks of hands and bodies: which joint is which, in a recording and in a rig, and where its bone points."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from warpjld.motion.clip import Clip
+from warpjld.skeleton import DIGITS, Skeleton
+
+__all__ = ["Landmarks", "landmarks_of_clip", "landmarks_of_skeleton"]
+
+_NEXT = {"shoulder": "elbow", "elbow": "wrist", "hip": "knee", "knee": "ankle"} | {
+    f"{digit}.{joint}": f"{digit}.{following}"
+    for digit in DIGITS
+    for joint, following in (("base", "knuckle2"), ("knuckle2", "knuckle3"), ("knuckle3", "tip"))
+}
+_TOWARDS_FINGERS = ("middle.base", "ring.base", "index.base", "pinky.base")
+
+
+@dataclass(frozen=True, eq=False)
+class Landmarks:
+    """Canonical names → joints of a tree.
+
+    Attributes:
+        joints: Canonical name, such as ``left.elbow`` or ``right.index.base``, → joint number.
+        parents: Parent of every joint, -1 for a root.
+        rest: Joint positions at rest, shape (J, 3).
+    """
+
+    joints: dict[str, int]
+    parents: NDArray[np.signedinteger]
+    rest: NDArray[np.float64]
+
+    @property
+    def pelvis(self) -> int | None:
+        """Where the legs meet."""
+        return self._meeting("left.hip", "right.hip")
+
+    @property
+    def chest(self) -> int | None:
+        """Where the arms meet."""
+        return self._meeting("left.shoulder", "right.shoulder")
+
+    def path(self, start: int, end: int) -> tuple[int, ...]:
+        """Joints below ``start`` down to ``end``; empty where ``end`` is not below it."""
+        out: list[int] = []
+        joint = end
+        while joint >= 0 and joint != start:
+            out.append(joint)
+            joint = int(self.parents[joint])
+        return tuple(reversed(out)) if joint == start else ()
+
+    def bone(self, name: str) -> NDArray[np.float64] | None:
+        """Vector at rest from a joint to the next of its limb: a wrist to fingers, an ankle to toes."""
+        joint = self.joints[name]
+        side, _, part = name.partition(".")
+        if part == "wrist":
+            ends = [self.joints[key] for f in _TOWARDS_FINGERS if (key := f"{side}.{f}") in self.joints][:1]
+        elif part == "ankle":
+            ends = [self.joints[key] for key in (f"{side}.ball",) if key in self.joints]
+            ends = ends or [j for n, j in self.joints.items() if n.startswith(f"{side}.toe") and n.endswith(".base")]
+        else:
+            ends = [self.joints[key] for key in (f"{side}.{_NEXT.get(part)}",) if key in self.joints]
+        if not ends and part in ("wrist", "ankle"):
+            ends = [j for j in range(len(self.rest)) if self.path(joint, j)]
+        if not ends:
+            return None
+        vector = np.asarray(self.rest[ends].mean(axis=0) - self.rest[joint])
+        return vector if np.linalg.norm(vector) > 0.0 else None
+
+    def thumb_side(self, side: str) -> NDArray[np.float64] | None:
+        """Vector at rest from a wrist to its thumb."""
+        for joint in ("thumb.knuckle2", "thumb.tip"):
+            if f"{side}.{joint}" in self.joints and f"{side}.wrist" in self.joints:
+                return np.asarray(self.rest[self.joints[f"{side}.{joint}"]] - self.rest[self.joints[f"{side}.wrist"]])
+        return None
+
+    def _meeting(self, a: str, b: str) -> int | None:
+        if a not in self.joints or b not in self.joints:
+            return None
+        above = set()
+        joint = self.joints[a]
+        while joint >= 0:
+            above.add(joint)
+            joint = int(self.parents[joint])
+        joint = self.joints[b]
+        while joint >= 0 and joint not in above:
+            joint = int(self.parents[joint])
+        return joint if joint >= 0 else None
+
+
+def landmarks_of_skeleton(skeleton: Skeleton) -> Landmarks:
+    """Landmarks of a rig's skeleton: its names are canonical already. A stub of forearm ends in an elbow's place."""
+    joints = {name: j for j, name in enumerate(skeleton.names)}
+    for side in ("left", "right"):
+        if f"{side}.forearm" in joints:
+            joints.setdefault(f"{side}.elbow", joints[f"{side}.forearm"])
+    return Landmarks(joints, skeleton.parents, skeleton.rest)
+
+
+def landmarks_of_clip(clip: Clip, *, side: str | None = None) -> Landmarks:
+    """Landmarks of a recording, recognised by its joints' names in any of the common conventions.
+
+    Args:
+        clip: The recording.
+        side: Side of a hand whose joints' names do not say it.
+    """
+    from warpjld.skeleton.recognise.by_name import roles_by_name
+    from warpjld.skeleton.recognise.tree import SourceTree
+
+    frames = np.tile(np.eye(4), (len(clip.names), 1, 1))
+    frames[:, :3, 3] = clip.rest
+    roles = roles_by_name(SourceTree(clip.names, clip.parents, frames))
+    joints = dict(roles.body)
+    for hand in roles.hands:
+        joints |= {f"{hand.side or side}.{name}": joint for name, joint in hand.joints.items()}
+    return Landmarks(joints, clip.parents, clip.rest)

@@ -1,0 +1,117 @@
+"""Any motion file → poses of a rig."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from warpjld.errors import InputError
+from warpjld.motion.tracks import Limits
+from warpjld.rig import Rig
+from warpjld.skeleton import Poses
+
+__all__ = ["MOTION_FORMATS", "LoadedMotion", "load_motion", "open_motion"]
+
+MOTION_FORMATS = {
+    ".csv": "key angles of joints by frame, degrees",
+    ".bvh": "motion capture",
+    ".glb": "an animation in a binary glTF file",
+    ".gltf": "an animation in a glTF file",
+    ".json": "a tracked hand: WebXR poses or a Leap Motion recording",
+}
+"""What each suffix is, for help texts."""
+
+
+@dataclass(frozen=True, eq=False)
+class LoadedMotion:
+    """A motion file on a rig.
+
+    Attributes:
+        poses: The rig's poses, frame after frame.
+        rate: Frames a second.
+        notes: What drives what, and what was held at a limit, for people to read.
+    """
+
+    poses: Poses
+    rate: float
+    notes: tuple[str, ...] = ()
+
+
+def load_motion(
+    path: str | Path, rig: Rig, *, rate: float | None = None, limits: Limits = "error"
+) -> tuple[Poses, float]:
+    """Poses of a rig from a motion file, and their frames a second; see ``open_motion``, which also gives notes."""
+    loaded = open_motion(path, rig, rate=rate, limits=limits)
+    return loaded.poses, loaded.rate
+
+
+def open_motion(path: str | Path, rig: Rig, *, rate: float | None = None, limits: Limits = "error") -> LoadedMotion:
+    """Read a motion file for a rig; the suffix says which kind it is (see ``MOTION_FORMATS``).
+
+    Tables of angles are drawn by Kochanek–Bartels splines from the first key to the last, and are the only ones that
+    joint limits apply to: captured rotations are taken as they are.
+
+    Args:
+        path: The file.
+        rig: What is driven; see ``read_csv``, ``retarget``, ``poses_of_gltf`` and ``poses_of_hand`` for how.
+        rate: Frames a second of the result; None for the file's own, or 25 for tables, which have none. A table's
+            frames are played at that rate, all others are resampled to it.
+        limits: What to do with angles beyond a joint's limit, see ``Motion.sample``.
+
+    Raises:
+        InputError: An unknown suffix, a file that cannot be read or understood, or that does not fit the rig.
+    """
+    path = Path(path)
+    if rate is not None and not (np.isfinite(rate) and rate > 0.0):
+        raise InputError(f"rate: want frames a second, above 0, got {rate:g}")
+    suffix = path.suffix.lower()
+    if suffix not in MOTION_FORMATS:
+        known = ", ".join(f"{s} ({what})" for s, what in MOTION_FORMATS.items())
+        raise InputError(f"unknown kind of motion '{path.suffix}'; known: {known}", path=path)
+    try:
+        if suffix == ".csv":
+            return _table(path, rig, rate, limits)
+        if suffix == ".bvh":
+            return _capture(path, rig, rate)
+        if suffix == ".json":
+            return _tracked_hand(path, rig, rate)
+        from warpjld.motion.gltf_animation import poses_of_gltf
+
+        return LoadedMotion(*poses_of_gltf(path, rig, rate=rate))
+    except InputError as error:
+        if error.path is not None:
+            raise
+        raise InputError(error.message, path=path) from error
+
+
+def _table(path: Path, rig: Rig, rate: float | None, limits: Limits) -> LoadedMotion:
+    from warpjld.motion.csv_file import read_csv
+
+    motion = read_csv(path, skeleton=rig.skeleton, **({} if rate is None else {"rate": rate}))
+    poses = motion.poses(rig.skeleton, limits=limits)
+    held = () if limits == "ignore" else motion.clamped(motion.frames, rig.skeleton)
+    return LoadedMotion(poses, motion.rate, tuple(str(one) for one in held))
+
+
+def _capture(path: Path, rig: Rig, rate: float | None) -> LoadedMotion:
+    from warpjld.motion.bvh import read_bvh
+    from warpjld.motion.retarget import correspondence, retarget
+
+    clip = read_bvh(path)
+    clip = clip if rate is None else clip.at_rate(rate)
+    driven = ", ".join(f"{own} ← {theirs}" for own, theirs in correspondence(clip, rig.skeleton).items())
+    notes = (f"besides the trunk these joints follow the recording: {driven}",) if driven else ()
+    return LoadedMotion(retarget(clip, rig.skeleton), clip.rate, notes)
+
+
+def _tracked_hand(path: Path, rig: Rig, rate: float | None) -> LoadedMotion:
+    from warpjld.motion.hand_track import poses_of_hand
+    from warpjld.motion.json_file import read_hand_track
+
+    track, own_rate = read_hand_track(path)
+    rate = own_rate if rate is None else rate
+    mirrored = f"{track.side}.wrist" not in rig.skeleton.names
+    notes = (f"a recorded {track.side} hand drives the other one, mirrored",) if mirrored else ()
+    return LoadedMotion(poses_of_hand(track, rig.skeleton, rate), rate, notes)

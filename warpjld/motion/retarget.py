@@ -1,0 +1,215 @@
+"""A recorded motion of another skeleton drives a rig: rotations are carried over, bone lengths stay the rig's.
+
+Both rest poses differ: recordings mostly rest in a T-pose, rigs in an A-pose. With R the recorded rotation of a bone
+from its rest, and A the alignment that brings the rig's rest pose to the recording's, the rig's bone turns by
+
+    Q(t) = W R(t) Wᵀ A
+
+where W turns the recording's axes into the rig's (up and left may be other axes there). A is built along the tree:
+starting from the parent's A, the smallest further rotation that takes the rig's rest bone to the recording's,
+
+    A_j = minimal(A_parent d_rig → W d_recording) A_parent
+
+so a deformed limb bone points exactly where the recorded one does, and a knee or elbow keeps the plane it bends in.
+Where both have a thumb, the hand is further turned about its axis until the thumbs are on the same side. Three
+exceptions, where rest directions say more about how a skeleton was modelled than about its pose: the trunk
+(A = 1, rotations interpolated along the spine, whatever the numbers of vertebrae), the collar bones (A = 1) and the
+feet (only the heading is aligned, so that flat soles stay flat). Joints without counterpart follow their parent.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial.transform import Rotation
+
+from warpjld.errors import InputError
+from warpjld.motion.clip import Clip
+from warpjld.motion.landmarks import Landmarks, landmarks_of_clip, landmarks_of_skeleton
+from warpjld.motion.rotations import conjugate, minimal_rotation, multiply, rotate, slerp, unit
+from warpjld.skeleton import DIGITS, Poses, Skeleton, poses_from_rotations
+
+__all__ = ["correspondence", "retarget"]
+
+_LIMBS = ("clavicle", "shoulder", "elbow", "wrist", "hip", "knee", "ankle", "ball")
+_IDENTITY = np.array([0.0, 0.0, 0.0, 1.0])
+_GROUND_PERCENTILE = 10.0
+"""Feet are tracked with noise: the height they come down to is a low percentile over the clip, not its minimum."""
+
+
+def correspondence(clip: Clip, skeleton: Skeleton) -> dict[str, str]:
+    """Which joint of a recording drives which joint of a rig, besides the trunk: rig's name → recording's name."""
+    return {skeleton.names[own]: clip.names[joint] for own, joint in _pairs(clip, skeleton)[2].values()}
+
+
+def retarget(clip: Clip, skeleton: Skeleton) -> Poses:
+    """Poses of a rig that follow a recording; see the module's text for the formula.
+
+    The root starts above where it rests and moves as the recording's does, scaled by the length of the legs (or of
+    whatever else both have). Heights are such that the feet come down to where they rest.
+
+    Raises:
+        InputError: Nothing of the recording was recognised in the rig.
+    """
+    source, target, pairs = _pairs(clip, skeleton)
+    if not pairs and (source.pelvis is None or target.pelvis is None):
+        raise InputError(
+            f"no joint of the motion ({_some(clip.names)}) was recognised as one of the rig ({_some(skeleton.names)})"
+        )
+    axes = _axes(source, target)
+    recorded = multiply(multiply(axes, clip.rotations), conjugate(axes))
+    trunk = _trunk(source, target, recorded)
+    frames = len(clip)
+    world = np.empty((frames, len(skeleton), 4))
+    align = np.empty((len(skeleton), 4))
+    driven = {j: (name, b) for name, (j, b) in pairs.items()}
+    for j in range(len(skeleton)):
+        parent = int(skeleton.parents[j])
+        align[j] = _IDENTITY if parent < 0 else align[parent]
+        if j in trunk:
+            align[j] = _IDENTITY
+            world[:, j] = trunk[j]
+        elif j in driven:
+            name, bone = driven[j]
+            align[j] = _alignment(name, source, target, axes, align[j])
+            world[:, j] = multiply(recorded[:, bone], align[j])
+        else:
+            world[:, j] = _IDENTITY if parent < 0 else world[:, parent]
+    above = -1 if trunk else int(skeleton.parents[min(j for j, _ in pairs.values())])
+    while above >= 0:  # the stub of forearm that carries a recorded hand goes with it
+        world[:, above] = world[:, min(driven)]
+        above = int(skeleton.parents[above])
+    local = world.copy()
+    for j in range(len(skeleton)):
+        if skeleton.parents[j] >= 0:
+            local[:, j] = multiply(conjugate(world[:, skeleton.parents[j]]), world[:, j])
+    poses = poses_from_rotations(skeleton, local)
+    return Poses(poses.positions + _travel(clip, source, target, pairs, axes, poses), poses.rotations, poses.flexion)
+
+
+def _pairs(clip: Clip, skeleton: Skeleton) -> tuple[Landmarks, Landmarks, dict[str, tuple[int, int]]]:
+    """Landmarks of both, and per canonical name its joint in the rig and in the recording."""
+    sides = {name.partition(".")[0] for name in skeleton.names if name.endswith(".wrist")}
+    source = landmarks_of_clip(clip, side=sides.pop() if len(sides) == 1 else None)
+    target = landmarks_of_skeleton(skeleton)
+    both = source.joints.keys() & target.joints.keys()
+    names = [f"{side}.{limb}" for side in ("left", "right") for limb in _LIMBS]
+    for side in ("left", "right"):
+        for digit in DIGITS:
+            # a single bone for a whole finger is a mitten: it would bend this finger and not its neighbours
+            if {f"{side}.{digit}.base", f"{side}.{digit}.knuckle2"} <= both:
+                names += [f"{side}.{digit}.{joint}" for joint in ("base", "knuckle2", "knuckle3")]
+    return source, target, {n: (target.joints[n], source.joints[n]) for n in names if n in both}
+
+
+def _axes(source: Landmarks, target: Landmarks) -> NDArray[np.float64]:
+    """W: of the 24 rotations that turn axes into axes, the one that best turns one rest body into the other."""
+    frames = [_body_frame(marks) for marks in (source, target)]
+    if frames[0] is None or frames[1] is None:
+        return _IDENTITY
+    turn = frames[1] @ frames[0].T
+    group = Rotation.create_group("O")
+    best = int(np.argmax(np.einsum("gij,ij->g", group.as_matrix(), turn)))
+    return np.asarray(group[best].as_quat())
+
+
+def _body_frame(marks: Landmarks) -> NDArray[np.float64] | None:
+    """Columns: left, up, forward."""
+    if marks.pelvis is None or "left.knee" not in marks.joints or "right.knee" not in marks.joints:
+        return None
+    knees = marks.rest[[marks.joints["left.knee"], marks.joints["right.knee"]]]
+    hips = marks.rest[[marks.joints["left.hip"], marks.joints["right.hip"]]]
+    up = unit((hips - knees).sum(axis=0))
+    left = unit(np.cross(up, np.cross(hips[0] - hips[1], up)))
+    return np.column_stack([left, up, np.cross(left, up)])
+
+
+def _trunk(source: Landmarks, target: Landmarks, recorded: NDArray[np.float64]) -> dict[int, NDArray[np.float64]]:
+    """Rotations of the rig's trunk joints, from pelvis to chest to head."""
+    ends = [(marks.pelvis, marks.chest, marks.joints.get("head")) for marks in (source, target)]
+    out: dict[int, NDArray[np.float64]] = {}
+    if ends[0][0] is not None and ends[1][0] is not None:
+        out[ends[1][0]] = recorded[:, ends[0][0]]
+    for (a, b), (c, d) in zip(
+        zip(ends[0], ends[0][1:], strict=False), zip(ends[1], ends[1][1:], strict=False), strict=True
+    ):
+        if a is None or b is None or c is None or d is None:
+            continue
+        given = recorded[:, [a, *source.path(a, b)]]
+        chain = target.path(c, d)
+        fractions = np.arange(1, len(chain) + 1) / max(len(chain), 1)
+        spread = slerp(np.linspace(0.0, 1.0, given.shape[1]), given.swapaxes(0, 1), fractions)
+        out |= dict(zip(chain, spread, strict=True))
+    return out
+
+
+def _alignment(
+    name: str, source: Landmarks, target: Landmarks, axes: NDArray[np.float64], inherited: NDArray[np.float64]
+) -> NDArray[np.float64]:
+    """A of one joint, given its parent's."""
+    side, _, part = name.partition(".")
+    if part == "clavicle":
+        return _IDENTITY
+    wanted, own = source.bone(name), target.bone(name)
+    if wanted is None or own is None:
+        return inherited
+    wanted, moved = rotate(axes, wanted), rotate(inherited, own)
+    if part == "ankle":
+        shin = target.bone(f"{side}.knee") if f"{side}.knee" in target.joints else None
+        up = np.array([0.0, 1.0, 0.0]) if shin is None else rotate(inherited, -shin)
+        return multiply(_turn_about(up, moved, wanted), inherited)
+    aligned = multiply(minimal_rotation(moved, wanted), inherited)
+    thumbs = source.thumb_side(side), target.thumb_side(side)
+    if part == "wrist" and thumbs[0] is not None and thumbs[1] is not None:
+        return multiply(_turn_about(wanted, rotate(aligned, thumbs[1]), rotate(axes, thumbs[0])), aligned)
+    return aligned
+
+
+def _turn_about(axis: NDArray[np.float64], start: NDArray[np.float64], end: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Rotation about an axis that brings ``start`` as close to ``end`` as it can."""
+    a = unit(axis)
+    u, v = start - a * (a @ start), end - a * (a @ end)
+    angle = np.arctan2(a @ np.cross(u, v), u @ v)
+    return np.array([*(np.sin(angle / 2.0) * a), np.cos(angle / 2.0)])
+
+
+def _travel(
+    clip: Clip,
+    source: Landmarks,
+    target: Landmarks,
+    pairs: dict[str, tuple[int, int]],
+    axes: NDArray[np.float64],
+    poses: Poses,
+) -> NDArray[np.float64]:
+    """Displacement [m] to add to all joints, shape (F, 1, 3)."""
+    if source.pelvis is not None and target.pelvis is not None:
+        joint, bone = target.pelvis, source.pelvis
+    else:
+        joint, bone = min(pairs.values())
+    scale = _scale(source, target, pairs)
+    moved = scale * rotate(axes, clip.positions[:, bone] - clip.positions[0, bone])
+    travel = (target.rest[joint] - poses.positions[:, joint] + moved)[:, None]
+    feet = [j for side in ("left", "right") for j in _foot(target, f"{side}.ankle") if f"{side}.ankle" in pairs]
+    if feet:
+        heights = (poses.positions[:, feet, 1] + travel[..., 1]).min(axis=1)
+        travel[..., 1] += target.rest[feet, 1].min() - np.percentile(heights, _GROUND_PERCENTILE)
+    return travel
+
+
+def _foot(marks: Landmarks, ankle: str) -> list[int]:
+    start = marks.joints.get(ankle)
+    return [] if start is None else [j for j in range(len(marks.rest)) if marks.path(start, j)] or [start]
+
+
+def _scale(source: Landmarks, target: Landmarks, pairs: dict[str, tuple[int, int]]) -> float:
+    legs = [name for name in pairs if name.endswith((".hip", ".knee"))]
+    lengths = []
+    for marks in (source, target):
+        bones = [marks.bone(name) for name in legs or pairs]
+        lengths.append([0.0 if bone is None else float(np.linalg.norm(bone)) for bone in bones])
+    known = [(a, b) for a, b in zip(*lengths, strict=True) if a > 0.0 and b > 0.0]
+    return sum(b for _, b in known) / sum(a for a, _ in known) if known else 1.0
+
+
+def _some(names: tuple[str, ...]) -> str:
+    return ", ".join(names[:4]) + (", …" if len(names) > 4 else "")

@@ -1,0 +1,78 @@
+"""Quaternion arithmetic of whole clips: products, minimal rotations, spherical interpolation. Order x, y, z, w."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+__all__ = ["conjugate", "minimal_rotation", "multiply", "rotate", "slerp", "unit"]
+
+_PARALLEL = 1e-12
+
+
+def unit(vectors: ArrayLike) -> NDArray[np.float64]:
+    """Vectors scaled to length one along the last axis; those without length stay zero."""
+    array = np.asarray(vectors, dtype=np.float64)
+    lengths = np.linalg.norm(array, axis=-1, keepdims=True)
+    return np.asarray(array / np.where(lengths > 0.0, lengths, 1.0))
+
+
+def multiply(a: NDArray[np.float64], b: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Hamilton product: first ``b``, then ``a``; shapes broadcast."""
+    va, wa, vb, wb = a[..., :3], a[..., 3:], b[..., :3], b[..., 3:]
+    return np.concatenate([wa * vb + wb * va + np.cross(va, vb), wa * wb - (va * vb).sum(-1, keepdims=True)], axis=-1)
+
+
+def conjugate(a: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Inverse of unit quaternions."""
+    return a * np.array([-1.0, -1.0, -1.0, 1.0])
+
+
+def rotate(a: NDArray[np.float64], vectors: ArrayLike) -> NDArray[np.float64]:
+    """Vectors turned by unit quaternions; shapes broadcast."""
+    v = np.asarray(vectors, dtype=np.float64)
+    across = 2.0 * np.cross(a[..., :3], v)
+    return np.asarray(v + a[..., 3:] * across + np.cross(a[..., :3], across))
+
+
+def minimal_rotation(start: ArrayLike, end: ArrayLike) -> NDArray[np.float64]:
+    """The smallest rotation that turns direction ``start`` into ``end``, about their common normal.
+
+    Opposite directions, where any normal would do, turn about the one closest to a coordinate axis.
+    """
+    a, b = np.broadcast_arrays(unit(start), unit(end))
+    half = unit(a + b)
+    out = np.concatenate([np.cross(a, half), (a * half).sum(-1, keepdims=True)], axis=-1)
+    opposite = np.linalg.norm(a + b, axis=-1) < _PARALLEL
+    if opposite.any():
+        across = np.eye(3)[np.abs(a[opposite]).argmin(axis=-1)]
+        out[opposite] = np.concatenate([unit(np.cross(a[opposite], across)), np.zeros((opposite.sum(), 1))], axis=-1)
+    return unit(out)
+
+
+def slerp(times: NDArray[np.float64], rotations: NDArray[np.float64], at: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Spherical interpolation along the first axis, the short way; held before the first and after the last.
+
+    Args:
+        times: Increasing times of the K rotations, shape (K,).
+        rotations: Unit quaternions, shape (K, …, 4).
+        at: Times wanted, shape (F,).
+
+    Returns:
+        Unit quaternions, shape (F, …, 4).
+    """
+    if len(times) == 1:
+        return np.repeat(rotations, len(at), axis=0)
+    at = np.clip(at, times[0], times[-1])
+    k = np.clip(np.searchsorted(times, at, side="right") - 1, 0, len(times) - 2)
+    u = ((at - times[k]) / (times[k + 1] - times[k])).reshape(-1, *(1,) * (rotations.ndim - 1))
+    a, b = rotations[k], rotations[k + 1]
+    cosine = (a * b).sum(-1, keepdims=True)
+    b = np.where(cosine < 0.0, -b, b)
+    angle = np.arccos(np.clip(np.abs(cosine), 0.0, 1.0))
+    sine = np.sin(angle)
+    near = sine < 1e-6
+    safe = np.where(near, 1.0, sine)
+    wa = np.where(near, 1.0 - u, np.sin((1.0 - u) * angle) / safe)
+    wb = np.where(near, u, np.sin(u * angle) / safe)
+    return unit(wa * a + wb * b)

@@ -1,0 +1,246 @@
+"""Tracks: the keys of one channel; and motions: tracks that together move a skeleton (R2–R5)."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Literal
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from warpjld.errors import InputError
+from warpjld.motion.channels import ROOT_CHANNELS, canonical_channels, resolve_channel
+from warpjld.motion.frame_times import frame_times
+from warpjld.motion.spline import Spline
+from warpjld.skeleton import CHANNELS, Poses, Skeleton, poses_from_angles
+
+__all__ = ["Clamped", "Key", "Limits", "Motion", "Track"]
+
+Limits = Literal["error", "clamp", "ignore"]
+"""What to do where an angle is beyond its joint's limits."""
+
+_ROUNDING = 1e-9
+"""Angles [rad] this far beyond a limit are at the limit: degrees and radians do not convert exactly."""
+
+
+@dataclass(frozen=True)
+class Key:
+    """A key value [rad or m] at a frame, with its Kochanek–Bartels constants."""
+
+    frame: float
+    value: float
+    tension: float = 0.0
+    continuity: float = 0.0
+    bias: float = 0.0
+
+
+class Track:
+    """Keys of one channel, in any order of setting."""
+
+    def __init__(self, channel: str) -> None:
+        self.channel = channel
+        self._keys: dict[float, Key] = {}
+        self._spline: Spline | None = None
+
+    def set(self, key: Key) -> None:
+        """Add a key; it replaces one at the same frame."""
+        self._keys[key.frame] = key
+        self._spline = None
+
+    @property
+    def keys(self) -> tuple[Key, ...]:
+        """The keys, frames increasing."""
+        return tuple(self._keys[frame] for frame in sorted(self._keys))
+
+    @property
+    def spline(self) -> Spline:
+        """The spline through the keys."""
+        if self._spline is None:
+            rows = ((k.frame, k.value, k.tension, k.continuity, k.bias) for k in self.keys)
+            self._spline = Spline(*zip(*rows, strict=True))
+        return self._spline
+
+
+@dataclass(frozen=True)
+class Clamped:
+    """In-betweens of a channel that went past a limit and were held there.
+
+    Attributes:
+        channel: ``joint.channel`` with the joint's full name.
+        frames: First and last frame concerned.
+        worst: The value [rad] farthest beyond.
+        limit: The limit [rad].
+    """
+
+    channel: str
+    frames: tuple[float, float]
+    worst: float
+    limit: float
+
+    def __str__(self) -> str:
+        first, last = self.frames
+        return (
+            f"{self.channel}: in-betweens of frames {first:g} to {last:g} reach {np.degrees(self.worst):.4g}°; "
+            f"held at the limit of {np.degrees(self.limit):.4g}°"
+        )
+
+
+@dataclass(eq=False)
+class Motion:
+    """Tracks, a rate and the constants of keys that do not bring their own.
+
+    Attributes:
+        rate: Frames a second.
+        tension: Default tension; likewise ``continuity`` and ``bias``.
+        span: First and last frame; None for those of the keys.
+        tracks: Tracks by channel.
+    """
+
+    rate: float = 25.0
+    tension: float = 0.0
+    continuity: float = 0.0
+    bias: float = 0.0
+    span: tuple[float, float] | None = None
+    tracks: dict[str, Track] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        if not (np.isfinite(self.rate) and self.rate > 0.0):
+            raise InputError(f"rate: want frames a second, above 0, got {self.rate:g}")
+
+    def set_key(
+        self,
+        channel: str,
+        frame: float,
+        value: float,
+        *,
+        tension: float | None = None,
+        continuity: float | None = None,
+        bias: float | None = None,
+    ) -> None:
+        """Set a key; a key already at that frame is replaced.
+
+        Args:
+            channel: ``joint.channel`` or ``root.x|y|z``, or an alias: ``metacarpus.flexion``, ``joint 14.flexion``.
+            frame: Frame number.
+            value: Angle [rad], or displacement of the root [m].
+            tension: The key's own constant instead of the motion's; likewise ``continuity`` and ``bias``.
+
+        Raises:
+            InputError: Unknown channel, or a number that is not finite.
+        """
+        if not (np.isfinite(frame) and np.isfinite(value)):
+            raise InputError(f"key of '{channel}': frame and value must be finite, got {frame:g} and {value:g}")
+        key = Key(
+            float(frame),
+            float(value),
+            self.tension if tension is None else tension,
+            self.continuity if continuity is None else continuity,
+            self.bias if bias is None else bias,
+        )
+        for name in canonical_channels(channel):
+            self.tracks.setdefault(name, Track(name)).set(key)
+
+    def value(self, channel: str, frame: ArrayLike) -> NDArray[np.float64]:
+        """Values [rad or m] at any key or in-between frame (R4), in the shape of ``frame``; 0 if nothing is keyed.
+
+        The side may be left out where only one side has keys.
+        """
+        name = canonical_channels(channel)[0]
+        sided = [n for n in self.tracks if n in (f"left.{name}", f"right.{name}")]
+        if name not in self.tracks and len(sided) == 1:
+            name = sided[0]
+        track = self.tracks.get(name)
+        return np.zeros(np.shape(frame)) if track is None else track.spline(frame)
+
+    @property
+    def frame_range(self) -> tuple[float, float]:
+        """First and last frame; (0, 0) without any key."""
+        if self.span is not None:
+            return self.span
+        frames = [key.frame for track in self.tracks.values() for key in track.keys]
+        return (min(frames), max(frames)) if frames else (0.0, 0.0)
+
+    @property
+    def frames(self) -> NDArray[np.float64]:
+        """Every frame from first to last, one apart, shape (F,)."""
+        first, last = self.frame_range
+        return frame_times(first, last, 1.0)
+
+    def sample(
+        self, frames: ArrayLike, skeleton: Skeleton, *, limits: Limits = "error"
+    ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Angles [rad], shape (F, J, 4), and displacements of the root [m], shape (F, 3), at F frames.
+
+        In-betweens that swing past a limit are held at it, unless limits are ignored; ``clamped`` tells which.
+
+        Args:
+            frames: Frame numbers, whole or not, shape (F,).
+            skeleton: Whose joints and limits.
+            limits: Keys beyond a limit: ``error`` refuses them, ``clamp`` holds them at it, ``ignore`` lets them be.
+
+        Raises:
+            InputError: A joint the skeleton does not have, two tracks of one channel, or a key beyond its limit.
+        """
+        angles, root = self._raw(frames, skeleton)
+        if limits == "ignore":
+            return angles, root
+        if limits == "error":
+            self._check_keys(skeleton)
+        for joint, channel in self._places(skeleton).values():
+            angles[:, joint, channel].clip(*skeleton.limits[joint, channel], out=angles[:, joint, channel])
+        return angles, root
+
+    def clamped(self, frames: ArrayLike, skeleton: Skeleton) -> tuple[Clamped, ...]:
+        """What ``sample`` holds at a limit over these frames, by channel."""
+        at = np.atleast_1d(np.asarray(frames, dtype=np.float64))
+        angles, _ = self._raw(at, skeleton)
+        found = []
+        for joint, channel in self._places(skeleton).values():
+            values = angles[:, joint, channel]
+            low, high = skeleton.limits[joint, channel]
+            for limit, beyond in ((low, low - values), (high, values - high)):
+                if len(where := np.flatnonzero(beyond > _ROUNDING)):
+                    name = f"{skeleton.names[joint]}.{CHANNELS[channel]}"
+                    worst = float(values[np.argmax(beyond)])
+                    found.append(Clamped(name, (float(at[where[0]]), float(at[where[-1]])), worst, float(limit)))
+        return tuple(found)
+
+    def poses(self, skeleton: Skeleton, frames: ArrayLike | None = None, *, limits: Limits = "error") -> Poses:
+        """Poses at the given frames, or at all; see ``sample``."""
+        angles, root = self.sample(self.frames if frames is None else frames, skeleton, limits=limits)
+        return poses_from_angles(skeleton, angles, root_position=root)
+
+    def _raw(self, frames: ArrayLike, skeleton: Skeleton) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        at = np.atleast_1d(np.asarray(frames, dtype=np.float64))
+        if at.ndim != 1 or not np.isfinite(at).all():
+            raise InputError(f"frames: want finite numbers, shape (n,), got shape {at.shape}")
+        angles = np.zeros((len(at), len(skeleton), len(CHANNELS)))
+        for name, (joint, channel) in self._places(skeleton).items():
+            angles[:, joint, channel] = self.tracks[name].spline(at)
+        root = np.stack([self.value(name, at) for name in ROOT_CHANNELS], axis=-1)
+        return angles, root
+
+    def _places(self, skeleton: Skeleton) -> Mapping[str, tuple[int, int]]:
+        places: dict[str, tuple[int, int]] = {}
+        owners: dict[tuple[int, int], str] = {}
+        for name in self.tracks:
+            if name in ROOT_CHANNELS:
+                continue
+            place = resolve_channel(name, skeleton)
+            if place in owners:
+                raise InputError(f"'{owners[place]}' and '{name}' are the same channel of this skeleton: use one name")
+            owners[place] = name
+            places[name] = place
+        return places
+
+    def _check_keys(self, skeleton: Skeleton) -> None:
+        for name, (joint, channel) in self._places(skeleton).items():
+            low, high = skeleton.limits[joint, channel]
+            for key in self.tracks[name].keys:
+                if not low - _ROUNDING <= key.value <= high + _ROUNDING:
+                    side, limit = ("below", low) if key.value < low else ("above", high)
+                    raise InputError(
+                        f"{skeleton.names[joint]}: {CHANNELS[channel]} {np.degrees(key.value):.6g}° at frame "
+                        f"{key.frame:g} is {side} its limit of {np.degrees(limit):.6g}°"
+                    )

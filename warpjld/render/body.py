@@ -1,0 +1,62 @@
+"""A shaded mesh inside a window whose vertices move while everything else stays."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from warpjld.render.creases import Shading
+
+__all__ = ["MATTE", "SKIN", "Body"]
+
+#: Materials for `Body.show`.
+SKIN: dict[str, float] = {"ambient": 0.3, "diffuse": 0.8, "specular": 0.16, "specular_power": 14.0}
+MATTE: dict[str, float] = {"ambient": 0.45, "diffuse": 0.75, "specular": 0.0}
+
+
+class Body:
+    """Split along creases once; then placed and painted frame by frame.
+
+    Args:
+        vertices: Positions in the first frame, which tells the creases, shape (n, 3).
+        faces: Triangles, shape (t, 3).
+        crease: Edges of a larger dihedral angle [rad] are shown as edges.
+    """
+
+    def __init__(self, vertices: NDArray[np.floating], faces: NDArray[np.integer], crease: float) -> None:
+        import pyvista
+
+        self._shading = Shading(vertices, faces, crease)
+        points, normals = self._shading.place(vertices)
+        self._mesh = pyvista.PolyData.from_regular_faces(points, self._shading.faces)
+        self._mesh.point_data["Normals"] = normals
+        self._mesh.point_data.active_normals_name = "Normals"
+
+    def show(self, plotter: Any, color: str | None, **look: Any) -> None:
+        """Add it in one colour, or (None) in those given by `paint`."""
+        if color is None:
+            self.paint(np.full((int(self._shading.origin.max()) + 1, 3), 200, np.uint8))
+        colored = {"scalars": "color", "rgb": True} if color is None else {"color": color}
+        # pyvista's own smooth shading would compute other normals
+        actor = plotter.add_mesh(self._mesh, smooth_shading=False, **colored, **look)
+        actor.prop.interpolation = "Phong"
+        if color is not None:
+            red, green, blue = actor.prop.color.float_rgb
+            # light that has gone through skin is warmer
+            actor.prop.ambient_color = (red, 0.84 * green, 0.78 * blue)
+
+    def place(self, vertices: NDArray[np.floating]) -> None:
+        """Move the vertices, shape (n, 3)."""
+        self._mesh.points, self._mesh.point_data["Normals"] = self._shading.place(vertices)
+
+    @property
+    def corners(self) -> NDArray[np.float64]:
+        """Corners of the bounding box [m], shape (8, 3)."""
+        bounds = np.reshape(self._mesh.bounds, (3, 2))
+        return np.stack(np.meshgrid(*bounds), axis=-1).reshape(-1, 3)
+
+    def paint(self, colors: NDArray[np.uint8]) -> None:
+        """Colour the vertices, shape (n, 3)."""
+        self._mesh.point_data["color"] = colors[self._shading.origin]

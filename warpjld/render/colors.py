@@ -1,0 +1,85 @@
+"""Numbers as colours, and the bar that explains them."""
+
+from __future__ import annotations
+
+import difflib
+from dataclasses import dataclass
+from typing import Self
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from warpjld.errors import InputError
+
+__all__ = ["ColorScale"]
+
+
+@dataclass(frozen=True)
+class ColorScale:
+    """A colour for every number between two limits; numbers beyond take the end's colour.
+
+    Attributes:
+        low: Number of the first colour.
+        high: Number of the last colour.
+        title: What the numbers are, with their unit.
+        colormap: Matplotlib's name of the colours.
+        factor: Multiplies the numbers where they are written, e.g. 1000 for metres shown in mm.
+    """
+
+    low: float
+    high: float
+    title: str = ""
+    colormap: str = "viridis"
+    factor: float = 1.0
+
+    def __post_init__(self) -> None:
+        if not (np.isfinite([self.low, self.high]).all() and self.low < self.high):
+            raise InputError(f"colour scale: want low < high, got {self.low} and {self.high}")
+
+    @classmethod
+    def spanning(cls, values: ArrayLike, *, title: str = "", colormap: str = "viridis", factor: float = 1.0) -> Self:
+        """A scale from the smallest to the largest of some numbers."""
+        numbers = np.asarray(values, np.float64)
+        if numbers.size == 0 or not np.isfinite(numbers).all():
+            raise InputError("colour scale: want at least one number, all finite")
+        low, high = float(numbers.min()), float(numbers.max())
+        if low == high:
+            low, high = low - 0.5 * (abs(low) or 1.0), high + 0.5 * (abs(high) or 1.0)
+        return cls(low, high, title, colormap, factor)
+
+    def colors(self, values: NDArray[np.floating]) -> NDArray[np.uint8]:
+        """Colours, shape (n, 3), of numbers (n,)."""
+        table = self._table()
+        share = np.clip((values - self.low) / (self.high - self.low), 0, 1)
+        return table[np.rint(share * 255).astype(int)]
+
+    def drawn_on(self, picture: NDArray[np.uint8], ink: str) -> NDArray[np.uint8]:
+        """The picture with a bar, five numbers and the title at its right border."""
+        from PIL import Image
+
+        from warpjld.render.text import write
+
+        height, width = picture.shape[:2]
+        size = max(10, round(height / 40))
+        bar_width, bar_height = max(8, round(0.7 * size)), round(0.5 * height)
+        left, top = width - bar_width - round(4.2 * size), round(0.25 * height)
+        canvas = Image.fromarray(picture.copy())
+        ramp = self.colors(np.linspace(self.high, self.low, bar_height))
+        canvas.paste(Image.fromarray(np.repeat(ramp[:, None], bar_width, axis=1)), (left, top))
+        for number in np.linspace(self.low, self.high, 5):
+            y = top + bar_height * (1 - (number - self.low) / (self.high - self.low))
+            text = f"{number * self.factor:.3g}".replace("-", "−")
+            write(canvas, (left + bar_width + 0.5 * size, y), text, size=size, color=ink, anchor="lm")
+        if self.title:
+            write(canvas, (width - 0.8 * size, top - 1.4 * size), self.title, size=size, color=ink, anchor="rm")
+        return np.asarray(canvas)
+
+    def _table(self) -> NDArray[np.uint8]:
+        import matplotlib
+
+        if self.colormap not in matplotlib.colormaps:
+            near = difflib.get_close_matches(self.colormap, list(matplotlib.colormaps), n=1)
+            hint = f", did you mean '{near[0]}'?" if near else ""
+            raise InputError(f"no colour map '{self.colormap}'{hint}")
+        colors = matplotlib.colormaps[self.colormap](np.arange(256) / 255)[:, :3]
+        return np.rint(255 * colors).astype(np.uint8)

@@ -1,0 +1,40 @@
+"""Picture files, written beside their place and renamed when complete."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from warpjld.errors import InputError
+
+__all__ = ["save_picture"]
+
+_FORMATS = {".png": "PNG", ".jpg": "JPEG", ".jpeg": "JPEG", ".webp": "WEBP", ".tif": "TIFF", ".tiff": "TIFF"}
+
+
+def save_picture(path: str | Path, picture: NDArray[np.uint8]) -> Path:
+    """Write a picture (height, width, 3); its suffix chooses the format. Its folder is made if missing.
+
+    Raises:
+        InputError: Unknown suffix, or a place that cannot be written.
+    """
+    from PIL import Image
+
+    path = Path(path)
+    kind = _FORMATS.get(path.suffix.lower())
+    if kind is None:
+        raise InputError(f"unknown kind of picture '{path.suffix}': want one of {', '.join(_FORMATS)}", path=path)
+    part = path.with_name(f"{path.name}.part")
+    options = {"quality": 95} if kind in ("JPEG", "WEBP") else {}
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        try:
+            Image.fromarray(picture).save(part, format=kind, **options)
+            part.replace(path)
+        finally:
+            part.unlink(missing_ok=True)
+    except OSError as error:
+        raise InputError(f"cannot write: {error.strerror or error}", path=path) from error
+    return path

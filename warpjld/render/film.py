@@ -1,0 +1,188 @@
+"""Films: pictures appended one by one, encoded as they come."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
+from pathlib import Path
+from types import TracebackType
+from typing import Any, Self
+
+import numpy as np
+from numpy.typing import NDArray
+
+from warpjld.errors import InputError, MissingExtraError, WarpjldError
+
+__all__ = ["Film"]
+
+_PILLOW = {".gif": "GIF", ".webp": "WEBP"}
+_FFMPEG = {".mp4": "mp4", ".mov": "mov", ".mkv": "matroska"}
+
+
+class Film:
+    """A film being written; use it in a ``with`` statement.
+
+    ``.mp4``, ``.mov`` and ``.mkv`` (H.264) need the extra ``film`` and stream; ``.gif`` and ``.webp`` need nothing
+    more but hold their compressed frames until the end. A film appears at its place when it is complete: after an
+    exception nothing is left.
+
+    >>> with Film("hand.mp4", rate=25) as film, Scene(faces, camera) as scene:   # doctest: +SKIP
+    ...     for vertices in frames:
+    ...         film.append(scene.draw(vertices))
+
+    Args:
+        path: Where to write; its folder is made if missing.
+        rate: Frames per second.
+
+    Attributes:
+        frames: Pictures appended so far.
+
+    Raises:
+        InputError: Unknown suffix, a rate that is not above 0, or (on entering) a place that cannot be written.
+        MissingExtraError: On entering, if the encoder is not installed.
+    """
+
+    def __init__(self, path: str | Path, *, rate: float = 25.0) -> None:
+        self.path = Path(path)
+        self.rate = float(rate)
+        self.frames = 0
+        known = [*_FFMPEG, *_PILLOW]
+        if self.path.suffix.lower() not in known:
+            raise InputError(f"unknown kind of film '{self.path.suffix}': want one of {', '.join(known)}", path=path)
+        if not (math.isfinite(self.rate) and self.rate > 0):
+            raise InputError(f"rate: want frames per second above 0, got {rate}")
+        self._part = self.path.with_name(f"{self.path.name}.part")
+        self._shape: tuple[int, ...] | None = None
+        self._encoder: Any = None
+        self._open = False
+
+    def append(self, picture: NDArray[np.uint8]) -> None:
+        """Add a frame, uint8 (height, width, 3), of the first one's size.
+
+        Raises:
+            InputError: Another size or type, or the disk refuses.
+        """
+        if not self._open:
+            raise WarpjldError("a film is written inside its with statement: with Film(...) as film: ...")
+        if picture.dtype != np.uint8 or picture.ndim != 3 or picture.shape[2] != 3:
+            raise InputError(f"picture: want uint8 (height, width, 3), got {picture.dtype} {picture.shape}")
+        if self._shape not in (None, picture.shape):
+            raise InputError(f"picture: want the size of the first, {self._shape}, got {picture.shape}")
+        self._shape = picture.shape
+        with self._disk():
+            self._encoder.add(picture)
+        self.frames += 1
+
+    def __enter__(self) -> Self:
+        suffix = self.path.suffix.lower()
+        with self._disk():
+            self.path.parent.mkdir(parents=True, exist_ok=True)
+            self._part.touch()  # a place that cannot be written shows now, not after an hour of drawing
+        try:
+            if suffix in _FFMPEG:
+                self._encoder = _Ffmpeg(self._part, self.rate, _FFMPEG[suffix])
+            else:
+                self._encoder = _Pillow(self._part, self.rate, _PILLOW[suffix])
+        except BaseException:
+            self._part.unlink(missing_ok=True)
+            raise
+        self._open = True
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self._open = False
+        try:
+            if kind is None and self.frames == 0:
+                raise InputError("a film wants at least one picture", path=self.path)
+            with self._disk():
+                self._encoder.close(kind is None)
+                if kind is None:
+                    self._part.replace(self.path)
+        finally:
+            with suppress(OSError):
+                self._part.unlink(missing_ok=True)
+
+    @contextmanager
+    def _disk(self) -> Iterator[None]:
+        try:
+            yield
+        except OSError as error:
+            raise InputError(f"cannot write: {error.strerror or error}", path=self.path) from error
+
+
+class _Ffmpeg:
+    """H.264 through the ffmpeg program that imageio-ffmpeg brings."""
+
+    def __init__(self, path: Path, rate: float, container: str) -> None:
+        try:
+            import imageio_ffmpeg
+        except ImportError as error:
+            raise MissingExtraError("writing video", "film") from error
+        self._write = imageio_ffmpeg.write_frames
+        self._arguments = {
+            "fps": rate,
+            "codec": "libx264",
+            "quality": None,
+            "macro_block_size": 1,
+            "pix_fmt_out": "yuv420p",
+            "ffmpeg_log_level": "error",
+            # visually lossless, playable while it loads, and with the colours named, or players guess them by size
+            "output_params": [
+                *("-crf", "16", "-preset", "veryfast", "-movflags", "+faststart"),
+                *("-vf", "scale=out_color_matrix=bt709:out_range=tv:flags=accurate_rnd"),
+                *("-colorspace", "bt709", "-color_primaries", "bt709", "-color_trc", "bt709", "-color_range", "tv"),
+                *("-f", container),
+            ],
+        }
+        self._path = path
+        self._frames: Any = None
+
+    def add(self, picture: NDArray[np.uint8]) -> None:
+        # H.264 stores colour for squares of 2 × 2 pixels
+        even = np.pad(picture, ((0, picture.shape[0] % 2), (0, picture.shape[1] % 2), (0, 0)), mode="edge")
+        if self._frames is None:
+            self._frames = self._write(str(self._path), even.shape[1::-1], **self._arguments)
+            self._frames.send(None)
+        self._frames.send(np.ascontiguousarray(even))
+
+    def close(self, complete: bool) -> None:
+        if self._frames is not None:
+            self._frames.close()
+
+
+class _Pillow:
+    """Animated GIF or WebP."""
+
+    def __init__(self, path: Path, rate: float, kind: str) -> None:
+        self._path, self._kind, self._rate = path, kind, rate
+        self._pictures: list[Any] = []
+
+    def add(self, picture: NDArray[np.uint8]) -> None:
+        from PIL import Image
+
+        image = Image.fromarray(picture.copy())
+        self._pictures.append(image.quantize(256, dither=Image.Dither.NONE) if self._kind == "GIF" else image)
+
+    def close(self, complete: bool) -> None:
+        if complete:
+            first, *rest = self._pictures
+            options: dict[str, Any] = {"quality": 88, "method": 2} if self._kind == "WEBP" else {"disposal": 1}
+            first.save(
+                self._path,
+                format=self._kind,
+                save_all=True,
+                append_images=rest,
+                duration=[self._duration(k) for k in range(len(self._pictures))],
+                loop=0,
+                **options,
+            )
+        self._pictures.clear()
+
+    def _duration(self, frame: int) -> int:
+        """Milliseconds of a frame, rounded so that the film's length is right: GIF counts hundredths."""
+        unit = 10 if self._kind == "GIF" else 1
+        ends = [round(1000 / unit * k / self._rate) for k in (frame, frame + 1)]
+        return max(unit * (ends[1] - ends[0]), unit)

@@ -1,0 +1,252 @@
+"""One picture after another of a moving surface: the window is built once, then only vertices change."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from types import TracebackType
+from typing import Any, Literal, Self
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from warpjld.errors import InputError
+from warpjld.render.body import MATTE, SKIN, Body
+from warpjld.render.camera import Camera
+from warpjld.render.colors import ColorScale
+from warpjld.render.lights import add_lights
+from warpjld.render.occlusion import occlusion, shade
+from warpjld.render.skeleton import bone_faces, bone_vertices, joint_faces, joint_vertices
+from warpjld.render.style import Quality, Style
+from warpjld.render.wires import Wires
+
+__all__ = ["Image", "Look", "Scene", "Solid"]
+
+#: Picture, uint8 (height, width, 3).
+Image = NDArray[np.uint8]
+#: ``shaded``, or ``wireframe``: edges under a veil of skin, the skeleton inside (R5, Figs 12–15).
+Look = Literal["shaded", "wireframe"]
+
+# how far surfaces darken one another, as a share of the bounding box diagonal
+_REACH = 0.09
+# dihedral angles [rad] above which an edge is meant to be seen
+_SKIN_CREASE, _SOLID_CREASE, _BONE_CREASE = 1.15, 0.7, 0.6
+
+
+@dataclass(frozen=True, eq=False)
+class Solid:
+    """An object beside the surface, say one that is grasped.
+
+    Attributes:
+        vertices: Positions [m], shape (n, 3); for a moving object give others to `Scene.draw`.
+        faces: Triangles, shape (t, 3).
+        color: Name or ``#rrggbb``.
+        opacity: 0…1.
+    """
+
+    vertices: ArrayLike
+    faces: ArrayLike
+    color: str = "#7fa3b8"
+    opacity: float = 1.0
+
+
+class Scene:
+    """Draws frames of one surface; use it in a ``with`` statement, or `close` it.
+
+    Args:
+        faces: Triangles over the welded vertices, shape (T, 3).
+        camera: Where from, see `Camera.view`.
+        look: Kind of picture.
+        size: Width and height [pixels].
+        segments: Proximal and distal joint of each bone to draw, shape (B, 2); joints come with each frame.
+            In shaded pictures bones show only where the style makes the skin translucent.
+        solids: Other objects.
+        scale: Colours for the values that come with each frame.
+        style: Colours.
+        quality: Effort.
+
+    Raises:
+        InputError: Wrong shapes, or a picture too small or large.
+    """
+
+    def __init__(
+        self,
+        faces: ArrayLike,
+        camera: Camera,
+        *,
+        look: Look = "shaded",
+        size: tuple[int, int] = (960, 720),
+        segments: ArrayLike | None = None,
+        solids: Sequence[Solid] = (),
+        scale: ColorScale | None = None,
+        style: Style | None = None,
+        quality: Quality | None = None,
+    ) -> None:
+        self._faces = np.asarray(faces)
+        if self._faces.ndim != 2 or self._faces.shape[1] != 3 or len(self._faces) == 0:
+            raise InputError(f"faces: want shape (n, 3) with n > 0, got {self._faces.shape}")
+        if look not in ("shaded", "wireframe"):
+            raise InputError(f"look: want 'shaded' or 'wireframe', got '{look}'")
+        if min(size) < 16 or max(size) > 8192:
+            raise InputError(f"size: want 16…8192 pixels, got {size[0]} × {size[1]}")
+        self._camera, self._size, self._wire = camera, size, look == "wireframe"
+        self._pairs = np.zeros((0, 2), int) if segments is None else np.asarray(segments, int).reshape(-1, 2)
+        self._solids, self._scale = tuple(solids), scale
+        self._style, self._quality = style or Style(), quality or Quality()
+        # distance of the picture plane [pixels]
+        self._focal = 0.5 * size[1] * camera.zoom / float(np.tan(camera.angle / 2))
+        self._plotter: Any = None
+
+    def draw(
+        self,
+        vertices: ArrayLike,
+        *,
+        joints: ArrayLike | None = None,
+        values: ArrayLike | None = None,
+        solids: Sequence[ArrayLike | None] = (),
+    ) -> Image:
+        """One frame.
+
+        Args:
+            vertices: Positions [m], shape (V, 3).
+            joints: Joint positions [m], shape (J, 3), where segments are drawn.
+            values: A number per vertex to show as colour, shape (V,), where a scale was given.
+            solids: New positions of the solids, in their order; None keeps the last.
+
+        Returns:
+            Picture, uint8 (height, width, 3).
+
+        Raises:
+            InputError: Something missing, of the wrong shape, or not finite.
+        """
+        points = _finite("vertices", vertices, (None, 3))
+        if len(points) <= self._faces.max():
+            raise InputError(f"vertices: faces want {self._faces.max() + 1} of them, got {len(points)}")
+        bones = self._bones_from(joints)
+        colors = self._colors_from(values, len(points))
+        if self._plotter is None:
+            self._build(points, bones)
+        self._skin.place(points)
+        if colors is not None:
+            self._skin.paint(colors)
+        if self._wire:
+            self._wires.place(points, self._camera.position)
+        if bones is not None:
+            self._bones.place(bone_vertices(bones, self._pairs, self._thickness))
+            self._balls.place(joint_vertices(bones[self._jointed], 0.45 * self._thickness))
+        for body, solid, moved in zip(self._bodies, self._solids, solids, strict=False):
+            if moved is not None:
+                body.place(_finite("solids", moved, (len(np.asarray(solid.vertices)), 3)))
+        self._clip(np.concatenate([points, *(body.corners for body in self._bodies)]))
+        return self._shoot()
+
+    def close(self) -> None:
+        """Free the window; drawing again opens another."""
+        if self._plotter is not None:
+            self._plotter.close()
+            self._plotter = None
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self.close()
+
+    def _bones_from(self, joints: ArrayLike | None) -> NDArray[np.float64] | None:
+        if not len(self._pairs):
+            return None
+        if joints is None:
+            raise InputError("joints: wanted, as segments are drawn")
+        bones = _finite("joints", joints, (None, 3))
+        low, high = self._pairs.min(), self._pairs.max()
+        if low < 0 or high >= len(bones):
+            raise InputError(f"segments: joints are 0…{len(bones) - 1}, got {low}…{high}")
+        return bones
+
+    def _colors_from(self, values: ArrayLike | None, count: int) -> NDArray[np.uint8] | None:
+        if (values is None) != (self._scale is None):
+            raise InputError("values: wanted with each frame where a scale is given, and only there")
+        if values is None or self._scale is None:
+            return None
+        return self._scale.colors(_finite("values", values, (count,)))
+
+    def _build(self, points: NDArray[np.float64], joints: NDArray[np.float64] | None) -> None:
+        from warpjld.render.window import open_window
+
+        style, times = self._style, self._quality.supersampling
+        extent = float(np.linalg.norm(np.ptp(points, axis=0)))
+        self._plotter = open_window((self._size[0] * times, self._size[1] * times))
+        self._plotter.set_background(style.background[0], top=style.background[1])
+        add_lights(self._plotter)
+
+        self._skin = Body(points, self._faces, _SKIN_CREASE)
+        opacity = style.veil if self._wire else style.opacity
+        if opacity > 0:
+            # of translucent skin only the front layer is drawn: then nothing needs sorting by depth
+            culling = "back" if opacity < 1 else False
+            color = None if self._scale else style.skin
+            self._skin.show(
+                self._plotter,
+                color,
+                opacity=opacity,
+                culling=culling,
+                **(MATTE if self._wire or self._scale else SKIN),
+            )
+        if self._wire:
+            distance = float(np.linalg.norm(np.subtract(self._camera.target, self._camera.position)))
+            width, unit = times * self._size[1] / 720, self._focal / distance
+            self._wires = Wires(points, self._faces)
+            self._wires.show(self._plotter, style.line, style.hidden_line, width=width, unit=unit)
+        if joints is not None:
+            self._thickness = 0.016 * extent
+            self._jointed = np.unique(self._pairs)
+            bones = bone_vertices(joints, self._pairs, self._thickness)
+            self._bones = Body(bones, bone_faces(len(self._pairs)), _BONE_CREASE)
+            self._bones.show(self._plotter, style.bone, **SKIN)
+            self._balls = Body(joint_vertices(joints[self._jointed], 1.0), joint_faces(len(self._jointed)), np.pi)
+            self._balls.show(self._plotter, style.joint, **SKIN)
+        self._bodies = [Body(np.asarray(s.vertices, float), np.asarray(s.faces), _SOLID_CREASE) for s in self._solids]
+        for solid, body in zip(self._solids, self._bodies, strict=True):
+            body.show(self._plotter, solid.color, opacity=solid.opacity, **SKIN)
+        self._extent, self._occluded = extent, self._quality.occlusion and not self._wire and opacity == 1
+        self._aim()
+
+    def _aim(self) -> None:
+        camera, wanted = self._plotter.camera, self._camera
+        camera.position, camera.focal_point, camera.up = wanted.position, wanted.target, wanted.up
+        camera.view_angle = float(np.degrees(wanted.angle))
+        camera.zoom(wanted.zoom)
+
+    def _clip(self, points: NDArray[np.floating]) -> None:
+        """Depths to draw. VTK would look at the bounds of the frame before, and frames depend on their order."""
+        eye, target = np.asarray(self._camera.position), np.asarray(self._camera.target)
+        depths = (points - eye) @ (target - eye) / np.linalg.norm(target - eye)
+        far = max(1.1 * float(depths.max()), 1e-6)
+        self._plotter.camera.clipping_range = (max(0.9 * float(depths.min()), 1e-3 * far), far)
+
+    def _shoot(self) -> Image:
+        from PIL import Image as Pictures
+
+        self._plotter.render()
+        picture = self._plotter.screenshot(return_img=True)
+        times = self._quality.supersampling
+        if times > 1:
+            picture = np.asarray(Pictures.fromarray(picture).reduce(times))
+        if self._occluded:
+            depth = -self._plotter.get_image_depth(fill_value=np.nan, reset_camera_clipping_range=False)
+            picture = shade(picture, occlusion(depth[::times, ::times], self._focal, _REACH * self._extent))
+        if self._scale is not None:
+            picture = self._scale.drawn_on(picture, self._style.ink)
+        return np.ascontiguousarray(picture, np.uint8)
+
+
+def _finite(name: str, array: ArrayLike, shape: tuple[int | None, ...]) -> NDArray[np.float64]:
+    result = np.asarray(array, np.float64)
+    if result.ndim != len(shape) or any(w not in (None, g) for w, g in zip(shape, result.shape, strict=True)):
+        want = ", ".join("n" if size is None else str(size) for size in shape)
+        raise InputError(f"{name}: want shape ({want}{',' * (len(shape) == 1)}), got {result.shape}")
+    if not np.isfinite(result).all():
+        raise InputError(f"{name}: entry {np.argwhere(~np.isfinite(result))[0].tolist()} is not finite")
+    return result

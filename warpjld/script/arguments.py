@@ -1,0 +1,234 @@
+"""What a command function reads its arguments with: each reader says what it wants, and errors point at the word."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterable, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from warpjld.errors import InputError
+from warpjld.script.statements import Number, Position, Text, Value, Word
+from warpjld.script.suggest import did_you_mean
+
+if TYPE_CHECKING:
+    from warpjld.script.interpreter import Interpreter
+    from warpjld.script.registry import Command
+
+__all__ = ["Arguments"]
+
+_MOST_KEYS = 10_000
+
+
+class Arguments:
+    """The arguments of one call of a command, read from left to right.
+
+    Attributes:
+        command: The command called.
+        position: Where the call stands.
+        interpreter: Who runs it, for commands that run other commands.
+    """
+
+    def __init__(
+        self,
+        command: Command,
+        values: Sequence[Value],
+        position: Position,
+        end: Position,
+        interpreter: Interpreter,
+    ) -> None:
+        self.command = command
+        self.position = position
+        self.interpreter = interpreter
+        self._values = tuple(values)
+        self._next = 0
+        self._end = end
+
+    def __len__(self) -> int:
+        """How many arguments are left."""
+        return len(self._values) - self._next
+
+    def __bool__(self) -> bool:
+        return len(self) > 0
+
+    @property
+    def last(self) -> Position:
+        """Where the argument read last stands."""
+        return self._values[self._next - 1].position if self._next else self.position
+
+    def error(self, message: str, position: Position | None = None) -> InputError:
+        """An error to be raised, at the argument read last unless told otherwise."""
+        return (position or self.last).error(message)
+
+    def expected(self, what: str, hint: str = "") -> InputError:
+        """An error to be raised: the next argument, or its absence, is not ``what``."""
+        if not self:
+            return self._end.error(f"expected {what} here{hint}; {self._usage}")
+        value = self._values[self._next]
+        return value.position.error(f"expected {what}, found {value}{hint}; {self._usage}")
+
+    @property
+    def _usage(self) -> str:
+        return f"the command is {self.command.syntax}"
+
+    def finish(self) -> None:
+        """Raise where an argument is left over."""
+        if self:
+            raise self.expected("the end of the line")
+
+    # ---- numbers -------------------------------------------------------------------------------------------------
+
+    def number(
+        self,
+        what: str,
+        *,
+        minimum: float = -math.inf,
+        maximum: float = math.inf,
+        above: float = -math.inf,
+    ) -> float:
+        """A number in [minimum, maximum] and greater than ``above``; ``what`` names it in errors."""
+        value = self._peek()
+        if not isinstance(value, Number):
+            raise self.expected(what)
+        self._next += 1
+        if not math.isfinite(value.value):
+            raise self.error(f"{what} must be a finite number")
+        if value.value < minimum:
+            raise self.error(f"{what} must be {minimum:g} or more, got {value}")
+        if value.value > maximum:
+            raise self.error(f"{what} must be {maximum:g} or less, got {value}")
+        if value.value <= above:
+            raise self.error(f"{what} must be greater than {above:g}, got {value}")
+        return value.value
+
+    def integer(self, what: str, *, minimum: int | None = None, maximum: int | None = None) -> int:
+        """A whole number."""
+        low, high = (-math.inf if minimum is None else minimum), (math.inf if maximum is None else maximum)
+        value = self.number(what, minimum=low, maximum=high)
+        if value != round(value):
+            raise self.error(f"{what} must be a whole number, got {value:g}")
+        return round(value)
+
+    def vector(self, what: str) -> tuple[float, float, float]:
+        """Three numbers."""
+        return self.number(f"{what} x"), self.number(f"{what} y"), self.number(f"{what} z")
+
+    def has_number(self) -> bool:
+        """Whether a number comes next."""
+        return isinstance(self._peek(), Number)
+
+    def keys_and_value(self, what: str = "the value in degrees") -> tuple[list[float], float]:
+        """``<key1> <key2> <step> <value>``: the keys key1, key1 + step, … up to key2, and the value (C15).
+
+        ``AT <key> <value>`` is a single key.
+        """
+        if self.keyword("AT"):
+            return [self.number("the key (a frame)")], self.number(what)
+        first = self.number("key1 (the first frame)")
+        second = self.number("key2 (the last frame)")
+        if second < first:
+            raise self.error(f"key2 must not come before key1 ({first:g}), got {second:g}")
+        step = self.number("the step in frames", above=0.0)
+        count = math.floor((second - first) / step + 1e-9) + 1
+        if count > _MOST_KEYS:
+            raise self.error(f"a step of {step:g} makes {count:,} keys; at most {_MOST_KEYS:,}")
+        return [first + k * step for k in range(count)], self.number(what)
+
+    # ---- words ---------------------------------------------------------------------------------------------------
+
+    def keyword(self, *words: str) -> str | None:
+        """One of these keywords, in capitals, if it comes next; otherwise nothing is read."""
+        value = self._peek()
+        if isinstance(value, Word) and value.text.upper() in words:
+            self._next += 1
+            return value.text.upper()
+        return None
+
+    def choice(self, what: str, options: Iterable[str]) -> str:
+        """One of these keywords, in capitals."""
+        wanted = list(options)
+        word = self.keyword(*wanted)
+        if word is None:
+            value = self._peek()
+            hint = did_you_mean(value.text, wanted) if isinstance(value, Word) else ""
+            raise self.expected(f"{what} ({'/'.join(wanted)})" if what else "/".join(wanted), hint)
+        return word
+
+    def choices(self, *groups: Sequence[str]) -> list[str]:
+        """One keyword of every group, in whatever order they stand; in the groups' order, in capitals."""
+        found: dict[int, str] = {}
+        while len(found) < len(groups):
+            missing = [g for g in range(len(groups)) if g not in found]
+            word = self.keyword(*(option for g in missing for option in groups[g]))
+            if word is None:
+                value = self._peek()
+                known = [option for g in missing for option in groups[g]]
+                hint = did_you_mean(value.text, known) if isinstance(value, Word) else ""
+                raise self.expected("/".join(groups[missing[0]]), hint)
+            found[next(g for g in missing if word in groups[g])] = word
+        return [found[g] for g in range(len(groups))]
+
+    def options(self, **readers: Callable[[], object]) -> dict[str, object]:
+        """Named options ``NAME value …`` in any order up to the end of the line: name in lower case → value."""
+        out: dict[str, object] = {}
+        while self:
+            name = self.choice("an option", [n.upper() for n in readers]).lower()
+            if name in out:
+                raise self.error(f"{name.upper()} is given twice")
+            out[name] = readers[name]()
+        return out
+
+    def text(self, what: str) -> str:
+        """A quoted text."""
+        value = self._peek()
+        if not isinstance(value, Text):
+            raise self.expected(f"{what} in quotes")
+        self._next += 1
+        return value.text
+
+    def name(self, what: str) -> str:
+        """A word, or a quoted text where it holds blanks or signs."""
+        value = self._peek()
+        if not isinstance(value, Word | Text):
+            raise self.expected(what)
+        self._next += 1
+        return value.text
+
+    def has_text(self) -> bool:
+        """Whether a quoted text comes next."""
+        return isinstance(self._peek(), Text)
+
+    def anything(self) -> Value:
+        """The next argument, whatever it is."""
+        value = self._peek()
+        if value is None:
+            raise self.expected("an argument")
+        self._next += 1
+        return value
+
+    # ---- files ---------------------------------------------------------------------------------------------------
+
+    def input_file(self, what: str) -> Path:
+        """A quoted name of a file that exists; relative to the script's folder (at a prompt, to the current one)."""
+        name = self.text(what)
+        script = Path(self.last.path)
+        folder = Path() if self.last.path.startswith("<") else script.parent
+        path = folder / Path(name).expanduser()
+        if not path.is_file():
+            there = [p.name for p in path.parent.iterdir()] if path.parent.is_dir() else []
+            raise self.error(f"there is no file '{path}'{did_you_mean(path.name, there)}")
+        return path
+
+    def output_name(self, what: str, suffixes: Sequence[str]) -> str:
+        """A quoted name of a file to make inside the output folder, with one of these suffixes."""
+        name = self.text(what)
+        path = Path(name)
+        if path.is_absolute() or ".." in path.parts or not path.name:
+            raise self.error(f"'{name}': want a name inside the output folder (choose the folder with --out)")
+        if path.suffix.lower() not in suffixes:
+            hint = did_you_mean(path.suffix, suffixes) if path.suffix else ""
+            raise self.error(f"'{name}': want a name that ends in {', '.join(suffixes)}{hint}")
+        return path.as_posix()
+
+    def _peek(self) -> Value | None:
+        return self._values[self._next] if self else None

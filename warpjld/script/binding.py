@@ -1,0 +1,35 @@
+"""An actor's surface bound to its skeleton; bound once, as long as nothing that matters changes."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from warpjld.script.scene import Actor
+
+if TYPE_CHECKING:
+    from warpjld.covering import Covering
+
+__all__ = ["cover"]
+
+
+def cover(actor: Actor) -> Covering:
+    """The covering of an actor with its parameters, method and domains."""
+    from warpjld.covering import bind
+
+    old = actor.covering
+    if old is not None and old.skeleton is actor.skeleton and actor.covered == (actor.method, actor.domains):
+        if old.parameters is not actor.parameters:
+            actor.covering = old.with_parameters(actor.parameters)
+    else:
+        rig = actor.rig
+        actor.covering = bind(
+            actor.skeleton,
+            rig.surface,
+            parameters=actor.parameters,
+            skin=rig.skin,
+            domains=actor.domains,
+            method=actor.method,
+        )
+        actor.covered = (actor.method, actor.domains)
+    assert actor.covering is not None
+    return actor.covering

@@ -1,0 +1,172 @@
+"""Key values of joint angles (A §9, R79–R84), and of whole actors."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import asdict
+
+from warpjld.motion import Key
+from warpjld.script.arguments import Arguments
+from warpjld.script.keys import read_joint, set_keys
+from warpjld.script.registry import command
+from warpjld.script.scene import Scene, SplineConstants
+from warpjld.skeleton import CHANNELS
+
+SIDES = ("LEFT", "RIGHT")
+FINGERS = ("THUMB", "INDEX", "MIDDLE", "RING", "PINKY")
+_KEYS = "<key1> <key2> <step> <degrees>"
+
+
+def _limb(scene: Scene, arguments: Arguments, joint: str, channels: Sequence[str]) -> None:
+    side, channel = arguments.choices(SIDES, channels)
+    set_keys(scene.actor_with(side), [f"{side}.{joint}"], channel, scene.spline, arguments)
+
+
+@command(
+    "SHOULDER",
+    syntax=f"SHOULDER <LEFT/RIGHT> <FLEXION/PIVOT/TWISTING/ABDUCTION> {_KEYS}",
+    help="Shoulder angle at key1, key1 + step, … up to key2.",
+    group="Animation",
+)
+def shoulder(scene: Scene, arguments: Arguments) -> None:
+    """R79."""
+    _limb(scene, arguments, "shoulder", ("FLEXION", "PIVOT", "TWISTING", "ABDUCTION"))
+
+
+@command(
+    "ELBOW",
+    syntax=f"ELBOW <LEFT/RIGHT> <FLEXION/TWISTING> {_KEYS}",
+    help="Elbow angle.",
+    group="Animation",
+)
+def elbow(scene: Scene, arguments: Arguments) -> None:
+    """R80."""
+    _limb(scene, arguments, "elbow", ("FLEXION", "TWISTING"))
+
+
+@command(
+    "WRIST",
+    syntax=f"WRIST <LEFT/RIGHT> <FLEXION/PIVOT/ABDUCTION> {_KEYS}",
+    help="Wrist angle.",
+    group="Animation",
+)
+def wrist(scene: Scene, arguments: Arguments) -> None:
+    """R81."""
+    _limb(scene, arguments, "wrist", ("FLEXION", "PIVOT", "ABDUCTION"))
+
+
+@command(
+    "METACARPUS",
+    syntax=f"METACARPUS <LEFT/RIGHT> {_KEYS}",
+    help="Flexion of the ring's and the pinky's metacarpals, 0 to 20 degrees: hollows the palm.",
+    group="Animation",
+)
+def metacarpus(scene: Scene, arguments: Arguments) -> None:
+    """R82: joints 1 and 2."""
+    (side,) = arguments.choices(SIDES)
+    joints = [f"{side}.ring.carpometacarpal", f"{side}.pinky.carpometacarpal"]
+    set_keys(scene.actor_with(side), joints, "FLEXION", scene.spline, arguments)
+
+
+@command(
+    "FINGER1",
+    syntax=f"FINGER1 <LEFT/RIGHT> <THUMB/INDEX/MIDDLE/RING/PINKY> <FLEXION/PIVOT/ABDUCTION> {_KEYS}",
+    help="Angle at the base of a finger. PIVOT turns the axis of flexion; ABDUCTION spreads the finger.",
+    group="Animation",
+)
+def finger1(scene: Scene, arguments: Arguments) -> None:
+    """R83."""
+    side, finger, channel = arguments.choices(SIDES, FINGERS, ("FLEXION", "PIVOT", "ABDUCTION"))
+    set_keys(scene.actor_with(side), [f"{side}.{finger}.base"], channel, scene.spline, arguments)
+
+
+@command(
+    "FINGER23",
+    syntax=f"FINGER23 <LEFT/RIGHT> <THUMB/INDEX/MIDDLE/RING/PINKY> <KNUCKLES2/KNUCKLES3> {_KEYS}",
+    help="Flexion of a finger's second or third joint.",
+    group="Animation",
+)
+def finger23(scene: Scene, arguments: Arguments) -> None:
+    """R84."""
+    side, finger, knuckle = arguments.choices(SIDES, FINGERS, ("KNUCKLES2", "KNUCKLES3"))
+    joint = f"{side}.{finger}.{knuckle.replace('KNUCKLES', 'knuckle')}"
+    set_keys(scene.actor_with(side), [joint], "FLEXION", scene.spline, arguments)
+
+
+@command(
+    "JOINT",
+    syntax=f"JOINT <joint> <FLEXION/PIVOT/TWISTING/ABDUCTION> {_KEYS}",
+    help="Angle of any joint, by name (left.index.base) or, for the current actor, by number.",
+    group="Animation",
+)
+def joint_(scene: Scene, arguments: Arguments) -> None:
+    """R10–R12: joints the printed commands do not reach."""
+    actor, joint = read_joint(scene, arguments)
+    channel = arguments.choice("the angle", [c.upper() for c in CHANNELS])
+    set_keys(actor, [actor.skeleton.names[joint]], channel, scene.spline, arguments)
+
+
+@command(
+    "MOVE",
+    syntax="MOVE <actor> <key> <x> <y> <z>",
+    help="Displacement of an actor from its rest place at a key, in metres.",
+    group="Animation",
+)
+def move(scene: Scene, arguments: Arguments) -> None:
+    """R89: actors in a director's script."""
+    actor = scene.actor(arguments.name("an actor's name"))
+    key = arguments.number("the key (a frame)")
+    for axis, value in zip("xyz", arguments.vector("the displacement's"), strict=True):
+        actor.placement.set_key(f"move.{axis}", Key(key, value, **asdict(scene.spline)))
+
+
+@command(
+    "TURN",
+    syntax="TURN <actor> <key> <x> <y> <z>",
+    help="Rotation of an actor about its root at a key, in degrees about the axes x, then y, then z.",
+    group="Animation",
+)
+def turn(scene: Scene, arguments: Arguments) -> None:
+    """R89."""
+    actor = scene.actor(arguments.name("an actor's name"))
+    key = arguments.number("the key (a frame)")
+    for axis, value in zip("xyz", arguments.vector("the rotation about"), strict=True):
+        actor.placement.set_key(f"turn.{axis}", Key(key, math.radians(value), **asdict(scene.spline)))
+
+
+@command(
+    "SPLINE",
+    syntax="SPLINE <tension> [<continuity> <bias>]",
+    help="Kochanek–Bartels constants, −1 to 1, of the keys set from here on; 0 0 0 at first.",
+    group="Animation",
+)
+def spline(scene: Scene, arguments: Arguments) -> None:
+    """R3."""
+    tension = arguments.number("the tension", minimum=-1, maximum=1)
+    if not arguments:
+        scene.spline = SplineConstants(tension)
+        return
+    continuity = arguments.number("the continuity", minimum=-1, maximum=1)
+    scene.spline = SplineConstants(tension, continuity, arguments.number("the bias", minimum=-1, maximum=1))
+
+
+@command(
+    "FRAMES",
+    syntax="FRAMES <first> <last>",
+    help="Frames to make, both included; without it, from the first key to the last.",
+    group="Animation",
+)
+def frames(scene: Scene, arguments: Arguments) -> None:
+    """R4."""
+    first = arguments.integer("the first frame")
+    last = arguments.integer("the last frame")
+    if last < first:
+        raise arguments.error(f"the last frame must not come before the first ({first}), got {last}")
+    scene.first, scene.last = first, last
+
+
+@command("RATE", syntax="RATE <frames a second>", help="Frames a second; 30 at first.", group="Animation")
+def rate(scene: Scene, arguments: Arguments) -> None:
+    """R2."""
+    scene.rate = arguments.number("the rate in frames a second", above=0, maximum=1000)

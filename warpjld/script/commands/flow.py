@@ -1,0 +1,80 @@
+"""Include files, messages, and looking at what there is. MACRO … END is part of the grammar."""
+
+from __future__ import annotations
+
+from warpjld.errors import InputError
+from warpjld.script import show
+from warpjld.script.arguments import Arguments
+from warpjld.script.registry import all_commands, command
+from warpjld.script.scene import Scene
+from warpjld.script.statements import Word
+
+_TOPICS = ("VALUES", "WIREFRAME", "SHADED", "ACTORS", "JOINTS", "PARAMETERS", "OUTPUTS")
+
+
+@command(
+    "INCLUDE",
+    syntax='INCLUDE "<script>"',
+    help="Run another script here; its name is relative to this script's folder.",
+    group="Flow",
+)
+def include(scene: Scene, arguments: Arguments) -> None:
+    """R88."""
+    path = arguments.input_file("a script")
+    arguments.interpreter.include(path, arguments.last)
+
+
+@command("PRINT", syntax='PRINT <word, number or "text"> …', help="Write a message.", group="Flow")
+def print_(scene: Scene, arguments: Arguments) -> None:
+    """R88."""
+    words = []
+    while arguments:
+        value = arguments.anything()
+        words.append(str(value) if not hasattr(value, "text") else value.text)
+    scene.say(" ".join(words))
+
+
+@command(
+    "SHOW",
+    syntax="SHOW VALUES <frame> or SHOW <WIREFRAME/SHADED> <frame> or SHOW <ACTORS/JOINTS/PARAMETERS/OUTPUTS>",
+    help="Values at any frame; a picture of it, whose path is printed; or what is on stage.",
+    group="Flow",
+)
+def show_(scene: Scene, arguments: Arguments) -> None:
+    """R4, R5."""
+    topic = arguments.choice("what to show", _TOPICS)
+    match topic:
+        case "VALUES":
+            frame = arguments.number("the frame")
+            for actor in scene.actors.values():
+                scene.say(show.values(actor, frame, scene.rate))
+        case "WIREFRAME" | "SHADED":
+            from warpjld.script.pictures import preview
+
+            frame = arguments.number("the frame")
+            scene.actor()  # says what to do where there is none
+            scene.say(str(preview(scene, frame, "shaded" if topic == "SHADED" else "wireframe")))
+        case "ACTORS":
+            scene.say(show.actors(scene))
+        case "JOINTS":
+            scene.say(show.joints(scene.actor()))
+        case "PARAMETERS":
+            scene.say(show.parameters(scene.actor()))
+        case "OUTPUTS":
+            scene.say("\n".join(output.name for output in scene.outputs) or "nothing asked for yet")
+
+
+@command("HELP", syntax="HELP [<command>]", help="All commands, or one.", group="Flow")
+def help_(scene: Scene, arguments: Arguments) -> None:
+    """R88."""
+    if not arguments:
+        scene.say(show.commands(all_commands()))
+        return
+    value = arguments.anything()
+    if not isinstance(value, Word):
+        raise arguments.error("expected a command's name")
+    try:
+        found = all_commands()[value.text]
+    except InputError as error:
+        raise arguments.error(error.message) from None
+    scene.say(f"{found.syntax}\n  {found.help}")

@@ -1,0 +1,113 @@
+"""The camera, and files to make."""
+
+from __future__ import annotations
+
+from typing import Literal, cast
+
+from warpjld.script.arguments import Arguments
+from warpjld.script.formats import EXPORTS, FILMS, PICTURES, VIEWS
+from warpjld.script.registry import command
+from warpjld.script.scene import Camera, ContactSheet, Export, Film, Output, Picture, Scene
+
+_STYLES = ("SHADED", "WIREFRAME")
+
+
+@command(
+    "CAMERA",
+    syntax=f"CAMERA <{'/'.join(VIEWS)}> [ZOOM <factor>] [FOLLOW] or CAMERA FROM <x> <y> <z> TO <x> <y> <z> …",
+    help="Where the pictures and films after this line are taken from [m]; FOLLOW goes along with the first actor.",
+    group="Output",
+)
+def camera(scene: Scene, arguments: Arguments) -> None:
+    """R5."""
+    view, position, target = None, None, None
+    if arguments.keyword("FROM"):
+        position = arguments.vector("the camera's")
+        arguments.choice("", ("TO",))
+        target = arguments.vector("the target's")
+        if position == target:
+            raise arguments.error("the camera cannot look at its own place")
+    else:
+        view = arguments.choice("a view or FROM", VIEWS).lower()
+    options = arguments.options(
+        zoom=lambda: arguments.number("the zoom factor", minimum=0.01, maximum=100), follow=lambda: True
+    )
+    zoom = cast(float, options.get("zoom", 1.0))
+    scene.camera = Camera(view, position, target, zoom, follow="follow" in options)
+
+
+@command(
+    "SIZE",
+    syntax="SIZE <width> <height>",
+    help="Pixels of the pictures and films; 960 by 720 at first.",
+    group="Output",
+)
+def size(scene: Scene, arguments: Arguments) -> None:
+    """R67."""
+    width = arguments.integer("the width in pixels", minimum=16, maximum=4096)
+    scene.size = width, arguments.integer("the height in pixels", minimum=16, maximum=4096)
+
+
+@command(
+    "PICTURE",
+    syntax='PICTURE <frame> "<name>.png" [SHADED/WIREFRAME]',
+    help="A picture of a frame.",
+    group="Output",
+)
+def picture(scene: Scene, arguments: Arguments) -> None:
+    """R5, R66, R67."""
+    frame = arguments.number("the frame")
+    name = arguments.output_name("the picture's name", PICTURES)
+    _ask_for(scene, arguments, Picture(name, frame, _style(arguments), scene.camera))
+
+
+@command(
+    "FILM",
+    syntax=f'FILM "<name>{"/".join(FILMS)}" [SHADED/WIREFRAME]',
+    help="A film of all frames.",
+    group="Output",
+)
+def film(scene: Scene, arguments: Arguments) -> None:
+    """R67."""
+    name = arguments.output_name("the film's name", FILMS)
+    _ask_for(scene, arguments, Film(name, _style(arguments), scene.camera))
+
+
+@command(
+    "CONTACT",
+    syntax='CONTACT "<name>.png" [<frame> …]',
+    help="A contact sheet: frames side by side, as wire-frame and shaded; key frames unless listed.",
+    group="Output",
+)
+def contact(scene: Scene, arguments: Arguments) -> None:
+    """R67: A Figs 14 and 15."""
+    name = arguments.output_name("the sheet's name", PICTURES)
+    frames = []
+    while arguments:
+        frames.append(arguments.number("a frame"))
+    _ask_for(scene, arguments, ContactSheet(name, tuple(frames), scene.camera))
+
+
+@command(
+    "EXPORT",
+    syntax=f'EXPORT "<name>{"/".join(EXPORTS)}" [<actor>]',
+    help="The animated surface of an actor; of all, each in a file of its own, if none is named.",
+    group="Output",
+)
+def export(scene: Scene, arguments: Arguments) -> None:
+    """R89: to the image synthesis part."""
+    name = arguments.output_name("the file's name", EXPORTS)
+    actor = scene.actor(arguments.name("an actor's name")).name if arguments else None
+    _ask_for(scene, arguments, Export(name, actor))
+
+
+def _style(arguments: Arguments) -> Literal["shaded", "wireframe"]:
+    if not arguments:
+        return "shaded"
+    return "wireframe" if arguments.choice("the style", _STYLES) == "WIREFRAME" else "shaded"
+
+
+def _ask_for(scene: Scene, arguments: Arguments, output: Output) -> None:
+    if any(other.name.lower() == output.name.lower() for other in scene.outputs):
+        raise arguments.error(f"'{output.name}' is asked for twice")
+    scene.outputs.append(output)

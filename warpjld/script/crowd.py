@@ -1,0 +1,141 @@
+"""All actors of a scene as one thing to draw, and cameras that show them all through all frames."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import TYPE_CHECKING, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from warpjld.script.scene import Actor, Camera
+from warpjld.script.staging import stage
+from warpjld.skeleton import Poses, Skeleton
+
+if TYPE_CHECKING:
+    from warpjld.covering import Covering
+    from warpjld.render import Camera as RenderCamera
+
+__all__ = ["Crowd", "Role"]
+
+_SAMPLES = 12  # frames whose surface a camera is made to show; the joints of all frames count as well
+
+
+@dataclass(frozen=True, eq=False)
+class Role:
+    """An actor with its surface bound, and its poses at the frames to make."""
+
+    actor: Actor
+    covering: Covering
+    poses: Poses
+
+
+@dataclass(frozen=True, eq=False)
+class Crowd:
+    """The roles of a scene, their vertices, faces, joints and segments put one after another.
+
+    Attributes:
+        roles: In the order of the scene's actors.
+        frames: Frame numbers of their poses, shape (F,).
+        device: Warp device of the covering.
+    """
+
+    roles: Sequence[Role]
+    frames: NDArray[np.float64]
+    device: str = "cpu"
+
+    @cached_property
+    def faces(self) -> NDArray[np.int32]:
+        """Triangles over the vertices of all, shape (T, 3)."""
+        counts = np.cumsum([0, *(len(r.covering.surface.vertices) for r in self.roles)])
+        faces = [r.covering.surface.faces + start for r, start in zip(self.roles, counts, strict=False)]
+        return np.concatenate(faces).astype(np.int32)
+
+    @cached_property
+    def segments(self) -> NDArray[np.int32]:
+        """Bones over the joints of all, shape (B, 2)."""
+        counts = np.cumsum([0, *(len(r.covering.skeleton) for r in self.roles)])
+        pairs = [
+            (segment.proximal + start, segment.distal + start)
+            for role, start in zip(self.roles, counts, strict=False)
+            for segment in role.covering.skeleton.segments
+        ]
+        return np.array(pairs, dtype=np.int32).reshape(-1, 2)
+
+    def at(self, frame: float, rate: float) -> Crowd:
+        """The same roles at one frame, whole or not, of a scene with that rate [1/s]."""
+        moment = np.array([frame])
+        return Crowd([replace(role, poses=stage(role.actor, moment, rate)) for role in self.roles], moment, self.device)
+
+    def joints(self, frame: int) -> NDArray[np.float64]:
+        """Joint positions of all at the frame of that place in the sequence [m], shape (J, 3)."""
+        return np.concatenate([role.poses.positions[frame] for role in self.roles])
+
+    def surface(self, frame: int) -> NDArray[np.float32]:
+        """Vertices of all at one frame [m], shape (V, 3)."""
+        some = slice(frame, frame + 1)
+        return np.concatenate([r.covering.deform(r.poses[some], device=self.device)[0] for r in self.roles])
+
+    def shift(self, camera: Camera, frame: int) -> NDArray[np.float64]:
+        """What to take off all positions at the frame of that place so that the camera goes along [m], shape (3,)."""
+        if not camera.follow:
+            return np.zeros(3)
+        first = self.roles[0]
+        return first.poses.positions[frame, 0] - first.covering.skeleton.rest[0]
+
+    def camera(self, camera: Camera, size: tuple[int, int]) -> RenderCamera:
+        """A camera for all frames; a named view is framed so that nothing leaves the picture."""
+        from warpjld.render import Camera as RenderCamera
+
+        if camera.position is not None and camera.target is not None:
+            sight = np.subtract(camera.target, camera.position)
+            steep = abs(sight[1]) > 0.99 * np.linalg.norm(sight)
+            above = (0.0, 0.0, -1.0) if steep else (0.0, 1.0, 0.0)
+            return RenderCamera(camera.position, camera.target, above, zoom=camera.zoom)
+        view = camera.view or self.default_view
+        forward, up, side = self._facing
+        return RenderCamera.view(
+            view, self._framing(camera), forward=forward, up=up, side=side, size=size, zoom=camera.zoom
+        )
+
+    @property
+    def default_view(self) -> str:
+        """Where to look from where no CAMERA was chosen."""
+        return "three-quarter" if self._facing[2] else "front"
+
+    def _framing(self, camera: Camera) -> NDArray[np.float64]:
+        """Points that must be in every picture [m], shape (n, 3)."""
+        count = len(self.frames)
+        shifts = np.stack([self.shift(camera, frame) for frame in range(count)])
+        surfaces = [points - shifts[frame] for frame, points in self._samples.items()]
+        joints = [(role.poses.positions - shifts[:, None]).reshape(-1, 3) for role in self.roles]
+        return np.concatenate([*surfaces, *joints])
+
+    @cached_property
+    def _samples(self) -> dict[int, NDArray[np.float32]]:
+        count = len(self.frames)
+        chosen = np.unique(np.linspace(0, count - 1, min(count, _SAMPLES)).astype(int))
+        return {int(frame): self.surface(int(frame)) for frame in chosen}
+
+    @cached_property
+    def _facing(self) -> tuple[NDArray[np.float64], NDArray[np.float64], Literal["left", "right"] | None]:
+        """Where a lone hand's palm looks, what is up for it, and its side; the stage's own axes for anything else."""
+        skeleton = self.roles[0].covering.skeleton
+        side = hand_side(skeleton) if len(self.roles) == 1 else None
+        if side is None:
+            return np.array([0.0, 0.0, 1.0]), np.array([0.0, 1.0, 0.0]), None
+        base, wrist = skeleton.index(f"{side}.middle.base"), skeleton.index(f"{side}.wrist")
+        up = skeleton.rest[base] - skeleton.rest[wrist]
+        # the normal segment × axis points to the back of the hand (R20)
+        forward = -np.cross(skeleton.directions[base], skeleton.axes[base])
+        return forward, up, side
+
+
+def hand_side(skeleton: Skeleton) -> Literal["left", "right"] | None:
+    """The side of a skeleton that is a single hand."""
+    sides: tuple[Literal["left", "right"], ...] = ("left", "right")
+    found = [side for side in sides if f"{side}.middle.base" in skeleton.names]
+    alone = len(found) == 1 and f"{found[0]}.wrist" in skeleton.names and len(skeleton) <= 40
+    return found[0] if alone else None

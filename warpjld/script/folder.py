@@ -1,0 +1,82 @@
+"""The output folder: files are made in a hidden folder inside it and moved into place when all of them are done."""
+
+from __future__ import annotations
+
+import shutil
+import tempfile
+from pathlib import Path
+from types import TracebackType
+from typing import Self
+
+from warpjld.errors import InputError
+
+__all__ = ["OutputFolder"]
+
+
+class OutputFolder:
+    """Use it in a ``with`` statement: a statement left by an error or Ctrl-C leaves the folder as it was.
+
+    Args:
+        path: The folder; it is made if missing.
+
+    Attributes:
+        path: The folder.
+        work: The hidden folder.
+
+    Raises:
+        InputError: It cannot be made or written to, or a folder stands where a file should go.
+    """
+
+    def __init__(self, path: Path) -> None:
+        self.path = path
+        self._made: list[Path] = []
+
+    def __enter__(self) -> Self:
+        missing = [p for p in (self.path, *self.path.parents) if not p.exists()]
+        try:
+            self.path.mkdir(parents=True, exist_ok=True)
+            self._made = missing
+            self.work = Path(tempfile.mkdtemp(prefix=".making-", dir=self.path))
+        except OSError as error:
+            self._remove_made()
+            raise InputError(f"cannot write into this folder: {error.strerror}", path=self.path) from error
+        return self
+
+    def place(self, name: str | Path) -> Path:
+        """Where to make a file that is to be called ``name``."""
+        if (self.path / name).is_dir():
+            raise InputError("a folder stands where this file should go", path=self.path / name)
+        path = self.work / name
+        path.parent.mkdir(parents=True, exist_ok=True)
+        return path
+
+    def made(self) -> list[Path]:
+        """Files made so far, relative to the folder."""
+        return sorted(p.relative_to(self.work) for p in self.work.rglob("*") if p.is_file())
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        try:
+            if kind is None:
+                self._publish()
+        except OSError as failure:
+            raise InputError(f"cannot write: {failure.strerror}", path=failure.filename or self.path) from failure
+        finally:
+            shutil.rmtree(self.work, ignore_errors=True)
+            if kind is not None:
+                self._remove_made()
+
+    def _publish(self) -> None:
+        for name in self.made():
+            target = self.path / name
+            target.parent.mkdir(parents=True, exist_ok=True)
+            (self.work / name).replace(target)
+
+    def _remove_made(self) -> None:
+        """Take away the folders that were made for nothing."""
+        for path in self._made:
+            try:
+                path.rmdir()
+            except OSError:
+                return

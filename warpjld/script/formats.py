@@ -1,0 +1,34 @@
+"""Names of files and views that scripts may ask for, and whether they can be made here: known before any work."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from importlib.util import find_spec
+from pathlib import PurePosixPath
+
+from warpjld.errors import MissingExtraError
+from warpjld.io.caches import FORMATS
+from warpjld.render.camera import VIEWS as _VIEWS
+
+__all__ = ["EXPORTS", "FILMS", "PICTURES", "VIEWS", "check_available", "video_is_available"]
+
+PICTURES = (".png",)
+FILMS = (".mp4", ".mov", ".mkv", ".gif", ".webp")
+_VIDEO = FILMS[:3]
+EXPORTS = tuple(FORMATS)
+VIEWS = tuple(name.upper() for name in _VIEWS)
+
+
+def video_is_available() -> bool:
+    """Whether H.264 films can be made here."""
+    return find_spec("imageio_ffmpeg") is not None
+
+
+def check_available(names: Iterable[str]) -> None:
+    """Raise MissingExtraError where a file's format needs an optional dependency that is not installed."""
+    for name in names:
+        suffix = PurePosixPath(name).suffix.lower()
+        if suffix in _VIDEO and not video_is_available():
+            raise MissingExtraError(f"the film '{name}'", "film")
+        if suffix in (".usd", ".usdc") and find_spec("pxr") is None:
+            raise MissingExtraError(f"'{name}' in binary USD (.usda does without)", "usd")

@@ -1,0 +1,93 @@
+"""Naming an actor's joints and setting their keys, within the joints' limits."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+import numpy as np
+
+from warpjld.errors import InputError
+from warpjld.script.arguments import Arguments
+from warpjld.script.scene import Actor, Scene, SplineConstants
+from warpjld.script.suggest import did_you_mean
+from warpjld.skeleton import CHANNELS, PAPER_NUMBERS, Skeleton
+
+__all__ = ["joint_numbers", "read_joint", "set_keys"]
+
+_SLACK = 1e-6  # degrees: limits come out of radians
+
+
+def joint_numbers(skeleton: Skeleton) -> dict[int, int]:
+    """Number a script may call a joint by → joint: the paper's numbers (A Fig. 2, R7) where the skeleton is a single
+    hand; its own order elsewhere."""
+    sides = [side for side in ("left", "right") if f"{side}.index.base" in skeleton.names]
+    if len(sides) != 1 or f"{sides[0]}.shoulder" in skeleton.names:
+        return {joint: joint for joint in range(len(skeleton))}
+    places = {name: joint for joint, name in enumerate(skeleton.names)}
+    return {
+        number: places[f"{sides[0]}.{name}"] for number, name in PAPER_NUMBERS.items() if f"{sides[0]}.{name}" in places
+    }
+
+
+def read_joint(scene: Scene, arguments: Arguments, side: str | None = None) -> tuple[Actor, int]:
+    """Read a joint, by name or by number: of the current actor, or of the one whose side the name begins with.
+
+    Args:
+        scene: The stage.
+        arguments: Where to read.
+        side: A side read before, which then need not be in the name.
+
+    Raises:
+        InputError: There is no such joint.
+    """
+    if arguments.has_number():
+        actor = scene.actor_with(side) if side else scene.actor()
+        numbers = joint_numbers(actor.skeleton)
+        number = arguments.integer("the joint's number", minimum=0, maximum=max(numbers))
+        if number not in numbers:
+            raise arguments.error(f"actor {actor.name} has no joint {number}")
+        return actor, numbers[number]
+    name = arguments.name("a joint's name or number").lower()
+    if side and not name.startswith(f"{side.lower()}."):
+        name = f"{side.lower()}.{name}"
+    try:
+        first = name.partition(".")[0]
+        actor = scene.actor_with(first) if first in ("left", "right") else scene.actor()
+        return actor, actor.skeleton.index(name)
+    except InputError as error:
+        raise arguments.error(error.message) from None
+
+
+def set_keys(
+    actor: Actor,
+    joints: Sequence[str],
+    channel: str,
+    constants: SplineConstants,
+    arguments: Arguments,
+) -> None:
+    """Read ``<key1> <key2> <step> <degrees>`` and set the value at these keys of one channel of some joints.
+
+    Raises:
+        InputError: A joint the actor lacks, keys that make no sense, or an angle beyond the joint's limits.
+    """
+    names = [joint.lower() for joint in joints]
+    for name in names:
+        if name not in actor.skeleton.names:
+            hint = did_you_mean(name, actor.skeleton.names)
+            raise arguments.error(f"actor {actor.name} has no joint {name}{hint}", arguments.position)
+    if actor.recorded is not None:
+        raise arguments.error(f"actor {actor.name} is driven by a MOTION file: no keys can be set", arguments.position)
+    keys, degrees = arguments.keys_and_value()
+    for name in names:
+        limits = actor.skeleton.limits[actor.skeleton.names.index(name), CHANNELS.index(channel.lower())]
+        low, high = np.degrees(limits)
+        if not low - _SLACK <= degrees <= high + _SLACK:
+            change = f"LIMIT {name} {channel} <smallest> <largest> changes that"
+            if low == high == 0.0:
+                raise arguments.error(f"{name} has no {channel.lower()}; {change}")
+            raise arguments.error(
+                f"{channel.lower()} of {name} goes from {low:.4g}° to {high:.4g}°, got {degrees:g}°; {change}"
+            )
+    for name in names:
+        actor.set_keys(f"{name}.{channel.lower()}", keys, math.radians(degrees), constants)

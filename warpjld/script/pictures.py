@@ -1,0 +1,107 @@
+"""Pictures, contact sheets and films of a scene's actors."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from warpjld import render
+from warpjld.script.binding import cover
+from warpjld.script.crowd import Crowd, Role
+from warpjld.script.folder import OutputFolder
+from warpjld.script.scene import Camera, ContactSheet, Film, Picture, Scene, Style
+from warpjld.script.staging import stage
+
+__all__ = ["FilmStudio", "draw_contact_sheet", "draw_picture", "film_studio", "preview", "sheet_frames"]
+
+_CELL = (5 / 12, 19 / 36)  # of the height of a picture: a contact sheet's cell, upright as a hand is
+_CELLS = 6  # on a contact sheet whose frames nobody listed
+
+
+class FilmStudio:
+    """Takes frame after frame of a film."""
+
+    def __init__(self, crowd: Crowd, camera: Camera, stage: render.Scene, film: render.Film) -> None:
+        self._crowd, self._camera = crowd, camera
+        self._stage, self._film = stage, film
+
+    def take(self, frame: int, vertices: NDArray[np.float32]) -> None:
+        """The frame of that place in the sequence, with the vertices of all actors [m], shape (V, 3)."""
+        shift = self._crowd.shift(self._camera, frame)
+        self._film.append(self._stage.draw(vertices - shift, joints=self._crowd.joints(frame) - shift))
+
+
+@contextmanager
+def film_studio(scene: Scene, crowd: Crowd, film: Film, path: Path) -> Iterator[FilmStudio]:
+    """A ``FILM`` being taken."""
+    with (
+        render.Scene(
+            crowd.faces,
+            crowd.camera(film.camera, scene.size),
+            look=film.style,
+            size=scene.size,
+            segments=_bones(crowd, film.style),
+            quality=render.Quality.film(),
+        ) as stage_,
+        render.Film(path, rate=scene.rate) as writer,
+    ):
+        yield FilmStudio(crowd, film.camera, stage_, writer)
+
+
+def draw_picture(scene: Scene, crowd: Crowd, picture: Picture, path: Path) -> None:
+    """A ``PICTURE``; the camera shows the whole sequence, so that pictures of one scene fit together."""
+    now = crowd.at(picture.frame, scene.rate)
+    with render.Scene(
+        crowd.faces,
+        crowd.camera(picture.camera, scene.size),
+        look=picture.style,
+        size=scene.size,
+        segments=_bones(crowd, picture.style),
+    ) as stage_:
+        shift = now.shift(picture.camera, 0)
+        render.save_picture(path, stage_.draw(now.surface(0) - shift, joints=now.joints(0) - shift))
+
+
+def draw_contact_sheet(scene: Scene, crowd: Crowd, sheet: ContactSheet, path: Path, title: str) -> None:
+    """A ``CONTACT`` sheet: A Figs 14 and 15 on one page."""
+    frames = sheet.frames or sheet_frames(scene, crowd.frames)
+    cell = max(16, round(_CELL[0] * scene.size[1])), max(16, round(_CELL[1] * scene.size[1]))
+    moments = [crowd.at(frame, scene.rate) for frame in frames]
+    picture = render.contact_sheet(
+        np.stack([m.surface(0) - m.shift(sheet.camera, 0) for m in moments]),
+        crowd.faces,
+        crowd.camera(sheet.camera, cell),
+        joints=np.stack([m.joints(0) - m.shift(sheet.camera, 0) for m in moments]),
+        segments=crowd.segments,
+        numbers=[round(frame, 3) if frame % 1 else int(frame) for frame in frames],  # type: ignore[misc]
+        size=cell,
+        title=title,
+    )
+    render.save_picture(path, picture)
+
+
+def sheet_frames(scene: Scene, frames: NDArray[np.float64]) -> tuple[float, ...]:
+    """Frames for a contact sheet: the key frames, or evenly spaced ones where there are too many or too few keys."""
+    keys = {key for actor in scene.actors.values() for key in actor.key_frames if frames[0] <= key <= frames[-1]}
+    if 3 <= len(keys) <= _CELLS:
+        return tuple(sorted(keys))
+    chosen = np.linspace(0, len(frames) - 1, min(_CELLS, len(frames))).round().astype(int)
+    return tuple(float(frame) for frame in frames[np.unique(chosen)])
+
+
+def preview(scene: Scene, frame: float, style: Style) -> Path:
+    """A picture of any frame of the scene as it is, in the output folder (R5)."""
+    roles = [Role(a, cover(a), stage(a, np.array([frame]), scene.rate)) for a in scene.actors.values()]
+    crowd = Crowd(roles, np.array([frame]))
+    name = f"{style}-{frame:g}.png"
+    with OutputFolder(scene.folder) as out:
+        draw_picture(scene, crowd, Picture(name, frame, style, scene.camera), out.place(name))
+    return scene.folder / name
+
+
+def _bones(crowd: Crowd, style: Style) -> NDArray[np.int32] | None:
+    return crowd.segments if style == "wireframe" else None

@@ -1,0 +1,55 @@
+"""Where an actor stands: keyed displacements and rotations of the whole."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial.transform import Rotation
+
+from warpjld.motion import Key, Track
+from warpjld.skeleton import Poses
+
+__all__ = ["Placement"]
+
+_AXES = "xyz"
+
+
+@dataclass(eq=False)
+class Placement:
+    """Keys of six channels: ``move.x`` … [m] from the rest place, ``turn.x`` … [rad] about the root."""
+
+    tracks: dict[str, Track] = field(default_factory=dict)
+
+    def set_key(self, channel: str, key: Key) -> None:
+        """Set a key of a channel; it replaces one at the same frame."""
+        self.tracks.setdefault(channel, Track(channel)).set(key)
+
+    def values(self, kind: str, frames: NDArray[np.float64]) -> NDArray[np.float64]:
+        """``move`` [m] or ``turn`` [rad] at F frames, shape (F, 3); 0 where nothing is keyed."""
+        columns = [
+            track.spline(frames) if (track := self.tracks.get(f"{kind}.{axis}")) else np.zeros(len(frames))
+            for axis in _AXES
+        ]
+        return np.stack(columns, axis=-1)
+
+    def apply(self, poses: Poses, frames: NDArray[np.float64]) -> Poses:
+        """Poses of these frames, turned about the root, then displaced."""
+        if not self.tracks:
+            return poses
+        turn = Rotation.from_euler("xyz", self.values("turn", frames))
+        root = poses.positions[:, :1]
+        matrices = turn.as_matrix()[:, None]
+        positions = root + np.squeeze(matrices @ (poses.positions - root)[..., None], -1)
+        positions += self.values("move", frames)[:, None]
+        return Poses(positions, _left_product(turn.as_quat(), poses.rotations), poses.flexion)
+
+
+def _left_product(turn: NDArray[np.float64], rotations: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Quaternion of a frame times those of its joints; keeps the signs that were aligned along the tree."""
+    vector, scalar = turn[:, None, :3], turn[:, None, 3:]
+    v, s = rotations[..., :3], rotations[..., 3:]
+    return np.concatenate(
+        [scalar * v + s * vector + np.cross(vector, v), scalar * s - (vector * v).sum(-1, keepdims=True)], axis=-1
+    )

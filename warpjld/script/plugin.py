@@ -1,0 +1,45 @@
+"""A Python file that adds commands, run on request."""
+
+from __future__ import annotations
+
+import importlib.util
+import sys
+from pathlib import Path
+
+from warpjld.errors import InputError, WarpjldError
+
+__all__ = ["load_commands"]
+
+
+def load_commands(path: Path) -> None:
+    """Import a Python file, so that its ``@command`` decorators run (R88).
+
+    Raises:
+        InputError: It cannot be read, or fails: names the line.
+    """
+    if not path.is_file():
+        raise InputError("cannot read commands: no such file", path=path)
+    name = f"warpjld_commands_{path.stem}"
+    spec = importlib.util.spec_from_file_location(name, path)
+    if spec is None or spec.loader is None:
+        raise InputError("want a Python file (.py)", path=path)
+    module = importlib.util.module_from_spec(spec)
+    sys.modules[name] = module
+    try:
+        spec.loader.exec_module(module)
+    except SyntaxError as error:
+        raise InputError(f"not Python: {error.msg}", path=path, line=error.lineno, column=error.offset) from error
+    except WarpjldError:
+        raise
+    except Exception as error:
+        raise InputError(f"{type(error).__name__}: {error}", path=path, line=_line(error, path)) from error
+
+
+def _line(error: BaseException, path: Path) -> int | None:
+    """Where in the file itself an error came up."""
+    line, trace = None, error.__traceback__
+    while trace is not None:
+        if trace.tb_frame.f_code.co_filename == str(path):
+            line = trace.tb_lineno
+        trace = trace.tb_next
+    return line

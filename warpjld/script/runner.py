@@ -1,0 +1,182 @@
+"""A scene made: bind → poses → deform, block after block, into exports, films and pictures."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from contextlib import ExitStack
+from pathlib import Path, PurePosixPath
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from warpjld.script.binding import cover
+from warpjld.script.crowd import Crowd, Role
+from warpjld.script.folder import OutputFolder
+from warpjld.script.formats import check_available, video_is_available
+from warpjld.script.pictures import draw_contact_sheet, draw_picture, film_studio
+from warpjld.script.scene import Actor, ContactSheet, Export, Film, Output, Picture, Scene
+from warpjld.script.staging import frame_numbers, notes, stage
+from warpjld.script.summary import Summary
+
+__all__ = ["Report", "cast", "run_scene"]
+
+_BLOCK = 16  # frames deformed at once: memory does not grow with the length of the film
+
+Report = Callable[[str, int, int], None]
+"""Called with what is being done, how much of it is done, and how much there is."""
+
+
+def run_scene(
+    scene: Scene,
+    folder: Path,
+    *,
+    script: Path | None = None,
+    device: str = "cpu",
+    threads: int | None = None,
+    dry: bool = False,
+    progress: Report = lambda what, done, total: None,
+) -> dict[str, Any]:
+    """Make everything a scene asks for; if it asks for nothing, an animated surface, a film and a contact sheet.
+
+    Args:
+        scene: What the script described.
+        folder: Where to; made if missing. Files appear in it only when all are complete.
+        script: Named in the summary.
+        device: Warp device of the covering.
+        threads: CPU threads of the covering; None leaves the choice to it.
+        dry: Check everything that can be checked, but compute and write nothing.
+        progress: Told about the work as it goes.
+
+    Returns:
+        The summary, also written as ``summary.json``: plain values, see ``Summary``.
+
+    Raises:
+        InputError: Nobody on stage, a key beyond a limit, a folder that cannot be written.
+        MissingExtraError: A format needs an optional dependency.
+    """
+    scene.actor()  # says what to do where there is none
+    frames = frame_numbers(scene)
+    summary = Summary(scene, frames, script, device)
+    outputs = list(scene.outputs)
+    if not outputs:
+        outputs = [Export("surface.npz", None), ContactSheet("contact.png", (), scene.camera)]
+        video = video_is_available()
+        outputs.insert(1, Film("film.mp4" if video else "film.gif", "shaded", scene.camera))
+        if not video:
+            summary.notes.append("the film is a GIF; for MP4: pip install 'warpjld[film]'")
+    check_available([output.name for output in outputs])
+    for actor in scene.actors.values():
+        stage(actor, frames[:1], scene.rate)  # keys beyond limits are found here
+        summary.notes += notes(actor, frames)
+    if dry:
+        return summary.content([{"name": name} for name in _names(scene, outputs)], folder)
+    with OutputFolder(folder) as out:
+        with summary.timed("bind"):
+            crowd = cast(scene, frames, device=device, progress=progress)
+        with summary.timed("frames"):
+            _make_sequences(scene, crowd, frames, outputs, out, threads, progress)
+        with summary.timed("pictures"):
+            _make_pictures(scene, crowd, outputs, out, progress, "" if script is None else script.stem)
+        return summary.write(out)
+
+
+def cast(
+    scene: Scene,
+    frames: NDArray[np.float64],
+    *,
+    device: str = "cpu",
+    progress: Report = lambda what, done, total: None,
+) -> Crowd:
+    """Bind every actor's surface and pose it at these frames."""
+    roles = []
+    for number, actor in enumerate(scene.actors.values()):
+        progress(f"binding {actor.name.lower()}", number, len(scene.actors))
+        roles.append(Role(actor, cover(actor), stage(actor, frames, scene.rate)))
+    return Crowd(roles, frames, device)
+
+
+def _names(scene: Scene, outputs: Sequence[Output]) -> list[str]:
+    names = []
+    for output in outputs:
+        if isinstance(output, Export):
+            names += [_export_name(output, actor, scene) for actor in _exported(output, scene)]
+        else:
+            names.append(output.name)
+    return names
+
+
+def _exported(export: Export, scene: Scene) -> list[Actor]:
+    return [actor for actor in scene.actors.values() if export.actor in (None, actor.name)]
+
+
+def _export_name(export: Export, actor: Actor, scene: Scene) -> str:
+    """``hands.usd``; for one of several actors ``hands-left.usd``: each has a file and a vertex order of its own."""
+    if export.actor is not None or len(scene.actors) == 1:
+        return export.name
+    path = PurePosixPath(export.name)
+    return str(path.with_name(f"{path.stem}-{actor.name.lower()}{path.suffix}"))
+
+
+def _make_sequences(
+    scene: Scene,
+    crowd: Crowd,
+    frames: NDArray[np.float64],
+    outputs: Sequence[Output],
+    out: OutputFolder,
+    threads: int | None,
+    progress: Report,
+) -> None:
+    """Exports and films, in one pass over the frames."""
+    from warpjld.io.caches import open_cache
+
+    exports = [output for output in outputs if isinstance(output, Export)]
+    films = [output for output in outputs if isinstance(output, Film)]
+    if not exports and not films:
+        return
+    with ExitStack() as stack:
+        caches = [
+            [
+                stack.enter_context(
+                    open_cache(
+                        out.place(_export_name(export, role.actor, scene)),
+                        role.actor.rig.surface,
+                        frames=len(frames),
+                        rate=scene.rate,
+                        start_frame=int(frames[0]),
+                        name=role.actor.name.lower(),
+                    )
+                )
+                for export in exports
+                if export.actor in (None, role.actor.name)
+            ]
+            for role in crowd.roles
+        ]
+        studios = [stack.enter_context(film_studio(scene, crowd, film, out.place(film.name))) for film in films]
+        blocks = [
+            role.covering.blocks(role.poses, frames=_BLOCK, device=crowd.device, threads=threads)
+            for role in crowd.roles
+        ]
+        for parts in zip(*blocks, strict=True):
+            start = parts[0][0]
+            for actor_caches, (_, vertices) in zip(caches, parts, strict=True):
+                for cache in actor_caches:
+                    cache.write(vertices)
+            for k in range(len(parts[0][1])):
+                progress("frames", start + k, len(frames))
+                together = np.concatenate([vertices[k] for _, vertices in parts])
+                for studio in studios:
+                    studio.take(start + k, together)
+
+
+def _make_pictures(
+    scene: Scene, crowd: Crowd, outputs: Sequence[Output], out: OutputFolder, progress: Report, title: str
+) -> None:
+    wanted = [output for output in outputs if isinstance(output, Picture | ContactSheet)]
+    for number, output in enumerate(wanted):
+        progress("pictures", number, len(wanted))
+        path = out.place(output.name)
+        if isinstance(output, Picture):
+            draw_picture(scene, crowd, output, path)
+        else:
+            draw_contact_sheet(scene, crowd, output, path, title)

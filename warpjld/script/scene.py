@@ -1,0 +1,231 @@
+"""What a script describes: actors and their motion, the camera, and the files to make."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import asdict, dataclass, field
+from pathlib import Path
+from typing import TYPE_CHECKING, Literal
+
+from warpjld.errors import InputError
+from warpjld.script.placement import Placement
+from warpjld.script.suggest import did_you_mean
+
+if TYPE_CHECKING:
+    from warpjld.covering import Covering, Parameters
+    from warpjld.motion import Motion
+    from warpjld.rig import Rig
+    from warpjld.skeleton import Poses, Skeleton
+
+__all__ = [
+    "Actor",
+    "Camera",
+    "ContactSheet",
+    "Export",
+    "Film",
+    "Output",
+    "Picture",
+    "Scene",
+    "SplineConstants",
+    "Style",
+]
+
+Style = Literal["shaded", "wireframe"]
+
+
+@dataclass(frozen=True)
+class SplineConstants:
+    """Kochanek–Bartels constants of the keys that follow (R3)."""
+
+    tension: float = 0.0
+    continuity: float = 0.0
+    bias: float = 0.0
+
+
+@dataclass(frozen=True)
+class Camera:
+    """Where pictures are taken from: a named view, or a position and a target [m].
+
+    With ``follow`` it goes along with the root of the first actor.
+    """
+
+    view: str | None = None
+    position: tuple[float, float, float] | None = None
+    target: tuple[float, float, float] | None = None
+    zoom: float = 1.0
+    follow: bool = False
+
+
+@dataclass(frozen=True)
+class Picture:
+    """One frame as a PNG."""
+
+    name: str
+    frame: float
+    style: Style
+    camera: Camera
+
+
+@dataclass(frozen=True)
+class Film:
+    """All frames as a film."""
+
+    name: str
+    style: Style
+    camera: Camera
+
+
+@dataclass(frozen=True)
+class ContactSheet:
+    """Several frames on one PNG, each as wire-frame and shaded."""
+
+    name: str
+    frames: tuple[float, ...]
+    camera: Camera
+
+
+@dataclass(frozen=True)
+class Export:
+    """The animated surface of one actor, or of all."""
+
+    name: str
+    actor: str | None
+
+
+Output = Picture | Film | ContactSheet | Export
+
+
+@dataclass(eq=False)
+class Actor:
+    """A rig on the stage.
+
+    Attributes:
+        name: Upper case.
+        rig: As loaded.
+        skeleton: The rig's, with the script's flexion axes and limits.
+        motion: Keys given by the script.
+        parameters: The covering's.
+        method: The covering's.
+        domains: Whether domains come from the geometry or from the rig's painted weights.
+        recorded: Poses of a motion file and their rate [1/s], which the keys then do not override.
+        placement: Keys of the actor as a whole.
+        covering: The surface as bound last; ``covered`` is the method and the domains it was bound with.
+    """
+
+    name: str
+    rig: Rig
+    skeleton: Skeleton
+    motion: Motion
+    parameters: Parameters
+    method: Literal["smooth", "paper"] = "smooth"
+    domains: Literal["geometry", "skin"] = "geometry"
+    recorded: tuple[Poses, float] | None = None
+    placement: Placement = field(default_factory=Placement)
+    covering: Covering | None = None
+    covered: tuple[str, str] = ("", "")
+
+    @property
+    def keyed(self) -> bool:
+        """Whether any joint has a key."""
+        return bool(self.motion.tracks)
+
+    def set_keys(self, channel: str, keys: Sequence[float], value: float, spline: SplineConstants) -> None:
+        """Set one value [rad] at several frames of a channel such as ``left.index.base.flexion``."""
+        for key in keys:
+            self.motion.set_key(channel, key, value, **asdict(spline))
+
+    @property
+    def key_frames(self) -> list[float]:
+        """Frames that hold a key of this actor."""
+        tracks = [*self.motion.tracks.values(), *self.placement.tracks.values()]
+        return sorted({key.frame for track in tracks for key in track.keys})
+
+    @property
+    def span(self) -> tuple[float, float] | None:
+        """First and last frame with a key, or of the recorded motion at its own rate."""
+        frames = self.key_frames
+        if self.recorded is not None:
+            frames = [*frames, 0.0, len(self.recorded[0]) - 1.0]
+        return (min(frames), max(frames)) if frames else None
+
+
+@dataclass(eq=False)
+class Scene:
+    """A stage with actors, a clock, a camera, and a list of files to make.
+
+    Attributes:
+        actors: By name, in the order they came on stage.
+        current: The actor that commands without a side speak to.
+        first, last: Frames to make, both included; None: from the first key to the last.
+        rate: Frames a second.
+        spline: Constants for the keys that follow.
+        camera: For the outputs that follow.
+        size: Width and height of pictures and films [pixels].
+        outputs: Files to make, relative to the output folder.
+        folder: The output folder.
+        say: Where PRINT and SHOW write.
+    """
+
+    actors: dict[str, Actor] = field(default_factory=dict)
+    current: str | None = None
+    first: int | None = None
+    last: int | None = None
+    rate: float = 30.0
+    spline: SplineConstants = SplineConstants()
+    camera: Camera = Camera()
+    size: tuple[int, int] = (960, 720)
+    outputs: list[Output] = field(default_factory=list)
+    folder: Path = Path("out")
+    say: Callable[[str], None] = print
+
+    def add(self, name: str, rig: Rig) -> Actor:
+        """Bring a rig on stage; it becomes the current actor.
+
+        Raises:
+            InputError: The name is taken.
+        """
+        from warpjld.covering.parameters import default_parameters
+        from warpjld.motion import Motion
+
+        name = name.upper()
+        if name in self.actors:
+            raise InputError(f"there is an actor {name} already; give this one another with NAME")
+        actor = Actor(name, rig, rig.skeleton, Motion(), default_parameters(rig.skeleton))
+        self.actors[name] = actor
+        self.current = name
+        return actor
+
+    def actor(self, name: str | None = None) -> Actor:
+        """The actor of that name, or the current one.
+
+        Raises:
+            InputError: There is none.
+        """
+        if not self.actors:
+            raise InputError("there is no actor yet; begin with a line such as HAND LEFT BUILTIN")
+        key = (name or self.current or "").upper()
+        if key not in self.actors:
+            raise InputError(f"there is no actor {name}{did_you_mean(key, self.actors)}")
+        return self.actors[key]
+
+    def actor_with(self, side: str) -> Actor:
+        """The actor whose left or right limbs are meant: the current one if it has any, else the only one that has.
+
+        Raises:
+            InputError: None has, or several have and none of them is the current one.
+        """
+        side = side.lower()
+        current = self.actor()
+        if _has_side(current, side):
+            return current
+        others = [actor for actor in self.actors.values() if _has_side(actor, side)]
+        if len(others) == 1:
+            return others[0]
+        if others:
+            names = ", ".join(actor.name for actor in others)
+            raise InputError(f"several actors have a {side} side ({names}); choose one with ACTOR")
+        raise InputError(f"no actor has a {side} side; bring one on with HAND {side.upper()} BUILTIN")
+
+
+def _has_side(actor: Actor, side: str) -> bool:
+    return any(name.startswith(f"{side}.") for name in actor.skeleton.names)

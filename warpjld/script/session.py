@@ -1,0 +1,168 @@
+"""A conversation in the command language: lines come one by one, a macro may take several."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+
+from warpjld.errors import InputError
+from warpjld.script.interpreter import Interpreter
+from warpjld.script.parser import UnfinishedError, parse, parse_file
+from warpjld.script.scene import Scene
+from warpjld.script.statements import Node, Statement, Text
+from warpjld.skeleton import CHANNELS, DIGITS
+
+__all__ = ["Session"]
+
+_OWN = ("RUN", "SAVE", "UNDO", "QUIT", "EXIT")
+
+
+class Session:
+    """Runs typed lines on a scene.
+
+    Besides the language's commands it knows ``RUN`` (make the files), ``SAVE "name.jld"`` (keep what was typed),
+    ``UNDO`` (forget the last line) and ``QUIT``.
+
+    Attributes:
+        scene: What the lines have described so far.
+        unfinished: Whether a MACRO waits for its END.
+    """
+
+    def __init__(
+        self,
+        folder: Path = Path("out"),
+        *,
+        device: str = "cpu",
+        threads: int | None = None,
+        say: Callable[[str], None] = print,
+    ) -> None:
+        self._device, self._threads = device, threads
+        self._folder, self._say = folder, say
+        self._script: Path | None = None
+        self._kept: list[str] = []
+        self._pending: list[str] = []
+        self._typed = 0
+        self._start()
+
+    @property
+    def unfinished(self) -> bool:
+        """Whether a MACRO waits for its END."""
+        return bool(self._pending)
+
+    def names(self) -> list[str]:
+        """Words worth completing."""
+        keywords = {
+            "LEFT",
+            "RIGHT",
+            "KNUCKLES2",
+            "KNUCKLES3",
+            "VALUES",
+            "WIREFRAME",
+            "SHADED",
+            "BUILTIN",
+            "MACRO",
+            "END",
+        }
+        keywords |= {word.upper() for word in (*DIGITS, *CHANNELS)}
+        commands = {command.name for command in self._interpreter.registry}
+        joints = {name for actor in self.scene.actors.values() for name in actor.skeleton.names}
+        return sorted(keywords | commands | set(_OWN) | set(self._interpreter.macros) | set(self.scene.actors) | joints)
+
+    def run_file(self, path: Path) -> None:
+        """Run a script; what is typed comes after it."""
+        parse_file(path)
+        self._script = path
+        self._interpreter.run_file(path)
+
+    def type(self, line: str) -> bool:
+        """Run a line; False when it says to quit.
+
+        Raises:
+            WarpjldError: The line is wrong; nothing of it was kept.
+        """
+        text = "\n".join([*self._pending, line])
+        before = self._typed - len(self._pending)
+        self._typed += 1
+        try:
+            nodes = parse("\n" * before + text, "<shell>")  # so that errors count lines from the first one
+        except UnfinishedError:
+            self._pending.append(line)
+            return True
+        except InputError:
+            self._pending = []
+            raise
+        self._pending = []
+        if len(nodes) == 1 and isinstance(nodes[0], Statement) and nodes[0].name.text.upper() in _OWN:
+            return self._own(nodes[0])
+        if nodes:
+            self._interpreter.execute(nodes, None)
+            if not _only_looks(nodes):
+                self._kept.append(text)
+        return True
+
+    def end(self) -> None:
+        """The input is over.
+
+        Raises:
+            InputError: Inside a MACRO.
+        """
+        if self._pending:
+            raise InputError("this MACRO has no END", path="<shell>", line=self._typed)
+
+    def _start(self) -> None:
+        self.scene = Scene(folder=self._folder, say=self._say)
+        self._interpreter = Interpreter(self.scene)
+
+    def _own(self, statement: Statement) -> bool:
+        name, arguments = statement.name.text.upper(), statement.arguments
+        wanted = 1 if name == "SAVE" else 0
+        if len(arguments) != wanted or (wanted and not isinstance(arguments[0], Text)):
+            raise statement.end.error('expected SAVE "<script>"' if wanted else f"{name} stands alone")
+        match name:
+            case "RUN":
+                self._run()
+            case "SAVE":
+                assert isinstance(arguments[0], Text)
+                self._save(arguments[0])
+            case "UNDO":
+                self._undo(statement)
+        return name not in ("QUIT", "EXIT")
+
+    def _run(self) -> None:
+        from warpjld.script.runner import run_scene
+        from warpjld.script.summary import table
+
+        content = run_scene(self.scene, self._folder, script=self._script, device=self._device, threads=self._threads)
+        table(content, self._say)
+
+    def _save(self, name: Text) -> None:
+        path = Path(name.text).expanduser()
+        lines = [] if self._script is None else [f'INCLUDE "{self._script.resolve().as_posix()}"']
+        beside = path.with_name(path.name + ".part")
+        try:
+            beside.write_text("\n".join([*lines, *self._kept]) + "\n", encoding="utf-8")
+            beside.replace(path)
+        except OSError as error:
+            raise name.position.error(f"cannot write '{path}': {error.strerror}") from error
+        self._say(str(path))
+
+    def _undo(self, statement: Statement) -> None:
+        if not self._kept:
+            raise statement.name.position.error("nothing to undo")
+        gone = self._kept.pop()
+        kept, self._kept = self._kept, []
+        say, self._say = self._say, lambda text: None
+        try:
+            self._start()
+            if self._script is not None:
+                self._interpreter.run_file(self._script)
+            for text in kept:
+                self.type(text)
+        finally:
+            self._say = self.scene.say = say
+        self._say(f"forgotten: {gone}")
+
+
+def _only_looks(nodes: tuple[Node, ...]) -> bool:
+    looking = ("SHOW", "HELP", "PRINT")
+    return all(isinstance(node, Statement) and node.name.text.upper() in looking for node in nodes)

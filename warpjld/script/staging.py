@@ -1,0 +1,64 @@
+"""Actors at frames: keys or recorded motion → poses on the stage."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from warpjld.script.scene import Actor, Scene
+from warpjld.skeleton import Poses
+
+__all__ = ["frame_numbers", "notes", "stage"]
+
+
+def frame_numbers(scene: Scene) -> NDArray[np.float64]:
+    """The frames to make: FRAMES, or from the first to the last key of all actors; shape (F,)."""
+    if scene.first is not None and scene.last is not None:
+        return np.arange(scene.first, scene.last + 1, dtype=np.float64)
+    spans = []
+    for actor in scene.actors.values():
+        if actor.span is not None:
+            first, last = actor.span
+            if actor.recorded is not None:
+                last = max(*actor.key_frames, 0.0, (len(actor.recorded[0]) - 1) * scene.rate / actor.recorded[1])
+            spans.append((first, last))
+    if not spans:
+        return np.zeros(1)
+    first, last = min(s[0] for s in spans), max(s[1] for s in spans)
+    return np.arange(np.floor(first), np.floor(last + 1e-6) + 1)
+
+
+def stage(actor: Actor, frames: NDArray[np.float64], rate: float) -> Poses:
+    """Poses of an actor at any frames, whole or not, of a scene with that rate [1/s]."""
+    if actor.recorded is None:
+        poses = actor.motion.poses(actor.skeleton, frames)
+    else:
+        recorded, own_rate = actor.recorded
+        poses = _resample(recorded, frames * own_rate / rate)
+    return actor.placement.apply(poses, frames)
+
+
+def notes(actor: Actor, frames: NDArray[np.float64]) -> list[str]:
+    """What a reader of the result should know of an actor's rig and motion."""
+    found = [f"{actor.name}: {note}" for note in actor.rig.notes]
+    if actor.recorded is None:
+        found += [f"{actor.name}: {held}" for held in actor.motion.clamped(frames, actor.skeleton)]
+    return found
+
+
+def _resample(poses: Poses, at: NDArray[np.float64]) -> Poses:
+    """Poses between recorded ones; before the first and after the last they hold."""
+    at = np.clip(at, 0, len(poses) - 1)
+    before = np.floor(at).astype(int)
+    after = np.minimum(before + 1, len(poses) - 1)
+    part = (at - before)[:, None, None]
+    if not part.any():
+        return Poses(poses.positions[before], poses.rotations[before], poses.flexion[before])
+    first, second = poses.rotations[before], poses.rotations[after]
+    # one sign for the whole frame: signs are aligned along the tree, and stay so
+    flip = np.where((first * second).sum((1, 2)) < 0, -1.0, 1.0)[:, None, None]
+    rotations = (1 - part) * first + part * flip * second
+    rotations /= np.linalg.norm(rotations, axis=-1, keepdims=True)
+    positions = (1 - part) * poses.positions[before] + part * poses.positions[after]
+    flexion = (1 - part[..., 0]) * poses.flexion[before] + part[..., 0] * poses.flexion[after]
+    return Poses(positions, rotations, flexion)

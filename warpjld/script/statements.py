@@ -1,0 +1,112 @@
+"""What a script says, with the place of every word: plain records the parser makes and the interpreter reads."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from warpjld.errors import InputError
+
+__all__ = [
+    "Argument",
+    "Expression",
+    "MacroDefinition",
+    "Node",
+    "Number",
+    "Operation",
+    "Position",
+    "Reference",
+    "Statement",
+    "Text",
+    "Value",
+    "Word",
+]
+
+
+@dataclass(frozen=True)
+class Position:
+    """A place in a script: 1-based line and column; ``path`` is the file, or a name in angle brackets."""
+
+    path: str
+    line: int
+    column: int
+
+    def error(self, message: str) -> InputError:
+        """An error at this place, to be raised."""
+        return InputError(message, path=self.path, line=self.line, column=self.column)
+
+
+@dataclass(frozen=True)
+class Number:
+    """A number, or what an expression came to."""
+
+    value: float
+    position: Position
+
+    def __str__(self) -> str:
+        return f"{self.value:g}"
+
+
+@dataclass(frozen=True)
+class Word:
+    """A bare word: a keyword, a name."""
+
+    text: str
+    position: Position
+
+    def __str__(self) -> str:
+        return self.text
+
+
+@dataclass(frozen=True)
+class Text:
+    """A quoted text: a file name, a message. ``$name`` inside is replaced in a macro."""
+
+    text: str
+    position: Position
+
+    def __str__(self) -> str:
+        return f'"{self.text}"'
+
+
+@dataclass(frozen=True)
+class Reference:
+    """``$name``: an argument of the macro it stands in."""
+
+    name: str
+    position: Position
+
+
+@dataclass(frozen=True)
+class Operation:
+    """Arithmetic in parentheses; a sign is 0 - x."""
+
+    operator: str
+    left: Expression
+    right: Expression
+    position: Position
+
+
+Value = Number | Word | Text
+Expression = Number | Reference | Operation
+Argument = Value | Reference | Operation
+
+
+@dataclass(frozen=True)
+class Statement:
+    """A command and its arguments; ``end`` is just behind the last one."""
+
+    name: Word
+    arguments: tuple[Argument, ...]
+    end: Position
+
+
+@dataclass(frozen=True)
+class MacroDefinition:
+    """``MACRO name parameters … END``."""
+
+    name: Word
+    parameters: tuple[Word, ...]
+    body: tuple[Statement, ...]
+
+
+Node = Statement | MacroDefinition

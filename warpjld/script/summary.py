@@ -1,0 +1,130 @@
+"""What a run made: one dictionary for people, for ``summary.json`` and for ``--json``."""
+
+from __future__ import annotations
+
+import json
+import platform
+import re
+import time
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from warpjld import __version__
+from warpjld.script.folder import OutputFolder
+from warpjld.script.scene import Scene
+
+__all__ = ["NAME", "Summary", "table"]
+
+NAME = "summary.json"
+
+
+@dataclass
+class Summary:
+    """Filled while a scene is made.
+
+    Attributes:
+        seconds: Time of each stage.
+        notes: What was guessed, held at a limit, left out or looks suspicious.
+    """
+
+    scene: Scene
+    frames: NDArray[np.float64]
+    script: Path | None
+    device: str
+    seconds: dict[str, float] = field(default_factory=dict)
+    notes: list[str] = field(default_factory=list)
+
+    @contextmanager
+    def timed(self, stage: str) -> Iterator[None]:
+        """Counts the time of a stage."""
+        start = time.perf_counter()
+        try:
+            yield
+        finally:
+            self.seconds[stage] = round(self.seconds.get(stage, 0.0) + time.perf_counter() - start, 3)
+
+    def write(self, out: OutputFolder) -> dict[str, Any]:
+        """Write ``summary.json`` beside the files made so far, and return its content."""
+        made = [(name.as_posix(), (out.work / name).stat().st_size) for name in out.made()]
+        content = self.content([{"name": name, "bytes": size} for name, size in made], out.path)
+        out.place(NAME).write_text(json.dumps(content, indent=1, ensure_ascii=False) + "\n", encoding="utf-8")
+        return content
+
+    def content(self, files: Sequence[dict[str, Any]], folder: Path) -> dict[str, Any]:
+        """Everything as plain values."""
+        return {
+            "warpjld": __version__,
+            "script": None if self.script is None else str(self.script),
+            "folder": str(folder),
+            "frames": {"first": int(self.frames[0]), "last": int(self.frames[-1]), "count": len(self.frames)},
+            "rate": self.scene.rate,
+            "device": self.device,
+            "machine": platform.machine(),
+            "actors": [
+                {
+                    "name": actor.name,
+                    "rig": actor.rig.name,
+                    "joints": len(actor.skeleton),
+                    "vertices": len(actor.rig.surface.vertices),
+                    "faces": len(actor.rig.surface.faces),
+                    "keys": sum(len(track.keys) for track in actor.motion.tracks.values()),
+                    "recorded": actor.recorded is not None,
+                    "method": actor.method,
+                    "domains": actor.domains,
+                }
+                for actor in self.scene.actors.values()
+            ],
+            "files": list(files),
+            "seconds": self.seconds,
+            "notes": self.notes,
+        }
+
+
+def table(content: dict[str, Any], say: Callable[[str], None] = print) -> None:
+    """Say a summary to people."""
+    from rich.console import Console
+    from rich.table import Table
+
+    console = Console(highlight=False, markup=False, soft_wrap=True)
+    frames = content["frames"]
+    with console.capture() as lines:
+        for actor in content["actors"]:
+            drive = "a motion file" if actor["recorded"] else f"{actor['keys']} keys"
+            console.print(f"{actor['name']}: {actor['rig']}, {actor['vertices']:,} vertices, {drive}")
+        spent = ", ".join(f"{stage} {value:.2f} s" for stage, value in content["seconds"].items())
+        count = f"{frames['count']} frames ({frames['first']} to {frames['last']}) at {content['rate']:g}/s"
+        console.print(f"{count}: {spent}" if spent else count)
+        files = Table(box=None, padding=(0, 2, 0, 0), show_header=False)
+        for name, size in _grouped(content["files"]):
+            files.add_row(f"{content['folder']}/{name}", "to be made" if size is None else _readable(size))
+        console.print(files)
+        for note in content["notes"]:
+            console.print(f"note: {note}")
+    say(lines.get().rstrip())
+
+
+def _grouped(files: list[dict[str, Any]]) -> list[tuple[str, float | None]]:
+    """Files by name and size; the many files of a sequence as one line."""
+    groups: dict[str, list[dict[str, Any]]] = {}
+    for file in files:
+        groups.setdefault(re.sub(r"\d{4,}(?=\.\w+$)", "####", file["name"]), []).append(file)
+    rows: list[tuple[str, float | None]] = []
+    for pattern, members in groups.items():
+        name = members[0]["name"] if len(members) == 1 else f"{pattern} ({len(members)} files)"
+        made = all("bytes" in member for member in members)
+        rows.append((name, sum(member["bytes"] for member in members) if made else None))
+    return rows
+
+
+def _readable(size: float) -> str:
+    for unit in ("bytes", "kB", "MB"):
+        if size < 1000:
+            return f"{size:.0f} {unit}" if unit == "bytes" else f"{size:.1f} {unit}"
+        size /= 1000
+    return f"{size:.1f} GB"

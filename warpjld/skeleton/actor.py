@@ -1,0 +1,189 @@
+"""The 87-point actor skeleton (B §2.1, R12), reconstructed: the papers publish its count, not its points.
+
+Two hands of 25 points (wrists included), 11 points of trunk and head, per arm 4, per leg 9: 50 + 11 + 8 + 18 = 87.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from warpjld.errors import InputError
+from warpjld.skeleton.hand import hand_joint_names
+from warpjld.skeleton.recognise.axes import perpendicular
+from warpjld.skeleton.recognise.extremity import find_extremity
+from warpjld.skeleton.recognise.section import nearby
+from warpjld.skeleton.tree import Skeleton
+
+__all__ = ["ACTOR_POINTS", "ActorSkeleton", "actor_skeleton"]
+
+_TRUNK = {
+    "pelvis": "where spine and legs part",
+    "vertebra1": "lowest of five joints of the spine",
+    "vertebra2": "second",
+    "vertebra3": "third",
+    "vertebra4": "fourth",
+    "vertebra5": "fifth: the lowest of the neck where the trunk has four",
+    "skull_base": "where the head turns",
+    "head_top": "extremity of the head: the centre of its round top",
+    "chin": "foremost point of the midline below the lips",
+    "nose_tip": "foremost point of the head",
+    "sternum": "between the inner ends of the clavicles",
+}
+_ARM = {
+    "clavicle": "its inner end",
+    "shoulder": "head of the humerus",
+    "elbow": "joint",
+    "forearm_twist": "middle of the forearm, about which it twists",
+}
+_LEG = {
+    "pelvic_hip": "hip bone: half-way from the pelvis to the head of the femur",
+    "femoral_head": "hip joint",
+    "knee": "joint",
+    "ankle": "joint",
+    "heel": "centre of the heel",
+    "ball": "ball of the foot: among the bases of the toes",
+    "big_toe_tip": "extremity",
+    "middle_toe_tip": "extremity",
+    "little_toe_tip": "extremity",
+}
+
+ACTOR_POINTS: dict[str, str] = (
+    {name: f"hand joint, {side}" for side in ("left", "right") for name in hand_joint_names(side)}
+    | _TRUNK
+    | {f"{side}.{name}": what for side in ("left", "right") for name, what in (_ARM | _LEG).items()}
+)
+"""The 87 points and what each one is; hand points have the names of the hands' joints."""
+
+
+@dataclass(frozen=True, eq=False)
+class ActorSkeleton:
+    """Points of the actor skeleton that a rig holds.
+
+    Attributes:
+        points: Names of ``ACTOR_POINTS`` → positions [m].
+        missing: Names that could not be placed.
+    """
+
+    points: dict[str, NDArray[np.float64]]
+    missing: tuple[str, ...]
+
+
+def actor_skeleton(skeleton: Skeleton, vertices: NDArray[np.float64], faces: NDArray[np.int32]) -> ActorSkeleton:
+    """Place the 87 points in a body.
+
+    Args:
+        skeleton: A body's canonical skeleton.
+        vertices: Rest surface [m], shape (V, 3).
+        faces: Its triangles, shape (T, 3).
+
+    Raises:
+        InputError: The skeleton is not a body's.
+    """
+    joints = dict(zip(skeleton.names, skeleton.rest, strict=True))
+    if "pelvis" not in joints:
+        raise InputError("an actor skeleton needs a body: this skeleton has no pelvis")
+    points = {name: joints[name] for side in ("left", "right") for name in hand_joint_names(side) if name in joints}
+    points |= dict(_trunk(joints))
+    points |= dict(_arms(joints))
+    points |= dict(_legs(joints))
+    up, forward = _facing(joints)
+    if up is not None and forward is not None:
+        points |= dict(_face(joints, vertices, up, forward))
+        points |= dict(_heels(joints, vertices, faces, forward))
+    ordered = {name: points[name] for name in ACTOR_POINTS if name in points}
+    return ActorSkeleton(ordered, tuple(name for name in ACTOR_POINTS if name not in points))
+
+
+Joints = dict[str, NDArray[np.float64]]
+Placed = Iterator[tuple[str, NDArray[np.float64]]]
+
+
+def _trunk(joints: Joints) -> Placed:
+    column = [*(n for n in joints if n[:5] == "spine"), *(n for n in joints if n[:4] == "neck")]
+    for n, name in enumerate(column[:5], start=1):
+        yield f"vertebra{n}", joints[name]
+    for point, name in (("pelvis", "pelvis"), ("skull_base", "head"), ("head_top", "head.top")):
+        if name in joints:
+            yield point, joints[name]
+    if "left.clavicle" in joints and "right.clavicle" in joints:
+        yield "sternum", (joints["left.clavicle"] + joints["right.clavicle"]) / 2
+
+
+def _arms(joints: Joints) -> Placed:
+    for side in ("left", "right"):
+        for name in ("clavicle", "shoulder", "elbow"):
+            if f"{side}.{name}" in joints:
+                yield f"{side}.{name}", joints[f"{side}.{name}"]
+        if f"{side}.elbow" in joints and f"{side}.wrist" in joints:
+            yield f"{side}.forearm_twist", (joints[f"{side}.elbow"] + joints[f"{side}.wrist"]) / 2
+
+
+def _legs(joints: Joints) -> Placed:
+    for side in ("left", "right"):
+        if f"{side}.hip" in joints:
+            yield f"{side}.femoral_head", joints[f"{side}.hip"]
+            yield f"{side}.pelvic_hip", (joints["pelvis"] + joints[f"{side}.hip"]) / 2
+        for name in ("knee", "ankle"):
+            if f"{side}.{name}" in joints:
+                yield f"{side}.{name}", joints[f"{side}.{name}"]
+        bases = [p for name, p in joints.items() if name.startswith(f"{side}.toe") and name.endswith(".base")]
+        if f"{side}.ball" in joints or bases:
+            yield f"{side}.ball", joints[f"{side}.ball"] if f"{side}.ball" in joints else np.mean(bases, axis=0)
+        for point, toe in (("big_toe_tip", "toe1"), ("middle_toe_tip", "toe3"), ("little_toe_tip", "toe5")):
+            if f"{side}.{toe}.tip" in joints:
+                yield f"{side}.{point}", joints[f"{side}.{toe}.tip"]
+        if f"{side}.toe.tip" in joints:
+            yield f"{side}.middle_toe_tip", joints[f"{side}.toe.tip"]
+
+
+def _facing(joints: Joints) -> tuple[NDArray[np.float64] | None, NDArray[np.float64] | None]:
+    if not {"head", "left.hip", "right.hip"} <= set(joints):
+        return None, None
+    up = joints["head"] - joints["pelvis"]
+    up /= np.linalg.norm(up)
+    return up, perpendicular(np.cross(joints["left.hip"] - joints["right.hip"], up), up)
+
+
+def _face(
+    joints: Joints, vertices: NDArray[np.float64], up: NDArray[np.float64], forward: NDArray[np.float64]
+) -> Placed:
+    """Nose and chin from the head's midline profile, seen from the skull base."""
+    if "head.top" not in joints:
+        return
+    base = joints["head"]
+    height = float((joints["head.top"] - base) @ up)
+    away = vertices - base
+    high, ahead, aside = away @ up, away @ forward, away @ np.cross(up, forward)
+    midline = (np.abs(aside) < 0.15 * height) & (ahead > 0)
+    face = np.flatnonzero(midline & (high > -0.2 * height) & (high < height))
+    if not len(face):
+        return
+    nose = face[ahead[face].argmax()]
+    yield "nose_tip", vertices[nose]
+    # below the nose by a quarter of the way from there to the crown come the lips, by two fifths the chin
+    crown = float(high[midline].max() - high[nose])
+    lower = np.flatnonzero(midline & (high < high[nose] - 0.36 * crown) & (high > high[nose] - 0.55 * crown))
+    if len(lower):
+        yield "chin", vertices[lower[ahead[lower].argmax()]]
+
+
+def _heels(
+    joints: Joints, vertices: NDArray[np.float64], faces: NDArray[np.int32], forward: NDArray[np.float64]
+) -> Placed:
+    for side in ("left", "right"):
+        if not {f"{side}.ankle", f"{side}.knee"} <= set(joints):
+            continue
+        ankle = joints[f"{side}.ankle"]
+        shin = ankle - joints[f"{side}.knee"]
+        length = float(np.linalg.norm(shin))
+        # the heel lies behind and below the ankle
+        direction = shin / length - forward
+        direction /= np.linalg.norm(direction)
+        near = nearby(vertices, faces, ankle, 0.5 * length)
+        heel = find_extremity(vertices, near, ankle, direction, 0.2 * length)
+        if heel is not None:
+            yield f"{side}.heel", heel

@@ -1,0 +1,1 @@
+"""Recognition of hands and bodies in joint trees of any origin (R12–R14)."""

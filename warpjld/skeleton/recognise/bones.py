@@ -1,0 +1,36 @@
+"""Which way a joint's bone points, read from its frame: files keep it on +X, +Y, -Z or any other axis."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from warpjld.skeleton.recognise.tree import SourceTree
+
+__all__ = ["bone_axis", "bone_directions"]
+
+_ALIGNED = 0.97  # cosine from which a bone counts as lying on an axis of its frame
+
+
+def bone_directions(tree: SourceTree, axis: NDArray[np.float64]) -> NDArray[np.float64]:
+    """World direction of ``axis``, given in joint frames, at every joint, shape (N, 3)."""
+    directions = tree.frames[:, :3, :3] @ axis
+    length = np.linalg.norm(directions, axis=1, keepdims=True)
+    return directions / np.where(length > 0, length, 1.0)
+
+
+def bone_axis(tree: SourceTree, pairs: list[tuple[int, int]]) -> NDArray[np.float64] | None:
+    """Axis of the joint frames on which bones lie, from (joint, next joint) pairs; None where they share none."""
+    locals_ = []
+    for joint, after in pairs:
+        bone = tree.positions[after] - tree.positions[joint]
+        if np.linalg.norm(bone) > 0 and abs(np.linalg.det(tree.frames[joint, :3, :3])) > 0:
+            local = np.linalg.solve(tree.frames[joint, :3, :3], bone)
+            locals_.append(local / np.linalg.norm(local))
+    if len(locals_) < 3:
+        return None
+    mean = np.median(np.array(locals_), axis=0)
+    axis = np.zeros(3)
+    axis[np.argmax(np.abs(mean))] = np.sign(mean[np.argmax(np.abs(mean))])
+    aligned = np.array(locals_) @ axis > _ALIGNED
+    return axis if aligned.mean() > 0.7 else None

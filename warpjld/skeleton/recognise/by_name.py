@@ -1,0 +1,134 @@
+"""Recognition by names: which joint plays which part, in any convention :mod:`names` reads."""
+
+from __future__ import annotations
+
+from collections import defaultdict
+
+from warpjld.skeleton.hand import DIGITS, FINGER_JOINTS
+from warpjld.skeleton.recognise.digits import assign_digit
+from warpjld.skeleton.recognise.names import Meaning, read_name
+from warpjld.skeleton.recognise.roles import HandRoles, Roles
+from warpjld.skeleton.recognise.tree import SourceTree
+
+__all__ = ["roles_by_name"]
+
+# canonical joint: kinds that may stand for it, best first; "shoulder" means the joint itself in SMPL-X and the
+# clavicle in Mixamo, Godot and VRM: it is what the better words leave over
+_ARM = (
+    ("shoulder", ("upperarm", "shoulder")),
+    ("elbow", ("forearm",)),
+    ("clavicle", ("clavicle", "scapula", "shoulder")),
+)
+_LEG = (("hip", ("thigh", "hip")), ("knee", ("shin",)), ("ankle", ("ankle", "foot")), ("ball", ("ball", "foot")))
+
+
+def roles_by_name(tree: SourceTree) -> Roles:
+    """Parts found by names alone; empty where the names say nothing."""
+    meanings = [read_name(name) for name in tree.names]
+    roles = Roles(how="names")
+    kinds: dict[tuple[str | None, str], list[int]] = defaultdict(list)
+    for j in sorted(range(len(tree)), key=lambda j: (tree.depth(j), meanings[j].number or 0, j)):
+        if meanings[j].kind:
+            kinds[meanings[j].side, str(meanings[j].kind)].append(j)
+    sides: list[str | None] = [*sorted({side for side, _ in kinds if side})] or [None]
+    if sides != [None] and any(meanings[j].kind == "digit" and meanings[j].side is None for j in range(len(tree))):
+        sides.append(None)
+    for side in sides:
+        _hand(tree, meanings, kinds, side, roles)
+        if side:
+            _limbs(kinds, side, roles)
+            _forearm_stub(tree, side, roles)
+            if kinds[side, "hand end"]:
+                roles.body[f"{side}.hand.tip"] = kinds[side, "hand end"][0]
+            _toes(tree, kinds, side, roles)
+    _trunk(tree, kinds, roles)
+    return roles
+
+
+def _hand(
+    tree: SourceTree,
+    meanings: list[Meaning],
+    kinds: dict[tuple[str | None, str], list[int]],
+    side: str | None,
+    roles: Roles,
+) -> None:
+    digits: dict[str, list[int]] = defaultdict(list)
+    for j in kinds[side, "digit"]:
+        digits[str(meanings[j].digit)].append(j)
+    for j in kinds[side, "carpal"]:
+        below = {meanings[k].digit for k in tree.subtree(j) if meanings[k].kind == "digit"}
+        if len(below) == 1:
+            digits[str(below.pop())].insert(0, j)
+    wrists = kinds[side, "wrist"] or kinds[side, "hand"] or (kinds[None, "wrist"] or kinds[None, "hand"])
+    wrist = wrists[-1] if kinds[side, "wrist"] else (wrists[0] if wrists else None)
+    if wrist is None and digits:
+        wrist = _common_ancestor(tree, [joints[0] for joints in digits.values()])
+    if not digits:
+        if wrist is not None and side:
+            roles.body[f"{side}.wrist"] = wrist
+        return
+    joints = {} if wrist is None else {"wrist": wrist}
+    for digit in DIGITS:
+        chain = sorted(digits[digit], key=lambda j: _order(tree, meanings[j], j))
+        if chain:
+            at = None if wrist is None else tree.positions[wrist]
+            joints |= assign_digit(digit, chain, [meanings[j].rank for j in chain], tree.positions, at)
+    roles.hands.append(HandRoles(side, joints))
+
+
+def _order(tree: SourceTree, meaning: Meaning, joint: int) -> tuple[int, int, int]:
+    rank = -1 if meaning.rank is None else meaning.rank
+    return tree.depth(joint), rank, meaning.number or 0
+
+
+def _common_ancestor(tree: SourceTree, joints: list[int]) -> int | None:
+    above = [tree.ancestors(j) for j in joints]
+    return next((j for j in above[0] if all(j in other for other in above[1:])), None)
+
+
+def _limbs(kinds: dict[tuple[str | None, str], list[int]], side: str, roles: Roles) -> None:
+    for table in (_ARM, _LEG):
+        taken: set[str] = set()
+        for name, candidates in table:
+            kind = next((k for k in candidates if kinds[side, k] and k not in taken), None)
+            if kind:
+                taken.add(kind)
+                # of upperarm01 and upperarm02 the first is the joint, the others divide the limb
+                roles.body[f"{side}.{name}"] = kinds[side, kind][0]
+
+
+def _forearm_stub(tree: SourceTree, side: str, roles: Roles) -> None:
+    """The built-in hand ends in a stub whose root is no elbow, and is called so."""
+    elbow = roles.body.get(f"{side}.elbow")
+    if elbow is not None and tree.names[elbow] == f"{side}.forearm":
+        roles.body[f"{side}.forearm"] = roles.body.pop(f"{side}.elbow")
+
+
+def _toes(tree: SourceTree, kinds: dict[tuple[str | None, str], list[int]], side: str, roles: Roles) -> None:
+    toes = kinds[side, "toe"]
+    heads = [j for j in toes if tree.parents[j] not in toes]
+    if len(heads) == 1:
+        rest = tree.subtree(heads[0])
+        if f"{side}.ball" not in roles.body:
+            roles.body[f"{side}.ball"] = rest.pop(0)
+        if rest:
+            roles.body[f"{side}.toe.tip"] = rest[-1]
+        return
+    for n, head in enumerate(heads, start=1):
+        for name, joint in zip(FINGER_JOINTS, tree.subtree(head), strict=False):
+            roles.body[f"{side}.toe{n}.{'tip' if read_name(tree.names[joint]).rank == 4 else name}"] = joint
+
+
+def _trunk(tree: SourceTree, kinds: dict[tuple[str | None, str], list[int]], roles: Roles) -> None:
+    if not (kinds[None, "spine"] or kinds[None, "pelvis"] or kinds[None, "head"]):
+        return
+    for name in ("spine", "neck"):
+        for n, joint in enumerate(kinds[None, name], start=1):
+            roles.body[f"{name}{n}"] = joint
+    for kind, name in (("head", "head"), ("head end", "head.top")):
+        if kinds[None, kind]:
+            roles.body[name] = kinds[None, kind][0]
+    if kinds[None, "pelvis"]:
+        roles.body["pelvis"] = kinds[None, "pelvis"][0]
+    elif kinds[None, "root"]:
+        roles.body["pelvis"] = kinds[None, "root"][0]

@@ -1,0 +1,201 @@
+"""Joint tree and surface → canonical skeleton."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+from numpy.typing import NDArray
+
+from warpjld.errors import InputError
+from warpjld.skeleton.hand import FINGER_JOINTS, PALM_SEGMENTS
+from warpjld.skeleton.limits import default_limits
+from warpjld.skeleton.recognise.axes import body_axes, hand_axes, perpendicular
+from warpjld.skeleton.recognise.bones import bone_axis, bone_directions
+from warpjld.skeleton.recognise.complete_body import find_extremities, merge_pelvis
+from warpjld.skeleton.recognise.complete_hand import complete_hand
+from warpjld.skeleton.recognise.hand_frame import chirality
+from warpjld.skeleton.recognise.layout import Layout, lay_out
+from warpjld.skeleton.recognise.recognise import recognise
+from warpjld.skeleton.recognise.roles import HandRoles, Roles
+from warpjld.skeleton.recognise.tree import SourceTree
+from warpjld.skeleton.tree import CHANNELS, Skeleton
+
+__all__ = ["Canonical", "canonical_skeleton"]
+
+_STRAIGHT = np.sin(np.radians(10.0))
+_SURE = 0.15  # chirality from which rest pose and thumb tell left from right
+
+
+@dataclass(frozen=True, eq=False)
+class Canonical:
+    """A canonical skeleton and how the file's joints map to it.
+
+    Attributes:
+        skeleton: The skeleton.
+        sources: Joint of the file for each of its joints, -1 for added ones.
+        owner: Joint of the skeleton that each joint of the file belongs to, shape (N,).
+        notes: What was recognised, added, merged or moved.
+    """
+
+    skeleton: Skeleton
+    sources: tuple[int, ...]
+    owner: NDArray[np.int64]
+    notes: tuple[str, ...]
+
+
+def canonical_skeleton(
+    tree: SourceTree,
+    vertices: NDArray[np.float64],
+    faces: NDArray[np.int32],
+    *,
+    side: str | None = None,
+    axes: Mapping[int, NDArray[np.float64]] | None = None,
+    limits: Mapping[int, Mapping[str, tuple[float, float]]] | None = None,
+) -> Canonical:
+    """Recognise a tree inside its surface.
+
+    Args:
+        tree: The file's joints [m].
+        vertices: Surface [m], shape (V, 3).
+        faces: Its triangles, shape (T, 3).
+        side: Side of a single hand, overriding what names and shape say.
+        axes: Flexion axes the file states, by its joint numbers.
+        limits: Channel limits [rad] the file states, likewise.
+    """
+    roles = recognise(tree)
+    notes: list[str] = []
+    hand_points: dict[str, dict[str, NDArray[np.float64]]] = {}
+    _release_partial_hands(roles, side)
+    for hand in roles.hands:
+        found = {name: tree.positions[j] for name, j in hand.joints.items()}
+        hand.side = _side(hand, found, side if len(roles.hands) == 1 else None, notes)
+        points, added = complete_hand(found, _last_bones(tree, hand), vertices, faces, f"{hand.side} hand")
+        hand_points[hand.side] = points
+        notes.append(f"{hand.side} hand: recognised by {roles.how}, {len(hand.joints)} of 25 joints in the file")
+        notes.extend(added)
+    place = merge_pelvis(tree, roles)
+    notes = [*roles.notes, *notes]
+    layout = lay_out(tree, roles, hand_points)
+    if place is not None:
+        layout.positions[layout.names.index("pelvis")] = place
+    if roles.body:
+        _extremities(layout, vertices, faces)
+    skeleton = _skeleton(layout, roles, hand_points, axes or {}, limits or {})
+    return Canonical(skeleton, tuple(layout.sources), layout.owner, (*notes, *layout.notes))
+
+
+def _release_partial_hands(roles: Roles, side: str | None) -> None:
+    """A few fingers without index and pinky span no palm: their joints stay as they are, in canonical names."""
+    for hand in [h for h in roles.hands if not {"index.base", "pinky.base", "index.knuckle2"} <= set(h.joints)]:
+        roles.hands.remove(hand)
+        prefix = f"{side or hand.side}." if side or hand.side else ""
+        roles.body |= {prefix + name: joint for name, joint in hand.joints.items()}
+        digits = sorted({name.partition(".")[0] for name in hand.joints} - {"wrist"})
+        roles.notes.append(f"{', '.join(digits)}: part of a hand only, nothing was added")
+
+
+def _side(hand: HandRoles, points: Mapping[str, NDArray[np.float64]], given: str | None, notes: list[str]) -> str:
+    turn = chirality(points) if {"wrist", "index.base", "pinky.base"} <= set(points) else 0.0
+    seen = None if abs(turn) < _SURE else ("right" if turn > 0 else "left")
+    chosen = given or hand.side or seen
+    if chosen is None:
+        raise InputError("neither names nor shape tell whether this is a left or a right hand: give its side")
+    if seen not in (None, chosen):
+        notes.append(f"named a {chosen} hand, but thumb and fingers look like a {seen} one")
+    return chosen
+
+
+def _extremities(layout: Layout, vertices: NDArray[np.float64], faces: NDArray[np.int32]) -> None:
+    parents = {
+        name: None if parent < 0 else layout.names[parent]
+        for name, parent in zip(layout.names, layout.parents, strict=True)
+    }
+    places = dict(zip(layout.names, layout.positions, strict=True))
+    found = find_extremities(places, parents, vertices, faces)
+    for name, (parent, point) in found.items():
+        layout.add(name, parent, point)
+    if found:
+        layout.notes.append(f"extremities added in the surface: {', '.join(found)}")
+
+
+def _last_bones(tree: SourceTree, hand: HandRoles) -> dict[str, NDArray[np.float64]]:
+    """Directions of the bones beyond the last joints of digits without tips, where frames tell."""
+    pairs: list[tuple[int, int]] = []
+    last: list[str] = []
+    for digit in ("pinky", "ring", "middle", "index", "thumb"):
+        chain = [f"{digit}.{j}" for j in FINGER_JOINTS if f"{digit}.{j}" in hand.joints]
+        pairs.extend((hand.joints[a], hand.joints[b]) for a, b in pairwise(chain))
+        last.extend(chain[-1:])
+    axis = bone_axis(tree, pairs)
+    if axis is None:
+        return {}
+    directions = bone_directions(tree, axis)
+    return {name: directions[hand.joints[name]] for name in last}
+
+
+def _skeleton(
+    layout: Layout,
+    roles: Roles,
+    hand_points: Mapping[str, Mapping[str, NDArray[np.float64]]],
+    given_axes: Mapping[int, NDArray[np.float64]],
+    given_limits: Mapping[int, Mapping[str, tuple[float, float]]],
+) -> Skeleton:
+    count = len(layout.names)
+    number = {name: i for i, name in enumerate(layout.names)}
+    limits = default_limits(layout.names)
+    blank = Skeleton(
+        names=tuple(layout.names),
+        parents=np.array(layout.parents, dtype=np.int32),
+        rest=layout.positions,
+        axes=np.tile([1.0, 0.0, 0.0], (count, 1)),
+        limits=limits,
+    )
+    found = body_axes(
+        dict(zip(layout.names, layout.positions, strict=True)),
+        dict(zip(layout.names, blank.directions, strict=True)),
+        *_facing(layout, number),
+    )
+    for side, points in hand_points.items():
+        found |= {f"{side}.{name}": axis for name, axis in hand_axes(points, side).items()}
+    axes = np.empty((count, 3))
+    for j, name in enumerate(layout.names):
+        source = layout.sources[j]
+        if source in given_axes:
+            axes[j] = given_axes[source] / np.linalg.norm(given_axes[source])
+        else:
+            axes[j] = perpendicular(found.get(name, _bend(blank, j)), blank.directions[j])
+        for channel, pair in given_limits.get(source, {}).items():
+            limits[j, CHANNELS.index(channel)] = pair
+    palms = tuple(
+        tuple(
+            (number[f"{side}.{a}"], number[f"{side}.{b}"])
+            for a, b in PALM_SEGMENTS
+            if f"{side}.{a}" in number and f"{side}.{b}" in number
+        )
+        for side in hand_points
+    )
+    return Skeleton(blank.names, blank.parents, blank.rest, axes, limits, palms)
+
+
+def _bend(skeleton: Skeleton, joint: int) -> NDArray[np.float64]:
+    """Axis about which a chain bends at rest; x where it is straight."""
+    parent = int(skeleton.parents[joint])
+    turn = np.cross(skeleton.directions[parent], skeleton.directions[joint]) if parent >= 0 else np.zeros(3)
+    return turn if np.linalg.norm(turn) > _STRAIGHT else np.array([1.0, 0.0, 0.0])
+
+
+def _facing(layout: Layout, number: Mapping[str, int]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Up and forward of a body; Y and Z where it does not tell."""
+    up, forward = np.array([0.0, 1.0, 0.0]), np.array([0.0, 0.0, 1.0])
+    if "head" in number and "pelvis" in number:
+        up = layout.positions[number["head"]] - layout.positions[number["pelvis"]]
+        up /= np.linalg.norm(up)
+    for part in ("hip", "shoulder"):
+        if f"left.{part}" in number and f"right.{part}" in number:
+            left = layout.positions[number[f"left.{part}"]] - layout.positions[number[f"right.{part}"]]
+            forward = perpendicular(np.cross(left, up), up)
+            break
+    return up, forward

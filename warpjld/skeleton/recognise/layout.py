@@ -1,0 +1,197 @@
+"""From roles to a canonical joint list: parents first, every joint of the file owned by one canonical joint."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from warpjld.skeleton.hand import HAND_PARENTS
+from warpjld.skeleton.recognise.names import read_name
+from warpjld.skeleton.recognise.roles import Roles
+from warpjld.skeleton.recognise.tree import SourceTree
+
+__all__ = ["Layout", "lay_out"]
+
+_FALLBACK_PARENTS = {
+    "wrist": "elbow",
+    "elbow": "shoulder",
+    "shoulder": "clavicle",
+    "knee": "hip",
+    "ankle": "knee",
+} | {"ball": "ankle"}
+
+
+@dataclass
+class Layout:
+    """Canonical joints, parents first.
+
+    Attributes:
+        names: Canonical names.
+        parents: Their parents, -1 for the root.
+        sources: Joint of the file each one is, -1 for added ones.
+        positions: Rest positions.
+        owner: Canonical joint that each joint of the file belongs to, shape (N,).
+        notes: What was merged or kept as it is.
+    """
+
+    names: list[str]
+    parents: list[int]
+    sources: list[int]
+    positions: NDArray[np.float64]
+    owner: NDArray[np.int64]
+    notes: list[str] = field(default_factory=list)
+
+    def add(self, name: str, parent: str, position: NDArray[np.float64]) -> None:
+        """Append an extremity that the file does not have."""
+        self.parents.append(self.names.index(parent))
+        self.names.append(name)
+        self.sources.append(-1)
+        self.positions = np.vstack([self.positions, position])
+
+
+def lay_out(tree: SourceTree, roles: Roles, hand_points: Mapping[str, Mapping[str, NDArray[np.float64]]]) -> Layout:
+    """Arrange recognised and remaining joints.
+
+    Limbs are single segments: twist bones, and joints that divide a limb or lie between two recognised ones, belong
+    to the recognised joint above them, with their weights. JLD spreads a twist along a segment by itself, and a
+    bisector plane in the middle of a limb would only add a crease. Face bones belong to the head. What else was not
+    recognised keeps its name, in lower case.
+
+    Args:
+        tree: The file's joints.
+        roles: What was recognised; every hand has a side.
+        hand_points: Per side, positions of its 25 joints, names without the side.
+    """
+    named = dict(roles.body)
+    for hand in roles.hands:
+        named |= {f"{hand.side}.{name}": joint for name, joint in hand.joints.items()}
+    of_source = {joint: name for name, joint in named.items()}
+    notes: list[str] = []
+    kept = _kept(tree, of_source, notes)
+    of_source |= kept
+    named |= {name: joint for joint, name in kept.items()}
+
+    places = {name: tree.positions[joint] for name, joint in named.items()}
+    above: dict[str, str | None] = {}
+    in_hands = {f"{side}.{short}": point for side, points in hand_points.items() for short, point in points.items()}
+    places |= in_hands
+    for name, joint in named.items():
+        if name not in in_hands or name.endswith(".wrist"):
+            parent = next((of_source[j] for j in tree.ancestors(joint) if j in of_source), None)
+            above[name] = parent if parent is not None else _fallback(name, named)
+    for side, points in hand_points.items():
+        above.setdefault(f"{side}.wrist", _fallback(f"{side}.wrist", named))
+        for short, hand_parent in HAND_PARENTS.items():
+            if short in points and hand_parent is not None:
+                above[f"{side}.{short}"] = f"{side}.{hand_parent}"
+    _one_root(above, roles, notes)
+    order = _parents_first(above)
+    number = {name: i for i, name in enumerate(order)}
+    owner = np.array([_owner(tree, j, of_source, number, above) for j in range(len(tree))])
+    return Layout(
+        names=order,
+        parents=[-1 if (parent := above[name]) is None else number[parent] for name in order],
+        sources=[named.get(name, -1) for name in order],
+        positions=np.array([places[name] for name in order]),
+        owner=owner,
+        notes=notes,
+    )
+
+
+def _kept(tree: SourceTree, of_source: Mapping[int, str], notes: list[str]) -> dict[int, str]:
+    """Joints that were not recognised and stay joints of their own, with their names."""
+    if not of_source:
+        return {j: _own_name(tree, j, range(len(tree))) for j in range(len(tree))}
+    size = float(np.linalg.norm(np.ptp(tree.positions, axis=0))) or 1.0
+    kept: dict[int, str] = {}
+    merged: dict[str, list[str]] = {}
+    for j in range(len(tree)):
+        if j in of_source:
+            continue
+        over = [of_source[k] for k in tree.ancestors(j) if k in of_source]
+        below = [of_source[k] for k in tree.subtree(j) if k in of_source]
+        near = [tree.parents[j], *(k for k in range(len(tree)) if tree.parents[k] == tree.parents[j] and k != j)]
+        double = (
+            any(k >= 0 and np.linalg.norm(tree.positions[j] - tree.positions[k]) < 1e-4 * size for k in near)
+            and not tree.children[j]
+        )
+        helper = read_name(tree.names[j]).kind in ("helper", "palm", "root")
+        in_hand = bool(over) and over[0].partition(".")[2] in HAND_PARENTS
+        if below or helper or double or in_hand or "head" in over or (not over and tree.flat):
+            into = over[0] if over else (below[0] if below else "the root")
+            merged.setdefault(into, []).append(tree.names[j])
+        else:
+            kept[j] = _own_name(tree, j, of_source)
+    if merged:
+        shown = (
+            f"{', '.join(names[:4])}{f' and {len(names) - 4} more' if len(names) > 4 else ''} → {into}"
+            for into, names in merged.items()
+        )
+        notes.append(f"merged into recognised joints: {'; '.join(shown)}")
+    if kept:
+        notes.append(f"not recognised, kept as joints: {', '.join(kept.values())}")
+    return kept
+
+
+def _own_name(tree: SourceTree, joint: int, _: object) -> str:
+    name = tree.names[joint].lower()
+    twice = [j for j in range(len(tree)) if tree.names[j].lower() == name]
+    return name if len(twice) == 1 else f"{name}#{twice.index(joint) + 1}"
+
+
+def _fallback(name: str, named: Mapping[str, int]) -> str | None:
+    """Parent by anatomy, for files without a hierarchy."""
+    side, _, part = name.rpartition(".")
+    above = f"{side}.{_FALLBACK_PARENTS.get(part, '')}"
+    if above in named:
+        return above
+    trunk = sorted(n for n in named if n.rstrip("0123456789") == "spine")
+    if part in ("clavicle", "shoulder", "neck1", "head") and trunk:
+        return trunk[-1]
+    return "pelvis" if "pelvis" in named and name != "pelvis" else None
+
+
+def _one_root(above: dict[str, str | None], roles: Roles, notes: list[str]) -> None:
+    roots = [name for name, parent in above.items() if parent is None]
+    if len(roots) < 2 or all(name.endswith(".wrist") for name in roots):
+        return  # two hands without a body move on their own
+    main = "pelvis" if "pelvis" in roots else next((r for r in roots if r.endswith(".wrist")), roots[0])
+    for name in roots:
+        if name != main:
+            above[name] = main
+    notes.append(f"several roots: {', '.join(r for r in roots if r != main)} hang on {main}")
+
+
+def _parents_first(above: Mapping[str, str | None]) -> list[str]:
+    order: list[str] = []
+    seen: set[str] = set()
+
+    def place(name: str) -> None:
+        if name in seen:
+            return
+        seen.add(name)
+        parent = above[name]
+        if parent is not None:
+            place(parent)
+        order.append(name)
+
+    for name in above:
+        place(name)
+    return order
+
+
+def _owner(
+    tree: SourceTree,
+    joint: int,
+    of_source: Mapping[int, str],
+    number: Mapping[str, int],
+    above: Mapping[str, str | None],
+) -> int:
+    for j in (joint, *tree.ancestors(joint)):
+        if j in of_source:
+            return number[of_source[j]]
+    below = [number[of_source[j]] for j in tree.subtree(joint) if j in of_source]
+    return min(below) if below else 0

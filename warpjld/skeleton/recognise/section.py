@@ -1,0 +1,133 @@
+"""Looking at a surface from inside: rays, winding numbers and cross-sections around a point of the skeleton."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+__all__ = ["CrossSection", "cross_section", "first_hits", "nearby", "winding_numbers"]
+
+_CHUNK = 2_000_000  # ray–triangle pairs at a time: about 200 MB of temporaries
+
+
+@dataclass(frozen=True)
+class CrossSection:
+    """The surface around a point, in the plane through it.
+
+    Attributes:
+        centre: Centroid of the section, shape (3,).
+        radius: Radius of the circle of the same area.
+        seen: Share of the directions in which a surface was met: below 1 at open ends.
+    """
+
+    centre: NDArray[np.float64]
+    radius: float
+    seen: float
+
+
+def nearby(
+    vertices: NDArray[np.float64], faces: NDArray[np.int32], centre: NDArray[np.float64], radius: float
+) -> NDArray[np.int32]:
+    """Faces that may reach within ``radius`` of ``centre``: what a hand needs of a body."""
+    corners = vertices[faces]
+    middle = corners.mean(axis=1)
+    extent = np.linalg.norm(corners - middle[:, None], axis=2).max(axis=1)
+    return faces[np.linalg.norm(middle - centre, axis=1) < radius + extent]
+
+
+def first_hits(
+    vertices: NDArray[np.float64],
+    faces: NDArray[np.int32],
+    origins: NDArray[np.float64],
+    directions: NDArray[np.float64],
+) -> NDArray[np.float64]:
+    """Distance along each ray of unit direction to its first triangle (Möller–Trumbore), ``inf`` where there is none,
+    shape (R,)."""
+    out = np.full(len(origins), np.inf)
+    if not len(faces):
+        return out
+    corners = vertices[faces]
+    middle = corners.mean(axis=1)
+    extent = np.linalg.norm(corners - middle[:, None], axis=2).max(axis=1) * (1 + 1e-9)
+    rows = max(1, _CHUNK // len(faces))
+    for start in range(0, len(origins), rows):
+        origin, direction = origins[start : start + rows], directions[start : start + rows]
+        # only triangles whose bounding sphere a ray meets are looked at closely
+        away = middle - origin[:, None]
+        along = np.einsum("rtk,rk->rt", away, direction)
+        aside = np.einsum("rtk,rtk->rt", away, away) - along**2
+        ray, triangle = np.nonzero((aside <= extent**2) & (along >= -extent))
+        distance = _distances(corners[triangle], origin[ray], direction[ray])
+        np.minimum.at(out, start + ray, distance)
+    return out
+
+
+def _distances(
+    corners: NDArray[np.float64], origin: NDArray[np.float64], direction: NDArray[np.float64]
+) -> NDArray[np.float64]:
+    """Distance of one ray to one triangle each, ``inf`` where they miss."""
+    edge1, edge2 = corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
+    p = np.cross(direction, edge2)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        inverse = 1.0 / (p * edge1).sum(axis=1)
+        s = origin - corners[:, 0]
+        u = (s * p).sum(axis=1) * inverse
+        q = np.cross(s, edge1)
+        v = (q * direction).sum(axis=1) * inverse
+        t = (q * edge2).sum(axis=1) * inverse
+        met = (u >= -1e-9) & (v >= -1e-9) & (u + v <= 1 + 1e-9) & (t > 1e-9) & np.isfinite(t)
+    return np.where(met, t, np.inf)
+
+
+def winding_numbers(
+    vertices: NDArray[np.float64], faces: NDArray[np.int32], points: NDArray[np.float64]
+) -> NDArray[np.float64]:
+    """Generalised winding number of each point (van Oosterom and Strackee's solid angle), about 1 inside, shape (P,).
+
+    It stays meaningful for open wrists and for several closed parts in one another.
+    """
+    middle = vertices.mean(axis=0)
+    vertices, points = vertices - middle, points - middle
+    a, b, c = (vertices[faces[:, k]] for k in range(3))
+    # every term is linear in the point but for its square, so each is one matrix product
+    normal = np.cross(a, b) + np.cross(b, c) + np.cross(c, a)
+    volume = np.einsum("fk,fk->f", a, np.cross(b, c))
+    out = np.empty(len(points))
+    rows = max(1, _CHUNK // max(1, len(faces)))
+    for start in range(0, len(points), rows):
+        p = points[start : start + rows]
+        square = (p * p).sum(axis=1)[:, None]
+        gap = vertices[None] - p[:, None]
+        la, lb, lc = np.moveaxis(np.sqrt((gap * gap).sum(axis=2))[:, faces], 2, 0)
+        ab, bc, ca = (np.einsum("fk,fk->f", x, y) - p @ (x + y).T + square for x, y in ((a, b), (b, c), (c, a)))
+        solid = np.arctan2(volume - p @ normal.T, la * lb * lc + ab * lc + bc * la + ca * lb)
+        out[start : start + rows] = solid.sum(axis=1) / (2.0 * np.pi)
+    return out
+
+
+def cross_section(
+    vertices: NDArray[np.float64],
+    faces: NDArray[np.int32],
+    point: NDArray[np.float64],
+    direction: NDArray[np.float64],
+    rays: int = 24,
+) -> CrossSection | None:
+    """The first surface met around ``point`` in the plane normal to ``direction``; None where hardly any is."""
+    across = np.cross(direction, np.eye(3)[np.argmin(np.abs(direction))])
+    across /= np.linalg.norm(across)
+    angle = np.arange(rays) * (2 * np.pi / rays)
+    spokes = np.outer(np.cos(angle), across) + np.outer(np.sin(angle), np.cross(direction, across))
+    reach = first_hits(vertices, faces, np.broadcast_to(point, spokes.shape), spokes)
+    seen = np.isfinite(reach)
+    if seen.mean() < 0.6:
+        return None
+    x, y = reach[seen] * np.cos(angle[seen]), reach[seen] * np.sin(angle[seen])
+    cross = x * np.roll(y, -1) - np.roll(x, -1) * y
+    area = cross.sum() / 2
+    if not area > 0:
+        return None
+    cx, cy = ((x + np.roll(x, -1)) * cross).sum() / (6 * area), ((y + np.roll(y, -1)) * cross).sum() / (6 * area)
+    centre = point + cx * across + cy * np.cross(direction, across)
+    return CrossSection(centre, float(np.sqrt(area / np.pi)), float(seen.mean()))

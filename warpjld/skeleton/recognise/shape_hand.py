@@ -1,0 +1,76 @@
+"""Hands by the tree's shape: a joint from which five chains of at least three joints leave."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from warpjld.skeleton.recognise.digits import assign_digit
+from warpjld.skeleton.recognise.tree import SourceTree
+
+__all__ = ["digit_chains", "hand_by_shape", "hand_roots"]
+
+_TOE_RATIO = 0.45  # chain length per distance from the common joint: 0.25 for toes, 0.6 or more for fingers
+
+
+def hand_roots(tree: SourceTree) -> list[int]:
+    """Joints that look like wrists."""
+    return [j for j in range(len(tree)) if _is_wrist(tree, j)]
+
+
+def _is_wrist(tree: SourceTree, joint: int) -> bool:
+    chains = digit_chains(tree, joint)
+    if len(chains) != 5 or any(len(chain) < 3 for chain in chains):
+        return False
+    if any(len(digit_chains(tree, child)) == 5 for child in tree.children[joint]):
+        return False  # a joint further down has all five
+    at = tree.positions
+    ratios = []
+    for chain in chains:
+        away = np.linalg.norm(at[chain[0]] - at[joint])
+        ratios.append(np.linalg.norm(np.diff(at[chain], axis=0), axis=1).sum() / max(float(away), 1e-12))
+    return bool(np.median(ratios) > _TOE_RATIO)
+
+
+def digit_chains(tree: SourceTree, joint: int) -> list[list[int]]:
+    """For every leaf below ``joint``, the joints above it that lead to no other leaf, from the root outwards."""
+    below = tree.subtree(joint)[1:]
+    chains = []
+    for leaf in (j for j in below if not tree.children[j]):
+        chain = [leaf]
+        above = int(tree.parents[leaf])
+        while above != joint and len(tree.children[above]) == 1:
+            chain.append(above)
+            above = int(tree.parents[above])
+        chains.append(chain[::-1])
+    return chains
+
+
+def hand_by_shape(tree: SourceTree, wrist: int) -> dict[str, int]:
+    """Canonical names without the side → joints, for the hand below ``wrist``.
+
+    The thumb is the digit with fewer joints than all others or, where counts are equal, the one that points
+    elsewhere; the fingers follow from index to pinky with growing distance from it.
+    """
+    chains = digit_chains(tree, wrist)
+    at = tree.positions
+    counts = sorted(len(chain) for chain in chains)
+    headings = np.array([at[chain[-1]] - at[chain[0]] for chain in chains])
+    headings /= np.linalg.norm(headings, axis=1, keepdims=True)
+    if counts[0] < counts[1]:
+        thumb = min(range(5), key=lambda c: len(chains[c]))
+    else:
+        thumb = min(range(5), key=lambda c: float(headings[c] @ np.delete(headings, c, axis=0).sum(axis=0)))
+    fingers = [c for c in range(5) if c != thumb]
+    forward = headings[fingers].mean(axis=0)
+    forward /= np.linalg.norm(forward)
+    middles = {c: at[chains[c]].mean(axis=0) for c in range(5)}
+    # across the palm, from where the fingers are spread
+    spread = np.array([middles[c] for c in fingers]) - np.mean([middles[c] for c in fingers], axis=0)
+    spread -= np.outer(spread @ forward, forward)
+    lateral = np.linalg.svd(spread)[2][0]
+    lateral *= np.sign(lateral @ (middles[thumb] - np.mean([middles[c] for c in fingers], axis=0))) or 1.0
+    fingers.sort(key=lambda c: -float(lateral @ middles[c]))
+    joints = {"wrist": wrist}
+    for digit, c in zip(("thumb", "index", "middle", "ring", "pinky"), (thumb, *fingers), strict=True):
+        joints |= assign_digit(digit, chains[c], [None] * len(chains[c]), at, at[wrist])
+    return joints

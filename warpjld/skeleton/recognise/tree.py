@@ -1,0 +1,62 @@
+"""A joint tree as a file has it: any names, any order, any bone axes, maybe no hierarchy at all."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+__all__ = ["SourceTree"]
+
+
+@dataclass(frozen=True, eq=False)
+class SourceTree:
+    """N joints of a file.
+
+    Attributes:
+        names: The file's own names.
+        parents: Nearest ancestor that is a joint, -1 for none, shape (N,); in any order.
+        frames: Joint-to-world transforms at rest, shape (N, 4, 4).
+    """
+
+    names: tuple[str, ...]
+    parents: NDArray[np.int64]
+    frames: NDArray[np.float64]
+
+    def __len__(self) -> int:
+        return len(self.names)
+
+    @property
+    def positions(self) -> NDArray[np.float64]:
+        """Joint positions, shape (N, 3)."""
+        return self.frames[:, :3, 3]
+
+    @cached_property
+    def children(self) -> tuple[tuple[int, ...], ...]:
+        """Children of every joint."""
+        return tuple(tuple(int(c) for c in np.flatnonzero(self.parents == j)) for j in range(len(self)))
+
+    @property
+    def flat(self) -> bool:
+        """Whether the hierarchy says nothing: more than four joints and none, or one, has children."""
+        return len(self) > 4 and int((np.bincount(self.parents + 1, minlength=len(self) + 1)[1:] > 0).sum()) <= 1
+
+    def depth(self, joint: int) -> int:
+        """Number of ancestors."""
+        return len(self.ancestors(joint))
+
+    def ancestors(self, joint: int) -> list[int]:
+        """Parent, grandparent, … of a joint."""
+        out = []
+        while (joint := int(self.parents[joint])) >= 0:
+            out.append(joint)
+        return out
+
+    def subtree(self, joint: int) -> list[int]:
+        """A joint and all below it, parents first."""
+        out = [joint]
+        for j in out:
+            out.extend(self.children[j])
+        return out
