@@ -12,13 +12,10 @@ from warpjld.errors import InputError
 from warpjld.fem.blockmatrix import BlockMatrix
 from warpjld.fem.body import Body
 from warpjld.fem.hexmesh import FACES, HexMesh
+from warpjld.fem.shape import POINTS, shape_at, slope_at
 
-__all__ = ["Centrifugal", "Loads", "external_forces", "subtract_pressure_stiffness"]
+__all__ = ["Centrifugal", "Loads", "external_forces", "subtract_pressure_stiffness", "volumes"]
 
-_SIDES = np.array(
-    [[-1, -1, -1], [1, -1, -1], [1, 1, -1], [-1, 1, -1], [-1, -1, 1], [1, -1, 1], [1, 1, 1], [-1, 1, 1]], dtype=float
-)
-_POINTS = _SIDES / np.sqrt(3.0)
 _QUAD = np.array([[-1, -1], [1, -1], [1, 1], [-1, 1]], dtype=float)
 
 
@@ -70,8 +67,8 @@ def external_forces(body: Body, loads: Loads, displacement: NDArray[np.float64] 
     out = np.zeros((len(mesh.nodes), 3))
     gravity = _vector(loads.gravity, "gravity")
     if gravity.any() or loads.centrifugal is not None:
-        shape = np.prod(1.0 + _SIDES[None] * _POINTS[:, None], axis=2) / 8.0
-        weight = _volumes(mesh) * body.density[:, None]
+        shape = shape_at(POINTS)
+        weight = volumes(mesh) * body.density[:, None]
         if gravity.any():
             share = weight @ shape
             _scatter(out, mesh.elements, share[:, :, None] * gravity)
@@ -132,14 +129,10 @@ def subtract_pressure_stiffness(
         np.subtract.at(stiffness.values, slot.reshape(-1), tangent.reshape(-1, 3, 3))
 
 
-def _volumes(mesh: HexMesh) -> NDArray[np.float64]:
-    """Rest volume at each of the eight points [m³], shape (E, 8)."""
-    x = mesh.nodes[mesh.elements]
-    out = np.empty((len(x), 8))
-    for q, point in enumerate(_POINTS):
-        h = 1.0 + _SIDES * point
-        gradient = _SIDES * np.stack([h[:, 1] * h[:, 2], h[:, 0] * h[:, 2], h[:, 0] * h[:, 1]], axis=1) / 8.0
-        out[:, q] = np.linalg.det(np.einsum("eai,aj->eij", x, gradient))
+def volumes(mesh: HexMesh) -> NDArray[np.float64]:
+    """Rest volume at each of the eight integration points [m³], shape (E, 8)."""
+    jacobian = np.einsum("eai,qaj->eqij", mesh.nodes[mesh.elements], slope_at(POINTS))
+    out: NDArray[np.float64] = np.linalg.det(jacobian)
     return out
 
 

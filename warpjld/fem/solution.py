@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from warpjld.errors import WarpjldError
 from warpjld.fem.conjugate import Status
+from warpjld.fem.loads import Loads
 
 __all__ = ["Instant", "Solution", "SolveError"]
 
@@ -43,12 +44,14 @@ class Solution:
         instants: Every equilibrium reached, in order.
         message: For people: what ended it.
         held: Degrees of freedom that were held because a body was free.
+        loads: The loads, at full strength.
     """
 
     status: Status
     instants: tuple[Instant, ...]
     message: str
     held: NDArray[np.int64]
+    loads: Loads
 
     @property
     def converged(self) -> bool:

@@ -35,6 +35,7 @@ def solve(
     prescribed: Prescribed,
     loads: Loads | None = None,
     *,
+    after: Solution | None = None,
     instants: int | list[float] = 1,
     free: str = "refuse",
     method: str = "auto",
@@ -49,6 +50,8 @@ def solve(
         body: Mesh and laws.
         prescribed: Known displacements.
         loads: Known forces.
+        after: Equilibrium to start from: loads and prescribed displacements go from what they were there to what is
+            given here, and degrees of freedom that are released let go of their reactions gradually.
         instants: Load instants, as a number of equal steps or as rising factors that end with 1; steps that fail are
             halved. One is enough for linear laws.
         free: What to do with a body that can move as a whole: ``refuse`` it, or ``hold`` it by as few degrees
@@ -66,13 +69,18 @@ def solve(
     if free not in _FREE:
         raise InputError(f"free: want {' or '.join(_FREE)}, got '{free}'")
     steps = _steps(instants)
-    before = prescribed.degrees
+    if after is not None and after.displacement.size != body.degrees:
+        raise InputError(f"after: is of a body with {after.displacement.size} degrees of freedom, not {body.degrees}")
+    held = np.empty(0, np.int64)
     if free == "hold":
+        wanted = prescribed.degrees
         prescribed = held_in_place(body, prescribed)
+        held = np.setdiff1d(prescribed.degrees, wanted)
+        if after is not None:
+            prescribed.values[np.isin(prescribed.degrees, held)] = after.displacement.reshape(-1)[held]
     else:
         refuse_free(body, prescribed)
-    held = np.setdiff1d(prescribed.degrees, before)
-    problem = _Problem(body, prescribed, loads or Loads(), method, precision, tolerance)
+    problem = _Problem(body, prescribed, loads or Loads(), after, method, precision, tolerance)
     run = problem.newton if body.large_strain else problem.linear
     solution = run(steps, held, progress)
     if check and not solution.converged:
@@ -82,17 +90,44 @@ def solve(
 
 class _Problem:
     def __init__(
-        self, body: Body, prescribed: Prescribed, loads: Loads, method: str, precision: str, tolerance: float
+        self,
+        body: Body,
+        prescribed: Prescribed,
+        loads: Loads,
+        after: Solution | None,
+        method: str,
+        precision: str,
+        tolerance: float,
     ) -> None:
         self.body = body
         self.prescribed = prescribed
         self.loads = loads
+        self.after = after
+        self.start = np.zeros(body.degrees) if after is None else after.displacement.reshape(-1)
         self.options: dict[str, Any] = {"method": method, "precision": precision, "threads": body.threads}
         bulk, shear = body.constants[:, 2], 2.0 * body.constants[:, :2].sum(axis=1)
         self.options["poisson"] = float(((3 * bulk - 2 * shear) / (6 * bulk + 2 * shear)).max())
         self.tolerance = tolerance
         self.free = prescribed.free(body.degrees)
         self.hierarchy: list[Any] | None = None
+
+    def known(self, factor: float) -> NDArray[np.float64]:
+        """Prescribed displacements at an instant, from where they started, shape (n,)."""
+        start: NDArray[np.float64] = self.start[self.prescribed.degrees]
+        return start + factor * (self.prescribed.values - start)
+
+    def external(self, factor: float, u: NDArray[np.float64] | None) -> NDArray[np.float64]:
+        """Nodal forces at an instant, at a displacement (at rest for linear laws), shape (3N,)."""
+        forces = factor * external_forces(self.body, self.loads, u)
+        if self.after is not None and factor != 1.0:
+            before = external_forces(self.body, self.after.loads, u) + self.after.reactions.reshape(-1)
+            forces += (1.0 - factor) * before
+        return forces
+
+    def subtract_pressure(self, stiffness: BlockMatrix, factor: float, u: NDArray[np.float64]) -> None:
+        subtract_pressure_stiffness(stiffness, self.body, self.loads, u, factor)
+        if self.after is not None and factor != 1.0:
+            subtract_pressure_stiffness(stiffness, self.body, self.after.loads, u, 1.0 - factor)
 
     def linear(self, steps: list[float], held: NDArray[np.int64], progress: Callable[[str], None] | None) -> Solution:
         """K is the same at every instant: one solve, scaled."""
@@ -103,18 +138,18 @@ class _Problem:
         try:
             solver = self._solver(stiffness)
         except IndefiniteError as error:
-            return Solution(Status.INDEFINITE, (self._rest(),), str(error), held)
+            return Solution(Status.INDEFINITE, (self._rest(),), str(error), held, self.loads)
         reached = []
         status, message = Status.CONVERGED, Status.CONVERGED.value
-        known = self.prescribed.full(body.degrees)
-        external = external_forces(body, self.loads)
         for factor in steps:
-            u = factor * known
-            right = factor * external - rest.forces - stiffness.product(u, threads=body.threads)
+            u = np.zeros(body.degrees)
+            u[self.prescribed.degrees] = self.known(factor)
+            external = self.external(factor, None)
+            right = external - rest.forces - stiffness.product(u, threads=body.threads)
             done = solver.solve(right, tolerance=self.tolerance)
             u = u + done.x
             forces = rest.forces + stiffness.product(u, threads=body.threads)
-            reactions = np.where(self.free, 0.0, forces - factor * external)
+            reactions = np.where(self.free, 0.0, forces - external)
             reached.append(
                 Instant(factor, u.reshape(-1, 3), reactions.reshape(-1, 3), 1, done.iterations, done.residual)
             )
@@ -123,11 +158,11 @@ class _Problem:
             if done.status is not Status.CONVERGED:
                 status, message = done.status, f"at load {factor:g}: {done.status.value} (residual {done.residual:.1e})"
                 break
-        return Solution(status, tuple(reached), message, held)
+        return Solution(status, tuple(reached), message, held, self.loads)
 
     def newton(self, steps: list[float], held: NDArray[np.int64], progress: Callable[[str], None] | None) -> Solution:
         """Newton with line search; an instant that fails is tried again at half the step."""
-        u = np.zeros(self.body.degrees)
+        u = self.start.copy()
         reached: list[Instant] = []
         factor, halvings = 0.0, 0
         todo = list(steps)
@@ -150,11 +185,11 @@ class _Problem:
             halvings += 1
             if halvings > _HALVINGS:
                 message = f"no equilibrium found above load {factor:.4g} (tried {target:.4g}): {status.value}"
-                return Solution(status, tuple(reached) or (self._rest(),), message, held)
+                return Solution(status, tuple(reached) or (self._rest(),), message, held, self.loads)
             if progress:
                 progress(f"load {target:.3g}: {status.value}; halving the step")
             todo.insert(0, 0.5 * (factor + target))
-        return Solution(Status.CONVERGED, tuple(reached), Status.CONVERGED.value, held)
+        return Solution(Status.CONVERGED, tuple(reached), Status.CONVERGED.value, held, self.loads)
 
     def _equilibrium(self, u: NDArray[np.float64], target: float, *, cautious: bool) -> tuple[Status, Instant | None]:
         """Newton's method at one load.
@@ -167,16 +202,15 @@ class _Problem:
         u = u.copy()
         known = self.prescribed.degrees
         jump = np.zeros_like(u)
-        jump[known] = target * self.prescribed.values - u[known]
+        jump[known] = self.known(target) - u[known]
         iterations = 0
         pressures: NDArray[np.float64] | None = None
         for step in range(_CAUTIOUS if cautious else _NEWTON):
             tangent = body.at(u, pressures=pressures)
             stiffness = tangent.stiffness
             assert stiffness is not None
-            external = target * external_forces(body, self.loads, u)
-            if self.loads.pressure:
-                subtract_pressure_stiffness(stiffness, body, self.loads, u, target)
+            external = self.external(target, u)
+            self.subtract_pressure(stiffness, target, u)
             residual = np.where(free, external - tangent.forces, 0.0)
             scale = max(norm(external), norm(np.where(free, 0.0, tangent.forces - external)), 1e-300)
             now = norm(residual)
@@ -198,7 +232,7 @@ class _Problem:
             jump = (1.0 - length) * jump
             if length == 1.0:
                 jump[:] = 0.0
-                u[known] = target * self.prescribed.values
+                u[known] = self.known(target)
         return Status.MAX_ITERATIONS, None
 
     def _line_search(
@@ -214,7 +248,7 @@ class _Problem:
                 upright = True
                 if before is None:
                     return length, Status.CONVERGED
-                external = target * external_forces(self.body, self.loads, there)
+                external = self.external(target, there)
                 size = norm(np.where(self.free, external - trial.forces, 0.0))
                 if size < best[0]:
                     best = (size, length)
@@ -248,7 +282,8 @@ class _Problem:
 
     def _rest(self) -> Instant:
         nothing = np.zeros((self.body.degrees // 3, 3))
-        return Instant(0.0, nothing, nothing, 0, 0, 0.0)
+        reactions = nothing if self.after is None else self.after.reactions
+        return Instant(0.0, self.start.reshape(-1, 3), reactions, 0, 0, 0.0)
 
 
 def _steps(instants: int | list[float]) -> list[float]:
