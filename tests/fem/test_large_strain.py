@@ -75,8 +75,13 @@ def test_elastica(load: float, deflection: float, shortening: float) -> None:
 
 @pytest.mark.parametrize(
     ("stretch", "pressure"),
-    [(1.05, 0.083654), (1.1, 0.144424), (1.2, 0.219506)]
-    + [pytest.param(1.5, 0.275019, marks=pytest.mark.slow), pytest.param(2.0, 0.23838, marks=pytest.mark.slow)],
+    [
+        (1.05, 0.083654),
+        (1.1, 0.144424),
+        (1.2, 0.219506),
+        pytest.param(1.5, 0.275019, marks=pytest.mark.slow),
+        pytest.param(2.0, 0.23838, marks=pytest.mark.slow),
+    ],
 )
 def test_inflated_shell_beyond_its_limit_point(stretch: float, pressure: float) -> None:
     """The inner wall's radius is prescribed, so that the pressure may fall; reactions give it."""

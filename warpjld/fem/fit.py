@@ -63,8 +63,8 @@ def fit_mesh(envelope: Envelope, spacing: float, *, least: float = 0.1, name: st
     notes = []
     if not envelope.watertight:
         notes.append(
-            f"the surface is not watertight ({envelope.open_edges} open edges, {envelope.crowded_edges} edges with more "
-            "than two faces): inside and outside were told apart by winding number"
+            f"the surface is not watertight ({envelope.open_edges} open edges, {envelope.crowded_edges} edges with "
+            "more than two faces): inside and outside were told apart by winding number"
         )
     cells, origin = _cells(envelope, spacing, notes)
     mesh, boundary = _grown(cells, origin, spacing, name)
@@ -129,10 +129,10 @@ def _grown(
     shape = [n + 1 for n in cells.shape]
     every = elements_of(np.arange(int(np.prod(shape)), dtype=np.int32).reshape(shape))[cells.ravel()]
     used, elements = np.unique(every, return_inverse=True)
-    elements = elements.reshape(-1, 8).astype(np.int32)
+    elements = np.asarray(elements.reshape(-1, 8), dtype=np.int32)
     lattice = np.stack(np.unravel_index(used, shape), axis=1).astype(np.int32)
     nodes = origin + spacing * lattice
-    core = HexMesh(nodes, elements, np.zeros(len(elements), np.int32), (name,))
+    core = HexMesh(nodes, np.asarray(elements, dtype=np.int32), np.zeros(len(elements), np.int32), (name,))
     quads = core.quads(core.boundary())
     skin = np.unique(quads)
     outer = np.full(len(nodes), -1, np.int32)

@@ -26,7 +26,7 @@ class Flesh:
     Attributes:
         mesh: Regions ``flesh`` and ``bone``; each bone's nodes are a set named ``bone.`` and the joint at its far end.
         bones: Far joint of each bone, in the skeleton's numbering.
-        parents: Near joint of each bone.
+        parents: Near joint of each bone, itself for the piece behind a root.
         names: Name of each bone's node set.
         skin: The rig's own surface, carried by the mesh.
         fit: Quality of the mesh.
@@ -94,9 +94,12 @@ def flesh_of(
     owner = np.full(len(centres), -1)
     for joint, parent in enumerate(skeleton.parents):
         if parent < 0:
-            continue
-        start, end = skeleton.rest[parent], skeleton.rest[joint]
-        along = end - start
+            # what lies behind the root (the forearm's stump) is held with it
+            parent, start = joint, skeleton.rest[joint]
+            along = _backwards(rig, envelope, joint)
+        else:
+            start = skeleton.rest[parent]
+            along = skeleton.rest[joint] - start
         length = float(np.linalg.norm(along))
         if length == 0.0:
             continue
@@ -106,7 +109,7 @@ def flesh_of(
         size = float(np.linalg.norm(back))
         back = back / size if size > 1e-9 else np.zeros(3)
         share = np.clip((centres - start) @ along / length**2, 0.0, 1.0)
-        inside = (share > gap) & (share < 1.0 - gap)
+        inside = (share > gap) & (share < (1.0 if parent == joint else 1.0 - gap))
         here = np.interp(share, t, depth)
         axis = start + share[:, None] * along + (flush * here)[:, None] * back
         away = np.linalg.norm(centres - axis, axis=1) / np.maximum(bone * here, 1e-12)
@@ -126,8 +129,29 @@ def flesh_of(
     )
     skin = embed(mesh, rig.surface.vertices, reach=3.0)
     return Flesh(
-        mesh, tuple(joints), tuple(int(skeleton.parents[j]) for j in joints), names, skin, fit, skeleton.rest.copy()
+        mesh,
+        tuple(joints),
+        tuple(int(skeleton.parents[j]) if skeleton.parents[j] >= 0 else j for j in joints),
+        names,
+        skin,
+        fit,
+        skeleton.rest.copy(),
     )
+
+
+def _backwards(rig: Rig, envelope: Envelope, root: int) -> NDArray[np.float64]:
+    """From a root joint away from its children, as far as the surface goes [m]."""
+    skeleton = rig.skeleton
+    children = skeleton.rest[np.asarray(skeleton.parents) == root] - skeleton.rest[root]
+    away = -children.mean(axis=0) if len(children) else np.zeros(3)
+    size = float(np.linalg.norm(away))
+    if size == 0.0:
+        return away
+    steps = np.linspace(0.0, envelope.size, 400)
+    inside = envelope.ask(skeleton.rest[root] + steps[:, None] * (away / size)).distance < 0.0
+    reach = steps[int(np.argmin(inside))] if not inside.all() else 0.0
+    out: NDArray[np.float64] = away * (reach / size)
+    return out
 
 
 def _apart(mesh: HexMesh, owner: NDArray[np.int64]) -> NDArray[np.int64]:

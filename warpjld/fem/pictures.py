@@ -99,7 +99,7 @@ def _bar(moved: Any, limits: tuple[float, float], label: str) -> NDArray[np.uint
     plotter.add_mesh(moved, scalars="value", cmap="viridis", clim=limits, opacity=0.0, show_scalar_bar=False)
     plotter.add_scalar_bar(
         label, n_labels=6, color="black", fmt="%.3g", vertical=True, position_x=0.1, position_y=0.15, height=0.7,
-        width=0.5, title_font_size=40, label_font_size=38,
+        width=0.5, title_font_size=34, label_font_size=38,
     )  # fmt: skip
     image = np.asarray(plotter.screenshot(return_img=True))
     plotter.close()
@@ -118,5 +118,5 @@ def _view(points: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.
     if extent[2] > 1.5 * extent[:2].max():
         return np.array([0.0, -1.0, 0.0]), np.array([0.0, 0.0, 1.0])
     front = np.zeros(3)
-    front[int(np.argmin(extent[:2] + [1e-9 * extent.max(), 0.0]))] = -1.0
+    front[int(np.argmin(extent[:2] + np.array([1e-9 * extent.max(), 0.0])))] = -1.0
     return front, np.array([0.0, 0.0, 1.0])

@@ -136,7 +136,7 @@ def free_motions(body: Body, prescribed: Prescribed) -> list[tuple[NDArray[np.in
         if len(mine):
             place = np.searchsorted(nodes, mine // 3)
             held = modes.reshape(-1, 3, 6)[place, mine % 3]
-            _, sizes, right = np.linalg.svd(held, full_matrices=True)
+            _, sizes, right = np.linalg.svd(np.linalg.qr(np.pad(held, ((0, 6), (0, 0))), mode="r"))
             rank = int((sizes > 1e-6 * max(1.0, np.sqrt(len(mine)))).sum())
             left = right[rank:].T
         else:

@@ -204,6 +204,7 @@ class _Problem:
         jump = np.zeros_like(u)
         jump[known] = self.known(target) - u[known]
         iterations = 0
+        start = 0.0
         pressures: NDArray[np.float64] | None = None
         for step in range(_CAUTIOUS if cautious else _NEWTON):
             tangent = body.at(u, pressures=pressures)
@@ -212,8 +213,9 @@ class _Problem:
             external = self.external(target, u)
             self.subtract_pressure(stiffness, target, u)
             residual = np.where(free, external - tangent.forces, 0.0)
-            scale = max(norm(external), norm(np.where(free, 0.0, tangent.forces - external)), 1e-300)
             now = norm(residual)
+            start = max(start, now) if step == 0 else start
+            scale = max(start, norm(external), norm(np.where(free, 0.0, tangent.forces - external)), 1e-300)
             moved = not jump.any()
             if moved and now <= self.tolerance * scale:
                 reactions = np.where(free, 0.0, tangent.forces - external).reshape(-1, 3)

@@ -67,7 +67,7 @@ def improve(
     def cost(vector: NDArray[np.float64]) -> tuple[float, NDArray[np.float64]]:
         x[:] = vector.reshape(-1, 3)
         launch()
-        gradient = np.stack(
+        gradient: NDArray[np.float64] = np.stack(
             [np.bincount(flat, weights=slopes[:, :, k].ravel(), minlength=count) for k in range(3)], axis=1
         )
         away = x[boundary] - targets
@@ -75,7 +75,7 @@ def improve(
         squared = np.einsum("bi,bi->b", away, away)
         value = float(costs.sum()) + float((pull * (along * along + slide * squared)).sum())
         gradient[boundary] += 2.0 * pull[:, None] * (along[:, None] * normals + slide * away)
-        return value, gradient.reshape(-1)
+        return value, np.asarray(gradient, dtype=np.float64).reshape(-1)
 
     targets = targets / spacing
     result = minimize(
