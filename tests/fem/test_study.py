@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 import pyvista
+import trimesh
 
 from warpjld.cli import main
 from warpjld.errors import InputError
@@ -96,6 +97,30 @@ def test_missing_face_and_free_body_are_one_line(tmp_path: Path, capsys: pytest.
     path.write_text(SMALL.replace('prescribed = [{ where = "z-", x = 0, y = 0, z = 0 }]', ""))
     assert run(["fem", str(path), "-o", str(tmp_path / "out"), "--no-pictures", "-q"]) == 1
     assert "is not held: free in moving along x" in capsys.readouterr().err
+
+
+def test_body_from_an_open_surface(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    surface = trimesh.creation.icosphere(3)
+    surface.update_faces(surface.triangles_center[:, 2] < 0.93)
+    surface.export(tmp_path / "cup.stl")
+    text = SMALL.replace(
+        'kind = "box"\nsize = [1.0, 1.0, 2.0]\ncounts = [2, 2, 4]', 'kind = "surface"\npath = "cup.stl"\nspacing = 0.25'
+    )
+    text = (
+        text.split("[sets.rim]")[0]
+        + """
+[sets.foot]
+below = { z = -0.7 }
+[[step]]
+gravity = [0, 0, -1.0]
+prescribed = [{ where = "foot", x = 0, y = 0, z = 0 }]
+"""
+    )
+    (tmp_path / "cup.toml").write_text(text)
+    assert run(["fem", str(tmp_path / "cup.toml"), "-o", str(tmp_path / "out"), "--no-pictures"]) == 0
+    printed = capsys.readouterr().out.replace("\n", " ")
+    assert "the surface is not watertight" in printed
+    assert "least scaled Jacobian" in printed
 
 
 def test_example_loads() -> None:

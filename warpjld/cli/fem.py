@@ -41,8 +41,8 @@ def command(study: Path, output: Path | None, no_pictures: bool, quiet: bool) ->
     with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always")
         loaded = load_study(study)
-    for warning in caught:
-        console.print(f"note: {warning.message}", markup=False)
+    for note in (*loaded.notes, *(str(warning.message) for warning in caught)):
+        console.print(f"note: {note}", markup=False)
     folder = output or Path(study.stem)
     folder.mkdir(parents=True, exist_ok=True)
     mesh = loaded.body.mesh

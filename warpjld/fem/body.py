@@ -89,6 +89,7 @@ class Body:
         stiffness: bool = True,
         pressures: NDArray[np.float64] | None = None,
         increment: NDArray[np.float64] | None = None,
+        reuse: Tangent | None = None,
     ) -> Tangent:
         """Stiffness and internal forces at a displacement.
 
@@ -97,6 +98,7 @@ class Body:
             stiffness: Whether K is wanted, or forces only.
             pressures: Pressure of each element that K is to take for its own, shape (E,); by default the present one.
             increment: Displacement that is about to be added [m], shape (3N,): ``pressures`` of the result foresee it.
+            reuse: A result that is not needed any more: its matrix is written over.
         """
         from warpjld_kernels import fem_element
 
@@ -109,7 +111,11 @@ class Body:
                 pressures = self.at(u, stiffness=False).pressures
         step = np.zeros(self.degrees) if increment is None else np.ascontiguousarray(increment, np.float64).ravel()
         blocks = len(self.pattern.columns) if stiffness else 0
-        values = np.zeros((max(blocks, 1), 3, 3))
+        if stiffness and reuse is not None and reuse.stiffness is not None:
+            values = reuse.stiffness.values
+            values.fill(0.0)
+        else:
+            values = np.zeros((max(blocks, 1), 3, 3))
         forces = np.zeros(self.degrees)
         lowest = np.empty(len(self._elements))
         found = np.empty(len(self._elements))

@@ -83,7 +83,7 @@ def fit_mesh(envelope: Envelope, spacing: float, *, least: float = 0.1, name: st
     return Fit(fitted, float(quality.min()), float(quality.mean()), gap, volume / envelope.volume, tuple(notes))
 
 
-def mesh_surface_file(path: Path, *, spacing: float, scale: float = 1.0) -> HexMesh:
+def mesh_surface_file(path: Path, *, spacing: float, scale: float = 1.0) -> Fit:
     """Mesh the inside of a surface file (OBJ, STL, PLY, …), scaled to metres.
 
     Raises:
@@ -97,7 +97,7 @@ def mesh_surface_file(path: Path, *, spacing: float, scale: float = 1.0) -> HexM
         loaded = trimesh.load(path, force="mesh", process=True)
     except Exception as error:
         raise InputError(f"not a surface that can be read: {error}", path=path) from error
-    return fit_mesh(Envelope(scale * np.asarray(loaded.vertices), np.asarray(loaded.faces)), spacing).mesh
+    return fit_mesh(Envelope(scale * np.asarray(loaded.vertices), np.asarray(loaded.faces)), spacing)
 
 
 def _cells(envelope: Envelope, spacing: float, notes: list[str]) -> tuple[NDArray[np.bool_], NDArray[np.float64]]:

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from warpjld.errors import InputError
 from warpjld.fem.blockmatrix import BlockMatrix
-from warpjld.fem.body import Body
+from warpjld.fem.body import Body, Tangent
 from warpjld.fem.conjugate import Iteration, Status
 from warpjld.fem.dots import norm
 from warpjld.fem.linear import LinearSolver
@@ -110,6 +110,7 @@ class _Problem:
         self.tolerance = tolerance
         self.free = prescribed.free(body.degrees)
         self.hierarchy: list[Any] | None = None
+        self.tangent: Tangent | None = None
 
     def known(self, factor: float) -> NDArray[np.float64]:
         """Prescribed displacements at an instant, from where they started, shape (n,)."""
@@ -207,7 +208,7 @@ class _Problem:
         start = 0.0
         pressures: NDArray[np.float64] | None = None
         for step in range(_CAUTIOUS if cautious else _NEWTON):
-            tangent = body.at(u, pressures=pressures)
+            tangent = self.tangent = body.at(u, pressures=pressures, reuse=self.tangent)
             stiffness = tangent.stiffness
             assert stiffness is not None
             external = self.external(target, u)

@@ -82,6 +82,7 @@ class Study:
         path: The file.
         method: Linear solver.
         precision: Its precision.
+        notes: What was found while meshing, for people.
     """
 
     title: str
@@ -90,6 +91,7 @@ class Study:
     path: Path
     method: str = "auto"
     precision: str = "float64"
+    notes: tuple[str, ...] = ()
 
     def run(self, progress: Callable[[str], None] | None = None) -> Iterator[Reached]:
         """Equilibria in order, as whole steps are done; the last one's solution may not have converged."""
@@ -136,7 +138,7 @@ def load_study(path: Path) -> Study:
         raise InputError(f"not TOML: {error}", path=path) from error
     try:
         _known("the study", table, ("title", "mesh", "material", "sets", "step", "solver", "initial_stress"))
-        mesh = _mesh(_need("the study", table, "mesh", dict), path.parent)
+        mesh, notes = _mesh(_need("the study", table, "mesh", dict), path.parent)
         for name, chosen in table.get("sets", {}).items():
             mesh = mesh.with_nodes(**{name: _set(mesh, name, chosen)})
         materials = {n: _material(n, t) for n, t in _need("the study", table, "material", dict).items()}
@@ -147,14 +149,14 @@ def load_study(path: Path) -> Study:
                 _prescribed(mesh, entry)
         solver = table.get("solver", {})
         _known("[solver]", solver, ("method", "precision"))
-        return Study(str(table.get("title", path.stem)), body, steps, path, **solver)
+        return Study(str(table.get("title", path.stem)), body, steps, path, notes=notes, **solver)
     except InputError as error:
         if error.path is None:
             raise InputError(error.message, path=path) from error
         raise
 
 
-def _mesh(table: Mapping[str, Any], folder: Path) -> HexMesh:
+def _mesh(table: Mapping[str, Any], folder: Path) -> tuple[HexMesh, tuple[str, ...]]:
     kind = _need("[mesh]", table, "kind", str)
     options = {k: v for k, v in table.items() if k != "kind"}
     makers: dict[str, Callable[..., HexMesh]] = {"box": box, "ball": ball, "cylinder": cylinder, "finger": finger}
@@ -162,22 +164,25 @@ def _mesh(table: Mapping[str, Any], folder: Path) -> HexMesh:
         from warpjld.fem.exchange import read_mesh
 
         _known("[mesh]", options, ("path", "scale"))
-        return read_mesh(folder / _need("[mesh]", options, "path", str), scale=float(options.get("scale", 1.0)))
+        path = folder / _need("[mesh]", options, "path", str)
+        return read_mesh(path, scale=float(options.get("scale", 1.0))), ()
     if kind == "surface":
         from warpjld.fem.fit import mesh_surface_file
 
         _known("[mesh]", options, ("path", "spacing", "scale"))
-        return mesh_surface_file(
+        fit = mesh_surface_file(
             folder / _need("[mesh]", options, "path", str),
             spacing=_need("[mesh]", options, "spacing", float),
             scale=float(options.get("scale", 1.0)),
         )
+        fitted = f"fitted to the surface: gap at most {1e3 * fit.gap:.2g} mm, volume {100 * fit.volume:.1f} % of it"
+        return fit.mesh, (fitted, *fit.notes)
     if kind not in makers:
         raise InputError(f"[mesh] kind: {_choice(kind, [*makers, 'file', 'surface'])}")
     import inspect
 
     _known("[mesh]", options, tuple(inspect.signature(makers[kind]).parameters))
-    return makers[kind](**options)
+    return makers[kind](**options), ()
 
 
 def _material(name: str, table: Mapping[str, Any]) -> Material:
