@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import runpy
 from pathlib import Path
 
 import numpy as np
@@ -39,6 +40,14 @@ def test_hand_sags_when_gravity_turns(data: Path) -> None:
         moved = held.values[chosen].reshape(-1, 3).mean(axis=0)
         ends = poses.positions[0, [parent, joint]] - rig.skeleton.rest[[parent, joint]]
         assert np.linalg.norm(moved - ends.mean(axis=0)) < 0.5 * np.linalg.norm(ends, axis=1).max() + 1e-9
+
+
+@pytest.mark.slow
+def test_example(tmp_path: Path) -> None:
+    example = Path(__file__).resolve().parents[2] / "examples" / "hand_gravity.py"
+    sag = runpy.run_path(str(example))["main"]("builtin:left", tmp_path, 0.004)
+    assert 1e-5 < sag < 1e-3
+    assert {p.name for p in tmp_path.iterdir()} == {"skin.npy", "hand.vtu", "hand.png"}
 
 
 def _volume(mesh):  # type: ignore[no-untyped-def]

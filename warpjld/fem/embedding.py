@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from warpjld.errors import InputError
 from warpjld.fem.hexmesh import HexMesh
-from warpjld.fem.shape import shape_at, slope_at
+from warpjld.fem.shape import CENTRE_GRADIENT, shape_at, slope_at
 
 __all__ = ["Embedding", "embed"]
 
@@ -73,6 +73,14 @@ def embed(mesh: HexMesh, points: NDArray[np.float64], *, reach: float = 1.0) -> 
         better = beyond < best[todo]
         chosen = todo[better]
         best[chosen], place[chosen], owner[chosen] = beyond[better], at[better], near[chosen, column]
+    # beyond the boundary, where Newton's method may fail: from the nearest element's middle, straight on
+    lost = np.flatnonzero(best > 1.0)
+    if len(lost):
+        element = x[near[lost, 0]]
+        jacobian = np.einsum("pai,aj->pij", element, CENTRE_GRADIENT)
+        at = np.linalg.solve(jacobian, (points[lost] - element.mean(axis=1))[:, :, None])[:, :, 0]
+        best[lost] = 0.5 * np.maximum(np.abs(at).max(axis=1) - 1.0, 0.0)
+        place[lost], owner[lost] = np.clip(at, -2.0, 2.0), near[lost, 0]
     if not (best <= reach).all():
         worst = int(np.argmax(best))
         raise InputError(f"point {worst} lies {best[worst]:.2g} element sizes outside the mesh, more than {reach:g}")

@@ -79,7 +79,7 @@ class LinearSolver:
         if method == "multigrid":
             if hierarchy is None:
                 self.hierarchy = hierarchy_of(mesh)
-            degree, spread = (6, 30.0) if poisson > _STIFF else (2, 5.0)
+            degree, spread = (8, 50.0) if poisson > _STIFF else (2, 5.0)
             assert self.hierarchy is not None
             self._precondition = Multigrid(
                 stiffness, free, self.hierarchy, degree=degree, spread=spread, threads=self.threads

@@ -9,8 +9,8 @@ from __future__ import annotations
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.optimize import minimize
 
+from warpjld.fem.descent import minimise
 from warpjld.fem.rows import Launch, shared, threads_of
 
 __all__ = ["improve"]
@@ -78,8 +78,6 @@ def improve(
         return value, np.asarray(gradient, dtype=np.float64).reshape(-1)
 
     targets = targets / spacing
-    result = minimize(
-        cost, (nodes / spacing).reshape(-1), jac=True, method="L-BFGS-B", options={"maxiter": rounds, "maxcor": 12}
-    )
-    improved: NDArray[np.float64] = result.x.reshape(-1, 3) * spacing
+    start = (nodes / spacing).reshape(-1)
+    improved: NDArray[np.float64] = minimise(cost, start, rounds=rounds, first_step=0.05).reshape(-1, 3) * spacing
     return improved
