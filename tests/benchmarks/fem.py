@@ -11,6 +11,8 @@ from __future__ import annotations
 
 import argparse
 import resource
+import subprocess
+import sys
 import time
 import warnings
 from collections.abc import Callable
@@ -41,6 +43,10 @@ def main() -> None:
     parser.add_argument("cases", nargs="*", default=["cube45", "finger57"], help=", ".join(CASES))
     parser.add_argument("--repeat", type=int, default=3)
     arguments = parser.parse_args()
+    if len(arguments.cases) > 1:  # each in a process of its own, for the memory's sake
+        for name in arguments.cases:
+            subprocess.run([sys.executable, __file__, name, "--repeat", str(arguments.repeat)], check=True)
+        return
     heads = ("setup", "solve", "total")
     print(
         f"{'case':10} {'DOF':>7} {'solver':22}",

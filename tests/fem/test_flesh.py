@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from warpjld.errors import InputError
 from warpjld.fem import Body, LinearElastic, Loads, solve
 from warpjld.fem.flesh import flesh_of
 from warpjld.io import load_rig
@@ -45,9 +46,17 @@ def test_hand_sags_when_gravity_turns(data: Path) -> None:
 @pytest.mark.slow
 def test_example(tmp_path: Path) -> None:
     example = Path(__file__).resolve().parents[2] / "examples" / "hand_gravity.py"
-    sag = runpy.run_path(str(example))["main"]("builtin:left", tmp_path, 0.004)
+    sag = runpy.run_path(str(example))["main"]("builtin:left", tmp_path, 0.003)
     assert 1e-5 < sag < 1e-3
     assert {p.name for p in tmp_path.iterdir()} == {"skin.npy", "hand.vtu", "hand.png"}
+
+
+@pytest.mark.slow
+def test_spacing_too_coarse_for_the_fingers() -> None:
+    from warpjld.hand import build_hand
+
+    with pytest.raises(InputError, match="too coarse, thin parts are not meshed"):
+        flesh_of(build_hand("left"), 0.004)
 
 
 def _volume(mesh):  # type: ignore[no-untyped-def]

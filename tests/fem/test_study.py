@@ -79,6 +79,11 @@ def test_study_writes_a_series_and_reactions(tmp_path: Path) -> None:
         ('where = "z+"', 'where = "top"', "no node set 'top'"),
         ("counts = [2, 2, 4]", "counts = [2, 2, 0]", "counts: want three positive"),
         ("[[step]]", "[step]", "not TOML"),
+        ("counts = [2, 2, 4]", 'counts = "many"', "counts|wrong kind"),
+        ("young = 1e5", 'young = "soft"', r"\[material.body\] young: want a number, got 'soft'"),
+        ("instants = 2", "centrifugal = { axle = [0, 0, 1] }", "wrong kind: .*axle"),
+        ("instants = 2", 'gravity = "down"', "wrong kind|gravity"),
+        ("instants = 2", "traction = { lid = [0, 0, 1] }", "traction on a missing face set"),
     ],
 )
 def test_wrong_study(tmp_path: Path, old: str, new: str, message: str) -> None:

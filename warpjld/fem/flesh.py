@@ -127,7 +127,12 @@ def flesh_of(
         region_names=("flesh", "bone"),
         node_sets={**mesh.node_sets, **sets},
     )
-    skin = embed(mesh, rig.surface.vertices, reach=3.0)
+    try:
+        skin = embed(mesh, rig.surface.vertices, reach=3.0)
+    except InputError as error:
+        raise InputError(
+            f"spacing: {spacing:g} m is too coarse, thin parts are not meshed ({error.message})"
+        ) from error
     return Flesh(
         mesh,
         tuple(joints),

@@ -17,7 +17,7 @@ from warpjld.fem.ball import ball, cylinder, finger
 from warpjld.fem.body import Body
 from warpjld.fem.box import box
 from warpjld.fem.hexmesh import HexMesh
-from warpjld.fem.loads import Centrifugal, Loads
+from warpjld.fem.loads import Centrifugal, Loads, external_forces
 from warpjld.fem.materials import LinearElastic, Material, MooneyRivlin, NeoHooke
 from warpjld.fem.prescribed import Prescribed, prescribe
 from warpjld.fem.solution import Instant, Solution
@@ -145,6 +145,7 @@ def load_study(path: Path) -> Study:
         body = Body(mesh, materials, initial_stress=table.get("initial_stress"))
         steps = tuple(_step(k, t) for k, t in enumerate(_need("the study", table, "step", list)))
         for step in steps:
+            external_forces(body, step.loads)
             for entry in step.prescribed:
                 _prescribed(mesh, entry)
         solver = table.get("solver", {})
@@ -154,6 +155,8 @@ def load_study(path: Path) -> Study:
         if error.path is None:
             raise InputError(error.message, path=path) from error
         raise
+    except (TypeError, ValueError, AttributeError, IndexError) as error:
+        raise InputError(f"an entry is of the wrong kind: {error}", path=path) from error
 
 
 def _mesh(table: Mapping[str, Any], folder: Path) -> tuple[HexMesh, tuple[str, ...]]:
