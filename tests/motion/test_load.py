@@ -15,7 +15,7 @@ from warpjld.motion import load_motion
 def test_tables_play_at_the_given_rate(tmp_path: Path) -> None:
     path = tmp_path / "curl.CSV"
     path.write_text("frame,index.base.flexion\n0,0\n10,60\n")
-    for rate, expected in ((None, 25.0), (50.0, 50.0)):
+    for rate, expected in ((None, 30.0), (50.0, 50.0)):
         poses, got = load_motion(path, rig(hand()), rate=rate)
         assert (len(poses), got) == (11, expected)
     assert np.degrees(poses.flexion[-1, hand().index("index.base")]) == pytest.approx(60)

@@ -25,7 +25,7 @@ _BLOCK = 16  # frames deformed at once: memory does not grow with the length of 
 @click.option("--unit", type=click.Choice(["m", "cm", "mm"]), help="RIG's unit; guessed by default.")
 @click.option("--up", type=click.Choice(["y", "z"]), help="RIG's up axis.")
 @click.option("--frames", "span", metavar="A:B", help="Only frames A to B, both included, the motion's first being 0.")
-@click.option("--rate", type=float, help="Frames a second; the motion's own by default, 25 for CSV.")
+@click.option("--rate", type=float, help="Frames a second; the motion's own by default, 30 for CSV.")
 @click.option(
     "--limits",
     type=click.Choice(["error", "clamp", "ignore"]),
@@ -40,6 +40,13 @@ _BLOCK = 16  # frames deformed at once: memory does not grow with the length of 
     default="geometry",
     show_default=True,
     help="Where a vertex's domain comes from: the surface alone, or painted weights.",
+)
+@click.option(
+    "--method",
+    type=click.Choice(["smooth", "paper"]),
+    default="smooth",
+    show_default=True,
+    help="Soft domain borders, or one segment a vertex as published.",
 )
 @click.option("--device", default="cpu", show_default=True, help="Where to compute: cpu, cuda:0, …")
 @click.option("--threads", type=click.IntRange(min=1), help="CPU threads; as many as pay by default.")
@@ -58,6 +65,7 @@ def command(
     limits: str,
     parameters: Path | None,
     domains: str,
+    method: str,
     device: str,
     threads: int | None,
     as_json: bool,
@@ -86,7 +94,14 @@ def command(
     writing = open_cache(out, driven.surface, frames=len(poses), rate=moved.rate, start_frame=first, name=driven.name)
     with progress(quiet) as report, writing as cache:
         report("binding", 0, len(poses))
-        covering = bind(driven.skeleton, driven.surface, parameters=chosen, skin=driven.skin, domains=domains)  # type: ignore[arg-type]
+        covering = bind(
+            driven.skeleton,
+            driven.surface,
+            parameters=chosen,
+            skin=driven.skin,
+            domains=domains,  # type: ignore[arg-type]
+            method=method,  # type: ignore[arg-type]
+        )
         for start, block in covering.blocks(poses, frames=_BLOCK, device=device, threads=threads):
             cache.write(block)
             report("deforming", start + len(block), len(poses))

@@ -9,7 +9,7 @@ from __future__ import annotations
 import numpy as np
 import scipy.sparse as sp
 from numpy.typing import NDArray
-from scipy.sparse.linalg import cg, splu
+from scipy.sparse.linalg import splu
 
 from warpjld.covering.corners import corner_conductivity
 from warpjld.covering.operators import Fan
@@ -19,7 +19,7 @@ from warpjld.skeleton.tree import Skeleton
 
 __all__ = ["domains_from_geometry", "domains_from_skin"]
 
-_DIRECT_LIMIT = 100_000  # vertices up to which a sparse factorisation is quicker than conjugate gradients
+_DIRECT_LIMIT = 20_000  # vertices up to which a sparse factorisation is quicker than multigrid
 
 
 def domains_from_geometry(
@@ -166,11 +166,12 @@ def _solve(matrix: sp.csc_array, right: NDArray[np.float64]) -> NDArray[np.float
         factors = splu(matrix, permc_spec="MMD_AT_PLUS_A", options={"SymmetricMode": True})
         solution: NDArray[np.float64] = factors.solve(right)
         return solution
-    rows = matrix.tocsr()
-    jacobi = sp.diags_array(1.0 / matrix.diagonal())
+    import pyamg
+
+    multigrid = pyamg.smoothed_aggregation_solver(sp.csr_matrix(matrix))
     out = np.empty_like(right)
     for k in range(right.shape[1]):
-        out[:, k], info = cg(rows, right[:, k], rtol=1e-7, atol=0.0, M=jacobi, maxiter=10_000)
+        out[:, k], info = multigrid.solve(right[:, k], tol=1e-7, accel="cg", maxiter=200, return_info=True)
         if info:
             raise InputError(f"domains: heat did not settle in {info} iterations; is the mesh badly broken?")
     return out

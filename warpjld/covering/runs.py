@@ -174,7 +174,7 @@ def _sparse(entries: list[tuple[NDArray, NDArray]], rows: int, width: int) -> sp
 
 
 def _group(used: sp.csr_array, columns: Columns, lanes: int) -> tuple[list[NDArray[np.int64]], list[list[int]]]:
-    """Vertices by the palette columns they use; groups smaller than a tile join the one where that costs least."""
+    """Vertices by the palette columns they use; groups join where that costs less than tiles that are partly filled."""
     signature = np.random.default_rng(0).integers(1, 2**62, used.shape[1])
     pattern = sp.csr_array((np.ones(used.nnz, dtype=np.int64), used.indices, used.indptr), shape=used.shape)
     _, first, member = np.unique(pattern @ signature, return_index=True, return_inverse=True)
@@ -182,17 +182,31 @@ def _group(used: sp.csr_array, columns: Columns, lanes: int) -> tuple[list[NDArr
     masks = [sum(1 << int(c) for c in used.indices[used.indptr[v] : used.indptr[v + 1]]) for v in first]
     sizes = [len(m) for m in members]
     cost = _column_cost(columns)
-    while len(masks) > 1 and min(sizes) < lanes:
-        small = sizes.index(min(sizes))
+
+    def work(size: int, mask: int) -> int:
+        return -(-size // lanes) * (_FIXED + cost(mask))
+
+    settled = 0  # groups at the front that are better left alone
+    while len(masks) - settled > 0 and len(masks) > 1:
+        small = min(range(settled, len(sizes)), key=sizes.__getitem__)
         mask, vertices, size = masks.pop(small), members.pop(small), sizes.pop(small)
-        added = [n * cost(mask & ~m) + size * cost(m & ~mask) for m, n in zip(masks, sizes, strict=True)]
-        near = added.index(min(added))
+        added = [work(n + size, m | mask) - work(n, m) for m, n in zip(masks, sizes, strict=True)]
+        near = min(range(len(added)), key=added.__getitem__)
+        if size >= lanes and added[near] >= work(size, mask):
+            masks.insert(0, mask)
+            members.insert(0, vertices)
+            sizes.insert(0, size)
+            settled += 1
+            continue
         masks[near] |= mask
         members[near] = np.concatenate([members[near], vertices])
         sizes[near] += size
     if sizes[0] < lanes:  # a surface smaller than one tile: its last vertex stands in for the missing ones
         members[0] = np.concatenate([members[0], np.repeat(members[0][-1:], lanes - sizes[0])])
     return members, [[c for c in range(m.bit_length()) if m >> c & 1] for m in masks]
+
+
+_FIXED = 60  # multiply-adds a vertex spends whatever its columns, mostly on rotating
 
 
 def _column_cost(columns: Columns) -> Callable[[int], int]:

@@ -17,7 +17,7 @@ from warpjld.skeleton import Skeleton
 __all__ = ["read_csv", "write_csv"]
 
 
-def read_csv(path: str | Path, *, skeleton: Skeleton | None = None, rate: float = 25.0) -> Motion:
+def read_csv(path: str | Path, *, skeleton: Skeleton | None = None, rate: float = 30.0) -> Motion:
     """Read a motion from a CSV file. An empty cell is no key: the spline runs on between its neighbours.
 
     Args:

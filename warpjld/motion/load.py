@@ -56,7 +56,7 @@ def open_motion(path: str | Path, rig: Rig, *, rate: float | None = None, limits
     Args:
         path: The file.
         rig: What is driven; see ``read_csv``, ``retarget``, ``poses_of_gltf`` and ``poses_of_hand`` for how.
-        rate: Frames a second of the result; None for the file's own, or 25 for tables, which have none. A table's
+        rate: Frames a second of the result; None for the file's own, or 30 for tables, which have none. A table's
             frames are played at that rate, all others are resampled to it.
         limits: What to do with angles beyond a joint's limit, see ``Motion.sample``.
 

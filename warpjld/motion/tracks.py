@@ -97,7 +97,7 @@ class Motion:
         tracks: Tracks by channel.
     """
 
-    rate: float = 25.0
+    rate: float = 30.0
     tension: float = 0.0
     continuity: float = 0.0
     bias: float = 0.0

@@ -68,7 +68,7 @@ class ColorScale:
         canvas.paste(Image.fromarray(np.repeat(ramp[:, None], bar_width, axis=1)), (left, top))
         for number in np.linspace(self.low, self.high, 5):
             y = top + bar_height * (1 - (number - self.low) / (self.high - self.low))
-            text = f"{number * self.factor:.3g}".replace("-", "−")
+            text = f"{number * self.factor:.3g}"  # with a hyphen: the built-in font has no minus sign
             write(canvas, (left + bar_width + 0.5 * size, y), text, size=size, color=ink, anchor="lm")
         if self.title:
             write(canvas, (width - 0.8 * size, top - 1.4 * size), self.title, size=size, color=ink, anchor="rm")

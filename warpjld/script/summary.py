@@ -89,7 +89,6 @@ class Summary:
 def table(content: dict[str, Any], say: Callable[[str], None] = print) -> None:
     """Say a summary to people."""
     from rich.console import Console
-    from rich.table import Table
 
     console = Console(highlight=False, markup=False, soft_wrap=True)
     frames = content["frames"]
@@ -100,10 +99,10 @@ def table(content: dict[str, Any], say: Callable[[str], None] = print) -> None:
         spent = ", ".join(f"{stage} {value:.2f} s" for stage, value in content["seconds"].items())
         count = f"{frames['count']} frames ({frames['first']} to {frames['last']}) at {content['rate']:g}/s"
         console.print(f"{count}: {spent}" if spent else count)
-        files = Table(box=None, padding=(0, 2, 0, 0), show_header=False)
-        for name, size in _grouped(content["files"]):
-            files.add_row(f"{content['folder']}/{name}", "to be made" if size is None else _readable(size))
-        console.print(files)
+        sizes = {f"{content['folder']}/{name}": size for name, size in _grouped(content["files"])}
+        width = max(map(len, sizes), default=0)  # a table would shorten paths that are wider than the terminal
+        for path, size in sizes.items():
+            console.print(f"{path:{width}}  {'to be made' if size is None else _readable(size)}")
         for note in content["notes"]:
             console.print(f"note: {note}")
     say(lines.get().rstrip())

@@ -46,6 +46,7 @@ def show_(scene: Scene, arguments: Arguments) -> None:
     match topic:
         case "VALUES":
             frame = arguments.number("the frame")
+            scene.actor()  # says what to do where there is none
             for actor in scene.actors.values():
                 scene.say(show.values(actor, frame, scene.rate))
         case "WIREFRAME" | "SHADED":
