@@ -7,7 +7,6 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from warpjld.errors import MissingExtraError
 from warpjld.fem.blockmatrix import BlockMatrix
 
 __all__ = ["Aggregation"]
@@ -20,16 +19,11 @@ class Aggregation:
         stiffness: Full K, float64.
         free: Free degrees of freedom, shape (3N,).
         nodes: Rest positions [m], shape (N, 3): what the rigid-body modes are made of.
-
-    Raises:
-        MissingExtraError: pyamg is not installed.
     """
 
     def __init__(self, stiffness: BlockMatrix, free: NDArray[np.bool_], nodes: NDArray[np.float64]) -> None:
-        try:
-            import pyamg
-        except ImportError as error:
-            raise MissingExtraError("aggregation multigrid", "amg") from error
+        import pyamg
+
         from warpjld.fem.prescribed import rigid_modes
 
         matrix = stiffness.masked(free)

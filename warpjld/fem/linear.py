@@ -45,7 +45,6 @@ class LinearSolver:
     Raises:
         IndefiniteError: Found while setting up.
         InputError: Unknown method.
-        MissingExtraError: ``aggregation`` without pyamg.
     """
 
     def __init__(
