@@ -79,8 +79,8 @@ def test_elastica(load: float, deflection: float, shortening: float) -> None:
         (1.05, 0.083654),
         (1.1, 0.144424),
         (1.2, 0.219506),
-        pytest.param(1.5, 0.275019, marks=pytest.mark.slow),
-        pytest.param(2.0, 0.23838, marks=pytest.mark.slow),
+        (1.5, 0.275019),
+        (2.0, 0.23838),
     ],
 )
 def test_inflated_shell_beyond_its_limit_point(stretch: float, pressure: float) -> None:
