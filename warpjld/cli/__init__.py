@@ -17,6 +17,7 @@ _COMMANDS = {
     "deform": "Deform a rig by a motion file.",
     "study": "Run many grasps and bring them into one table.",
     "inspect": "Report what was recognised in a rig.",
+    "fem": "Load a deformable body and solve for its shape, stresses and reactions.",
     "calibrate": "Fit the covering's parameters to a rig.",
     "shell": "Type commands of the language and look at the result.",
 }

@@ -1,0 +1,148 @@
+"""A body: mesh and materials, and their stiffness and forces at a displacement."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from warpjld.errors import InputError
+from warpjld.fem.blockmatrix import BlockMatrix
+from warpjld.fem.hexmesh import HexMesh
+from warpjld.fem.materials import NEO_HOOKE, Material, laws_of
+from warpjld.fem.pattern import Pattern, batches_of, pattern_of
+from warpjld.fem.rows import on_rows, shared, threads_of
+
+__all__ = ["Body", "Tangent"]
+
+
+@dataclass(frozen=True, eq=False)
+class Tangent:
+    """Stiffness and internal forces at a displacement.
+
+    Attributes:
+        stiffness: Tangent K, or None where only forces were asked for.
+        forces: Internal forces, initial stresses included [N], shape (3N,).
+        lowest: Lowest Jacobian determinant of each element [m³/8], shape (E,); ≤ 0 where it is turned inside out.
+        pressures: κ (θ − 1) of each element [Pa], or what it would be after the increment, to first order, shape (E,).
+    """
+
+    stiffness: BlockMatrix | None
+    forces: NDArray[np.float64]
+    lowest: NDArray[np.float64]
+    pressures: NDArray[np.float64]
+
+
+class Body:
+    """One or several meshed bodies with their laws; the pattern is found once and reused (B eqs. 2–5, R101–R103).
+
+    Args:
+        mesh: The mesh; elements must not be inside out.
+        materials: One law, or one per region name.
+        initial_stress: Stress at rest [Pa], xx yy zz xy yz zx, shape (6,) or (E, 6) (R98). Second Piola–Kirchhoff
+            where the law is for large strain.
+        threads: Threads for assembly and products, by default all.
+
+    Raises:
+        InputError: Inverted elements, a region without a law, or wrong shapes.
+    """
+
+    def __init__(
+        self,
+        mesh: HexMesh,
+        materials: Material | Mapping[str, Material],
+        *,
+        initial_stress: ArrayLike | None = None,
+        threads: int | None = None,
+    ) -> None:
+        self.mesh = mesh
+        self.kinds, self.constants, self.density = laws_of(mesh, materials)
+        self.threads = threads_of(threads)
+        stress = np.zeros(6) if initial_stress is None else np.asarray(initial_stress, dtype=np.float64)
+        if stress.shape not in {(6,), (len(mesh.elements), 6)}:
+            raise InputError(f"initial_stress: want shape (6,) or ({len(mesh.elements)}, 6), got {stress.shape}")
+        self.initial_stress = np.ascontiguousarray(np.broadcast_to(stress, (len(mesh.elements), 6)))
+        self.pattern: Pattern = pattern_of(mesh, threads=self.threads)
+        parts = self.threads if len(mesh.elements) >= 200 else 1
+        self._batches = batches_of(self.pattern, self.kinds, parts)
+        self._elements = np.ascontiguousarray(mesh.elements)
+        self._nodes = np.ascontiguousarray(mesh.nodes).reshape(-1)
+        self._check_jacobians()
+
+    @property
+    def large_strain(self) -> bool:
+        """Whether any law needs Newton's method."""
+        return bool((self.kinds >= NEO_HOOKE).any())
+
+    @property
+    def degrees(self) -> int:
+        """Degrees of freedom, 3N."""
+        return 3 * len(self.mesh.nodes)
+
+    def at(
+        self,
+        displacement: NDArray[np.float64] | None = None,
+        *,
+        stiffness: bool = True,
+        pressures: NDArray[np.float64] | None = None,
+        increment: NDArray[np.float64] | None = None,
+        reuse: Tangent | None = None,
+    ) -> Tangent:
+        """Stiffness and internal forces at a displacement.
+
+        Args:
+            displacement: [m], shape (3N,) or (N, 3); at rest by default.
+            stiffness: Whether K is wanted, or forces only.
+            pressures: Pressure of each element that K is to take for its own, shape (E,); by default the present one.
+            increment: Displacement that is about to be added [m], shape (3N,): ``pressures`` of the result foresee it.
+            reuse: A result that is not needed any more: its matrix is written over.
+        """
+        from warpjld_kernels import fem_element
+
+        u = np.zeros(self.degrees) if displacement is None else np.ascontiguousarray(displacement, np.float64).ravel()
+        if u.shape != (self.degrees,):
+            raise InputError(f"displacement: want {self.degrees} values, got {u.size}")
+        if pressures is None:
+            pressures = np.zeros(len(self._elements))
+            if stiffness and displacement is not None and self.large_strain:
+                pressures = self.at(u, stiffness=False).pressures
+        step = np.zeros(self.degrees) if increment is None else np.ascontiguousarray(increment, np.float64).ravel()
+        blocks = len(self.pattern.columns) if stiffness else 0
+        if stiffness and reuse is not None and reuse.stiffness is not None:
+            values = reuse.stiffness.values
+            values.fill(0.0)
+        else:
+            values = np.zeros((max(blocks, 1), 3, 3))
+        forces = np.zeros(self.degrees)
+        lowest = np.empty(len(self._elements))
+        found = np.empty(len(self._elements))
+        b = self._batches
+        tables: list[NDArray[Any]] = [
+            b.ranges,
+            b.range_batches,
+            b.elements,
+            b.kinds,
+            b.counts,
+            self._nodes,
+            self._elements,
+        ]
+        tables += [self.pattern.slots, self.constants, self.initial_stress, u, pressures, step]
+        outputs: list[NDArray[Any]] = [values.reshape(-1), forces, lowest, found]
+        arguments: list[Any] = [*(shared(t) for t in tables), stiffness, *(shared(o) for o in outputs)]
+        on_rows(fem_element.assemble, len(b.ranges) - 1, arguments, threads=self.threads, least=2)
+        matrix = BlockMatrix(self.pattern.rows, self.pattern.columns, values) if stiffness else None
+        return Tangent(matrix, forces, lowest, found)
+
+    def _check_jacobians(self) -> None:
+        lowest = self.at(stiffness=False).lowest
+        if not (lowest > 0).all():
+            worst = int(np.argmin(np.where(np.isfinite(lowest), lowest, -np.inf)))
+            count = int((~(lowest > 0)).sum())
+            raise InputError(
+                f"mesh: {count} of {len(lowest)} elements have a negative Jacobian, the worst is element {worst} "
+                f"({lowest[worst]:.3g} m³/8) in region '{self.mesh.region_names[self.mesh.regions[worst]]}': "
+                "corners out of order, or the element is turned inside out"
+            )

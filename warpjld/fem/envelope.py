@@ -1,0 +1,98 @@
+"""A closed surface as a region of space: inside or outside, and how far (R104)."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from warpjld.errors import InputError
+
+__all__ = ["Envelope"]
+
+
+@dataclass(frozen=True)
+class _Answer:
+    distance: NDArray[np.float64]
+    closest: NDArray[np.float64]
+    normal: NDArray[np.float64]
+
+
+class Envelope:
+    """Triangles that enclose a volume; holes are bridged by the winding number and reported.
+
+    Args:
+        vertices: [m], shape (V, 3).
+        faces: Triangles, shape (T, 3).
+
+    Raises:
+        InputError: Not finite, indices out of range, or no volume.
+    """
+
+    def __init__(self, vertices: ArrayLike, faces: ArrayLike) -> None:
+        import warp as wp
+
+        points = np.ascontiguousarray(vertices, dtype=np.float64)
+        triangles = np.ascontiguousarray(faces, dtype=np.int32)
+        if points.ndim != 2 or points.shape[1] != 3 or not np.isfinite(points).all():
+            raise InputError("surface: want finite vertices of shape (n, 3)")
+        if triangles.ndim != 2 or triangles.shape[1] != 3 or len(triangles) == 0:
+            raise InputError(f"surface: want triangles of shape (n, 3) with n > 0, got {triangles.shape}")
+        if triangles.min() < 0 or triangles.max() >= len(points):
+            raise InputError(f"surface: triangle indices must lie in 0…{len(points) - 1}")
+        corners = points[triangles]
+        volume = float(np.einsum("ti,ti->", corners[:, 0], np.cross(corners[:, 1], corners[:, 2]))) / 6.0
+        if volume < 0:
+            triangles = np.ascontiguousarray(triangles[:, ::-1])
+            volume = -volume
+        self.size = float(np.linalg.norm(np.ptp(points, axis=0)))
+        if not volume > 1e-9 * self.size**3:
+            raise InputError("surface: encloses no volume")
+        edges = np.sort(triangles[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2), axis=1)
+        _, uses = np.unique(edges, axis=0, return_counts=True)
+        self.open_edges = int((uses == 1).sum())
+        self.crowded_edges = int((uses > 2).sum())
+        self.volume = volume
+        self.vertices = points
+        self.faces = triangles
+        cross = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+        sign = 1.0 if np.array_equal(triangles, np.ascontiguousarray(faces, dtype=np.int32)) else -1.0
+        length = np.linalg.norm(cross, axis=1)
+        self.normals = sign * cross / np.maximum(length, 1e-300)[:, None]
+        wp.init()
+        self._origin = points.mean(axis=0)
+        local = ((points - self._origin) / self.size).astype(np.float32)
+        self._mesh = wp.Mesh(
+            points=wp.array(local, dtype=wp.vec3, device="cpu"),
+            indices=wp.array(triangles.reshape(-1), dtype=wp.int32, device="cpu"),
+            support_winding_number=True,
+        )
+
+    @property
+    def watertight(self) -> bool:
+        """Whether every edge has two faces."""
+        return self.open_edges == 0 and self.crowded_edges == 0
+
+    def ask(self, points: NDArray[np.float64]) -> _Answer:
+        """Signed distance [m] (negative inside), closest point and the surface's normal there, of points (n, 3)."""
+        import warp as wp
+        from warpjld_kernels import fem_inside
+
+        count = len(points)
+        local = np.ascontiguousarray((points - self._origin) / self.size, dtype=np.float32)
+        distance = np.empty(count, np.float32)
+        closest = np.empty((count, 3), np.float32)
+        face = np.empty(count, np.int32)
+        outputs = [
+            wp.array(distance, dtype=float, device="cpu", copy=False),
+            wp.array(closest, dtype=wp.vec3, device="cpu", copy=False),
+            wp.array(face, dtype=wp.int32, device="cpu", copy=False),
+        ]
+        inputs = [self._mesh.id, 10.0, wp.array(local, dtype=wp.vec3, device="cpu")]
+        wp.launch(fem_inside.signed_distance, dim=count, inputs=[*inputs, *outputs], device="cpu")
+        return _Answer(
+            distance.astype(np.float64) * self.size,
+            closest.astype(np.float64) * self.size + self._origin,
+            self.normals[np.maximum(face, 0)],
+        )

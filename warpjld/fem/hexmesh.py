@@ -1,0 +1,208 @@
+"""A mesh of 8-node elements: what every other part of ``fem`` starts from."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from warpjld.errors import InputError
+
+__all__ = ["FACES", "HexMesh", "elements_of", "merge"]
+
+FACES = np.array(
+    [[0, 4, 7, 3], [1, 2, 6, 5], [0, 1, 5, 4], [3, 7, 6, 2], [0, 3, 2, 1], [4, 5, 6, 7]],
+    dtype=np.int32,
+)
+"""Corners of the faces −x, +x, −y, +y, −z, +z of an element, anticlockwise seen from outside, shape (6, 4)."""
+
+_EDGES = np.array(  # corner, and its three neighbours in right-handed order
+    [[1, 3, 4], [2, 0, 5], [3, 1, 6], [0, 2, 7], [7, 5, 0], [4, 6, 1], [5, 7, 2], [6, 4, 3]],
+    dtype=np.int32,
+)
+
+
+@dataclass(frozen=True, eq=False)
+class HexMesh:
+    """N nodes and E elements with eight corners in the order of VTK's hexahedron (B §3.2, R96).
+
+    Corners may coincide: with 2 = 3 and 6 = 7 an element is a prism, with also 4 = 5 = 6 = 7 a tetrahedron.
+
+    Attributes:
+        nodes: Rest positions [m], shape (N, 3).
+        elements: Corners, shape (E, 8).
+        regions: Region of each element, an index into ``region_names``, shape (E,).
+        region_names: Names that materials are given to.
+        faces: Named parts of the boundary: element and local face (see ``FACES``), shape (F, 2) each.
+        node_sets: Named nodes, shape (n,) each.
+        blocks: Structured grids of node numbers, shape (ni + 1, nj + 1, nk + 1) each, that together are the mesh; empty
+            where it is not structured. A multigrid hierarchy takes every other line of them.
+        lattice: Integer coordinates of the nodes on a regular grid, shape (N, 3), for meshes cut from one.
+    """
+
+    nodes: NDArray[np.float64]
+    elements: NDArray[np.int32]
+    regions: NDArray[np.int32]
+    region_names: tuple[str, ...] = ("body",)
+    faces: dict[str, NDArray[np.int32]] = field(default_factory=dict)
+    node_sets: dict[str, NDArray[np.int32]] = field(default_factory=dict)
+    blocks: tuple[NDArray[np.int32], ...] = ()
+    lattice: NDArray[np.int32] | None = None
+
+    def __post_init__(self) -> None:
+        if self.nodes.ndim != 2 or self.nodes.shape[1] != 3:
+            raise InputError(f"nodes: want shape (n, 3), got {self.nodes.shape}")
+        if self.elements.ndim != 2 or self.elements.shape[1] != 8 or len(self.elements) == 0:
+            raise InputError(f"elements: want shape (n, 8) with n > 0, got {self.elements.shape}")
+        if not np.isfinite(self.nodes).all():
+            raise InputError(f"nodes: node {int(np.argwhere(~np.isfinite(self.nodes))[0][0])} is not finite")
+        if self.elements.min() < 0 or self.elements.max() >= len(self.nodes):
+            raise InputError(
+                f"elements: corners must lie in 0…{len(self.nodes) - 1}, got "
+                f"{self.elements.min()}…{self.elements.max()}"
+            )
+        if self.regions.shape != (len(self.elements),):
+            raise InputError(f"regions: want shape ({len(self.elements)},), got {self.regions.shape}")
+
+    @property
+    def size(self) -> float:
+        """Diagonal of the bounding box [m]."""
+        return float(np.linalg.norm(np.ptp(self.nodes, axis=0)))
+
+    def boundary(self) -> NDArray[np.int32]:
+        """Faces that belong to one element only: element and local face, shape (F, 2). They are the surface (R96)."""
+        corners = np.sort(self.elements[:, FACES].reshape(-1, 4), axis=1)
+        repeated = np.zeros(corners.shape, dtype=bool)
+        repeated[:, 1:] = corners[:, 1:] == corners[:, :-1]
+        corners[repeated] = -1  # a triangle is one whichever corner it repeats
+        corners.sort(axis=1)
+        order = np.lexsort(corners.T)
+        fresh = np.ones(len(corners) + 1, dtype=bool)
+        fresh[1:-1] = (corners[order[1:]] != corners[order[:-1]]).any(axis=1)
+        single = np.zeros(len(corners), dtype=bool)
+        single[order] = fresh[:-1] & fresh[1:]
+        single &= repeated.sum(axis=1) <= 1
+        index = np.flatnonzero(single)
+        return np.stack([index // 6, index % 6], axis=1).astype(np.int32)
+
+    def quads(self, faces: NDArray[np.int32]) -> NDArray[np.int32]:
+        """Corners of faces given as (element, local face), anticlockwise seen from outside, shape (F, 4)."""
+        return self.elements[faces[:, :1], FACES[faces[:, 1]]]
+
+    def face_set(self, name: str) -> NDArray[np.int32]:
+        """Named faces; ``surface`` is the whole boundary.
+
+        Raises:
+            InputError: No such name.
+        """
+        if name in self.faces:
+            return self.faces[name]
+        if name == "surface":
+            return self.boundary()
+        raise InputError(_unknown("face set", name, [*self.faces, "surface"]))
+
+    def node_set(self, name: str) -> NDArray[np.int32]:
+        """Nodes of a named set, or of a named part of the boundary, or of a region.
+
+        Raises:
+            InputError: No such name.
+        """
+        if name in self.node_sets:
+            return self.node_sets[name]
+        if name in self.faces or name == "surface":
+            return np.unique(self.quads(self.face_set(name))).astype(np.int32)
+        if name in self.region_names:
+            return np.unique(self.elements[self.region(name)]).astype(np.int32)
+        raise InputError(_unknown("node set", name, [*self.node_sets, *self.faces, "surface", *self.region_names]))
+
+    def region(self, name: str) -> NDArray[np.bool_]:
+        """Mask of the elements of a region.
+
+        Raises:
+            InputError: No such region.
+        """
+        if name not in self.region_names:
+            raise InputError(_unknown("region", name, list(self.region_names)))
+        return self.regions == self.region_names.index(name)
+
+    def scaled_jacobian(self) -> NDArray[np.float64]:
+        """Least scaled Jacobian over the corners of each element: 1 for a box, ≤ 0 for an inverted corner, shape (E,).
+
+        Corners whose edges collapse (prisms, tetrahedra) do not count.
+        """
+        x = self.nodes[self.elements]
+        out = np.full(len(x), np.inf)
+        for corner in range(8):
+            edges = x[:, _EDGES[corner]] - x[:, corner, None]
+            length = np.linalg.norm(edges, axis=2).prod(axis=1)
+            volume = np.einsum("ei,ei->e", edges[:, 0], np.cross(edges[:, 1], edges[:, 2]))
+            solid = length > 0
+            out[solid] = np.minimum(out[solid], volume[solid] / length[solid])
+        return out
+
+    def moved(self, displacement: NDArray[np.float64]) -> HexMesh:
+        """The same mesh with displaced nodes."""
+        return replace(self, nodes=self.nodes + displacement.reshape(-1, 3))
+
+    def with_faces(self, **faces: NDArray[np.int32]) -> HexMesh:
+        """The same mesh with more named faces."""
+        return replace(self, faces={**self.faces, **faces})
+
+    def with_nodes(self, **sets: NDArray[np.int32]) -> HexMesh:
+        """The same mesh with more named nodes."""
+        return replace(self, node_sets={**self.node_sets, **sets})
+
+
+def elements_of(grid: NDArray[np.int32]) -> NDArray[np.int32]:
+    """Elements of a structured grid of node numbers (ni + 1, nj + 1, nk + 1), x index slowest, shape (ni nj nk, 8)."""
+    low, high = slice(None, -1), slice(1, None)
+    corners = [
+        grid[low, low, low],
+        grid[high, low, low],
+        grid[high, high, low],
+        grid[low, high, low],
+        grid[low, low, high],
+        grid[high, low, high],
+        grid[high, high, high],
+        grid[low, high, high],
+    ]
+    return np.stack([c.ravel() for c in corners], axis=1).astype(np.int32)
+
+
+def merge(*meshes: HexMesh) -> HexMesh:
+    """Several bodies as one mesh, not tied to one another; sets of the same name are joined (R101)."""
+    names = tuple(dict.fromkeys(name for mesh in meshes for name in mesh.region_names))
+    offset = 0
+    count = 0
+    nodes, elements, regions, blocks = [], [], [], []
+    faces: dict[str, list[NDArray[np.int32]]] = {}
+    sets: dict[str, list[NDArray[np.int32]]] = {}
+    for mesh in meshes:
+        nodes.append(mesh.nodes)
+        elements.append(mesh.elements + offset)
+        regions.append(np.array([names.index(n) for n in mesh.region_names], dtype=np.int32)[mesh.regions])
+        blocks += [grid + offset for grid in mesh.blocks]
+        for name, part in mesh.faces.items():
+            faces.setdefault(name, []).append(part + np.array([count, 0], dtype=np.int32))
+        for name, chosen in mesh.node_sets.items():
+            sets.setdefault(name, []).append(chosen + offset)
+        offset += len(mesh.nodes)
+        count += len(mesh.elements)
+    return HexMesh(
+        nodes=np.concatenate(nodes),
+        elements=np.concatenate(elements).astype(np.int32),
+        regions=np.concatenate(regions),
+        region_names=names,
+        faces={n: np.concatenate(p) for n, p in faces.items()},
+        node_sets={n: np.concatenate(p) for n, p in sets.items()},
+        blocks=tuple(blocks) if all(mesh.blocks for mesh in meshes) else (),
+    )
+
+
+def _unknown(kind: str, name: str, known: list[str]) -> str:
+    from difflib import get_close_matches
+
+    close = get_close_matches(name, known, n=1)
+    hint = f", did you mean '{close[0]}'?" if close else ""
+    return f"no {kind} '{name}'{hint} There are: {', '.join(known)}"

@@ -1,0 +1,79 @@
+"""Launching a kernel over rows, shared between threads."""
+
+from __future__ import annotations
+
+import os
+from concurrent.futures import ThreadPoolExecutor
+from functools import cache
+from itertools import pairwise
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+__all__ = ["Launch", "on_rows", "shared", "threads_of"]
+
+_LEAST_ROWS = 3000
+"""Rows below which handing a part to another thread costs more than it saves."""
+
+
+def threads_of(threads: int | None = None) -> int:
+    """As many threads as asked for, by default as this process may use."""
+    if threads is not None:
+        return max(1, threads)
+    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+
+
+def shared(values: NDArray[Any]) -> Any:
+    """A Warp array over the memory of a contiguous NumPy array."""
+    import warp as wp
+
+    wp.init()
+    if not values.flags.c_contiguous:
+        raise ValueError("want a contiguous array")
+    return wp.from_numpy(values, device="cpu") if values.size == 0 else wp.array(values, device="cpu", copy=False)
+
+
+class Launch:
+    """A kernel over rows with its arguments, recorded once and run many times.
+
+    Args:
+        kernel: Takes its first row as first argument.
+        count: Rows.
+        inputs: Further arguments; arrays are kept alive.
+        threads: Threads to share the rows between; every row gives the same bits however they are shared.
+        least: Rows below which one thread does all.
+    """
+
+    def __init__(
+        self, kernel: Any, count: int, inputs: list[Any], *, threads: int = 1, least: int = _LEAST_ROWS
+    ) -> None:
+        import warp as wp
+
+        parts = threads if threads > 1 and count >= max(least, 2) else 1
+        edges = np.linspace(0, count, parts + 1).astype(int)
+        self._kept = inputs
+        self._threads = threads
+        self._commands = [
+            wp.launch(kernel, dim=int(high - low), inputs=[int(low), *inputs], device="cpu", record_cmd=True)
+            for low, high in pairwise(edges)
+            if high > low
+        ]
+
+    def __call__(self) -> None:
+        """Run it, and return when all rows are done."""
+        others = [_pool(self._threads).submit(command.launch) for command in self._commands[1:]]
+        for command in self._commands[:1]:
+            command.launch()
+        for other in others:
+            other.result()
+
+
+def on_rows(kernel: Any, count: int, inputs: list[Any], *, threads: int = 1, least: int = _LEAST_ROWS) -> None:
+    """Launch ``kernel(first, *inputs)`` over ``count`` rows once (see ``Launch``)."""
+    Launch(kernel, count, inputs, threads=threads, least=least)()
+
+
+@cache
+def _pool(threads: int) -> ThreadPoolExecutor:
+    return ThreadPoolExecutor(max_workers=threads - 1, thread_name_prefix="warpjld-fem")

@@ -1,0 +1,83 @@
+"""Moving the nodes of a mesh so that its elements are well shaped.
+
+Minimises, over all corners of all elements, the shape measure |A|³ / (3√3 det A) of the corner's three edges A (1 for
+a cube), with the determinant regularised so that corners turned inside out can be turned back (Escobar et al. 2003,
+doi:10.1016/S0045-7825(03)00299-8), and pulls boundary nodes to the tangent planes they belong to.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from warpjld.fem.descent import minimise
+from warpjld.fem.rows import Launch, shared, threads_of
+
+__all__ = ["improve"]
+
+
+def improve(
+    nodes: NDArray[np.float64],
+    elements: NDArray[np.int32],
+    spacing: float,
+    boundary: NDArray[np.int64],
+    targets: NDArray[np.float64],
+    normals: NDArray[np.float64],
+    *,
+    pull: NDArray[np.float64],
+    slide: float = 0.02,
+    softness: float = 0.1,
+    rounds: int = 60,
+) -> NDArray[np.float64]:
+    """Better positions of the nodes.
+
+    Args:
+        nodes: [m], shape (N, 3).
+        elements: Corners, shape (E, 8).
+        spacing: Edge length that is wanted [m].
+        boundary: Nodes pulled to the surface, shape (B,).
+        targets: Their closest points on it [m], shape (B, 3).
+        normals: Its normals there, shape (B, 3).
+        pull: Weight of each one's distance along the normal, shape (B,); across it a node slides almost freely.
+        slide: Weight of the distance across the normal, relative to ``pull``.
+        softness: Regularisation of the determinant; the smaller, the more worst corners count.
+        rounds: Iterations.
+    """
+    import warp as wp
+    from warpjld_kernels import fem_shape_measure
+
+    count = len(nodes)
+    flat = elements.ravel()
+    x = np.ascontiguousarray(nodes / spacing)
+    costs = np.empty(len(elements))
+    slopes = np.empty((len(elements), 8, 3))
+    launch = Launch(
+        fem_shape_measure.measure,
+        len(elements),
+        [
+            shared(np.ascontiguousarray(elements)),
+            wp.float64(softness),
+            wp.array(x, dtype=wp.vec3d, device="cpu", copy=False),
+            shared(costs),
+            wp.array(slopes, dtype=wp.vec3d, device="cpu", copy=False),
+        ],
+        threads=threads_of(),
+    )
+
+    def cost(vector: NDArray[np.float64]) -> tuple[float, NDArray[np.float64]]:
+        x[:] = vector.reshape(-1, 3)
+        launch()
+        gradient: NDArray[np.float64] = np.stack(
+            [np.bincount(flat, weights=slopes[:, :, k].ravel(), minlength=count) for k in range(3)], axis=1
+        )
+        away = x[boundary] - targets
+        along = np.einsum("bi,bi->b", away, normals)
+        squared = np.einsum("bi,bi->b", away, away)
+        value = float(costs.sum()) + float((pull * (along * along + slide * squared)).sum())
+        gradient[boundary] += 2.0 * pull[:, None] * (along[:, None] * normals + slide * away)
+        return value, np.asarray(gradient, dtype=np.float64).reshape(-1)
+
+    targets = targets / spacing
+    start = (nodes / spacing).reshape(-1)
+    improved: NDArray[np.float64] = minimise(cost, start, rounds=rounds, first_step=0.05).reshape(-1, 3) * spacing
+    return improved
