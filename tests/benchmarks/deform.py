@@ -105,6 +105,7 @@ def throughput(covering: Covering, poses: Poses, threads: int, repeats: int) -> 
     times = defaultdict(list)
     for repeat in range(repeats + 1):
         for name, method in methods.items():
+            time.sleep(0.1)  # BLAS threads spin for a while after their work and would take a core from the next row
             seconds = _seconds(method)
             if repeat:  # the first one compiles
                 times[name].append(seconds)

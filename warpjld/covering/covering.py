@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
-from functools import cached_property
+from functools import cache, cached_property
 from typing import Any, Literal
 
 import numpy as np
@@ -27,6 +27,12 @@ from warpjld.surface import Surface
 __all__ = ["Covering", "bind"]
 
 _SPLIT_BELOW = 200_000  # vertex-frames a thread must have before splitting pays
+
+
+@cache
+def _pool(threads: int) -> ThreadPoolExecutor:
+    """Kept for the next call: starting threads can cost as much as deforming."""
+    return ThreadPoolExecutor(threads, thread_name_prefix="warpjld")
 
 
 class Covering:
@@ -210,8 +216,7 @@ class Covering:
             span(0, len(rows))
             return
         wp.load_module(deform_runs.module, device=device)  # compiling is not safe from several threads
-        with ThreadPoolExecutor(len(cuts) - 1) as pool:
-            list(pool.map(span, cuts[:-1].tolist(), cuts[1:].tolist()))
+        list(_pool(len(cuts) - 1).map(span, cuts[:-1].tolist(), cuts[1:].tolist()))
 
     def _on(self, device: Any, name: str, make: Any) -> list[Any]:
         """Arguments that stay on a device between calls."""
