@@ -14,6 +14,7 @@ from scipy.sparse.linalg import splu
 from warpjld.covering.corners import corner_conductivity
 from warpjld.covering.operators import Fan
 from warpjld.errors import InputError
+from warpjld.normals import vertex_normals
 from warpjld.rig import Skin
 from warpjld.skeleton.tree import Skeleton
 
@@ -109,7 +110,7 @@ def _nearest_visible(
         )
         for e in ("proximal", "distal")
     )
-    normals = wp.array(_vertex_normals(vertices, faces).astype(np.float32), dtype=wp.vec3, device=device)
+    normals = wp.array(vertex_normals(vertices, faces), dtype=wp.vec3, device=device)
     nearest = wp.empty(len(vertices), dtype=wp.int32, device=device)
     distance = wp.empty(len(vertices), dtype=float, device=device)
     inset = 1e-4 * float(np.linalg.norm(np.ptp(vertices, axis=0)))
@@ -121,14 +122,6 @@ def _nearest_visible(
         device=device,
     )
     return fan_of[nearest.numpy()], distance.numpy().astype(np.float64)
-
-
-def _vertex_normals(vertices: NDArray[np.float64], faces: NDArray[np.int32]) -> NDArray[np.float64]:
-    a, b, c = (vertices[faces[:, k]] for k in range(3))
-    normals = np.zeros_like(vertices)
-    for k in range(3):
-        np.add.at(normals, faces[:, k], np.cross(b - a, c - a))
-    return normals / np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-30)
 
 
 def _cotangent_laplacian(
