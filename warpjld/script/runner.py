@@ -192,17 +192,19 @@ def _make_sequences(
         ]
         for parts in zip(*blocks, strict=True):
             start = parts[0][0]
-            for actor_caches, (_, vertices) in zip(caches, parts, strict=True):
+            worn = [crowd.worn(role, v, start) for role, (_, v) in zip(crowd.roles, parts, strict=True)]
+            for actor_caches, vertices in zip(caches, worn, strict=True):
                 for cache in actor_caches:
                     cache.write(vertices)
             count = len(parts[0][1])
             for prop, places, object_caches in zip(crowd.props, crowd.places, prop_caches, strict=True):
+                if object_caches:
+                    moved = np.stack([crowd.prop_vertices(prop, places, start + k) for k in range(count)])
                 for cache in object_caches:
-                    moved = places[start : start + count].apply(prop.thing.vertices)
                     cache.write(moved.astype(np.float32))
             for k in range(count):
                 progress("frames", start + k, len(frames))
-                together = np.concatenate([vertices[k] for _, vertices in parts])
+                together = np.concatenate([vertices[k] for vertices in worn])
                 for studio in studios:
                     studio.take(start + k, together)
 

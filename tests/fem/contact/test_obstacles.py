@@ -107,7 +107,7 @@ def egg() -> tuple[NDArray[np.float64], NDArray[np.int32]]:
 
 def keyframed() -> Keyframed:
     vertices, faces = egg()
-    return Keyframed(faces, [0.0, 1.0, 3.0], [vertices, vertices * [1.2, 0.8, 1.0], vertices + 0.1])
+    return Keyframed(faces, [0.0, 1.0, 3.0], [vertices, vertices * [1.2, 0.8, 1.0], vertices + 0.1], moving)
 
 
 MESHES: dict[str, Obstacle] = {

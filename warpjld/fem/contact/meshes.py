@@ -7,7 +7,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from warpjld.errors import InputError
 from warpjld.fem.contact.facets import Facets
-from warpjld.fem.contact.obstacles import Motion, Obstacle, Points, Rigid, Touching, checked_points
+from warpjld.fem.contact.obstacles import Motion, Obstacle, Points, Rigid, Touching, checked_points, placement
 
 __all__ = ["Keyframed", "RigidMesh"]
 
@@ -42,12 +42,14 @@ class Keyframed(Obstacle):
         faces: Triangles, shape (t, 3).
         times: Increasing, shape (T,).
         vertices: [m], shape (T, v, 3).
+        motion: See `Motion`; of the deformed shape.
 
     Raises:
         InputError: Times that do not increase, wrong shapes, or see `Facets`.
     """
 
-    def __init__(self, faces: ArrayLike, times: ArrayLike, vertices: ArrayLike) -> None:
+    def __init__(self, faces: ArrayLike, times: ArrayLike, vertices: ArrayLike, motion: Motion | None = None) -> None:
+        self._motion = motion
         self._times = np.asarray(times, dtype=np.float64)
         self._vertices = np.asarray(vertices, dtype=np.float64)
         if self._times.ndim != 1 or len(self._times) == 0 or not (np.diff(self._times) > 0.0).all():
@@ -62,21 +64,26 @@ class Keyframed(Obstacle):
 
     def project(self, points: Points, time: float) -> Touching:
         """See `Obstacle.project`."""
-        return self._at(time).project(checked_points(points))
+        turn, shift = placement(self._motion, time)
+        found = self._at(time).project((checked_points(points) - shift) @ turn)
+        return Touching(found.distance, found.closest @ turn.T + shift, found.normal @ turn.T)
 
     def carried(self, points: Points, time_from: float, time_to: float) -> Points:
         """See `Obstacle.carried`: the offset from the nearest facet turns with it."""
-        points = checked_points(points)
+        turn, shift = placement(self._motion, time_from)
+        then, there = placement(self._motion, time_to)
+        points = (checked_points(points) - shift) @ turn
         facets = self._at(time_from)
         found, place = facets.locate(points)
         before, after = facets.vertices, self._shape(time_to)
         offset = np.einsum("nij,nj->ni", facets.frames(place, before), points - found.closest)
         turned = np.einsum("nij,ni->nj", facets.frames(place, after), offset)
-        return np.asarray(facets.at(place, after) + turned)
+        return np.asarray((facets.at(place, after) + turned) @ then.T + there)
 
     def mesh(self, time: float) -> tuple[Points, NDArray[np.int32]]:
         """See `Obstacle.mesh`."""
-        return self._shape(time), self._facets.faces
+        turn, shift = placement(self._motion, time)
+        return self._shape(time) @ turn.T + shift, self._facets.faces
 
     def _at(self, time: float) -> Facets:
         moment = float(np.clip(time, self._times[0], self._times[-1]))
