@@ -15,6 +15,7 @@ from warpjld.script.staging import stage
 
 if TYPE_CHECKING:
     from warpjld.fem.contact.barr import Barr
+    from warpjld.fem.contact.obstacles import Motion
     from warpjld.grasp.keyframes import KeyframedShape
     from warpjld.press.wishes import Barred
     from warpjld.script.scene import Scene
@@ -61,8 +62,8 @@ class Prop:
             return self.barr().mesh(frame)[0]
         return self.thing.vertices
 
-    def barr(self, start: float = 0.0) -> Barr:
-        """Its deformed shape in its own frame; time is in frames from ``start``."""
+    def barr(self, start: float = 0.0, motion: Motion | None = None) -> Barr:
+        """Its deformed shape, in its own frame unless it has a motion; time is in frames from ``start``."""
         from warpjld.fem.contact.barr import Barr
 
         barred = self.barred
@@ -73,6 +74,7 @@ class Prop:
             taper=lambda time: barred.at("taper", start + time),
             twist=lambda time: barred.at("twist", start + time),
             bend=lambda time: barred.at("bend", start + time),
+            motion=motion,
         )
 
     @property
