@@ -14,7 +14,7 @@ if TYPE_CHECKING:
 
 __all__ = ["PressureView"]
 
-_COLORS = "YlOrRd"
+_COLORS = "OrRd"
 _NOTHING = 1.0  # Pa: the scale's top where nothing touches
 
 
