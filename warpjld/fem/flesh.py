@@ -121,6 +121,8 @@ def flesh_of(
         mine = inside & (away < 1.0) & (away < nearest)
         nearest[mine], owner[mine] = away[mine], joint
     owner = _apart(mesh, owner)
+    if head is not None:
+        owner = _jointed(mesh, owner, skeleton.parents)
     joints = [int(j) for j in np.unique(owner[owner >= 0])]
     if not joints:
         raise InputError(f"spacing: at {spacing:g} m no element fits inside a bone")
@@ -162,6 +164,24 @@ def _backwards(rig: Rig, envelope: Envelope, root: int) -> NDArray[np.float64]:
     reach = steps[int(np.argmin(inside))] if not inside.all() else 0.0
     out: NDArray[np.float64] = away * (reach / size)
     return out
+
+
+def _jointed(mesh: HexMesh, owner: NDArray[np.int64], parents: NDArray[np.int32]) -> NDArray[np.int64]:
+    """At least two elements of flesh between bones that meet at a joint: one would have to bear its whole motion."""
+    owner = owner.copy()
+    for joint, parent in enumerate(parents):
+        if parent < 0 or not (owner == joint).any() or not (owner == parent).any():
+            continue
+        own, before = (np.zeros(len(mesh.nodes), dtype=bool) for _ in range(2))
+        own[mesh.elements[owner == joint]] = True
+        before[mesh.elements[owner == parent]] = True
+        bridge = own[mesh.elements].any(axis=1) & before[mesh.elements].any(axis=1)
+        near = np.zeros(len(mesh.nodes), dtype=bool)
+        near[mesh.elements[bridge]] = True
+        thin = (owner == joint) & (near & own)[mesh.elements].any(axis=1)
+        if not thin[owner == joint].all():
+            owner[thin] = -1
+    return owner
 
 
 def _apart(mesh: HexMesh, owner: NDArray[np.int64]) -> NDArray[np.int64]:

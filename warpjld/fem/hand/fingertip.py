@@ -51,16 +51,16 @@ def build_fingertip(
     spacing: float = 0.001,
     *,
     skin: float = 1.5e-3,
-    bone: tuple[float, float] = (0.26, 0.17),
-    raised: float = 0.19,
+    bone: tuple[float, float] = (0.3, 0.2),
+    raised: float = 0.15,
     reach: float = 0.72,
     nail: float = 0.55,
 ) -> Fingertip:
     """Cut a fingertip off a hand's surface and mesh it.
 
     The bone is an ellipse in section, tapered to its rounded end; its size is given over the height of the finger at
-    the joint, from nail to pulp. The defaults are a distal phalanx some 7 mm wide and 4.6 mm high in a finger of
-    13.5 mm, under 2 mm of nail and its bed, over 7 mm of pulp: proportions of an adult's index finger, from memory.
+    the joint, from nail to pulp. The defaults are a distal phalanx some 8 mm wide and 5 mm high in a finger of
+    13.5 mm, over 6 mm of pulp: proportions of an adult's index finger, from memory.
 
     Args:
         rig: Surface and skeleton.
