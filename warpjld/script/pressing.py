@@ -72,6 +72,7 @@ def run_press(scene: Scene, folder: Path, progress: Report = lambda what, done, 
 
 def _run(scene: Scene, pressing: Pressing, folder: Path, progress: Report) -> PressReport:
     from warpjld.press.bodies import assemble
+    from warpjld.press.checks import refuse_hopeless
     from warpjld.press.pressed import Pressed
     from warpjld.press.run import solve_frames
     from warpjld.press.verdict import verdict_of
@@ -85,6 +86,7 @@ def _run(scene: Scene, pressing: Pressing, folder: Path, progress: Report) -> Pr
     rigid = [prop for prop in scene.props.values() if prop.name not in scene.contact.physical]
     obstacles = {prop.name: prop_obstacle(scene, prop, start) for prop in rigid}
     bodies = assemble(hands, objects, obstacles, scene.contact)
+    refuse_hopeless(bodies, scene.contact)
     frames = [f for f in range(pressing.first, pressing.last + 1, pressing.every) if f > start]
     if frames[-1:] != [pressing.last]:
         frames.append(pressing.last)
