@@ -103,7 +103,8 @@ def close_digits(
 ) -> Attempt:
     """Close digits on an object: keys of the open hand at ``first``, of the closed one at ``last``."""
     from warpjld.grasp import ObjectSet, Status
-    from warpjld.grasp.close import close_hand, digit_chains
+    from warpjld.grasp.close import close_hand
+    from warpjld.grasp.digits import digit_chains
     from warpjld.grasp.intersection import intersection
 
     covering = cover(actor)

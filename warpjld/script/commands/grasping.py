@@ -232,7 +232,7 @@ def release(scene: Scene, arguments: Arguments) -> None:
 
 def _search(scene: Scene, arguments: Arguments, name: str, key: float, side: str, joint_name: str, finger: str) -> None:
     from warpjld.grasp import NEAREST, Status
-    from warpjld.grasp.close import pad_vertex
+    from warpjld.grasp.digits import pad_vertex
     from warpjld.script.binding import cover
     from warpjld.script.grasping import Attempt, search_flexion
 
