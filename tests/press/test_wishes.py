@@ -131,7 +131,7 @@ def test_built_in_shapes_are_exact_obstacles(run) -> None:
         ("PHYSICAL ball HOLLOW 0.03", r"a wall must be thinner than half of BALL, 0.03 m"),
         ("PHYSICAL ball PRESSURE 1000", r"only a hollow object has an inside"),
         ("FLESH right", r"4:7: there is no actor right"),
-        ("FLESH left TOE", r"expected an option \(ELEMENT/YOUNG/SKIN/POISSON/ITSELF\), found TOE"),
+        ("FLESH left TOE", r"expected an option \(ELEMENT/YOUNG/SKIN/POISSON/STIFFENING/ITSELF\), found TOE"),
         ("FRICTION left ball nan", r"expected the coefficient of friction, found nan"),
         ("FRICTION left ball -1", r"must be 0 or more, got -1"),
         ("FRICTION left bal 1", r"there is no actor or object BAL; did you mean BALL"),

@@ -157,7 +157,13 @@ def _hand(scene: Scene, actor: Actor, wish: FleshWish, start: float, notes: list
     if gap > 0.5 * wish.element:
         notes.append(f"{actor.name}: the volume stays up to {1e3 * gap:.1f} mm off the skin where it folds")
     part = part_of(hand, poses, skin, wish.digits)
-    laws = hand_laws(part.hand.mesh.region_names, flesh=wish.flesh, skin=wish.skin, poisson=wish.poisson)
+    laws = hand_laws(
+        part.hand.mesh.region_names,
+        flesh=wish.flesh,
+        skin=wish.skin,
+        poisson=wish.poisson,
+        stiffening=wish.stiffening,
+    )
 
     @lru_cache(maxsize=8)
     def moves(time: float) -> Moves:
