@@ -188,7 +188,9 @@ class Equilibrium:
             assert stiffness is not None
             if body.large_strain:
                 subtract_pressure_stiffness(stiffness, body, step.loads, u, step.share)
-            matrix = with_contact(stiffness, contact.points, [r.blocks for r in contact.responses], threads=body.threads)
+            matrix = with_contact(
+                stiffness, contact.points, [r.blocks for r in contact.responses], threads=body.threads
+            )
             matrix = self._steadied(matrix, stiffness, loose)
             try:
                 solver, done = self._solve(solver, matrix, free, residual - matrix.product(jump, threads=body.threads))
@@ -273,15 +275,15 @@ class Equilibrium:
             self._tangent = self.body.at(u, pressures=pressures, reuse=self._tangent)
             return self._tangent
         assert self._rest.stiffness is not None
-        return replace(self._rest, forces=self._rest.forces + self._rest.stiffness.product(u, threads=self.body.threads))
+        return replace(
+            self._rest, forces=self._rest.forces + self._rest.stiffness.product(u, threads=self.body.threads)
+        )
 
     def _normals(self, u: NDArray[np.float64]) -> list[NDArray[np.float64]]:
         x = self.body.mesh.nodes + u.reshape(-1, 3)
         return [interface.slave.normals(x) for interface in self.interfaces]
 
-    def _points(
-        self, u: NDArray[np.float64], step: Step, normals: list[NDArray[np.float64]]
-    ) -> list[ContactPoints]:
+    def _points(self, u: NDArray[np.float64], step: Step, normals: list[NDArray[np.float64]]) -> list[ContactPoints]:
         """Every interface's points at displacement u (3N,)."""
         x = self.body.mesh.nodes + u.reshape(-1, 3)
         return [i.points(x, step.before, step.time, n) for i, n in zip(self.interfaces, normals, strict=True)]

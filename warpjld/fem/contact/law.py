@@ -134,7 +134,9 @@ def respond(
         along = _unit(carried)
         friction = np.where(sticking[:, None], held, limit[:, None] * along)
         # a sliding point resists what would turn its path, as much as it slides
-        turning = np.minimum(penalty, np.divide(limit, np.linalg.norm(slip, axis=1), out=penalty.copy(), where=slip.any(axis=1)))
+        turning = np.minimum(
+            penalty, np.divide(limit, np.linalg.norm(slip, axis=1), out=penalty.copy(), where=slip.any(axis=1))
+        )
         turning = np.where(limit > 0.0, turning, 0.0)
         beside = across - along[:, :, None] * along[:, None, :]
         tangent = np.where(sticking[:, None, None], penalty[:, None, None] * across, turning[:, None, None] * beside)
@@ -143,7 +145,12 @@ def respond(
 
 
 def remember(
-    pair: Pair, memory: Memory, points: ContactPoints, response: Response, slip: NDArray[np.float64], known: NDArray[np.bool_]
+    pair: Pair,
+    memory: Memory,
+    points: ContactPoints,
+    response: Response,
+    slip: NDArray[np.float64],
+    known: NDArray[np.bool_],
 ) -> Memory:
     """Multipliers after a linear solve that foresees a response and a slip (m, 3), and who sticks from now on (R122).
 

@@ -34,9 +34,7 @@ class Mortar:
         threads: Threads.
     """
 
-    def __init__(
-        self, slave: ContactSurface, master: ContactSurface, pair: Pair, count: int, threads: int
-    ) -> None:
+    def __init__(self, slave: ContactSurface, master: ContactSurface, pair: Pair, count: int, threads: int) -> None:
         self._slave, self._master = slave, master
         self._count, self._threads = count, threads
         exclusion = pair.exclusion
@@ -61,7 +59,10 @@ class Mortar:
         self._labels = [np.ascontiguousarray(a) for a in (mine, other, never)]
 
     def points(self, x: NDArray[np.float64], reach: float, normals: NDArray[np.float64]) -> ContactPoints:
-        """Points at positions x (N, 3), slave normals (m, 3): of facets that face one another, no farther apart than ``reach``, nor deeper."""
+        """Points at positions x (N, 3) with slave normals (m, 3).
+
+        Of facets face to face, no farther apart than ``reach``, nor deeper.
+        """
         from scipy.sparse import coo_array, csr_array
 
         from warpjld.fem.contact.points import ContactPoints
@@ -78,13 +79,13 @@ class Mortar:
         entries = np.concatenate([found[:, :16].ravel(), -found[:, 16:32].ravel()])
         places = (np.concatenate([rows.ravel(), rows.ravel()]), np.concatenate([own.ravel(), far.ravel()]))
         table = csr_array(coo_array((entries, places), shape=(len(slave.nodes), self._count)))
-        area = np.bincount(rows.ravel(), weights=found[:, :16].ravel(), minlength=len(slave.nodes))
-        nodes = np.flatnonzero(area > _LEAST * slave.edge**2)
+        area = np.asarray(np.bincount(rows.ravel(), found[:, :16].ravel(), minlength=len(slave.nodes)), np.float64)
+        nodes: NDArray[np.int64] = np.flatnonzero(area > _LEAST * slave.edge**2)
         table = table[nodes]
         table.data /= np.repeat(area[nodes], np.diff(table.indptr))
         table.sort_indices()
         normal = normals[nodes]
-        gap = -np.einsum("mi,mi->m", normal, table @ x)
+        gap = np.asarray(-np.einsum("mi,mi->m", normal, table @ x), np.float64)
         return ContactPoints(nodes, table, normal, area[nodes], gap, np.zeros((len(nodes), 3)))
 
     def _neighbours(self, x: NDArray[np.float64], reach: float) -> NDArray[np.int32]:
@@ -104,14 +105,13 @@ class Mortar:
         mine, other, never = (shared(a) for a in self._labels)
         starts, counts = np.zeros(count + 1, np.int32), np.zeros(count, np.int32)
         inputs: list[Any] = [bvh.id, lower, upper, mine, other, never]
-        nothing = np.zeros(1, np.int32)
-        for fill, out in ((False, nothing), (True, None)):
+        out = np.empty(1, np.int32)
+        for fill in (False, True):
             if fill:
                 np.cumsum(counts, out=starts[1:])
                 out = np.empty(max(int(starts[-1]), 1), np.int32)
             arguments = [*inputs, shared(starts), fill, shared(counts), shared(out)]
             wp.launch(contact_mortar.facet_pairs, dim=count, inputs=arguments, device="cpu")
-        assert out is not None
         facet = np.repeat(np.arange(count, dtype=np.int32), counts)
         return np.stack([facet, out[: len(facet)]], axis=1)
 

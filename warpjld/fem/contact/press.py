@@ -50,7 +50,8 @@ def press(
 
     Args:
         body: All bodies, merged into one mesh.
-        prescribed: Known displacements from rest at the last time, reached in proportion to time; or a function of time.
+        prescribed: Known displacements from rest at the last time, reached in proportion to time; or a function of
+            time.
         pairs: What may touch what.
         loads: Loads at the last time, reached in proportion to time; or a function of time.
         times: Rising times above 0 (above ``after``'s) to find equilibria at.
@@ -68,7 +69,11 @@ def press(
     """
     wanted = [float(t) for t in times]
     first = 0.0 if after is None else after.last.time
-    if not wanted or not np.isfinite(wanted).all() or any(b <= a for a, b in zip([first, *wanted], wanted, strict=False)):
+    if (
+        not wanted
+        or not np.isfinite(wanted).all()
+        or any(b <= a for a, b in zip([first, *wanted], wanted, strict=False))
+    ):
         raise InputError(f"times: want rising times above {first:g}, got {list(times)}")
     for name, value in (("tolerance", tolerance), ("penetration", penetration)):
         if not 0.0 < value < 1.0:
@@ -140,7 +145,8 @@ class _Run:
         watch: Callable[[ContactInstant], str | None] | None,
         progress: Callable[[str], None] | None,
     ) -> ContactSolution:
-        now, reached, halvings = self.start, [], 0
+        now, halvings = self.start, 0
+        reached: list[ContactInstant] = []
         todo = list(self.times)
         solves, iterations = 0, 0
         while todo:

@@ -40,7 +40,8 @@ class ContactSurface:
         flat = np.repeat(faces.reshape(len(faces), -1) / 4.0, 4, axis=0)
         where = self.corners.ravel()
         columns = [np.bincount(where, weights=column, minlength=len(self.nodes)) for column in flat.T]
-        return np.stack(columns, axis=1).reshape(-1, *faces.shape[1:])
+        out: NDArray[np.float64] = np.asarray(np.stack(columns, axis=1), np.float64).reshape(-1, *faces.shape[1:])
+        return out
 
     def normals(self, x: NDArray[np.float64]) -> NDArray[np.float64]:
         """Outward unit normals at the nodes, the average of the faces' by area, shape (m, 3)."""
@@ -64,15 +65,13 @@ def surface_of(mesh: HexMesh, faces: str | NDArray[np.int32], what: str) -> Cont
         found = np.asarray(faces)
         if found.ndim != 2 or found.shape[1] != 2:
             raise InputError(f"{what}: want faces of shape (n, 2), got {found.shape}")
-        if len(found) and (
-            found.min() < 0 or found[:, 0].max() >= len(mesh.elements) or found[:, 1].max() > 5
-        ):
+        if len(found) and (found.min() < 0 or found[:, 0].max() >= len(mesh.elements) or found[:, 1].max() > 5):
             raise InputError(f"{what}: faces must name an element in 0…{len(mesh.elements) - 1} and a face in 0…5")
     if len(found) == 0:
         raise InputError(f"{what}: no faces")
     quads = np.ascontiguousarray(mesh.quads(found), dtype=np.int32)
-    nodes, corners = np.unique(quads, return_inverse=True)
-    corners = corners.reshape(quads.shape).astype(np.int32)
+    nodes, inverse = np.unique(quads, return_inverse=True)
+    corners: NDArray[np.int32] = np.asarray(inverse, dtype=np.int32).reshape(quads.shape)
     surface = ContactSurface(quads, nodes.astype(np.int32), corners, np.empty(len(nodes)))
     area = np.linalg.norm(surface.area_vectors(mesh.nodes), axis=1)
     used = np.bincount(corners.ravel(), minlength=len(nodes))
