@@ -126,7 +126,7 @@ class ObjectSet:
         solids.first_face = wp.array(firsts.astype(np.int32), dtype=wp.int32, device=self.device)
         flags = np.array([thing.report.solid for thing in self.objects], dtype=np.int32)
         solids.solid = wp.array(flags, dtype=wp.int32, device=self.device)
-        features = np.concatenate([feature_normals(thing.vertices, thing.faces) for thing in self.objects])
+        features = np.concatenate([_features(thing) for thing in self.objects])
         solids.features = wp.array(features.astype(np.float32), dtype=wp.vec3, device=self.device)
         self.solids: Any = solids
         """``warpjld_kernels.surface_distance.Solids`` on the device."""
@@ -270,6 +270,13 @@ def feature_normals(vertices: NDArray[np.float64], faces: NDArray[np.int32]) -> 
         np.add.at(at_corner, faces[:, k], angle[:, None] * normal)
     out[:, 4:] = at_corner[faces]
     return out
+
+
+def _features(thing: GraspObject) -> NDArray[np.float64]:
+    """Feature normals; zeros where winding numbers tell inside from outside and nobody asks for them."""
+    if not thing.report.solid:
+        return np.zeros((len(thing.faces), 7, 3))
+    return feature_normals(thing.vertices, thing.faces)
 
 
 def _finite_points(points: ArrayLike) -> NDArray[np.float64]:
