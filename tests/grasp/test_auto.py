@@ -52,8 +52,8 @@ def test_sampled_hands_are_next_to_the_object_and_not_in_it(covering) -> None:
 
 
 def test_finding_a_grasp(covering) -> None:
-    thing = ball(0.06).placed((1.0, 0.5, 0.0))
-    found = find_grasp(covering, thing, count=12, seed=1)
+    thing = ball(0.06, subdivisions=3).placed((1.0, 0.5, 0.0))
+    found = find_grasp(covering, thing, count=8, seed=1)
     assert found.posture == "sphere"
     assert found.verdict.closed
     assert found.verdict.epsilon > 0.05
@@ -61,7 +61,7 @@ def test_finding_a_grasp(covering) -> None:
     skin = covering.deform(found.poses(covering.skeleton))[0]
     seen = penetration(covering, skin, thing)
     assert seen.depth <= 1e-3
-    again = find_grasp(covering, thing, count=12, seed=1)
+    again = find_grasp(covering, thing, count=8, seed=1)
     np.testing.assert_array_equal(found.angles, again.angles)
     np.testing.assert_array_equal(found.position, again.position)
 

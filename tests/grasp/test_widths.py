@@ -1,15 +1,15 @@
 """Widths of objects that are known, and where a hand is opened by so much."""
 
 import numpy as np
-import pytest
 
 from warpjld.grasp import ObjectSet
+from warpjld.grasp.digits import pad_vertex
 from warpjld.grasp.opening import closing_in_air
 from warpjld.grasp.placements import across_widths
 from warpjld.grasp.postures import posture_angles
 from warpjld.grasp.shapes import ball, box
 from warpjld.grasp.widths import sample_widths
-from warpjld.skeleton import DIGITS, poses_from_angles
+from warpjld.skeleton import DIGITS
 
 
 def test_lines_through_a_ball_are_as_long_as_its_chords() -> None:
@@ -29,9 +29,9 @@ def test_only_what_fits_is_found() -> None:
     assert np.median(upright) > 0.9  # through the thin side
 
 
-def test_pads_meet_the_ends_of_a_width_in_the_air(covering) -> None:
-    """With nothing to touch before, thumb and fingers are on either side of the width, the palm beside it."""
-    closing = [digit for digit in DIGITS if digit != "pinky"]
+def test_pads_meet_the_ends_of_a_width(covering) -> None:
+    """Thumb and fingers come to either side of the width, without touching."""
+    closing = ("thumb", "index", "middle")
     start = posture_angles(covering.skeleton, "left", "pinch")
     opening = closing_in_air(covering, "left", start, closing)
     assert (np.diff(opening.width[:6]) < 0).all()
@@ -42,23 +42,18 @@ def test_pads_meet_the_ends_of_a_width_in_the_air(covering) -> None:
     hands = across_widths(covering, [opening], objects, widths, "left", rng, into=0.0)
     skin = covering.deform(hands.poses(covering.skeleton))
     assert objects.distances(skin, which=np.zeros(len(hands), int)).distance.min() > 0.0
-    step = opening.step_for(float(widths.width.max()))
-    closed = np.repeat(opening.angles[step][None], len(hands), axis=0)
-    poses = hands.poses(covering.skeleton, closed)
-    tip = covering.skeleton.index("thumb.tip"), covering.skeleton.index("index.tip")
-    line = poses.positions[:, tip[1]] - poses.positions[:, tip[0]]
+    closed = np.repeat(opening.angles[opening.step_for(0.02)][None], len(hands), axis=0)
+    pads = [pad_vertex(covering, f"left.{digit}") for digit in ("thumb", "index", "middle")]
+    at = covering.points(hands.poses(covering.skeleton, closed), np.array(pads))
+    line = at[:, 1:].mean(axis=1) - at[:, 0]
     cosine = (line * (widths.second - widths.first)).sum(axis=1) / np.linalg.norm(line, axis=1) / widths.width
-    assert np.median(cosine) > 0.8
+    np.testing.assert_allclose(cosine, 1.0, atol=0.02)
 
 
-def test_a_hand_without_a_thumb_in_the_way_keeps_its_rest(covering) -> None:
+def test_a_hand_that_curls_keeps_to_its_limits(covering) -> None:
     start = posture_angles(covering.skeleton, "left", "sphere")
     opening = closing_in_air(covering, "left", start, DIGITS)
     np.testing.assert_array_equal(opening.angles[0], start)
     low, high = covering.skeleton.limits[:, 0].T
-    assert (
-        (opening.angles[..., 0] <= np.maximum(high, start[:, 0]) + 1e-9) & (opening.angles[..., 0] >= low - 1e-9)
-    ).all()
-    poses = poses_from_angles(covering.skeleton, opening.angles[:1])
-    assert opening.width[0] == pytest.approx(0.1, abs=0.05)
-    assert len(poses) == 1
+    bent = opening.angles[..., 0]
+    assert ((bent >= low - 1e-9) & (bent <= high + 1e-9)).all()
