@@ -34,6 +34,8 @@ LINEAR_FULL = 1
 """Linear elasticity with the volumetric part at every point: locks near ν = ½; for comparison."""
 NEO_HOOKE = 2
 MOONEY_RIVLIN = 3
+FUNG = 4
+"""Neo-Hookean with a shear modulus that grows as exp(β (Ī₁ − 3))."""
 
 
 @wp.func_native(
@@ -62,13 +64,14 @@ MOONEY_RIVLIN = 3
         const int kind = batch_kinds.data[batch], count = batch_counts.data[batch];
         const bool large = kind >= {NEO_HOOKE};
 
-        V rest[8][3], now[8][3], moved[8][3], c10, c01, kappa, s0[6];
+        V rest[8][3], now[8][3], moved[8][3], c10, c01, kappa, beta, s0[6];
         for (int l = 0; l < {LANES}; ++l) {{
             const int e = ids[l];
-            const double* law = laws.data + 3 * e;
+            const double* law = laws.data + 4 * e;
             c10[l] = law[0];
             c01[l] = law[1];
             kappa[l] = law[2];
+            beta[l] = law[3];
             for (int I = 0; I < 6; ++I) s0[I][l] = initial_stress.data[6 * e + I];
             for (int a = 0; a < 8; ++a)
                 for (int i = 0; i < 3; ++i) {{
@@ -175,8 +178,10 @@ MOONEY_RIVLIN = 3
                     b2[I] = b[at[i][0]] * b[at[0][j]] + b[at[i][1]] * b[at[1][j]] + b[at[i][2]] * b[at[2][j]];
                 }}
                 const V first = b[0] + b[1] + b[2];
-                V trace = 0;
-                for (int I = 0; I < 6; ++I) tau[I] = 2.0 * c10 * b[I] + 2.0 * c01 * (first * b[I] - b2[I]);
+                V trace = 0, slope = c10;
+                if (kind == {FUNG})
+                    for (int l = 0; l < {LANES}; ++l) slope[l] *= exp(beta[l] * (first[l] - 3.0));
+                for (int I = 0; I < 6; ++I) tau[I] = 2.0 * slope * b[I] + 2.0 * c01 * (first * b[I] - b2[I]);
                 trace = tau[0] + tau[1] + tau[2];
                 for (int I = 0; I < 3; ++I) tau[I] -= trace / 3.0;
                 for (int I = 0; I < 6; ++I)
@@ -184,6 +189,9 @@ MOONEY_RIVLIN = 3
                         const double shape = (I < 3 && J < 3 ? -1.0 / 3.0 : 0.0) + (I == J ? (I < 3 ? 1.0 : 0.5) : 0.0);
                         D[I][J] = (2.0 / 3.0) * (trace * shape - (I < 3 ? tau[J] : V(0)) - (J < 3 ? tau[I] : V(0)));
                     }}
+                if (kind == {FUNG})
+                    for (int I = 0; I < 6; ++I)
+                        for (int J = 0; J < 6; ++J) D[I][J] += beta / slope * tau[I] * tau[J];
                 if (kind == {MOONEY_RIVLIN}) {{
                     // P : 4 c01 (b ⊗ b − b ⊡ b) : P, the second invariant's own tangent
                     V m[6];
