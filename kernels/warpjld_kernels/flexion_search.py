@@ -353,10 +353,10 @@ def search(
         if task.facet >= 0:
             hit = over_facet(solids, task.thing, task.facet, local)
         else:
-            limit = float(FAR)
+            limit = wp.float64(FAR)
             if count > 0:  # the last nearest point is on the surface still
-                limit = 1.0001 * wp.length(local - hit.point) + 1.0e-6
-            hit = nearest(solids, task.thing, local, limit)
+                limit = wp.float64(1.0001 * wp.length(local - hit.point) + 1.0e-6)
+            hit = nearest(solids, task.thing, wp.vec3d(local), limit)
         hit.distance = hit.distance - task.target
         count += 1
         if hit.distance < closest.distance or count == 1:
