@@ -6,6 +6,7 @@ either.
 
 | word | meaning |
 |---|---|
+| ``Stored`` | floats in an array, as a pointer's target: they need not be aligned |
 | ``PICK(x, l)`` | lane l of x |
 | ``LOWEST(x, y)``, ``HIGHEST(x, y)`` | lane by lane |
 | ``WIDENED(x)`` | floats as doubles |
@@ -20,6 +21,7 @@ def prelude(lanes: int) -> str:
 #if defined(__CUDA_ARCH__)
     typedef double Doubles;
     typedef float Floats;
+    typedef float Stored;
     constexpr int N = 1;
 #define PICK(x, l) (x)
 #define LOWEST(x, y) ((x) < (y) ? (x) : (y))
@@ -28,8 +30,9 @@ def prelude(lanes: int) -> str:
 #define LANES_OF(test) ((test) ? 1u : 0u)
 #define FIRST_OF(bits) (__ffs(bits) - 1)
 #else
-    typedef double Doubles __attribute__((ext_vector_type({lanes}), aligned(8)));
-    typedef float Floats __attribute__((ext_vector_type({lanes}), aligned(4)));
+    typedef double Doubles __attribute__((ext_vector_type({lanes})));
+    typedef float Floats __attribute__((ext_vector_type({lanes})));
+    typedef float Stored __attribute__((ext_vector_type({lanes}), aligned(4)));
     typedef bool Bits __attribute__((ext_vector_type({lanes})));
     constexpr int N = {lanes};
 #define PICK(x, l) (x)[l]

@@ -121,8 +121,7 @@ def nearest(solids: Solids, o: int, point: wp.vec3d, limit: wp.float64) -> Hit:
     """
     hit = Hit()
     hit.distance = FAR
-    tree = solids.tree
-    hit.face = nearest_triangle(tree.root[o], tree.child, tree.boxes, tree.corners, tree.face, point, limit)
+    hit.face = nearest_triangle(solids.tree, o, point, limit)
     if hit.face >= 0:
         surface = wp.mesh_get(solids.mesh[o])
         a = wp.vec3d(surface.points[surface.indices[3 * hit.face]]) - point

@@ -40,7 +40,7 @@ class Tree:
     + f"""
     // squared distance, whose bits are in the order of its values, and node: one word
     wp::uint64 stack[{WAITING}];
-    stack[0] = (wp::uint32)root;
+    stack[0] = (wp::uint32)tree.root.data[surface];
     int count = 1, nearest = -1;
     double best = bound * bound;
     const float at[3] = {{(float)point[0], (float)point[1], (float)point[2]}};
@@ -52,14 +52,14 @@ class Tree:
         if (squared_next > best) continue;
         const int node = (int)(wp::uint32)next;
         if (node < 0) {{
-            const float* leaf = corners.data + {9 * WIDTH} * size_t(-1 - node);
-            const int* number = face.data + {WIDTH} * size_t(-1 - node);
+            const float* leaf = tree.corners.data + {9 * WIDTH} * size_t(-1 - node);
+            const int* number = tree.face.data + {WIDTH} * size_t(-1 - node);
             for (int base = 0; base < {WIDTH}; base += N) {{
                 Doubles corner[3][3], edge[3][3], normal[3], squared;
                 Doubles lateral = Doubles(1e300), lengths = Doubles(0.0);
                 for (int k = 0; k < 3; ++k)
                     for (int i = 0; i < 3; ++i)
-                        corner[k][i] = WIDENED(*(const Floats*)(leaf + {WIDTH} * (3 * k + i) + base)) - point[i];
+                        corner[k][i] = WIDENED(*(const Stored*)(leaf + {WIDTH} * (3 * k + i) + base)) - point[i];
                 for (int k = 0; k < 3; ++k)
                     for (int i = 0; i < 3; ++i) edge[k][i] = corner[(k + 1) % 3][i] - corner[k][i];
                 for (int i = 0; i < 3; ++i) {{
@@ -99,14 +99,14 @@ class Tree:
                 }}
             }}
         }} else {{
-            const float* box = boxes.data + {6 * WIDTH} * size_t(node);
-            const int first = child.data[node], step = first < 0 ? -1 : 1;
+            const float* box = tree.boxes.data + {6 * WIDTH} * size_t(node);
+            const int first = tree.child.data[node], step = first < 0 ? -1 : 1;
             const int begin = count;
             for (int base = 0; base < {WIDTH}; base += N) {{
                 Floats squared = Floats(0.0f);
                 for (int i = 0; i < 3; ++i) {{
-                    const Floats below = *(const Floats*)(box + {WIDTH} * i + base) - at[i];
-                    const Floats over = at[i] - *(const Floats*)(box + {3 * WIDTH} + {WIDTH} * i + base);
+                    const Floats below = *(const Stored*)(box + {WIDTH} * i + base) - at[i];
+                    const Floats over = at[i] - *(const Stored*)(box + {3 * WIDTH} + {WIDTH} * i + base);
                     const Floats gap = HIGHEST(HIGHEST(below, over), Floats(0.0f));
                     squared += gap * gap;
                 }}
@@ -128,13 +128,5 @@ class Tree:
     return nearest;
 """
 )
-def nearest_triangle(
-    root: int,
-    child: wp.array(dtype=wp.int32),
-    boxes: wp.array(dtype=float),
-    corners: wp.array(dtype=float),
-    face: wp.array(dtype=wp.int32),
-    point: wp.vec3d,
-    bound: wp.float64,
-) -> int:
+def nearest_triangle(tree: Tree, surface: int, point: wp.vec3d, bound: wp.float64) -> int:
     """Number of the triangle nearest to a point, -1 where none is nearer than ``bound``."""
