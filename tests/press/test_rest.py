@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from warpjld.fem.hand.flesh_hand import FleshHand, build_flesh_hand
 
 from warpjld.covering import Covering, bind
 from warpjld.fem.contact.facets import Facets
+from warpjld.fem.hand.flesh_hand import FleshHand, build_flesh_hand
 from warpjld.press.rest import part_of, posed
 from warpjld.rig import Rig
 from warpjld.skeleton import Poses, poses_from_angles

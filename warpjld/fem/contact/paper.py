@@ -141,8 +141,8 @@ def by_turns(
             progress(f"time {time:.3g}: {instant.solves // 2} turns, {status.value}")
         if status is not Status.CONVERGED:
             message = (
-                f"at time {time:.4g}: repelling and releasing did not settle ({status.value}); it does where the master "
-                "is the stiffer body, or with Aitken's relaxation, or use the default method"
+                f"at time {time:.4g}: repelling and releasing did not settle ({status.value}); it does where the "
+                "master is the stiffer body, or with Aitken's relaxation, or use the default method"
             )
             break
         reason = watch(instant) if watch else None
