@@ -46,7 +46,7 @@ class Batches:
 
 @wp.struct
 class Model:
-    """Places of the nodes; corners of the elements, the blocks they add to, constants c10, c01, κ, initial stress."""
+    """Places of the nodes; corners of the elements, the blocks they add to, c10, c01, κ and β, initial stress."""
 
     nodes: wp.array(dtype=wp.float64)
     elements: wp.array2d(dtype=wp.int32)
@@ -92,13 +92,14 @@ class Sums:
         const int kind = batches.kinds.data[batch], count = left < N ? left : N;
         const bool large = kind >= NEO_HOOKE;
 
-        Doubles rest[8][3], now[8][3], moved[8][3], c10, c01, kappa, s0[6];
+        Doubles rest[8][3], now[8][3], moved[8][3], c10, c01, kappa, beta, s0[6];
         for (int l = 0; l < N; ++l) {
             const int e = ids[l];
-            const double* law = model.laws.data + 3 * e;
+            const double* law = model.laws.data + 4 * e;
             PICK(c10, l) = law[0];
             PICK(c01, l) = law[1];
             PICK(kappa, l) = law[2];
+            PICK(beta, l) = law[3];
             for (int I = 0; I < 6; ++I) PICK(s0[I], l) = model.initial_stress.data[6 * e + I];
             for (int a = 0; a < 8; ++a)
                 for (int i = 0; i < 3; ++i) {

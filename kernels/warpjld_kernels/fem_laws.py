@@ -10,9 +10,11 @@ LINEAR_FULL = 1
 """Linear elasticity with the volumetric part at every point: locks near ν = ½; for comparison."""
 NEO_HOOKE = 2
 MOONEY_RIVLIN = 3
+FUNG = 4
+"""Neo-Hookean with a shear modulus that grows as exp(β (Ī₁ − 3))."""
 
 VOIGT = f"""
-    constexpr int LINEAR_FULL = {LINEAR_FULL}, NEO_HOOKE = {NEO_HOOKE}, MOONEY_RIVLIN = {MOONEY_RIVLIN};
+    constexpr int LINEAR_FULL = {LINEAR_FULL}, NEO_HOOKE = {NEO_HOOKE}, MOONEY_RIVLIN = {MOONEY_RIVLIN}, FUNG = {FUNG};
     const int voigt[6][2] = {{{{0, 0}}, {{1, 1}}, {{2, 2}}, {{0, 1}}, {{1, 2}}, {{2, 0}}}};
     const int at[3][3] = {{{{0, 3, 5}}, {{3, 1, 4}}, {{5, 4, 2}}}};
 """
@@ -50,8 +52,10 @@ STRESS = """
                     b2[I] = b[at[i][0]] * b[at[0][j]] + b[at[i][1]] * b[at[1][j]] + b[at[i][2]] * b[at[2][j]];
                 }
                 const Doubles first = b[0] + b[1] + b[2];
-                Doubles trace = 0;
-                for (int I = 0; I < 6; ++I) tau[I] = 2.0 * c10 * b[I] + 2.0 * c01 * (first * b[I] - b2[I]);
+                Doubles trace = 0, slope = c10;
+                if (kind == FUNG)
+                    for (int l = 0; l < N; ++l) PICK(slope, l) *= exp(PICK(beta, l) * (PICK(first, l) - 3.0));
+                for (int I = 0; I < 6; ++I) tau[I] = 2.0 * slope * b[I] + 2.0 * c01 * (first * b[I] - b2[I]);
                 trace = tau[0] + tau[1] + tau[2];
                 for (int I = 0; I < 3; ++I) tau[I] -= trace / 3.0;
                 for (int I = 0; I < 6; ++I)
@@ -62,6 +66,9 @@ STRESS = """
                         if (J < 3) d -= tau[I];
                         D[I][J] = (2.0 / 3.0) * d;
                     }
+                if (kind == FUNG)
+                    for (int I = 0; I < 6; ++I)
+                        for (int J = 0; J < 6; ++J) D[I][J] += beta / slope * tau[I] * tau[J];
                 if (kind == MOONEY_RIVLIN) {
                     // P : 4 c01 (b ⊗ b − b ⊡ b) : P, the second invariant's own tangent
                     Doubles m[6];
@@ -87,6 +94,6 @@ STRESS = """
                 }
             }
 """
-"""Reads the constants ``c10``, ``c01``, ``kappa`` and initial stress ``s0``, ``kind``, ``large``, and at point q ``F``,
-``dv``, ``dV``. Defines ``tau`` (τ), ``D`` (c) and ``total`` (τ with the initial stress carried along).
+"""Reads the constants ``c10``, ``c01``, ``kappa``, ``beta`` and initial stress ``s0``, ``kind``, ``large``, and at
+point q ``F``, ``dv``, ``dV``. Defines ``tau`` (τ), ``D`` (c) and ``total`` (τ with the initial stress carried along).
 """

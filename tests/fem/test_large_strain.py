@@ -7,6 +7,7 @@ import pytest
 
 from warpjld.fem import (
     Body,
+    Fung,
     LinearElastic,
     Loads,
     Material,
@@ -19,11 +20,14 @@ from warpjld.fem import (
     solve,
 )
 from warpjld.fem.loads import external_forces, subtract_pressure_stiffness
+from warpjld.fem.stress import cauchy
 
 pytestmark = pytest.mark.filterwarnings("ignore::warpjld.fem.MaterialWarning")
 
 
-@pytest.mark.parametrize("law", [NeoHooke(1.0, 0.4), MooneyRivlin(0.3, 0.2, 0.45), LinearElastic(1.0, 0.3)])
+@pytest.mark.parametrize(
+    "law", [NeoHooke(1.0, 0.4), MooneyRivlin(0.3, 0.2, 0.45), Fung(1.0, 3.0, 0.4), LinearElastic(1.0, 0.3)]
+)
 def test_tangent_against_finite_differences(law: Material) -> None:
     mesh = box((1.0, 1.0, 1.0), (2, 2, 2))
     rng = np.random.default_rng(0)
@@ -111,7 +115,7 @@ def test_shell_under_following_pressure(stretch: float, pressure: float) -> None
     assert radius / 0.8 == pytest.approx(stretch, rel=2e-3)
 
 
-@pytest.mark.parametrize("law", [NeoHooke(1.0, 0.3), MooneyRivlin(0.1, 0.09, 0.3)])
+@pytest.mark.parametrize("law", [NeoHooke(1.0, 0.3), MooneyRivlin(0.1, 0.09, 0.3), Fung(1.0, 5.0, 0.3)])
 def test_turning_as_a_whole_costs_nothing(law: Material) -> None:
     mesh = box((1.0, 1.0, 1.0), (2, 2, 2))
     angle = 2.0
@@ -129,6 +133,20 @@ def test_uniform_stretch_of_mooney_rivlin() -> None:
     found = solve(Body(mesh, MooneyRivlin(c10, c01, 0.4999)), held, instants=4)
     pull = found.reactions[mesh.node_set("x+"), 0].sum()
     assert pull == pytest.approx(2 * (stretch - stretch**-2) * (c10 + c01 / stretch), rel=2e-3)
+
+
+def test_uniform_stretch_of_fung() -> None:
+    """Incompressible uniaxial tension: P = μ exp(β (λ² + 2/λ − 3)) (λ − λ⁻²), true stress λ P."""
+    mesh = box((1.0, 1.0, 1.0), (2, 2, 2))
+    beta, stretch = 2.0, 1.4
+    held = prescribe(mesh, "x-", x=0) + prescribe(mesh, "y-", y=0) + prescribe(mesh, "z-", z=0)
+    held = held + prescribe(mesh, "x+", x=stretch - 1.0)
+    body = Body(mesh, Fung(3.0, beta, 0.4999))
+    found = solve(body, held, instants=4)
+    pull = found.reactions[mesh.node_set("x+"), 0].sum()
+    law = np.exp(beta * (stretch**2 + 2 / stretch - 3)) * (stretch - stretch**-2)
+    assert pull == pytest.approx(law, rel=2e-3)
+    np.testing.assert_allclose(cauchy(body, found.displacement)[:, 0], stretch * law, rtol=2e-3)
 
 
 def test_too_much_pressure_says_so() -> None:

@@ -5,8 +5,9 @@ import pytest
 
 from warpjld.errors import InputError
 from warpjld.grasp import ObjectSet
-from warpjld.grasp.auto import find_grasp, palm_frame, sample_wrists
+from warpjld.grasp.auto import find_grasp
 from warpjld.grasp.intersection import intersection
+from warpjld.grasp.placements import palm_frame, sample_wrists
 from warpjld.grasp.postures import POSTURES, posture_angles, posture_for
 from warpjld.grasp.shapes import ball, box, cylinder, glass, plate
 from warpjld.skeleton import poses_from_angles

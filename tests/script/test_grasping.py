@@ -8,7 +8,7 @@ import pytest
 
 from warpjld.errors import InputError
 from warpjld.grasp import ObjectSet, Status
-from warpjld.grasp.close import pad_vertex
+from warpjld.grasp.digits import pad_vertex
 from warpjld.script.binding import cover
 from warpjld.script.grasping import placed_at, posture
 from warpjld.script.runner import run_scene

@@ -6,7 +6,7 @@ from warpjld.fem.box import box
 from warpjld.fem.conjugate import Status
 from warpjld.fem.hexmesh import HexMesh, merge
 from warpjld.fem.loads import Centrifugal, Loads
-from warpjld.fem.materials import LinearElastic, Material, MaterialWarning, MooneyRivlin, NeoHooke
+from warpjld.fem.materials import Fung, LinearElastic, Material, MaterialWarning, MooneyRivlin, NeoHooke
 from warpjld.fem.prescribed import FreeBodyError, Prescribed, prescribe
 from warpjld.fem.solution import Instant, Solution, SolveError
 from warpjld.fem.static import solve
@@ -15,6 +15,7 @@ __all__ = [
     "Body",
     "Centrifugal",
     "FreeBodyError",
+    "Fung",
     "HexMesh",
     "Instant",
     "LinearElastic",

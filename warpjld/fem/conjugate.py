@@ -26,6 +26,7 @@ class Status(Enum):
     NOT_FINITE = "a number became infinite or undefined"
     MAX_ITERATIONS = "the iterations allowed were not enough"
     INVERTED = "elements were turned inside out, however small the step"
+    STOPPED = "stopped as asked"
 
 
 @dataclass(frozen=True, eq=False)

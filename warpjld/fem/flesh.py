@@ -65,6 +65,7 @@ def flesh_of(
     bone: float = 0.45,
     flush: float = 0.4,
     gap: float = 0.08,
+    head: float | None = None,
     least: float = 0.1,
 ) -> Flesh:
     """Mesh the inside of a rig's surface and mark its bones.
@@ -78,13 +79,16 @@ def flesh_of(
         bone: Radius of a bone over the depth of its segment under the skin.
         flush: Shift towards the back over that depth; bone + flush = 1 makes it touch the skin.
         gap: Part of a segment that is left soft at either end, so that joints can move.
+        head: The same at the far end where another segment follows, by default ``gap``; small, so that the bone's head
+            makes the knuckle as it does in a real hand.
         least: Least scaled Jacobian.
 
     Raises:
         InputError: Shares that make no bone, a surface that cannot be meshed, or no bone at this spacing.
     """
-    if not 0 < bone < 1 or not 0 <= flush < 1 or not 0 <= gap < 0.5:
-        raise InputError(f"want 0 < bone < 1, 0 ≤ flush < 1, 0 ≤ gap < 0.5, got {bone}, {flush}, {gap}")
+    far = gap if head is None else head
+    if not 0 < bone < 1 or not 0 <= flush < 1 or not 0 <= gap < 0.5 or not 0 <= far < 0.5:
+        raise InputError(f"want 0 < bone < 1, 0 ≤ flush < 1, 0 ≤ gap, head < 0.5, got {bone}, {flush}, {gap}, {far}")
     envelope = Envelope(rig.surface.vertices, rig.surface.faces)
     fit = fit_mesh(envelope, spacing, least=least, name="flesh")
     mesh = fit.mesh
@@ -109,13 +113,16 @@ def flesh_of(
         size = float(np.linalg.norm(back))
         back = back / size if size > 1e-9 else np.zeros(3)
         share = np.clip((centres - start) @ along / length**2, 0.0, 1.0)
-        inside = (share > gap) & (share < (1.0 if parent == joint else 1.0 - gap))
+        end = 1.0 if parent == joint else 1.0 - (far if skeleton.children[joint] else gap)
+        inside = (share > gap) & (share < end)
         here = np.interp(share, t, depth)
         axis = start + share[:, None] * along + (flush * here)[:, None] * back
         away = np.linalg.norm(centres - axis, axis=1) / np.maximum(bone * here, 1e-12)
         mine = inside & (away < 1.0) & (away < nearest)
         nearest[mine], owner[mine] = away[mine], joint
     owner = _apart(mesh, owner)
+    if head is not None:
+        owner = _jointed(mesh, owner, skeleton.parents)
     joints = [int(j) for j in np.unique(owner[owner >= 0])]
     if not joints:
         raise InputError(f"spacing: at {spacing:g} m no element fits inside a bone")
@@ -157,6 +164,24 @@ def _backwards(rig: Rig, envelope: Envelope, root: int) -> NDArray[np.float64]:
     reach = steps[int(np.argmin(inside))] if not inside.all() else 0.0
     out: NDArray[np.float64] = away * (reach / size)
     return out
+
+
+def _jointed(mesh: HexMesh, owner: NDArray[np.int64], parents: NDArray[np.int32]) -> NDArray[np.int64]:
+    """At least two elements of flesh between bones that meet at a joint: one would have to bear its whole motion."""
+    owner = owner.copy()
+    for joint, parent in enumerate(parents):
+        if parent < 0 or not (owner == joint).any() or not (owner == parent).any():
+            continue
+        own, before = (np.zeros(len(mesh.nodes), dtype=bool) for _ in range(2))
+        own[mesh.elements[owner == joint]] = True
+        before[mesh.elements[owner == parent]] = True
+        bridge = own[mesh.elements].any(axis=1) & before[mesh.elements].any(axis=1)
+        near = np.zeros(len(mesh.nodes), dtype=bool)
+        near[mesh.elements[bridge]] = True
+        thin = (owner == joint) & (near & own)[mesh.elements].any(axis=1)
+        if not thin[owner == joint].all():
+            owner[thin] = -1
+    return owner
 
 
 def _apart(mesh: HexMesh, owner: NDArray[np.int64]) -> NDArray[np.int64]:

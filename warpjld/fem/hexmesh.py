@@ -39,6 +39,7 @@ class HexMesh:
         blocks: Structured grids of node numbers, shape (ni + 1, nj + 1, nk + 1) each, that together are the mesh; empty
             where it is not structured. A multigrid hierarchy takes every other line of them.
         lattice: Integer coordinates of the nodes on a regular grid, shape (N, 3), for meshes cut from one.
+        parts: The meshes that were merged into this one, in the order of their nodes; empty for a single one.
     """
 
     nodes: NDArray[np.float64]
@@ -49,6 +50,7 @@ class HexMesh:
     node_sets: dict[str, NDArray[np.int32]] = field(default_factory=dict)
     blocks: tuple[NDArray[np.int32], ...] = ()
     lattice: NDArray[np.int32] | None = None
+    parts: tuple[HexMesh, ...] = ()
 
     def __post_init__(self) -> None:
         if self.nodes.ndim != 2 or self.nodes.shape[1] != 3:
@@ -197,6 +199,7 @@ def merge(*meshes: HexMesh) -> HexMesh:
         faces={n: np.concatenate(p) for n, p in faces.items()},
         node_sets={n: np.concatenate(p) for n, p in sets.items()},
         blocks=tuple(blocks) if all(mesh.blocks for mesh in meshes) else (),
+        parts=tuple(part for mesh in meshes for part in (mesh.parts or (mesh,))),
     )
 
 

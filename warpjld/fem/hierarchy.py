@@ -21,8 +21,10 @@ def hierarchy_of(mesh: HexMesh) -> list[Any]:
 
     Structured blocks take every other line; meshes cut from a regular grid every other grid plane; any other mesh is
     laid into a regular grid of about twice its element size, whose trilinear functions contain every rigid motion.
-    Weights depend on the numbering only, not on how nodes were moved to fit a shape.
+    Weights depend on the numbering only, not on how nodes were moved to fit a shape. Merged meshes each keep their own.
     """
+    if mesh.parts:
+        return _side_by_side([hierarchy_of(part) for part in mesh.parts], [len(part.nodes) for part in mesh.parts])
     if mesh.blocks:
         return _from_blocks(mesh.blocks, len(mesh.nodes))
     if mesh.lattice is not None:
@@ -61,6 +63,20 @@ def _from_blocks(blocks: tuple[NDArray[np.int32], ...], count: int) -> list[Any]
         out.append(_tidy(csr_array(parts, shape=(count, len(fine_of)))))
         blocks = tuple(number[grid] for grid in coarse_grids)
         count = len(fine_of)
+    return out
+
+
+def _side_by_side(parts: list[list[Any]], counts: list[int]) -> list[Any]:
+    """Levels of several bodies together; one that has no coarser level left is handed on as it is."""
+    from scipy.sparse import block_diag, eye_array
+
+    out = []
+    for level in range(max(map(len, parts))):
+        weights = []
+        for k, levels in enumerate(parts):
+            weights.append(levels[level] if level < len(levels) else eye_array(counts[k], format="csr"))
+            counts[k] = weights[-1].shape[1]
+        out.append(_tidy(block_diag(weights, format="csr")))
     return out
 
 

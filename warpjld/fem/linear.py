@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from copy import copy
 from typing import Any
 
 import numpy as np
@@ -73,6 +74,7 @@ class LinearSolver:
         self.hierarchy = hierarchy
         self._precision = precision
         self._stiffness = stiffness
+        self._mesh = mesh
         self._mask = free.astype(np.float64)
         self._product = _Product(stiffness, self.threads)
         self._precondition: Callable[[NDArray[Any]], NDArray[Any]]
@@ -93,6 +95,15 @@ class LinearSolver:
             self._precondition = lambda r: np.einsum("nij,nj->ni", inverse, r.reshape(-1, 3)).ravel().astype(r.dtype)
         else:
             self._factor = _factor(stiffness, free, definite)
+
+    def of(self, stiffness: BlockMatrix) -> LinearSolver:
+        """A solver for a matrix that differs little from this one's: the preconditioner stays, a factor does not."""
+        if self.method == "direct":
+            return LinearSolver(stiffness, self.free, self._mesh, method="direct", threads=self.threads)
+        out = copy(self)
+        out._stiffness = stiffness
+        out._product = _Product(stiffness, self.threads)
+        return out
 
     def solve(self, b: NDArray[np.float64], *, tolerance: float = 1e-8, iterations: int = 4000) -> Iteration:
         """U_u for a right side of which only the free part counts, shape (3N,); zero where prescribed."""

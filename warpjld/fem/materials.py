@@ -12,10 +12,10 @@ from numpy.typing import NDArray
 from warpjld.errors import InputError
 from warpjld.fem.hexmesh import HexMesh
 
-__all__ = ["LinearElastic", "Material", "MaterialWarning", "MooneyRivlin", "NeoHooke", "laws_of"]
+__all__ = ["Fung", "LinearElastic", "Material", "MaterialWarning", "MooneyRivlin", "NeoHooke", "laws_of"]
 
 _USUAL_POISSON = 0.49
-LINEAR, LINEAR_FULL, NEO_HOOKE, MOONEY_RIVLIN = range(4)
+LINEAR, LINEAR_FULL, NEO_HOOKE, MOONEY_RIVLIN, FUNG = range(5)
 
 
 class MaterialWarning(UserWarning):
@@ -32,6 +32,7 @@ class Material:
         c01: Mooney and Rivlin's second constant [Pa].
         bulk: Bulk modulus [Pa].
         density: Mass per rest volume [kg/m³].
+        stiffening: Fung's exponent β.
     """
 
     kind: int
@@ -39,6 +40,7 @@ class Material:
     c01: float
     bulk: float
     density: float = 1000.0
+    stiffening: float = 0.0
 
     @property
     def large_strain(self) -> bool:
@@ -111,6 +113,26 @@ def MooneyRivlin(c10: float, c01: float, poisson: float = 0.49, density: float =
     return Material(MOONEY_RIVLIN, c10, c01, bulk, density)
 
 
+def Fung(young: float, stiffening: float, poisson: float = 0.48, density: float = 1000.0) -> Material:
+    """W = μ/2β (exp(β (Ī₁ − 3)) − 1) + κ/2 (θ − 1)²: skin and flesh, whose stiffness grows exponentially with strain.
+
+    Demiray 1972 (doi:10.1016/0021-9290(72)90047-4), the isotropic form of Fung's law. β = 0 would be ``NeoHooke``.
+
+    Args:
+        young: Young's modulus at small strain [Pa].
+        stiffening: β > 0; the modulus has grown by e where Ī₁ − 3 = 1 / β (a stretch of 1.6 for β = 1, 1.2 for β = 10).
+        poisson: Poisson's ratio at small strain.
+        density: [kg/m³].
+
+    Raises:
+        InputError: A modulus, exponent, ratio or density that no material has.
+    """
+    if not 0.0 < stiffening <= 100.0:
+        raise InputError(f"stiffening: want an exponent above 0, at most 100, got {stiffening}")
+    shear, bulk = _moduli(young, poisson, density)
+    return Material(FUNG, 0.5 * shear, 0.0, bulk, density, float(stiffening))
+
+
 def _moduli(young: float, poisson: float, density: float) -> tuple[float, float]:
     if not (young > 0.0 and np.isfinite(young)):
         raise InputError(f"young: want a modulus above 0 Pa, got {young}")
@@ -130,7 +152,7 @@ def _moduli(young: float, poisson: float, density: float) -> tuple[float, float]
 def laws_of(
     mesh: HexMesh, materials: Material | Mapping[str, Material]
 ) -> tuple[NDArray[np.int32], NDArray[np.float64], NDArray[np.float64]]:
-    """Kind (E,), constants c₁₀, c₀₁, κ (E, 3) and density (E,) of every element.
+    """Kind (E,), constants c₁₀, c₀₁, κ, β (E, 4) and density (E,) of every element.
 
     Args:
         mesh: The mesh.
@@ -148,5 +170,5 @@ def laws_of(
         raise InputError(f"materials: region '{missing[0]}' has no material; regions: {', '.join(mesh.region_names)}")
     chosen = [materials[name] for name in mesh.region_names]
     kinds = np.array([m.kind for m in chosen], dtype=np.int32)[mesh.regions]
-    constants = np.array([(m.c10, m.c01, m.bulk) for m in chosen])[mesh.regions]
+    constants = np.array([(m.c10, m.c01, m.bulk, m.stiffening) for m in chosen])[mesh.regions]
     return kinds, constants, np.array([m.density for m in chosen])[mesh.regions]

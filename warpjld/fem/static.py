@@ -36,6 +36,7 @@ def solve(
     loads: Loads | None = None,
     *,
     after: Solution | None = None,
+    guess: NDArray[np.float64] | None = None,
     instants: int | list[float] = 1,
     free: str = "refuse",
     method: str = "auto",
@@ -52,6 +53,8 @@ def solve(
         loads: Known forces.
         after: Equilibrium to start from: loads and prescribed displacements go from what they were there to what is
             given here, and degrees of freedom that are released let go of their reactions gradually.
+        guess: First guess of the displacement at the full load [m], shape (N, 3): where Newton's method for that
+            instant starts, if no element is inside out there. Linear laws need none.
         instants: Load instants, as a number of equal steps or as rising factors that end with 1; steps that fail are
             halved. One is enough for linear laws.
         free: What to do with a body that can move as a whole: ``refuse`` it, or ``hold`` it by as few degrees
@@ -80,7 +83,10 @@ def solve(
             prescribed.values[np.isin(prescribed.degrees, held)] = after.displacement.reshape(-1)[held]
     else:
         refuse_free(body, prescribed)
+    if guess is not None and guess.size != body.degrees:
+        raise InputError(f"guess: want {body.degrees} values, got {guess.size}")
     problem = _Problem(body, prescribed, loads or Loads(), after, method, precision, tolerance)
+    problem.guess = guess
     run = problem.newton if body.large_strain else problem.linear
     solution = run(steps, held, progress)
     if check and not solution.converged:
@@ -111,6 +117,7 @@ class _Problem:
         self.free = prescribed.free(body.degrees)
         self.hierarchy: list[Any] | None = None
         self.tangent: Tangent | None = None
+        self.guess: NDArray[np.float64] | None = None
 
     def known(self, factor: float) -> NDArray[np.float64]:
         """Prescribed displacements at an instant, from where they started, shape (n,)."""
@@ -169,7 +176,9 @@ class _Problem:
         todo = list(steps)
         while todo:
             target = todo[0]
-            status, found = self._equilibrium(u, target, cautious=False)
+            status, found = self._from_guess(target)
+            if status is not Status.CONVERGED:
+                status, found = self._equilibrium(u, target, cautious=False)
             if status is not Status.CONVERGED:
                 status, found = self._equilibrium(u, target, cautious=True)
             if found is not None and status is Status.CONVERGED:
@@ -192,7 +201,22 @@ class _Problem:
             todo.insert(0, 0.5 * (factor + target))
         return Solution(Status.CONVERGED, tuple(reached), Status.CONVERGED.value, held, self.loads)
 
-    def _equilibrium(self, u: NDArray[np.float64], target: float, *, cautious: bool) -> tuple[Status, Instant | None]:
+    def _from_guess(self, target: float) -> tuple[Status, Instant | None]:
+        """The full load's equilibrium from a first guess of it, where there is one."""
+        if self.guess is None or target != 1.0:
+            return Status.STAGNATED, None
+        u = self.guess.astype(np.float64).reshape(-1)
+        u[self.prescribed.degrees] = self.known(target)
+        if not (self.body.at(u, stiffness=False).lowest > 0).all():
+            return Status.INVERTED, None
+        # a guess squeezes elements here and there: their false pressures would make K indefinite, those of the
+        # equilibrium before do not
+        pressures = self.body.at(self.start, stiffness=False).pressures
+        return self._equilibrium(u, target, cautious=False, guessed=pressures)
+
+    def _equilibrium(
+        self, u: NDArray[np.float64], target: float, *, cautious: bool, guessed: NDArray[np.float64] | None = None
+    ) -> tuple[Status, Instant | None]:
         """Newton's method at one load.
 
         Full steps first: in slender and nearly incompressible bodies the residual rises before it falls, and a search
@@ -206,7 +230,7 @@ class _Problem:
         jump[known] = self.known(target) - u[known]
         iterations = 0
         start = 0.0
-        pressures: NDArray[np.float64] | None = None
+        pressures = guessed
         for step in range(_CAUTIOUS if cautious else _NEWTON):
             tangent = self.tangent = body.at(u, pressures=pressures, reuse=self.tangent)
             stiffness = tangent.stiffness
@@ -215,7 +239,8 @@ class _Problem:
             self.subtract_pressure(stiffness, target, u)
             residual = np.where(free, external - tangent.forces, 0.0)
             now = norm(residual)
-            start = max(start, now) if step == 0 else start
+            # forces of a guess that is off are no measure of those in equilibrium
+            start = max(start, now) if step == 0 and guessed is None else start
             scale = max(start, norm(external), norm(np.where(free, 0.0, tangent.forces - external)), 1e-300)
             moved = not jump.any()
             if moved and now <= self.tolerance * scale:

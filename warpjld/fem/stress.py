@@ -21,7 +21,7 @@ def cauchy(body: Body, displacement: NDArray[np.float64]) -> NDArray[np.float64]
     x = body.mesh.nodes[body.mesh.elements]
     jacobian = np.einsum("eai,aj->eij", x, CENTRE_GRADIENT)
     slope = np.einsum("eai,aj->eij", u, CENTRE_GRADIENT) @ np.linalg.inv(jacobian)
-    c10, c01, bulk = body.constants.T
+    c10, c01, bulk, stiffening = body.constants.T
     identity = np.eye(3)
     strain = 0.5 * (slope + slope.transpose(0, 2, 1))
     spread = np.einsum("eii->e", strain)
@@ -34,7 +34,8 @@ def cauchy(body: Body, displacement: NDArray[np.float64]) -> NDArray[np.float64]
         volume = np.linalg.det(f)
         b = f @ f.transpose(0, 2, 1) * (volume ** (-2.0 / 3.0))[:, None, None]
         first = np.einsum("eii->e", b)[:, None, None]
-        tau = 2.0 * c10[large, None, None] * b + 2.0 * c01[large, None, None] * (first * b - b @ b)
+        slope = c10[large, None, None] * np.exp(stiffening[large, None, None] * (first - 3.0))
+        tau = 2.0 * slope * b + 2.0 * c01[large, None, None] * (first * b - b @ b)
         tau -= np.einsum("eii->e", tau)[:, None, None] / 3.0 * identity
         tau += f @ _matrix(body.initial_stress[large]) @ f.transpose(0, 2, 1)
         pressure = body.at(displacement, stiffness=False).pressures[large]

@@ -20,7 +20,7 @@ from warpjld.fem.entries import like, one_of, three_numbers, whole
 from warpjld.fem.hexmesh import HexMesh
 from warpjld.fem.linear import METHODS, PRECISIONS
 from warpjld.fem.loads import Centrifugal, Loads, external_forces
-from warpjld.fem.materials import LinearElastic, Material, MooneyRivlin, NeoHooke
+from warpjld.fem.materials import Fung, LinearElastic, Material, MooneyRivlin, NeoHooke
 from warpjld.fem.prescribed import Prescribed, prescribe
 from warpjld.fem.solution import Instant, Solution
 from warpjld.fem.static import FREE, solve
@@ -31,6 +31,11 @@ _LAWS: dict[str, Callable[..., Material]] = {
     "linear": LinearElastic,
     "neo-hooke": NeoHooke,
     "mooney-rivlin": MooneyRivlin,
+    "fung": Fung,
+}
+_CONSTANTS = {
+    "mooney-rivlin": ("c10", "c01", "poisson", "density"),
+    "fung": ("young", "stiffening", "poisson", "density"),
 }
 _STEP_KEYS = ("name", "instants", "free", "gravity", "centrifugal", "pressure", "traction", "force", "prescribed")
 
@@ -201,7 +206,7 @@ def _material(name: str, table: Mapping[str, Any]) -> Material:
     law = _need(where, table, "law", str)
     if law not in _LAWS:
         raise InputError(f"{where} law: {_choice(law, list(_LAWS))}")
-    keys = ("c10", "c01", "poisson", "density") if law == "mooney-rivlin" else ("young", "poisson", "density")
+    keys = _CONSTANTS.get(law, ("young", "poisson", "density"))
     options = {k: v for k, v in table.items() if k != "law"}
     _known(where, options, keys)
     for key in keys[:2]:

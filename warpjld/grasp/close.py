@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import lru_cache, partial
 
@@ -11,22 +11,26 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from warpjld.covering import Covering
-from warpjld.errors import InputError
+from warpjld.grasp.both_ways import BothWays, give_way
+from warpjld.grasp.digits import digit_chains
 from warpjld.grasp.distance import ObjectSet
+from warpjld.grasp.moved import joints_beyond, share_moved
 from warpjld.grasp.objects import Places
 from warpjld.grasp.search import FlexionSearch, Searches, Status
 from warpjld.grasp.separate import keep_apart
-from warpjld.skeleton import CHANNELS, DIGITS, Poses, Skeleton, poses_from_angles
+from warpjld.skeleton import CHANNELS, Poses, poses_from_angles
 
-__all__ = ["Closed", "close_hand", "digit_chains", "pad_vertex"]
+__all__ = ["Closed", "close_hand"]
 
 _FLEXION = CHANNELS.index("flexion")
-_KNUCKLES = ("base", "knuckle2", "knuckle3")
 _OWN = 0.5  # share of the operators at or beyond a joint from which a vertex counts as moved by it
 _WIDEST = 0.35  # how far a base joint may open again for the sake of swelling skin [rad]
 _CUTS, _PIECES = 3, 8  # the opening is found to a 512th of that
 _ROUNDS = 4  # of bending and opening again
 _TOUCH = 1e-4  # skin this near touches [m]
+_PRESSED = 5e-4  # depth of an object's edges in the skin that stays [m]
+_THROUGH = 1e-3  # the same of a digit on its way [m]
+_QUICK = 3  # every third vertex searches at a first look
 
 
 @dataclass(frozen=True, eq=False)
@@ -38,8 +42,9 @@ class Closed:
         digits: Names of the digits that closed, e.g. ``left.index``.
         status: Per digit and joint how its search ended (values of ``Status``), shape (G, D, 3); CONVERGED is a touch,
             NO_CONTACT the limit reached without one.
-        gap: Smallest signed distance of every digit's skin to the object [m], shape (G, D).
-        penetration: Deepest vertex of the digits inside the object [m], shape (G,).
+        gap: Smallest signed distance of every digit's skin and the object [m], looked at from both sides (see
+            ``BothWays``), after a first look from the skin's only; shape (G, D).
+        penetration: Depth of digits, or of the palm, and object in one another [m], likewise, shape (G,).
     """
 
     angles: NDArray[np.float64]
@@ -53,74 +58,19 @@ class Closed:
         return np.asarray(self.gap < _TOUCH)
 
 
-def digit_chains(skeleton: Skeleton, digits: Sequence[str] = ()) -> dict[str, tuple[int, ...]]:
-    """Flexion joints of the digits of a skeleton, base first; of all, or of those named (``index``, ``left.index``).
-
-    Raises:
-        InputError: There is no such digit, or none at all.
-    """
-    found = {}
-    for side in ("left.", "right.", ""):
-        for digit in DIGITS:
-            names = [f"{side}{digit}.{k}" for k in _KNUCKLES]
-            if all(name in skeleton.names for name in names):
-                found[f"{side}{digit}"] = tuple(skeleton.names.index(name) for name in names)
-    if not found:
-        raise InputError("this skeleton has no digits to close")
-    if not digits:
-        return found
-    chosen = {}
-    for digit in digits:
-        matches = [name for name in found if digit.lower() in (name, name.partition(".")[2])]
-        if len(matches) != 1:
-            raise InputError(f"no digit '{digit}' in this skeleton; there are {', '.join(found)}")
-        chosen[matches[0]] = found[matches[0]]
-    return chosen
-
-
 @lru_cache(maxsize=32)
 def _moved(covering: Covering, joint: int) -> NDArray[np.int32]:
     """Vertices of which operators at or beyond a joint hold at least half."""
-    anchors = covering.anchors
-    beyond = _beyond(covering.skeleton, joint)
-    share = (anchors.weight * beyond[anchors.ends[anchors.segment, 0]]).sum(axis=1)
-    return np.flatnonzero(share >= _OWN).astype(np.int32)
+    return np.flatnonzero(share_moved(covering, joint) >= _OWN).astype(np.int32)
 
 
 @lru_cache(maxsize=32)
 def _moving(covering: Covering, bases: tuple[int, ...]) -> NDArray[np.int32]:
     """Vertices that move at all when digits bend, those of the palm that swell included."""
     anchors = covering.anchors
-    beyond = np.any([_beyond(covering.skeleton, base) for base in bases], axis=0)
+    beyond = np.any([joints_beyond(covering.skeleton, base) for base in bases], axis=0)
     touched = beyond[anchors.ends[anchors.segment]].any(axis=2)
     return np.flatnonzero(((anchors.weight > 0.0) & touched).any(axis=1)).astype(np.int32)
-
-
-def _beyond(skeleton: Skeleton, joint: int) -> NDArray[np.bool_]:
-    """Joints at or beyond a joint, shape (J,)."""
-    out = np.zeros(len(skeleton), dtype=bool)
-    for j, parent in enumerate(skeleton.parents):
-        out[j] = j == joint or (parent >= 0 and out[parent])
-    return out
-
-
-def pad_vertex(covering: Covering, digit: str) -> int:
-    """The vertex in the middle of a digit's pad: on the internal side of its last segment, three fifths along.
-
-    Raises:
-        InputError: There is no such digit.
-    """
-    (chain,) = digit_chains(covering.skeleton, [digit]).values()
-    anchors = covering.anchors
-    strongest = anchors.weight.argmax(axis=1)
-    rows = np.arange(len(anchors))
-    on_last = anchors.ends[anchors.segment[rows, strongest], 0] == chain[-1]
-    ratio, side = anchors.ratio[rows, strongest], anchors.side[rows, strongest]
-    # of vertices alike in ratio the one farthest out on the internal side
-    height = np.linalg.norm(anchors.lift[rows, strongest], axis=1)
-    length = np.linalg.norm(np.ptp(covering.surface.vertices[on_last], axis=0))
-    cost = np.where(on_last, np.abs(ratio - 0.6) + side - height / length, np.inf)
-    return int(cost.argmin())
 
 
 def close_hand(
@@ -134,6 +84,7 @@ def close_hand(
     digits: Sequence[str] = (),
     coupling: tuple[float, float] | None = None,
     apart: bool = True,
+    quick: bool = False,
     tolerance: float = 1e-5,
     threads: int | None = None,
 ) -> Closed:
@@ -142,7 +93,9 @@ def close_hand(
     Every digit bends at its base until a vertex beyond touches, then at its second joint, then at its third; a joint
     whose skin touches already stays. With ``coupling`` all three bend together until the first touch, the others at
     these times the base's rate; joints beyond the touch then go on together. Skin that swells as a finger bends may
-    enter the object beside a touch: the base then opens as far as it must, and the joints beyond close again.
+    enter the object beside a touch: the base then opens as far as it must, and the joints beyond close again. What of
+    the object, an edge or a corner, then is deeper than half a millimetre in the skin between its vertices, opens the
+    digit it is in (``give_way``).
 
     Args:
         covering: The hand, smooth method.
@@ -154,6 +107,8 @@ def close_hand(
         digits: Names of digits; all if left out.
         coupling: Rates of the second and third joint relative to the base.
         apart: Stop digits that would pass through one another or the palm; the costliest part.
+        quick: For a first look at many hands: a third of the vertices search, and nothing opens again; ``apart`` is
+            left out.
         tolerance: Distance that counts as a touch [m].
         threads: CPU threads.
 
@@ -168,29 +123,51 @@ def close_hand(
         places = Places(np.concatenate([p.position for p in own]), np.concatenate([p.rotation for p in own]))
     elif len(places) == 1:
         places = places[np.zeros(count, dtype=int)]
-    hand = _Hand(covering, poses, angles, objects, which, places, tolerance, threads)
+    hand = _Hand(covering, poses, angles, objects, which, places, tolerance, threads, _QUICK if quick else 1)
     names = list(chains)
     status = np.full((count, len(names), 3), int(Status.NO_CONTACT), dtype=np.int32)
     joints = np.array([chains[name] for name in names])
     if coupling is not None:
         hand.bend(joints, np.array([1.0, *coupling]))
-    for again in range(_ROUNDS):
+    for again in range(1 if quick else _ROUNDS):
         for k in range(1 if again else 0, 3):
             # a joint with a touch at or beyond its segment finds it at once and stays
             ended = hand.bend(joints[:, k:], np.array([1.0, 0.0, 0.0])[: 3 - k])
             # skin left inside by less than twice the tolerance is a touch
             ended = np.where(ended == int(Status.INSIDE), int(Status.CONVERGED), ended) if again else ended
             status[..., k] = ended
-        if not hand.settle(joints):
+        if quick or not hand.settle(joints):
             break
-    if apart:
-        for g in range(count):
-            hand.angles[g], stopped = keep_apart(covering, partial(hand.poses_of, g), angles[g], hand.angles[g], chains)
+    if quick:
+        gap = np.stack([hand.distances(_moved(covering, int(chain[0]))).min(axis=1) for chain in joints], axis=1)
+        depth = -hand.distances(_moving(covering, tuple(joints[:, 0].tolist()))).min(axis=1)
+        return Closed(hand.angles, tuple(names), status, gap, np.maximum(0.0, depth))
+    gap, depth = np.empty((count, len(names))), np.empty(count)
+    both = [BothWays(covering, thing) for thing in objects.objects]
+    for g in range(count):
+        one, poses_of = both[which[g]], partial(hand.poses_of, g)
+
+        def gaps(
+            wanted: NDArray[np.float64],
+            moved: bool = True,
+            g: int = g,
+            one: BothWays = one,
+            poses_of: Callable[[NDArray[np.float64]], Poses] = poses_of,
+        ) -> NDArray[np.float64]:
+            skin = covering.deform(poses_of(wanted[None]), threads=threads)[0]
+            return one.gaps(skin, places[g], moved=moved)
+
+        hand.angles[g], _ = give_way(
+            gaps, one.parts, angles[g], hand.angles[g], chains, allowed=_PRESSED, on_the_way=_THROUGH
+        )
+        if apart:
+            hand.angles[g], stopped = keep_apart(covering, poses_of, angles[g], hand.angles[g], chains)
             for name in stopped:
                 status[g, names.index(name)] = int(Status.BLOCKED)
-    gap = np.stack([hand.distances(_moved(covering, int(chain[0]))).min(axis=1) for chain in joints], axis=1)
-    penetration = -hand.distances(_moving(covering, tuple(joints[:, 0].tolist()))).min(axis=1)
-    return Closed(hand.angles, tuple(names), status, gap, np.maximum(0.0, penetration))
+        now = gaps(hand.angles[g], moved=False)
+        gap[g] = now[[one.parts.index(name) for name in names]]
+        depth[g] = max(0.0, -float(now.min()))
+    return Closed(hand.angles, tuple(names), status, gap, depth)
 
 
 class _Hand:
@@ -206,8 +183,10 @@ class _Hand:
         places: Places,
         tolerance: float,
         threads: int | None,
+        every: int,
     ) -> None:
         covering.check(poses)
+        self.every = every
         self.covering, self.angles, self.open = covering, angles.copy(), angles
         self.objects, self.which, self.places = objects, which, places
         self.tolerance, self.threads = tolerance, threads
@@ -242,7 +221,7 @@ class _Hand:
     def bend(self, joints: NDArray[np.int64], rates: NDArray[np.float64]) -> NDArray[np.int32]:
         """Bend the joints of every digit (D, k) at these rates until the first touch; how each ended, shape (G, D)."""
         count = len(self.angles)
-        vertices = [_moved(self.covering, int(chain[0])) for chain in joints]
+        vertices = [_moved(self.covering, int(chain[0]))[:: self.every] for chain in joints]
         owner = np.concatenate([np.full(len(v), d) for d, v in enumerate(vertices)])
         vertex = np.concatenate(vertices)
         moving = rates != 0.0

@@ -130,7 +130,7 @@ class ObjectSet:
         solids.first_face = wp.array(firsts.astype(np.int32), dtype=wp.int32, device=self.device)
         flags = np.array([thing.report.solid for thing in self.objects], dtype=np.int32)
         solids.solid = wp.array(flags, dtype=wp.int32, device=self.device)
-        features = np.concatenate([feature_normals(thing.vertices, thing.faces) for thing in self.objects])
+        features = np.concatenate([_features(thing) for thing in self.objects])
         solids.features = wp.array(features.astype(np.float32), dtype=wp.vec3, device=self.device)
         tree, built = Tree(), join_trees([build_tree(thing.vertices, thing.faces) for thing in self.objects])
         for name, kind in (
@@ -275,8 +275,7 @@ def feature_normals(vertices: NDArray[np.float64], faces: NDArray[np.int32]) -> 
     Triangles without area have none and add none.
     """
     corner = vertices[faces]
-    normal = np.cross(corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0])
-    normal /= np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), 1e-300)
+    normal = _face_normals(corner)
     out = np.empty((len(faces), 7, 3))
     out[:, 0] = normal
     edges = np.sort(faces[:, [[1, 2], [2, 0], [0, 1]]].reshape(-1, 2), axis=1)
@@ -292,6 +291,20 @@ def feature_normals(vertices: NDArray[np.float64], faces: NDArray[np.int32]) -> 
         np.add.at(at_corner, faces[:, k], angle[:, None] * normal)
     out[:, 4:] = at_corner[faces]
     return out
+
+
+def _features(thing: GraspObject) -> NDArray[np.float64]:
+    """Feature normals; only the faces' own where winding numbers tell inside from outside."""
+    if thing.report.solid:
+        return feature_normals(thing.vertices, thing.faces)
+    out = np.zeros((len(thing.faces), 7, 3))
+    out[:, 0] = _face_normals(thing.vertices[thing.faces])
+    return out
+
+
+def _face_normals(corner: NDArray[np.float64]) -> NDArray[np.float64]:
+    normal = np.cross(corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0])
+    return np.asarray(normal / np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), 1e-300))
 
 
 def _finite_points(points: ArrayLike) -> NDArray[np.float64]:

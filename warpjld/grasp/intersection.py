@@ -8,7 +8,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from warpjld.covering import Covering
-from warpjld.covering.intersections import surface_parts
 from warpjld.errors import InputError
 from warpjld.grasp.distance import ObjectSet
 from warpjld.grasp.objects import GraspObject, Places
@@ -58,9 +57,9 @@ class Contact:
 
     Attributes:
         part: E.g. ``left.index``, ``left.palm``.
-        vertices: Vertices nearer than the tolerance, those inside included.
-        deepest: Largest penetration [m]; 0 where none.
-        nearest: Smallest signed distance [m].
+        vertices: Vertices nearer than the tolerance, those inside included; 0 where an edge touches between them.
+        deepest: Largest depth of part and object in one another [m], seen from both sides; 0 where none.
+        nearest: Smallest signed distance [m], likewise.
     """
 
     part: str
@@ -137,19 +136,19 @@ def contacts(
     tolerance: float = 5e-4,
 ) -> list[Contact]:
     """Parts of a deformed surface (V, 3) that touch an object, nearer than ``tolerance`` [m]."""
+    from warpjld.grasp.both_ways import BothWays
+
     where = thing.place if place is None else place
+    both = BothWays(covering, thing)
+    gaps = both.gaps(vertices, where)
     objects = ObjectSet(thing.placed(where.position[0], where.rotation[0]))
-    distance = objects.distances(vertices, limit=max(0.05, tolerance)).distance[0]
-    parts = surface_parts(covering)
-    part_of = np.zeros(len(distance), dtype=np.int32)
-    part_of[covering.surface.faces.ravel()] = np.repeat(parts.of_face, 3)
-    found = []
-    for k, name in enumerate(parts.names):
-        own = distance[part_of == k]
-        if len(own) and own.min() < tolerance:
-            nearest = float(own.min())
-            found.append(Contact(name, int((own < tolerance).sum()), max(0.0, -nearest), nearest))
-    return found
+    near = objects.distances(vertices, limit=2.0 * tolerance).distance[0] < tolerance
+    counts = np.bincount(both.part_of_vertex[near], minlength=len(gaps))
+    return [
+        Contact(name, int(count), max(0.0, -float(gap)), float(gap))
+        for name, count, gap in zip(both.parts, counts, gaps, strict=True)
+        if gap < tolerance
+    ]
 
 
 def _common_volume(

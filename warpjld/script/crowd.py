@@ -18,6 +18,7 @@ from warpjld.skeleton import Poses, Skeleton
 if TYPE_CHECKING:
     from warpjld.covering import Covering
     from warpjld.grasp import Places
+    from warpjld.press.pressed import Pressed
     from warpjld.render import Camera as RenderCamera
     from warpjld.render import Solid
 
@@ -45,6 +46,7 @@ class Crowd:
         device: Warp device of the covering.
         props: Objects on the stage.
         whereabouts: Places of an object at some frames.
+        pressed: What contact makes of skin and objects, where it was solved.
     """
 
     roles: Sequence[Role]
@@ -52,6 +54,7 @@ class Crowd:
     device: str = "cpu"
     props: Sequence[Prop] = ()
     whereabouts: Callable[[Prop, NDArray[np.float64]], Places] | None = None
+    pressed: Pressed | None = None
 
     @cached_property
     def faces(self) -> NDArray[np.int32]:
@@ -97,17 +100,28 @@ class Crowd:
         if np.any(shift) or frame == 0:
             return [*self.solid_vertices(frame, shift)]
         return [
-            None
-            if np.array_equal(places.position[frame], places.position[frame - 1])
-            and np.array_equal(places.rotation[frame], places.rotation[frame - 1])
-            else places[frame].apply(prop.thing.vertices)[0]
+            None if self._stays(prop, places, frame) else self.prop_vertices(prop, places, frame)
             for prop, places in zip(self.props, self.places, strict=True)
         ]
 
     def solid_vertices(self, frame: int, shift: NDArray[np.float64] | float = 0.0) -> list[NDArray[np.float64]]:
         """Vertices of every object at the frame of that place in the sequence, less a shift [m]."""
         pairs = zip(self.props, self.places, strict=True)
-        return [places[frame].apply(prop.thing.vertices)[0] - shift for prop, places in pairs]
+        return [self.prop_vertices(prop, places, frame) - shift for prop, places in pairs]
+
+    def prop_vertices(self, prop: Prop, places: Places, frame: int) -> NDArray[np.float64]:
+        """Vertices of an object at the frame of that place in the sequence [m], shape (n, 3)."""
+        if self.pressed is not None and (found := self.pressed.object(prop.name, self.frames[frame])) is not None:
+            return found
+        return places[frame].apply(prop.shape(float(self.frames[frame])))[0]
+
+    def _stays(self, prop: Prop, places: Places, frame: int) -> bool:
+        """Whether an object is as it was a frame before."""
+        pressed = self.pressed is not None and self.pressed.moves(prop.name)
+        still = np.array_equal(places.position[frame], places.position[frame - 1]) and np.array_equal(
+            places.rotation[frame], places.rotation[frame - 1]
+        )
+        return still and not prop.deforms and not pressed
 
     def joints(self, frame: int) -> NDArray[np.float64]:
         """Joint positions of all at the frame of that place in the sequence [m], shape (J, 3)."""
@@ -116,7 +130,21 @@ class Crowd:
     def surface(self, frame: int) -> NDArray[np.float32]:
         """Vertices of all at one frame [m], shape (V, 3)."""
         some = slice(frame, frame + 1)
-        return np.concatenate([r.covering.deform(r.poses[some], device=self.device)[0] for r in self.roles])
+        return np.concatenate(
+            [self.worn(r, r.covering.deform(r.poses[some], device=self.device), frame)[0] for r in self.roles]
+        )
+
+    def worn(self, role: Role, vertices: NDArray[np.float32], start: int) -> NDArray[np.float32]:
+        """Surfaces of a role (n, V, 3) from the frame of that place on, as contact deforms them where it was solved."""
+        if self.pressed is None:
+            return vertices
+        out = vertices
+        for k in range(len(vertices)):
+            found = self.pressed.skin(role.actor.name, float(self.frames[start + k]), vertices[k])
+            if found is not None:
+                out = out.copy() if out is vertices else out
+                out[k] = found
+        return out
 
     def shift(self, camera: Camera, frame: int) -> NDArray[np.float64]:
         """What to take off all positions at the frame of that place so that the camera goes along [m], shape (3,)."""

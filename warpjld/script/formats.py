@@ -10,9 +10,11 @@ from warpjld.errors import MissingExtraError
 from warpjld.io.caches import FORMATS
 from warpjld.render.camera import VIEWS as _VIEWS
 
-__all__ = ["EXPORTS", "FILMS", "PICTURES", "VIEWS", "check_available", "video_is_available"]
+__all__ = ["EXPORTS", "FILMS", "PICTURES", "TABLES", "VIEWS", "VOLUMES", "check_available", "video_is_available"]
 
 PICTURES = (".png",)
+TABLES = (".csv", ".parquet")
+VOLUMES = (".pvd",)
 FILMS = (".mp4", ".mov", ".mkv", ".gif", ".webp")
 _VIDEO = FILMS[:3]
 EXPORTS = tuple(FORMATS)
@@ -30,5 +32,7 @@ def check_available(names: Iterable[str]) -> None:
         suffix = PurePosixPath(name).suffix.lower()
         if suffix in _VIDEO and not video_is_available():
             raise MissingExtraError(f"the film '{name}'", "film")
+        if suffix == ".parquet" and find_spec("pyarrow") is None:
+            raise MissingExtraError(f"the table '{name}'", "study")
         if suffix in (".usd", ".usdc") and find_spec("pxr") is None:
             raise MissingExtraError(f"'{name}' in binary USD (.usda does without)", "usd")

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -67,7 +67,8 @@ def posture(scene: Scene, actor: Actor, key: float) -> tuple[Poses, NDArray[np.f
 def placed_at(scene: Scene, prop: Prop, key: float) -> GraspObject:
     """An object where it is at a frame."""
     there = scene.whereabouts(prop, np.array([key]))
-    return prop.thing.placed(there.position[0], there.rotation[0])
+    thing = replace(prop.thing, vertices=prop.shape(key)) if prop.deforms else prop.thing
+    return thing.placed(there.position[0], there.rotation[0])
 
 
 def search_flexion(
@@ -102,7 +103,8 @@ def close_digits(
 ) -> Attempt:
     """Close digits on an object: keys of the open hand at ``first``, of the closed one at ``last``."""
     from warpjld.grasp import ObjectSet, Status
-    from warpjld.grasp.close import close_hand, digit_chains
+    from warpjld.grasp.close import close_hand
+    from warpjld.grasp.digits import digit_chains
     from warpjld.grasp.intersection import intersection
 
     covering = cover(actor)

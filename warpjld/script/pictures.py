@@ -13,10 +13,19 @@ from warpjld import render
 from warpjld.script.binding import cover
 from warpjld.script.crowd import Crowd, Role
 from warpjld.script.folder import OutputFolder
+from warpjld.script.pressure import PressureView
 from warpjld.script.scene import Camera, ContactSheet, Film, Picture, Scene, Style
 from warpjld.script.staging import stage
 
-__all__ = ["FilmStudio", "draw_contact_sheet", "draw_picture", "film_studio", "preview", "sheet_frames"]
+__all__ = [
+    "FilmStudio",
+    "PressureStudio",
+    "draw_contact_sheet",
+    "draw_picture",
+    "film_studio",
+    "preview",
+    "sheet_frames",
+]
 
 _CELL = (5 / 12, 19 / 36)  # of the height of a picture: a contact sheet's cell, upright as a hand is
 _CELLS = 6  # on a contact sheet whose frames nobody listed
@@ -36,31 +45,59 @@ class FilmStudio:
         self._film.append(self._stage.draw(vertices - shift, joints=self._crowd.joints(frame) - shift, solids=solids))
 
 
+class PressureStudio:
+    """Takes frame after frame of a film in the colours of contact pressure."""
+
+    def __init__(self, view: PressureView, camera: Camera, stage: render.Scene, film: render.Film) -> None:
+        self._view, self._camera = view, camera
+        self._stage, self._film = stage, film
+
+    def take(self, frame: int, vertices: NDArray[np.float32]) -> None:
+        """As `FilmStudio.take`."""
+        shift = self._view.crowd.shift(self._camera, frame)
+        points, values = self._view.at(frame, vertices)
+        self._film.append(
+            self._stage.draw(points - shift, values=values, solids=[v - shift for v in self._view.others(frame)])
+        )
+
+
 @contextmanager
-def film_studio(scene: Scene, crowd: Crowd, film: Film, path: Path) -> Iterator[FilmStudio]:
+def film_studio(scene: Scene, crowd: Crowd, film: Film, path: Path) -> Iterator[FilmStudio | PressureStudio]:
     """A ``FILM`` being taken."""
-    with (
-        render.Scene(
+    camera = crowd.camera(film.camera, scene.size)
+    quality = render.Quality.film()
+    with render.Film(path, rate=scene.rate) as writer:
+        if film.style == "pressure":
+            view = PressureView(crowd, film.only)
+            with view.stage(camera, scene.size, quality, 0) as stage_:
+                yield PressureStudio(view, film.camera, stage_, writer)
+            return
+        with render.Scene(
             crowd.faces,
-            crowd.camera(film.camera, scene.size),
+            camera,
             look=film.style,
             size=scene.size,
             segments=_bones(crowd, film.style),
             solids=crowd.solids(),
-            quality=render.Quality.film(),
-        ) as stage_,
-        render.Film(path, rate=scene.rate) as writer,
-    ):
-        yield FilmStudio(crowd, film.camera, stage_, writer)
+            quality=quality,
+        ) as stage_:
+            yield FilmStudio(crowd, film.camera, stage_, writer)
 
 
 def draw_picture(scene: Scene, crowd: Crowd, picture: Picture, path: Path) -> None:
     """A ``PICTURE``; the camera shows the whole sequence, so that pictures of one scene fit together."""
     now = crowd.at(picture.frame, scene.rate)
     shift = now.shift(picture.camera, 0)
+    camera = crowd.camera(picture.camera, scene.size)
+    if picture.style == "pressure":
+        view = PressureView(now, picture.only)
+        points, values = view.at(0, now.surface(0))
+        with view.stage(camera, scene.size, render.Quality(), shift) as stage_:
+            render.save_picture(path, stage_.draw(points - shift, values=values))
+        return
     with render.Scene(
         crowd.faces,
-        crowd.camera(picture.camera, scene.size),
+        camera,
         look=picture.style,
         size=scene.size,
         segments=_bones(crowd, picture.style),

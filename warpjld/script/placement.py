@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,6 +12,9 @@ from scipy.spatial.transform import Rotation
 from warpjld.motion import Key, Track
 from warpjld.skeleton import Poses
 
+if TYPE_CHECKING:
+    from warpjld.grasp import Places
+
 __all__ = ["Placement"]
 
 _AXES = "xyz"
@@ -18,7 +22,7 @@ _AXES = "xyz"
 
 @dataclass(eq=False)
 class Placement:
-    """Keys of six channels: ``move.x`` … [m] from the rest place, ``turn.x`` … [rad] about the root."""
+    """Keys of six channels: ``move.x`` … [m] from the rest place, ``turn.x`` … [rad] about the root or origin."""
 
     tracks: dict[str, Track] = field(default_factory=dict)
 
@@ -44,6 +48,15 @@ class Placement:
         positions = root + np.squeeze(matrices @ (poses.positions - root)[..., None], -1)
         positions += self.values("move", frames)[:, None]
         return Poses(positions, _left_product(turn.as_quat(), poses.rotations), poses.flexion)
+
+    def apply_to_places(self, places: Places, frames: NDArray[np.float64]) -> Places:
+        """Places of an object at these frames, turned about its origin, then displaced."""
+        from warpjld.grasp import Places
+
+        if not self.tracks:
+            return places
+        turn = Rotation.from_euler("xyz", self.values("turn", frames)) * Rotation.from_quat(places.rotation)
+        return Places(places.position + self.values("move", frames), turn.as_quat())
 
 
 def _left_product(turn: NDArray[np.float64], rotations: NDArray[np.float64]) -> NDArray[np.float64]:

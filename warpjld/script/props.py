@@ -10,9 +10,14 @@ from numpy.typing import NDArray
 
 from warpjld.grasp.attach import Association, carried, joint_basis
 from warpjld.grasp.objects import GraspObject, Places
+from warpjld.script.placement import Placement
 from warpjld.script.staging import stage
 
 if TYPE_CHECKING:
+    from warpjld.fem.contact.barr import Barr
+    from warpjld.fem.contact.obstacles import Motion
+    from warpjld.grasp.keyframes import KeyframedShape
+    from warpjld.press.wishes import Barred
     from warpjld.script.scene import Scene
     from warpjld.surface import Surface
 
@@ -31,22 +36,63 @@ class Prop:
         thing: The object at its initial place.
         color: Name or ``#rrggbb``.
         associations: Joints it follows.
+        placement: Keys of the object as a whole: from where the joints leave it, about its own origin.
+        shapes: Its shapes over time, where key frames deform it.
+        barred: Barr's deformations, where they do.
     """
 
     name: str
     thing: GraspObject
     color: str
     associations: list[Association] = field(default_factory=list)
+    placement: Placement = field(default_factory=Placement)
+    shapes: KeyframedShape | None = None
+    barred: Barred | None = None
+
+    @property
+    def deforms(self) -> bool:
+        """Whether its shape is a function of time."""
+        return self.shapes is not None or self.barred is not None
+
+    def shape(self, frame: float) -> NDArray[np.float64]:
+        """Vertices in its own frame at a frame [m], shape (n, 3)."""
+        if self.shapes is not None:
+            return self.shapes.at(frame)
+        if self.barred is not None:
+            return self.barr().mesh(frame)[0]
+        return self.thing.vertices
+
+    def barr(self, start: float = 0.0, motion: Motion | None = None) -> Barr:
+        """Its deformed shape, in its own frame unless it has a motion; time is in frames from ``start``."""
+        from warpjld.fem.contact.barr import Barr
+
+        barred = self.barred
+        assert barred is not None
+        return Barr(
+            (self.thing.vertices, self.thing.faces),
+            axis=barred.axis,
+            taper=lambda time: barred.at("taper", start + time),
+            twist=lambda time: barred.at("twist", start + time),
+            bend=lambda time: barred.at("bend", start + time),
+            motion=motion,
+        )
+
+    @property
+    def key_frames(self) -> list[float]:
+        """Frames that hold a key of this object."""
+        tracks = [*self.placement.tracks.values(), *(self.barred.tracks.values() if self.barred else ())]
+        return sorted({key.frame for track in tracks for key in track.keys})
 
 
 def prop_places(scene: Scene, prop: Prop, frames: NDArray[np.float64]) -> Places:
-    """Where an object is at F frames (R70–R72)."""
+    """Where an object is at F frames (R70–R72), its own keys put on top."""
 
     def basis(association: Association, at: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         actor = scene.actor(association.actor)
         return joint_basis(actor.skeleton, stage(actor, at, scene.rate), association.joint)
 
-    return carried(prop.thing.place, prop.associations, frames, basis)
+    places = carried(prop.thing.place, prop.associations, frames, basis)
+    return prop.placement.apply_to_places(places, frames)
 
 
 def prop_surface(prop: Prop) -> Surface:

@@ -28,7 +28,7 @@ if TYPE_CHECKING:
 __all__ = ["GROUPS", "NOTES", "RESERVED", "Command", "Registry", "all_commands", "command", "commands_table"]
 
 ENTRY_POINTS = "warpjld.commands"
-GROUPS = ("Actors", "Animation", "Grasping", "Covering", "Output", "Flow")
+GROUPS = ("Actors", "Animation", "Grasping", "Contact", "Covering", "Output", "Flow")
 """Headings of our own commands, in the order in which the table of commands prints them."""
 
 NOTES = {
@@ -36,6 +36,10 @@ NOTES = {
         "`<key1> <key2> <step> <degrees>` sets the angle at key1, key1 + step, … up to key2; "
         "`AT <key> <degrees>` in its place sets a single key. "
         "The words of a command may stand in any order before its numbers."
+    ),
+    "Contact": (
+        "Objects that are not PHYSICAL push and are not pushed: rigid ones, those from animated surfaces, those that "
+        "DEFORM changes. Displacements and deformations take keys as angles do, `AT <key>` included."
     ),
     "Flow": (
         "`MACRO <name> <parameter> … END` around lines makes a command of them; inside, `$parameter` stands for what "
@@ -52,7 +56,17 @@ RESERVED = (
 )
 """Words that no command and no macro may be called by."""
 
-_BUILT_IN = ("actors", "animation", "grasping", "covering", "output", "flow")
+_BUILT_IN = (
+    "actors",
+    "animation",
+    "grasping",
+    "physical",
+    "deforming",
+    "pressing",
+    "covering",
+    "output",
+    "flow",
+)
 
 Function = Callable[["Scene", "Arguments"], None]
 _F = TypeVar("_F", bound=Function)

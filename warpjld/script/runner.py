@@ -4,12 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from contextlib import ExitStack
+from dataclasses import replace
 from pathlib import Path, PurePosixPath
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from warpjld.errors import InputError
 from warpjld.script.binding import cover
 from warpjld.script.crowd import Crowd, Role
 from warpjld.script.folder import OutputFolder
@@ -17,9 +19,12 @@ from warpjld.script.formats import check_available, video_is_available
 from warpjld.script.grasping import contact_reports
 from warpjld.script.pictures import draw_contact_sheet, draw_picture, film_studio
 from warpjld.script.props import Prop, prop_surface
-from warpjld.script.scene import Actor, ContactSheet, Export, Film, Output, Picture, Scene
+from warpjld.script.scene import Actor, ContactSheet, Export, Film, Output, Picture, Scene, Table, Volume
 from warpjld.script.staging import frame_numbers, notes, stage
 from warpjld.script.summary import Summary
+
+if TYPE_CHECKING:
+    from warpjld.script.pressing import PressReport
 
 __all__ = ["Report", "cast", "run_scene"]
 
@@ -67,7 +72,10 @@ def run_scene(
         outputs.insert(1, Film("film.mp4" if video else "film.gif", "shaded", scene.camera))
         if not video:
             summary.notes.append("the film is a GIF; for MP4: pip install 'warpjld[film]'")
+    if scene.contact.pressing is not None and not any(isinstance(output, Table) for output in outputs):
+        outputs.append(Table("contact.csv"))
     check_available([output.name for output in outputs])
+    _check_press(scene, outputs)
     for actor in scene.actors.values():
         stage(actor, frames[:1], scene.rate)  # keys beyond limits are found here
         summary.notes += notes(actor, frames)
@@ -76,8 +84,19 @@ def run_scene(
     with OutputFolder(folder) as out:
         with summary.timed("bind"):
             crowd = cast(scene, frames, device=device, progress=progress)
+        report = None
+        if scene.contact.pressing is not None:
+            from warpjld.script.pressing import run_press
+
+            with summary.timed("contact"):
+                report = run_press(scene, folder, progress)
+            crowd = replace(crowd, pressed=report.pressed)
+            summary.press = report.verdict.content()
+            summary.notes += report.notes
         with summary.timed("frames"):
             _make_sequences(scene, crowd, frames, outputs, out, threads, progress)
+        if report is not None:
+            _write_press(report, outputs, out)
         if scene.props:
             with summary.timed("contacts"):
                 summary.contacts = contact_reports(scene, crowd)
@@ -192,19 +211,42 @@ def _make_sequences(
         ]
         for parts in zip(*blocks, strict=True):
             start = parts[0][0]
-            for actor_caches, (_, vertices) in zip(caches, parts, strict=True):
+            worn = [crowd.worn(role, v, start) for role, (_, v) in zip(crowd.roles, parts, strict=True)]
+            for actor_caches, vertices in zip(caches, worn, strict=True):
                 for cache in actor_caches:
                     cache.write(vertices)
             count = len(parts[0][1])
             for prop, places, object_caches in zip(crowd.props, crowd.places, prop_caches, strict=True):
+                if object_caches:
+                    moved = np.stack([crowd.prop_vertices(prop, places, start + k) for k in range(count)])
                 for cache in object_caches:
-                    moved = places[start : start + count].apply(prop.thing.vertices)
                     cache.write(moved.astype(np.float32))
             for k in range(count):
                 progress("frames", start + k, len(frames))
-                together = np.concatenate([vertices[k] for _, vertices in parts])
+                together = np.concatenate([vertices[k] for vertices in worn])
                 for studio in studios:
                     studio.take(start + k, together)
+
+
+def _check_press(scene: Scene, outputs: Sequence[Output]) -> None:
+    """Raise where something is asked for that only PRESS gives."""
+    if scene.contact.pressing is not None:
+        return
+    for output in outputs:
+        if isinstance(output, Table | Volume) or (isinstance(output, Film | Picture) and output.style == "pressure"):
+            raise InputError(f"'{output.name}' shows contact, but none is solved: PRESS <first> <last> asks for it")
+
+
+def _write_press(report: PressReport, outputs: Sequence[Output], out: OutputFolder) -> None:
+    """Tables and volumes."""
+    from warpjld.press.table import write_table
+    from warpjld.press.volume_series import write_volumes
+
+    for output in outputs:
+        if isinstance(output, Table):
+            write_table(out.place(output.name), report.rows)
+        elif isinstance(output, Volume):
+            write_volumes(out.place(output.name), report.pressed)
 
 
 def _make_pictures(

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from warpjld.errors import InputError
+from warpjld.press.wishes import ContactWishes
 from warpjld.script.placement import Placement
 from warpjld.script.suggest import did_you_mean
 
@@ -34,9 +35,11 @@ __all__ = [
     "Scene",
     "SplineConstants",
     "Style",
+    "Table",
+    "Volume",
 ]
 
-Style = Literal["shaded", "wireframe"]
+Style = Literal["shaded", "wireframe", "pressure"]
 
 
 @dataclass(frozen=True)
@@ -64,21 +67,23 @@ class Camera:
 
 @dataclass(frozen=True)
 class Picture:
-    """One frame as a PNG."""
+    """One frame as a PNG; coloured by pressure perhaps of one actor or object ``only``."""
 
     name: str
     frame: float
     style: Style
     camera: Camera
+    only: str | None = None
 
 
 @dataclass(frozen=True)
 class Film:
-    """All frames as a film."""
+    """All frames as a film; coloured by pressure perhaps of one actor or object ``only``."""
 
     name: str
     style: Style
     camera: Camera
+    only: str | None = None
 
 
 @dataclass(frozen=True)
@@ -98,7 +103,21 @@ class Export:
     actor: str | None
 
 
-Output = Picture | Film | ContactSheet | Export
+@dataclass(frozen=True)
+class Table:
+    """Forces, areas and pressures by frame and digit, as CSV or Parquet."""
+
+    name: str
+
+
+@dataclass(frozen=True)
+class Volume:
+    """The deformed volumes as a VTK series."""
+
+    name: str
+
+
+Output = Picture | Film | ContactSheet | Export | Table | Volume
 
 
 @dataclass(eq=False)
@@ -163,6 +182,7 @@ class Scene:
         actors: By name, in the order they came on stage.
         props: Objects by name.
         attempts: Searches and grasps made so far, for the summary.
+        contact: What is said about contact.
         grips: Angles of an actor's digits before it closed them, by channel [rad].
         current: The actor that commands without a side speak to.
         first, last: Frames to make, both included; None: from the first key to the last.
@@ -178,6 +198,7 @@ class Scene:
     actors: dict[str, Actor] = field(default_factory=dict)
     props: dict[str, Prop] = field(default_factory=dict)
     attempts: list[Attempt] = field(default_factory=list)
+    contact: ContactWishes = field(default_factory=ContactWishes)
     grips: dict[str, dict[str, float]] = field(default_factory=dict)
     current: str | None = None
     first: int | None = None
@@ -230,6 +251,18 @@ class Scene:
             first = "" if self.props else "; bring one on with a line such as OBJECT APPLE BALL 0.07"
             raise InputError(f"there is no object {name}{did_you_mean(name, self.props)}{first}")
         return self.props[name.upper()]
+
+    def placement(self, name: str) -> Placement:
+        """Keys of the actor or object of that name as a whole.
+
+        Raises:
+            InputError: There is none.
+        """
+        if name.upper() in self.props:
+            return self.props[name.upper()].placement
+        if name.upper() in self.actors or not self.props:
+            return self.actor(name).placement
+        raise InputError(f"there is no actor or object {name}{did_you_mean(name, [*self.actors, *self.props])}")
 
     def whereabouts(self, prop: Prop, frames: NDArray[np.float64]) -> Places:
         """Where an object is at F frames."""

@@ -12,7 +12,7 @@ __all__ = ["frame_numbers", "notes", "stage"]
 
 
 def frame_numbers(scene: Scene) -> NDArray[np.float64]:
-    """The frames to make: FRAMES, or from the first to the last key of all actors; shape (F,)."""
+    """The frames to make: FRAMES, or from the first to the last key of all actors and objects; shape (F,)."""
     if scene.first is not None and scene.last is not None:
         return np.arange(scene.first, scene.last + 1, dtype=np.float64)
     spans = []
@@ -22,6 +22,7 @@ def frame_numbers(scene: Scene) -> NDArray[np.float64]:
             if actor.recorded is not None:
                 last = max(*actor.key_frames, 0.0, (len(actor.recorded[0]) - 1) * scene.rate / actor.recorded[1])
             spans.append((first, last))
+    spans += [(keys[0], keys[-1]) for prop in scene.props.values() if (keys := prop.key_frames)]
     if not spans:
         return np.zeros(1)
     first, last = min(s[0] for s in spans), max(s[1] for s in spans)

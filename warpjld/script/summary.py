@@ -30,6 +30,7 @@ class Summary:
 
     Attributes:
         seconds: Time of each stage.
+        press: How a contact solve ended, if there was one.
         contacts: What touches which object, by frame.
         notes: What was guessed, held at a limit, left out or looks suspicious.
     """
@@ -40,6 +41,7 @@ class Summary:
     device: str
     seconds: dict[str, float] = field(default_factory=dict)
     contacts: list[dict[str, Any]] = field(default_factory=list)
+    press: dict[str, Any] | None = None
     notes: list[str] = field(default_factory=list)
 
     @contextmanager
@@ -94,6 +96,7 @@ class Summary:
             ],
             "searches": [attempt.content() for attempt in self.scene.attempts],
             "contacts": self.contacts,
+            "press": self.press,
             "files": list(files),
             "seconds": self.seconds,
             "notes": self.notes,
@@ -115,6 +118,11 @@ def table(content: dict[str, Any], say: Callable[[str], None] = print) -> None:
             console.print(f"{search['command']} at {search['frame']:g}: {search['message']}")
         for row in content.get("contacts", []):
             console.print(f"frame {row['frame']:g}, {row['actor']} and {row['object']}: {row['message']}")
+        if content.get("press"):
+            press = content["press"]
+            console.print(f"contact: {press['verdict']}")
+            for line in [*press["digits"], *press["suggestions"]]:
+                console.print(f"  {line}")
         for actor in content["actors"]:
             drive = "a motion file" if actor["recorded"] else f"{actor['keys']} keys"
             console.print(f"{actor['name']}: {actor['rig']}, {actor['vertices']:,} vertices, {drive}")

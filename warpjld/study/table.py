@@ -74,8 +74,10 @@ def write_parquet(path: Path, rows: Sequence[dict[str, Any]], columns: Sequence[
     beside.replace(path)
 
 
-def write_csv(path: Path, rows: Sequence[dict[str, Any]], columns: Sequence[Column]) -> None:
-    """Write a CSV file (UTF-8, one header line, missing values empty), and ``columns.json`` that describes it."""
+def write_csv(
+    path: Path, rows: Sequence[dict[str, Any]], columns: Sequence[Column], *, described: str = "columns.json"
+) -> None:
+    """Write a CSV file (UTF-8, one header line, missing values empty), and a JSON file beside it that describes it."""
     beside = path.with_name(path.name + ".part")
     with beside.open("w", encoding="utf-8", newline="") as file:
         writer = csv.writer(file, lineterminator="\n")
@@ -83,8 +85,8 @@ def write_csv(path: Path, rows: Sequence[dict[str, Any]], columns: Sequence[Colu
         for row in rows:
             writer.writerow([_cell(row[c.name]) for c in columns])
     beside.replace(path)
-    described = [{"name": c.name, "type": c.kind, "unit": c.unit, "description": c.about} for c in columns]
-    path.with_name("columns.json").write_text(json.dumps(described, indent=1, ensure_ascii=False) + "\n", "utf-8")
+    about = [{"name": c.name, "type": c.kind, "unit": c.unit, "description": c.about} for c in columns]
+    path.with_name(described).write_text(json.dumps(about, indent=1, ensure_ascii=False) + "\n", "utf-8")
 
 
 def write_arrays(path: Path, arrays: dict[str, NDArray[Any]]) -> None:

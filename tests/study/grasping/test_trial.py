@@ -16,10 +16,10 @@ import pytest
 
 from warpjld.cli import main
 from warpjld.errors import InputError
+from warpjld.grasp.segments import SEGMENTS
 from warpjld.study.columns import checked_values
 from warpjld.study.experiment import generator
 from warpjld.study.grasping import GraspExperiment, load_plan
-from warpjld.study.grasping.load import SEGMENTS
 from warpjld.study.table import read_table
 from warpjld.study.worker import perform
 

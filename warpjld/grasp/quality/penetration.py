@@ -11,6 +11,7 @@ from warpjld.covering import Covering
 from warpjld.grasp.distance import ObjectSet
 from warpjld.grasp.intersection import intersection
 from warpjld.grasp.objects import GraspObject
+from warpjld.grasp.outline import outline
 from warpjld.grasp.validation import MeshReport
 
 __all__ = ["Penetration", "depth_inside", "penetration"]
@@ -22,7 +23,7 @@ class Penetration:
 
     Attributes:
         skin: Depth of the deepest skin vertex inside the object [m]; 0 where none is.
-        thing: Depth of the deepest vertex of the object inside the skin [m]; 0 where none is.
+        thing: Depth of the object's deepest vertex, or point of a sharp edge, inside the skin [m]; 0 where none is.
         volume: Common volume [m³], by the midpoint rule of `warpjld.grasp.Intersection`.
         spacing: Edge of that grid's cells [m].
     """
@@ -43,11 +44,11 @@ def penetration(covering: Covering, vertices: NDArray[np.floating], thing: Grasp
 
     With d_O the signed distance to the object, d_S that to the skin, negative inside,
 
-        skin = max(0, −min d_O(skin vertices)),   thing = max(0, −min d_S(object vertices)),
+        skin = max(0, −min d_O(skin vertices)),   thing = max(0, −min d_S(object's outline)),
 
-    the two halves of a depth by vertices (Zhang, Kim, Varadhan & Manocha 2007 compute the exact one): a finger with
-    few vertices does not hide the edge of a box that cuts into it. What lies between the vertices of both only the
-    volume sees.
+    the two halves of a depth by points (Zhang, Kim, Varadhan & Manocha 2007 compute the exact one), the outline being
+    the object's vertices and points of its sharp edges (`warpjld.grasp.outline`): a finger with few vertices does not
+    hide the edge of a box that cuts into it.
 
     Args:
         covering: The hand; its skin may be open, as at the wrist.
@@ -55,7 +56,7 @@ def penetration(covering: Covering, vertices: NDArray[np.floating], thing: Grasp
         thing: The object, at its own place.
     """
     inside = intersection(covering, vertices, thing)
-    stage = thing.place.apply(thing.vertices)[0]
+    stage = thing.place.apply(outline(thing))[0]
     return Penetration(
         inside.deepest, depth_inside(stage, vertices, covering.surface.faces), inside.volume, inside.spacing
     )

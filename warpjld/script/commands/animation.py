@@ -109,30 +109,30 @@ def joint_(scene: Scene, arguments: Arguments) -> None:
 
 @command(
     "MOVE",
-    syntax="MOVE <actor> <key> <x> <y> <z>",
-    help="Displacement of an actor from its rest place at a key, in metres.",
+    syntax="MOVE <actor or object> <key> <x> <y> <z>",
+    help="Displacement of an actor or an object from its rest place at a key, in metres.",
     group="Animation",
 )
 def move(scene: Scene, arguments: Arguments) -> None:
     """R89: actors in a director's script."""
-    actor = scene.actor(arguments.name("an actor's name"))
+    placement = scene.placement(arguments.name("an actor's or an object's name"))
     key = arguments.number("the key (a frame)")
     for axis, value in zip("xyz", arguments.vector("the displacement's"), strict=True):
-        actor.placement.set_key(f"move.{axis}", Key(key, value, **asdict(scene.spline)))
+        placement.set_key(f"move.{axis}", Key(key, value, **asdict(scene.spline)))
 
 
 @command(
     "TURN",
-    syntax="TURN <actor> <key> <x> <y> <z>",
-    help="Rotation of an actor about its root at a key, in degrees about the axes x, then y, then z.",
+    syntax="TURN <actor or object> <key> <x> <y> <z>",
+    help="Rotation of an actor about its root, an object about its origin, at a key: degrees about x, then y, then z.",
     group="Animation",
 )
 def turn(scene: Scene, arguments: Arguments) -> None:
     """R89."""
-    actor = scene.actor(arguments.name("an actor's name"))
+    placement = scene.placement(arguments.name("an actor's or an object's name"))
     key = arguments.number("the key (a frame)")
     for axis, value in zip("xyz", arguments.vector("the rotation about"), strict=True):
-        actor.placement.set_key(f"turn.{axis}", Key(key, math.radians(value), **asdict(scene.spline)))
+        placement.set_key(f"turn.{axis}", Key(key, math.radians(value), **asdict(scene.spline)))
 
 
 @command(

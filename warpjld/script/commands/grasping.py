@@ -30,13 +30,14 @@ _AUTO = "<key> [LEFT/RIGHT] {}<hand vertex or PAD> <object> <facet or NEAREST> [
         "[UNIT <M/CM/MM/…>] [UP <X/Y/Z>] [CENTRE], then [SCALE <factor>] [AT <x> <y> <z>] [TURN <x> <y> <z>] "
         '[COLOR "<colour>"]'
     ),
-    help="Bring on an object: a built-in shape of given sizes, or a surface from a file.",
+    help="Bring on an object: a built-in shape of given sizes, or a surface from a file; animated ones (.npz) deform.",
     group="Grasping",
 )
 def object_(scene: Scene, arguments: Arguments) -> None:
     """A §7: a list of objects."""
     from scipy.spatial.transform import Rotation
 
+    from warpjld.grasp.keyframes import load_keyframes
     from warpjld.grasp.object_file import UNITS
     from warpjld.script.props import COLORS, Prop
 
@@ -62,8 +63,15 @@ def object_(scene: Scene, arguments: Arguments) -> None:
     )
     if path is None and {"unit", "up", "centre"} & set(options):
         raise arguments.error("UNIT, UP and CENTRE are for surfaces from files", where)
+    shapes = None
     try:
-        thing = _made(name.lower(), shape, sizes, path, options)
+        if path is not None and path.suffix.lower() == ".npz":
+            if {"unit", "up", "centre"} & set(options):
+                raise InputError("an animated surface is in metres with Y up: UNIT, UP and CENTRE are not for it")
+            shapes = load_keyframes(path, name=name.lower(), scale=float(cast(float, options.get("scale", 1.0))))
+            thing = shapes.thing
+        else:
+            thing = _made(name.lower(), shape, sizes, path, options)
     except TypeError:
         raise arguments.error(f"too many sizes for a {str(shape).upper()}", where) from None
     except InputError as error:
@@ -71,7 +79,7 @@ def object_(scene: Scene, arguments: Arguments) -> None:
     turn = Rotation.from_euler("xyz", np.radians(cast(tuple, options.get("turn", (0.0, 0.0, 0.0)))))
     thing = thing.placed(cast(tuple, options.get("at", (0.0, 0.0, 0.0))), turn.as_quat())
     color = str(options.get("color", COLORS[len(scene.props) % len(COLORS)]))
-    scene.props[name] = Prop(name, thing, color)
+    scene.props[name] = Prop(name, thing, color, shapes=shapes)
 
 
 @command(
@@ -224,7 +232,7 @@ def release(scene: Scene, arguments: Arguments) -> None:
 
 def _search(scene: Scene, arguments: Arguments, name: str, key: float, side: str, joint_name: str, finger: str) -> None:
     from warpjld.grasp import NEAREST, Status
-    from warpjld.grasp.close import pad_vertex
+    from warpjld.grasp.digits import pad_vertex
     from warpjld.script.binding import cover
     from warpjld.script.grasping import Attempt, search_flexion
 

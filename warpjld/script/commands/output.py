@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
-from typing import Literal, cast
+from typing import cast
 
 from warpjld.script.arguments import Arguments
 from warpjld.script.formats import EXPORTS, FILMS, PICTURES, VIEWS
 from warpjld.script.registry import command
-from warpjld.script.scene import Camera, ContactSheet, Export, Film, Output, Picture, Scene
+from warpjld.script.scene import Camera, ContactSheet, Export, Film, Output, Picture, Scene, Style
+from warpjld.script.suggest import did_you_mean
 
-_STYLES = ("SHADED", "WIREFRAME")
+_STYLES = ("SHADED", "WIREFRAME", "PRESSURE")
 
 
 @command(
@@ -50,27 +51,29 @@ def size(scene: Scene, arguments: Arguments) -> None:
 
 @command(
     "PICTURE",
-    syntax='PICTURE <frame> "<name>.png" [SHADED/WIREFRAME]',
-    help="A picture of a frame.",
+    syntax='PICTURE <frame> "<name>.png" [SHADED/WIREFRAME/PRESSURE [<actor or object>]]',
+    help="A picture of a frame; PRESSURE colours what touches, all or one actor or object alone.",
     group="Output",
 )
 def picture(scene: Scene, arguments: Arguments) -> None:
     """R5, R66, R67."""
     frame = arguments.number("the frame")
     name = arguments.output_name("the picture's name", PICTURES)
-    _ask_for(scene, arguments, Picture(name, frame, _style(arguments), scene.camera))
+    style = _style(arguments)
+    ask_for(scene, arguments, Picture(name, frame, style, scene.camera, _only(scene, arguments, style)))
 
 
 @command(
     "FILM",
-    syntax=f'FILM "<name>{"/".join(FILMS)}" [SHADED/WIREFRAME]',
+    syntax=f'FILM "<name>{"/".join(FILMS)}" [SHADED/WIREFRAME/PRESSURE [<actor or object>]]',
     help="A film of all frames.",
     group="Output",
 )
 def film(scene: Scene, arguments: Arguments) -> None:
     """R67."""
     name = arguments.output_name("the film's name", FILMS)
-    _ask_for(scene, arguments, Film(name, _style(arguments), scene.camera))
+    style = _style(arguments)
+    ask_for(scene, arguments, Film(name, style, scene.camera, _only(scene, arguments, style)))
 
 
 @command(
@@ -85,7 +88,7 @@ def contact(scene: Scene, arguments: Arguments) -> None:
     frames = []
     while arguments:
         frames.append(arguments.number("a frame"))
-    _ask_for(scene, arguments, ContactSheet(name, tuple(frames), scene.camera))
+    ask_for(scene, arguments, ContactSheet(name, tuple(frames), scene.camera))
 
 
 @command(
@@ -98,16 +101,26 @@ def export(scene: Scene, arguments: Arguments) -> None:
     """R89: to the image synthesis part."""
     name = arguments.output_name("the file's name", EXPORTS)
     actor = scene.actor(arguments.name("an actor's name")).name if arguments else None
-    _ask_for(scene, arguments, Export(name, actor))
+    ask_for(scene, arguments, Export(name, actor))
 
 
-def _style(arguments: Arguments) -> Literal["shaded", "wireframe"]:
-    if not arguments:
-        return "shaded"
-    return "wireframe" if arguments.choice("the style", _STYLES) == "WIREFRAME" else "shaded"
+def _style(arguments: Arguments) -> Style:
+    return cast(Style, arguments.choice("the style", _STYLES).lower()) if arguments else "shaded"
 
 
-def _ask_for(scene: Scene, arguments: Arguments, output: Output) -> None:
+def _only(scene: Scene, arguments: Arguments, style: Style) -> str | None:
+    """What is shown alone."""
+    if style != "pressure" or not arguments:
+        return None
+    name = arguments.name("an actor's or an object's name").upper()
+    known = [*scene.actors, *scene.props]
+    if name not in known:
+        raise arguments.error(f"there is no actor or object {name}{did_you_mean(name, known)}")
+    return name
+
+
+def ask_for(scene: Scene, arguments: Arguments, output: Output) -> None:
+    """Note a file to make."""
     if any(other.name.lower() == output.name.lower() for other in scene.outputs):
         raise arguments.error(f"'{output.name}' is asked for twice")
     scene.outputs.append(output)

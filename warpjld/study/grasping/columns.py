@@ -34,8 +34,9 @@ _TOUCH = (
 )  # fmt: skip
 _MEASURED = (
     Column("penetration", "number", "m", "The larger of the two depths that follow."),
-    Column("skin_inside", "number", "m", "Depth of the deepest skin vertex inside the object; 0 where none is."),
-    Column("object_inside", "number", "m", "Depth of the object's deepest vertex inside the skin; 0 where none is."),
+    Column("skin_inside", "number", "m", "Depth of the deepest point of the skin inside the object; 0 where none is."),
+    Column("object_inside", "number", "m", "Depth of the object's deepest vertex, or point of a sharp edge, inside the"
+           " skin; 0 where none is."),
     Column("overlap", "number", "m³", "Volume common to hand and object, on a grid (see warpjld.grasp.Intersection)."),
     Column("closed", "truth", "", "Force closure with discretised cones (Nguyen 1988)."),
     Column("margin", "number", "", "Evenness of the closing force: smallest share of a cone edge × number of edges."),

@@ -12,18 +12,18 @@ from numpy.typing import NDArray
 from warpjld.covering import Covering, bind
 from warpjld.errors import InputError
 from warpjld.grasp import GraspObject, ObjectSet
+from warpjld.grasp.finer import FinerSkin
 from warpjld.grasp.postures import posture_angles
+from warpjld.grasp.segments import vertex_segments
 from warpjld.rig import Rig
-from warpjld.skeleton import CHANNELS, DIGITS, Skeleton, poses_from_angles
-from warpjld.skeleton.hand import FINGER_JOINTS
+from warpjld.skeleton import CHANNELS, Skeleton, poses_from_angles
 from warpjld.study.grasping.choices import HandChoice, ObjectChoice
 from warpjld.study.grasping.plan import Posture
 from warpjld.study.grasping.wrist import Palm, find_palm
 
-__all__ = ["SEGMENTS", "Hand", "Opened", "Thing", "hand_of", "opened_hand", "thing_of"]
+__all__ = ["Hand", "Opened", "Thing", "hand_of", "opened_hand", "thing_of"]
 
-SEGMENTS = (*(f"{digit}.{joint}" for digit in reversed(DIGITS) for joint in FINGER_JOINTS[:3]), "palm")
-"""Parts of a hand that touch, each named after the joint it begins at; thumb first, the palm with its carpus last."""
+_SPACING = 1.5e-3  # of the points that stand for skin [m]
 
 
 @dataclass(frozen=True, eq=False)
@@ -35,13 +35,15 @@ class Hand:
         covering: Bound.
         side: Which hand it is.
         palm: Where its palm is.
-        parts: Place in ``SEGMENTS`` of every vertex's segment, shape (V,); -1 for what is no hand.
+        finer: Its skin with points 1.5 mm apart, for contacts.
+        parts: Place in ``SEGMENTS`` of every such point's segment, shape (n,); -1 for what is no hand.
     """
 
     rig: Rig
     covering: Covering
     side: Literal["left", "right"]
     palm: Palm
+    finer: FinerSkin
     parts: NDArray[np.int64]
 
 
@@ -91,9 +93,9 @@ def hand_of(choice: HandChoice) -> Hand:
     if len(sides) != 1:
         raise InputError(f"hand {choice.name}: want a rig of one hand, this one has {len(sides)}", path=rig.path)
     covering = bind(rig.skeleton, rig.surface, skin=rig.skin)
-    segment = np.array([_segment(fan.name) for fan in covering.fans])
-    parts = segment[covering.domains.argmax(axis=1)]
-    return Hand(rig, covering, sides[0], find_palm(rig.skeleton, rig.surface.vertices), parts)
+    finer = FinerSkin(rig.surface.vertices, rig.surface.faces, _SPACING)
+    parts = vertex_segments(covering)[finer.parents]
+    return Hand(rig, covering, sides[0], find_palm(rig.skeleton, rig.surface.vertices), finer, parts)
 
 
 @lru_cache(maxsize=32)
@@ -111,14 +113,6 @@ def opened_hand(choice: HandChoice, posture: Posture) -> Opened:
         angles = _angles(skeleton, posture, choice.name)
     skin = hand.covering.deform(poses_from_angles(skeleton, angles[None]), threads=1)[0]
     return Opened(angles, skin.astype(np.float64))
-
-
-def _segment(fan: str) -> int:
-    """Place in ``SEGMENTS`` of what an operator of the covering moves."""
-    name = fan.removeprefix("left.").removeprefix("right.")
-    if name in SEGMENTS:
-        return SEGMENTS.index(name)
-    return SEGMENTS.index("palm") if name in ("carpus", "wrist") or name.endswith(".carpometacarpal") else -1
 
 
 def _angles(skeleton: Skeleton, posture: tuple[tuple[str, str, float], ...], name: str) -> NDArray[np.float64]:

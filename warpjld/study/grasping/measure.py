@@ -15,8 +15,9 @@ from warpjld.grasp.quality import (
     penetration,
     wrench_space,
 )
+from warpjld.grasp.segments import SEGMENTS
 from warpjld.skeleton import DIGITS
-from warpjld.study.grasping.load import SEGMENTS, Hand, Thing
+from warpjld.study.grasping.load import Hand, Thing
 from warpjld.study.grasping.plan import Measuring
 
 __all__ = ["measure_grasp"]
@@ -35,11 +36,12 @@ def measure_grasp(
         how: Settings.
     """
     body, scale = thing.body, how.torque_scale or thing.radius
-    found = thing.objects.distances(vertices, nearest=True, threads=1)
+    points = hand.finer.points(vertices)
+    found = thing.objects.distances(points, nearest=True, threads=1)
     assert found.point is not None
     patches = contact_patches(
-        vertices,
-        hand.rig.surface.faces,
+        points,
+        hand.finer.faces,
         hand.parts,
         SEGMENTS,
         found.distance[0],
@@ -61,6 +63,7 @@ def measure_grasp(
         edges=how.edges,
     )
     inside = penetration(hand.covering, vertices, body)
+    skin_inside = max(inside.skin, -float(found.distance.min()))
     areas = dict.fromkeys((*DIGITS, "palm"), 0.0)
     for digit, area in zip(patches.digits, patches.areas, strict=True):
         areas[digit if digit in DIGITS else "palm"] += float(area)
@@ -70,8 +73,8 @@ def measure_grasp(
         "digits": sum(areas[digit] > 0.0 for digit in DIGITS),
         "area": float(patches.areas.sum()),
         **{f"area_{part}": area for part, area in areas.items()},
-        "penetration": inside.depth,
-        "skin_inside": inside.skin,
+        "penetration": max(skin_inside, inside.thing),
+        "skin_inside": skin_inside,
         "object_inside": inside.thing,
         "overlap": inside.volume,
         "closed": closure.closed,
@@ -82,6 +85,6 @@ def measure_grasp(
         "mass": thing.mass,
         "displacement": gravity.worst if np.isfinite(gravity.worst) else None,
         "held": int(gravity.held.sum()),
-        "success": bool(closure.closed and inside.depth <= how.penetration and firm),
+        "success": bool(closure.closed and max(skin_inside, inside.thing) <= how.penetration and firm),
     }
     return values, patches

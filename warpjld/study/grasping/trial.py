@@ -15,12 +15,13 @@ from warpjld.grasp.auto import find_grasp
 from warpjld.grasp.close import close_hand
 from warpjld.grasp.postures import posture_for
 from warpjld.grasp.quality import Patches
+from warpjld.grasp.segments import SEGMENTS
 from warpjld.skeleton import poses_from_angles
 from warpjld.study.columns import Column
 from warpjld.study.experiment import Outcome
 from warpjld.study.grasping.choices import HandChoice, ObjectChoice
 from warpjld.study.grasping.columns import GRASP_COLUMNS
-from warpjld.study.grasping.load import SEGMENTS, Hand, Thing, hand_of, opened_hand, thing_of
+from warpjld.study.grasping.load import Hand, Thing, hand_of, opened_hand, thing_of
 from warpjld.study.grasping.measure import measure_grasp
 from warpjld.study.grasping.plan import GraspPlan
 from warpjld.study.grasping.wrist import Approach, draw_approach, place_palm, touch_along
@@ -102,7 +103,7 @@ class GraspExperiment:
         choice, wanted, scale, friction = self.settings.combination(trial)
         hand, thing = hand_of(choice), self._thing(wanted, scale)
         best_of = self.settings.wrist.best_of
-        tried = self._best_of(best_of, hand, thing, rng) if best_of else self._one(choice, thing, rng)
+        tried = self._best_of(best_of, hand, thing, friction, rng) if best_of else self._one(choice, thing, rng)
         if isinstance(tried, Outcome):
             return tried
         root = {"root_position": tried.position, "root_rotation": tried.rotation}
@@ -143,7 +144,9 @@ class GraspExperiment:
         )
         return _Tried(closed.angles[0], position, rotation, bool(closed.touching().any()), values)
 
-    def _best_of(self, count: int, hand: Hand, thing: Thing, rng: np.random.Generator) -> _Tried | Outcome:
+    def _best_of(
+        self, count: int, hand: Hand, thing: Thing, friction: float, rng: np.random.Generator
+    ) -> _Tried | Outcome:
         """The best of some placements, as the script's GRASP … AUTO takes it."""
         posture = self.settings.posture
         assert isinstance(posture, str)
@@ -154,6 +157,7 @@ class GraspExperiment:
                 count=count,
                 posture=None if posture == "auto" else posture,
                 coupling=self.settings.coupling if any(self.settings.coupling) else None,
+                friction=friction,
                 seed=int(rng.integers(2**31)),
             )
         except InputError as error:

@@ -1,0 +1,14 @@
+"""One flesh hand for all tests of its package."""
+
+from __future__ import annotations
+
+import pytest
+
+from warpjld.fem.hand import FleshHand, build_flesh_hand
+
+
+@pytest.fixture(scope="session")
+def hand() -> FleshHand:
+    from warpjld.hand import build_hand
+
+    return build_flesh_hand(build_hand("left", resolution=4000), 0.003)

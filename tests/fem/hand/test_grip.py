@@ -1,0 +1,85 @@
+"""The gentlest grip of blocks whose answer is known."""
+
+from __future__ import annotations
+
+import math
+
+import pytest
+
+from warpjld.errors import InputError
+from warpjld.fem.hand.grip import GripStatus, Trial, gentlest_grip
+
+
+def squeezed(weight: float, friction: float, stiffness: float = 4e3, touch: float = 1e-3, limit: float = math.inf):  # type: ignore[no-untyped-def]
+    """Two springy fingers squeeze a block between them: N each, held where 2 μ N ≥ W."""
+
+    def hold(closing: float) -> Trial:
+        each = stiffness * max(0.0, closing - touch)
+        held = 2.0 * friction * each >= weight and each > 0.0
+        sliding = math.nan if each == 0.0 else 0.0 if held else 1.0
+        return Trial(held, sliding, 2.0 * each, each / limit, "index")
+
+    return hold
+
+
+@pytest.mark.parametrize(("weight", "friction"), [(2.0, 0.5), (0.3, 0.9), (15.0, 0.6)])
+def test_block_between_two_fingers(weight: float, friction: float) -> None:
+    found = gentlest_grip(squeezed(weight, friction), 0.0, 0.05, weight=weight, friction=friction, tolerance=1e-3)
+    assert found.status is GripStatus.HELD
+    assert found.trial is not None
+    needed = weight / (2.0 * friction)
+    assert found.trial.force / 2.0 == pytest.approx(needed, rel=0.02)
+    assert found.trial.force / 2.0 >= needed
+    assert found.grip == pytest.approx(1e-3 + needed / 4e3, rel=2e-3)
+    assert len(found.trials) < 25
+
+
+def test_wedge_slides_out_however_hard() -> None:
+    """Faces that lean by α > atan μ: the squeeze itself drives the wedge out, whatever it weighs."""
+    lean, friction, weight = math.radians(40.0), 0.5, 1.0
+
+    def hold(force: float) -> Trial:
+        held = force * (friction * math.cos(lean) - math.sin(lean)) * 2.0 >= weight
+        return Trial(held, 0.0 if held else 1.0, 2.0 * force)
+
+    found = gentlest_grip(hold, 0.0, 1000.0, weight=weight, friction=friction)
+    assert found.status is GripStatus.SLIDES
+    assert "friction cones" in found.text
+    assert found.grip < 1000.0
+
+
+def test_reasons_why_none_holds() -> None:
+    weak = gentlest_grip(squeezed(50.0, 0.5, limit=20.0), 0.0, 0.1, weight=50.0, friction=0.5)
+    assert weak.status is GripStatus.TOO_WEAK
+    assert "index at" in weak.text
+    away = gentlest_grip(squeezed(1.0, 0.5, touch=1.0), 0.0, 0.1, weight=1.0, friction=0.5)
+    assert away.status is GripStatus.NO_CONTACT
+    short = gentlest_grip(squeezed(1e3, 0.5), 0.0, 0.02, weight=1e3, friction=0.5)
+    assert short.status is GripStatus.LIMIT
+    assert short.grip == 0.02
+    slippery = gentlest_grip(squeezed(1.0, 0.0), 0.0, 0.1, weight=1.0, friction=0.0)
+    assert slippery.status is GripStatus.SLIDES
+    lost = gentlest_grip(lambda g: None if g > 0.01 else Trial(False, 1.0, 1.0), 0.0, 0.1, weight=9.0, friction=0.5)
+    assert lost.status is GripStatus.NO_SOLUTION
+    assert lost.trial is None
+    easy = gentlest_grip(squeezed(1e-3, 0.5, touch=-1.0), 0.0, 0.1, weight=1e-3, friction=0.5)
+    assert easy.status is GripStatus.HELD_AT_ONCE
+    assert len(easy.trials) == 1
+
+
+def test_held_only_with_more_than_muscles_have() -> None:
+    """The grip that holds is found between a step that is too gentle and one that is too hard for the muscles."""
+    # 5 N each are needed, 6 N each is the limit: coarse steps overshoot it, the answer does not
+    found = gentlest_grip(squeezed(5.0, 0.5, limit=6.0), 0.0, 0.05, weight=5.0, friction=0.5)
+    assert found.status is GripStatus.HELD
+    over = gentlest_grip(squeezed(5.0, 0.5, limit=4.0), 0.0, 0.05, weight=5.0, friction=0.5)
+    assert over.status is GripStatus.TOO_WEAK
+
+
+@pytest.mark.parametrize(
+    ("low", "high", "weight", "friction"),
+    [(1.0, 1.0, 1.0, 0.5), (0.0, math.nan, 1.0, 0.5), (0.0, 1.0, -1.0, 0.5), (0.0, 1.0, 1.0, math.nan)],
+)
+def test_what_cannot_be_is_refused(low: float, high: float, weight: float, friction: float) -> None:
+    with pytest.raises(InputError, match="grip: want"):
+        gentlest_grip(squeezed(1.0, 0.5), low, high, weight=weight, friction=friction)

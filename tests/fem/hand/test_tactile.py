@@ -1,0 +1,121 @@
+"""Pads read from contact made by hand, and the files written of them."""
+
+from __future__ import annotations
+
+import csv
+import json
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from warpjld.errors import InputError
+from warpjld.fem.hand import FleshHand
+from warpjld.fem.hand.tactile import tactile_of
+from warpjld.fem.hand.tactile_files import TACTILE_COLUMNS, draw_tactile, write_tactile
+
+
+@dataclass(frozen=True, eq=False)
+class Touched:
+    """As ``Touch`` of the contact package, as far as it is read."""
+
+    nodes: NDArray[np.int32]
+    pressure: NDArray[np.float64]
+    area: NDArray[np.float64]
+    slip: NDArray[np.float64]
+    sticking: NDArray[np.bool_]
+    nodal: NDArray[np.float64]
+    name: str = "ball"
+
+
+@dataclass(frozen=True, eq=False)
+class Moment:
+    time: float
+    displacement: NDArray[np.float64]
+    touches: tuple[Touched, ...] = field(default=())
+
+
+def pad_nodes(hand: FleshHand, name: str) -> NDArray[np.int64]:
+    return np.flatnonzero(hand.node_labels == hand.label_names.index(name))
+
+
+def pressed(hand: FleshHand, name: str, pressure: float, *, slave: bool) -> Touched:
+    """Even pressure on a pad, half of it sticking, the rest slipped by 1 mm; as slave, or as the other side."""
+    nodes = pad_nodes(hand, name)
+    area = np.full(len(nodes), 4e-6)
+    quads = hand.mesh.quads(hand.skin_faces)
+    x = hand.mesh.nodes[quads]
+    out = np.zeros_like(hand.mesh.nodes)
+    np.add.at(out, quads, 0.125 * np.cross(x[:, 2] - x[:, 0], x[:, 3] - x[:, 1])[:, None].repeat(4, axis=1))
+    normal = out[nodes] / np.linalg.norm(out[nodes], axis=1)[:, None]
+    nodal = np.zeros((len(hand.mesh.nodes) + 7, 3))
+    nodal[nodes] = -pressure * area[:, None] * normal
+    sticking = np.arange(len(nodes)) % 2 == 0
+    slip = np.where(sticking[:, None], 0.0, [1e-3, 0.0, 0.0])
+    if not slave:
+        return Touched(
+            np.array([len(hand.mesh.nodes) + 2], np.int32), np.array([5.0]), np.array([1.0]), np.zeros((1, 3)),
+            np.array([True]), nodal,
+        )  # fmt: skip
+    return Touched(nodes.astype(np.int32), np.full(len(nodes), pressure), area, slip, sticking, nodal)
+
+
+def test_pads_of_a_slave_and_of_a_master(hand: FleshHand) -> None:
+    still = np.zeros((len(hand.mesh.nodes) + 7, 3))
+    name = "left.index.distal"
+    instants = [
+        Moment(1.0, still),
+        Moment(2.0, still, (pressed(hand, name, 8e3, slave=True),)),
+        Moment(3.0, still, (pressed(hand, name, 8e3, slave=False),)),
+    ]
+    found = tactile_of(hand, instants)
+    p = found.pads.index(name)
+    nodes = pad_nodes(hand, name)
+    total = 8e3 * 4e-6 * len(nodes)
+    assert not found.touching[0].any()
+    np.testing.assert_array_equal(np.flatnonzero(found.touching[1]), [p])
+    np.testing.assert_array_equal(np.flatnonzero(found.touching[2]), [p])
+    for frame in (1, 2):
+        assert found.normal_force[frame, p] == pytest.approx(total)
+        np.testing.assert_allclose(found.force[frame, p], instants[frame].touches[0].nodal.sum(axis=0))
+        np.testing.assert_allclose(found.centre[frame, p], hand.mesh.nodes[nodes].mean(axis=0))
+    assert found.area[1, p] == pytest.approx(4e-6 * len(nodes))
+    assert found.peak[1, p] == pytest.approx(8e3)
+    assert found.sticking[1, p] == pytest.approx(0.5, abs=0.02)
+    assert found.slip[1, p] == pytest.approx(0.5e-3, abs=2e-5)
+    assert np.isnan(found.sticking[2, p])
+    assert found.area[2, p] > 0.0
+    assert np.isnan(found.centre[1, p - 1]).all()
+    assert not tactile_of(hand, instants, only="plate").touching.any()
+    with pytest.raises(InputError, match="at least one instant"):
+        tactile_of(hand, [])
+
+
+def test_files(hand: FleshHand, tmp_path: Path) -> None:
+    still = np.zeros((len(hand.mesh.nodes) + 7, 3))
+    instants = [Moment(float(t), still, (pressed(hand, "left.thumb.distal", 1e3 * t, slave=True),)) for t in (1, 2)]
+    found = tactile_of(hand, instants)
+    write_tactile(tmp_path / "tactile.csv", found)
+    with (tmp_path / "tactile.csv").open(encoding="utf-8") as file:
+        rows = list(csv.DictReader(file))
+    assert len(rows) == 2 * len(found.pads)
+    touched = [row for row in rows if row["touching"] == "true"]
+    assert [row["pad"] for row in touched] == ["left.thumb.distal"] * 2
+    assert float(touched[1]["normal_force"]) == pytest.approx(2.0 * float(touched[0]["normal_force"]))
+    assert all(row["centre_x"] == "" for row in rows if row["touching"] == "false")
+    described = json.loads((tmp_path / "tactile.columns.json").read_text(encoding="utf-8"))
+    assert [c["name"] for c in described] == [c.name for c in TACTILE_COLUMNS]
+
+    from warpjld.study.table import read_table
+
+    pytest.importorskip("pyarrow")
+    write_tactile(tmp_path / "tactile.parquet", found)
+    table = read_table(tmp_path / "tactile.parquet")
+    assert [r["pad"] for r in table] == [r["pad"] for r in rows]
+    assert table[0]["centre_x"] is None
+
+    draw_tactile(tmp_path / "tactile.png", found)
+    assert (tmp_path / "tactile.png").stat().st_size > 10_000
+    assert not list(tmp_path.glob("*.part*"))

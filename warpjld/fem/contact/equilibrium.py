@@ -1,0 +1,408 @@
+"""One load step of bodies in contact: Newton's method on bodies and contact together.
+
+The system is K plus a moderate penalty at the contact points, symmetric and well conditioned, so that conjugate
+gradients keep working; the multipliers are brought up to date after every linear solve, so that what the penalty
+leaves of overlap and slip is gone when forces balance (Simo & Laursen 1992; reference: B §3.4, R108, R117).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from warpjld.fem.blockmatrix import BlockMatrix
+from warpjld.fem.body import Body, Tangent
+from warpjld.fem.conjugate import Iteration, Status
+from warpjld.fem.contact.law import Memory, Response, remember, respond
+from warpjld.fem.contact.points import ContactPoints, Interface
+from warpjld.fem.contact.stiffness import with_contact
+from warpjld.fem.dots import dot, norm
+from warpjld.fem.linear import LinearSolver
+from warpjld.fem.loads import Loads, external_forces, subtract_pressure_stiffness
+from warpjld.fem.multigrid import IndefiniteError
+from warpjld.fem.prescribed import Prescribed, free_motions
+
+__all__ = ["Equilibrium", "Reached", "Step"]
+
+_ITERATIONS = 40
+_PENALTY = 300.0
+"""Contact stiffness over the stiffness of a node: more makes the linear solves slow, less makes them many."""
+_SETTLED = 2e-3
+"""Share of the contact forces by which the multipliers may still change."""
+_ROUNDING = 1e-13
+"""Part of stiffness times displacement that is rounding, where bodies move without a force."""
+_HELD = 1e-4
+"""Stiffness given to bodies that only contact holds, over their own: it slows them down, and leaves no force."""
+_TURNING = 2
+"""Iterations after which normals stay; weights follow until they no longer change the gaps. That both are right is
+looked at once forces balance. (Newton's method without their derivatives converges slowly, with them not symmetric.)"""
+_CARELESS = 8
+"""Iterations with full steps and multipliers brought up to date at once; what has not settled by then takes turns."""
+_LINE_SEARCH = 8
+_INNER = 1e-4
+_PATIENCE = 25
+"""Iterations after which a preconditioner made for an earlier matrix has served its time."""
+
+
+@dataclass(frozen=True, eq=False)
+class Step:
+    """What a load step goes from and to.
+
+    Attributes:
+        before: Time it starts from.
+        time: Time it goes to.
+        prescribed: Displacements at ``time``.
+        loads: Loads, and the share of them that acts at ``time``.
+        share: That share.
+        allowed: Share of the overlap at the start that is still allowed at ``time``.
+    """
+
+    before: float
+    time: float
+    prescribed: Prescribed
+    loads: Loads
+    share: float
+    allowed: float
+
+
+@dataclass(frozen=True, eq=False)
+class Reached:
+    """Equilibrium at the end of a load step."""
+
+    displacement: NDArray[np.float64]
+    reactions: NDArray[np.float64]
+    points: list[ContactPoints]
+    responses: list[Response]
+    slips: list[NDArray[np.float64]]
+    memory: list[Memory]
+    residual: float
+
+
+@dataclass(frozen=True, eq=False)
+class _Contact:
+    """Every interface's points, slips [m] and responses, and their nodal forces together [N], shape (3N,)."""
+
+    points: list[ContactPoints]
+    slips: list[NDArray[np.float64]]
+    responses: list[Response]
+    forces: NDArray[np.float64]
+
+
+class Equilibrium:
+    """The bodies and interfaces of a contact problem, and the matrices kept between steps.
+
+    Args:
+        body: All bodies, merged.
+        interfaces: What may touch.
+        tolerance: Relative residual.
+        penetration: Overlap left, as a share of an edge.
+        precision: Of the linear solver.
+    """
+
+    def __init__(
+        self,
+        body: Body,
+        interfaces: list[Interface],
+        *,
+        tolerance: float = 1e-5,
+        penetration: float = 1e-3,
+        penalty: float = _PENALTY,
+        precision: str = "float64",
+    ) -> None:
+        self.body = body
+        self.interfaces = interfaces
+        self.solves = 0
+        self.iterations = 0
+        self._tolerance = tolerance
+        self._penetration = penetration
+        self._penalty = penalty
+        bulk, shear = body.constants[:, 2], 2.0 * body.constants[:, :2].sum(axis=1)
+        poisson = float(((3 * bulk - 2 * shear) / (6 * bulk + 2 * shear)).max())
+        self._options: dict[str, Any] = {"precision": precision, "threads": body.threads, "poisson": poisson}
+        self._hierarchy: list[Any] | None = None
+        self._tangent: Tangent | None = None
+        self._rest = None if body.large_strain else body.at()
+        self._loose: tuple[bytes, NDArray[np.bool_]] | None = None
+        tangent = self._rest or body.at()
+        assert tangent.stiffness is not None
+        blocks = tangent.stiffness.diagonal()
+        self._stiff = np.einsum("nii->n", blocks) / 3.0
+        self._stiff_of = [self._meeting(interface) for interface in interfaces]
+
+    def _meeting(self, interface: Interface) -> NDArray[np.float64]:
+        """Stiffness of slave nodes against what they meet [N/m], shape (m,)."""
+        own = self._stiff[interface.slave.nodes]
+        if len(interface.opposite) == 0:
+            return own
+        return np.asarray(np.minimum(own, float(np.median(self._stiff[interface.opposite]))))
+
+    def find(
+        self,
+        u: NDArray[np.float64],
+        memory: list[Memory],
+        step: Step,
+        first: NDArray[np.float64] | None = None,
+    ) -> tuple[Status, Reached | None]:
+        """Equilibrium from displacement u (3N,) at ``step.before``; ``first`` is where to begin to look."""
+        body, start = self.body, u
+        known = step.prescribed.degrees
+        free = step.prescribed.free(body.degrees)
+        loose = self._unheld(step.prescribed)
+        u = (start if first is None else first.reshape(-1)).copy()
+        jump = np.zeros_like(u)
+        if first is None:
+            jump[known] = step.prescribed.values - u[known]
+        else:
+            u[known] = step.prescribed.values
+        pressures: NDArray[np.float64] | None = None
+        solver: LinearSolver | None = None
+        normals = self._normals(u)
+        held = (self._points(u, step, normals), u)
+        settled, since = False, 0
+        contact = self._answered(held[0], u, start, memory, keep=True, allowed=step.allowed)
+        for iteration in range(_ITERATIONS):
+            careful = iteration - since >= _CARELESS
+            tangent = self._at(u, pressures)
+            external = step.share * external_forces(body, step.loads, u if body.large_strain else None)
+            residual = np.where(free, external + contact.forces - tangent.forces, 0.0)
+            balance = tangent.forces - external - contact.forces
+            moved = not jump.any()
+            pushed = norm(np.where(free, contact.forces, 0.0))
+            scale = max(norm(external), pushed, norm(np.where(free, 0.0, balance)), 1e-300)
+            now = norm(residual) / scale
+            noise = _ROUNDING * norm(np.repeat(self._stiff, 3) * u)
+            if moved and now <= max(self._tolerance, noise / scale) and self._settled(contact, memory):
+                normals = self._normals(u)
+                fresh = self._points(u, step, normals)
+                if step.allowed > 0.0 or self._mismatch(fresh, contact.points, contact.responses) <= self._penetration:
+                    return Status.CONVERGED, self._reached(u, np.where(free, 0.0, balance), contact, memory, now)
+                held, settled, since = (fresh, u), False, iteration
+                contact = self._answered(fresh, u, start, memory, keep=True, allowed=step.allowed)
+                continue
+            if not np.isfinite(now):
+                return Status.NOT_FINITE, None
+            stiffness = tangent.stiffness
+            assert stiffness is not None
+            if body.large_strain:
+                subtract_pressure_stiffness(stiffness, body, step.loads, u, step.share)
+            matrix = with_contact(
+                stiffness, contact.points, [r.blocks for r in contact.responses], threads=body.threads
+            )
+            matrix = self._steadied(matrix, stiffness, loose)
+            try:
+                solver, done = self._solve(solver, matrix, free, residual - matrix.product(jump, threads=body.threads))
+            except IndefiniteError:
+                return Status.INDEFINITE, None
+            self.solves += 1
+            self.iterations += done.iterations
+            if done.status in (Status.INDEFINITE, Status.NOT_FINITE):
+                return done.status, None
+            move = done.x + jump
+            length = self._search(u, move, contact, memory, step, residual if moved and careful else None)
+            if length == 0.0:
+                return Status.INVERTED, None
+            move *= length
+            if body.large_strain:
+                pressures = body.at(u, stiffness=False, increment=move).pressures
+            u = u + move
+            jump *= 1.0 - length
+            if length == 1.0:
+                u[known] = step.prescribed.values
+                jump[:] = 0.0
+            foreseen = self._foreseen(contact, memory, move, step.allowed)
+            if not careful or _alike(contact.responses, foreseen):
+                memory = self._remembered(memory, contact, foreseen, move)
+            points = [_shifted(p, (u - held[1]).reshape(-1, 3)) for p in held[0]]
+            if not settled:
+                normals = self._normals(u) if iteration < _TURNING else normals
+                fresh = self._points(u, step, normals)
+                settled = iteration > _TURNING and self._mismatch(fresh, points, foreseen) <= 0.3 * self._penetration
+                held, points = (held, points) if settled else ((fresh, u), fresh)
+            contact = self._answered(points, u, start, memory, keep=not careful, allowed=step.allowed)
+        return Status.MAX_ITERATIONS, None
+
+    def _solve(
+        self, solver: LinearSolver | None, matrix: BlockMatrix, free: NDArray[np.bool_], right: NDArray[np.float64]
+    ) -> tuple[LinearSolver, Iteration]:
+        """With the preconditioner of the step's first matrix while it serves."""
+        if solver is not None:
+            done = solver.of(matrix).solve(right, tolerance=_INNER, iterations=_PATIENCE)
+            if done.status is Status.CONVERGED:
+                return solver, done
+        solver = LinearSolver(matrix, free, self.body.mesh, hierarchy=self._hierarchy, **self._options)
+        self._hierarchy = solver.hierarchy
+        return solver, solver.solve(right, tolerance=_INNER)
+
+    def _search(
+        self,
+        u: NDArray[np.float64],
+        move: NDArray[np.float64],
+        contact: _Contact,
+        memory: list[Memory],
+        step: Step,
+        residual: NDArray[np.float64] | None,
+    ) -> float:
+        """How far to go, zero for nowhere: no element inside out; and, where the residual here is given and forces
+        there pull back harder than half of what drives here, to where they balance along the way. A contact that opens
+        and closes in turn settles so.
+        """
+        body = self.body
+        length = 1.0
+        for _ in range(_LINE_SEARCH):
+            there = u + length * move
+            trial = self._at(there, None) if self._rest is not None else body.at(there, stiffness=False)
+            if self._rest is not None or (trial.lowest > 0).all():
+                break
+            length *= 0.5
+        else:
+            return 0.0
+        if residual is None or length < 1.0:
+            return length
+        pushed = np.zeros_like(body.mesh.nodes)
+        for p, r in zip(contact.points, self._foreseen(contact, memory, move, step.allowed), strict=True):
+            pushed += p.forces(r.traction(p))
+        external = step.share * external_forces(body, step.loads, there if body.large_strain else None)
+        free = step.prescribed.free(body.degrees)
+        ahead = dot(np.where(free, external + pushed.reshape(-1) - trial.forces, 0.0), move)
+        here = dot(residual, move)
+        return here / (here - ahead) if here > 0.0 and ahead < -0.5 * here else 1.0
+
+    def _at(self, u: NDArray[np.float64], pressures: NDArray[np.float64] | None) -> Tangent:
+        if self._rest is None:
+            self._tangent = self.body.at(u, pressures=pressures, reuse=self._tangent)
+            return self._tangent
+        assert self._rest.stiffness is not None
+        return replace(
+            self._rest, forces=self._rest.forces + self._rest.stiffness.product(u, threads=self.body.threads)
+        )
+
+    def _normals(self, u: NDArray[np.float64]) -> list[NDArray[np.float64]]:
+        x = self.body.mesh.nodes + u.reshape(-1, 3)
+        return [interface.slave.normals(x) for interface in self.interfaces]
+
+    def _points(self, u: NDArray[np.float64], step: Step, normals: list[NDArray[np.float64]]) -> list[ContactPoints]:
+        """Every interface's points at displacement u (3N,)."""
+        x = self.body.mesh.nodes + u.reshape(-1, 3)
+        return [i.points(x, step.before, step.time, n) for i, n in zip(self.interfaces, normals, strict=True)]
+
+    def _answered(
+        self,
+        points: list[ContactPoints],
+        u: NDArray[np.float64],
+        start: NDArray[np.float64],
+        memory: list[Memory],
+        *,
+        keep: bool,
+        allowed: float,
+    ) -> _Contact:
+        """What points answer at displacement u (3N,)."""
+        since = (u - start).reshape(-1, 3)
+        slips = [p.relative(since) - p.carried for p in points]
+        responses = [
+            respond(i.pair, p, m, slip, self._stiff_penalty(k, p), allowed, keep=keep)
+            for k, (i, p, m, slip) in enumerate(zip(self.interfaces, points, memory, slips, strict=True))
+        ]
+        total = np.zeros_like(self.body.mesh.nodes)
+        for p, r in zip(points, responses, strict=True):
+            total += p.forces(r.traction(p))
+        return _Contact(points, slips, responses, total.reshape(-1))
+
+    def _foreseen(
+        self, contact: _Contact, memory: list[Memory], move: NDArray[np.float64], allowed: float
+    ) -> list[Response]:
+        """What points answer after a move, by the linear model: the multipliers to go on with."""
+        out = []
+        for k, (p, m, slip) in enumerate(zip(contact.points, memory, contact.slips, strict=True)):
+            there = _shifted(p, move.reshape(-1, 3))
+            slip = slip + p.relative(move.reshape(-1, 3))
+            out.append(respond(self.interfaces[k].pair, there, m, slip, self._stiff_penalty(k, p), allowed))
+        return out
+
+    def _remembered(
+        self, memory: list[Memory], contact: _Contact, foreseen: list[Response], move: NDArray[np.float64]
+    ) -> list[Memory]:
+        out = []
+        for k, (m, p, r) in enumerate(zip(memory, contact.points, foreseen, strict=True)):
+            slip = contact.slips[k] + p.relative(move.reshape(-1, 3))
+            out.append(remember(self.interfaces[k].pair, m, p, r, slip, contact.responses[k].active))
+        return out
+
+    def _reached(
+        self,
+        u: NDArray[np.float64],
+        reactions: NDArray[np.float64],
+        contact: _Contact,
+        memory: list[Memory],
+        residual: float,
+    ) -> Reached:
+        kept = self._remembered(memory, contact, contact.responses, np.zeros_like(u))
+        return Reached(u, reactions, contact.points, contact.responses, contact.slips, kept, residual)
+
+    def _stiff_penalty(self, k: int, points: ContactPoints) -> NDArray[np.float64]:
+        """ε of points [Pa/m]: a multiple of the stiffness of their nodes, over the area they would have whole."""
+        edge = self.interfaces[k].slave.edge[points.nodes]
+        return np.asarray(self._penalty * self._stiff_of[k][points.nodes] / edge**2)
+
+    def _settled(self, contact: _Contact, memory: list[Memory]) -> bool:
+        for k, (p, r, m) in enumerate(zip(contact.points, contact.responses, memory, strict=True)):
+            if not r.active.any():
+                continue
+            if (r.error / self.interfaces[k].slave.edge[p.nodes]).max() > self._penetration:
+                return False
+            change = np.abs(r.pressure - m.pressure[p.nodes]) + np.linalg.norm(r.friction - m.friction[p.nodes], axis=1)
+            size = np.abs(r.pressure) + np.linalg.norm(r.friction, axis=1)
+            if p.area @ change > _SETTLED * (p.area @ size):
+                return False
+        return True
+
+    def _mismatch(self, fresh: list[ContactPoints], points: list[ContactPoints], responses: list[Response]) -> float:
+        """How far gaps as they are differ from those believed, where surfaces press or overlap, over an edge."""
+        worst = 0.0
+        for k, (p, r, q) in enumerate(zip(points, responses, fresh, strict=True)):
+            edge = self.interfaces[k].slave.edge
+            active = np.zeros(len(edge), dtype=bool)
+            active[p.nodes] = r.active
+            believed = np.full(len(edge), np.inf)
+            believed[p.nodes] = p.gap
+            off = np.abs(q.gap - believed[q.nodes])
+            off = np.where(active[q.nodes], off, np.minimum(off, np.maximum(-q.gap, 0.0)))
+            worst = max(worst, float((off / edge[q.nodes]).max(initial=0.0)))
+        return worst
+
+    def _unheld(self, prescribed: Prescribed) -> NDArray[np.bool_]:
+        """Nodes of bodies that the prescribed displacements do not hold, shape (N,)."""
+        key = prescribed.degrees.tobytes()
+        if self._loose is None or self._loose[0] != key:
+            mask = np.zeros(len(self.body.mesh.nodes), dtype=bool)
+            for nodes, _ in free_motions(self.body, prescribed):
+                mask[nodes] = True
+            self._loose = (key, mask)
+        return self._loose[1]
+
+    def _steadied(self, matrix: BlockMatrix, own: BlockMatrix, loose: NDArray[np.bool_]) -> BlockMatrix:
+        if not loose.any():
+            return matrix
+        if matrix is own:
+            matrix = BlockMatrix(own.rows, own.columns, own.values.copy())
+        row = np.repeat(np.arange(matrix.size, dtype=np.int32), np.diff(matrix.rows))
+        place = np.flatnonzero(row == matrix.columns)[loose]
+        matrix.values[place] += (_HELD * self._stiff[loose])[:, None, None] * np.eye(3)
+        return matrix
+
+
+def _shifted(points: ContactPoints, move: NDArray[np.float64]) -> ContactPoints:
+    """Points after a move (N, 3), by the linear model: their normals and weights stay."""
+    if not move.any():
+        return points
+    return replace(points, gap=points.gap - np.einsum("mi,mi->m", points.normal, points.relative(move)))
+
+
+def _alike(responses: list[Response], others: list[Response]) -> bool:
+    """Whether the same points touch, and stick, in both."""
+    return all(
+        np.array_equal(r.active, s.active) and np.array_equal(r.sticking, s.sticking)
+        for r, s in zip(responses, others, strict=True)
+    )

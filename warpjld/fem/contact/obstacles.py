@@ -1,0 +1,131 @@
+"""What contact does not deform: the face every obstacle shows to the solver, and rigid motion (R94)."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from warpjld.errors import InputError
+
+__all__ = ["Motion", "Obstacle", "Rigid", "Touching", "checked_points", "checked_vector", "placement", "standing"]
+
+Motion = Callable[[float], tuple[ArrayLike, ArrayLike]]
+"""Time → position [m] and quaternion x, y, z, w: a point x of the first placement lies at rotation · x + position."""
+
+Points = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class Touching:
+    """Nearest points of an obstacle's surface.
+
+    Attributes:
+        distance: Signed distance [m], negative inside, shape (n,).
+        closest: Nearest points of the surface [m], shape (n, 3).
+        normal: Unit normals there, outward from the obstacle, smooth across the facets of meshes, shape (n, 3).
+    """
+
+    distance: NDArray[np.float64]
+    closest: Points
+    normal: Points
+
+
+class Obstacle(ABC):
+    """A surface that pushes and is not pushed; its place and shape are functions of time."""
+
+    @abstractmethod
+    def project(self, points: Points, time: float) -> Touching:
+        """Distances of points (n, 3) [m] at a time."""
+
+    @abstractmethod
+    def carried(self, points: Points, time_from: float, time_to: float) -> Points:
+        """Where the obstacle's material points that lie at ``points`` (n, 3) at one time lie at another [m]; what is
+        off the surface goes along as if it were glued to it."""
+
+    @abstractmethod
+    def mesh(self, time: float) -> tuple[Points, NDArray[np.int32]]:
+        """Vertices [m], shape (v, 3), and triangles, shape (t, 3), to draw it at a time."""
+
+
+class Rigid(Obstacle):
+    """An obstacle with a ``motion`` and a shape that is always the same in its own frame."""
+
+    motion: Motion | None
+
+    @abstractmethod
+    def _project(self, points: Points) -> Touching:
+        """Distances in the first placement."""
+
+    @abstractmethod
+    def _mesh(self) -> tuple[Points, NDArray[np.int32]]:
+        """To draw it in the first placement."""
+
+    def project(self, points: Points, time: float) -> Touching:
+        """See `Obstacle.project`."""
+        points = checked_points(points)
+        turn, shift = placement(self.motion, time)
+        found = self._project((points - shift) @ turn)
+        return Touching(found.distance, found.closest @ turn.T + shift, found.normal @ turn.T)
+
+    def carried(self, points: Points, time_from: float, time_to: float) -> Points:
+        """See `Obstacle.carried`."""
+        turn, shift = placement(self.motion, time_from)
+        then, there = placement(self.motion, time_to)
+        return np.asarray((checked_points(points) - shift) @ turn @ then.T + there)
+
+    def mesh(self, time: float) -> tuple[Points, NDArray[np.int32]]:
+        """See `Obstacle.mesh`."""
+        turn, shift = placement(self.motion, time)
+        vertices, faces = self._mesh()
+        return vertices @ turn.T + shift, faces
+
+
+def standing(position: ArrayLike = (0.0, 0.0, 0.0), rotation: ArrayLike = (0.0, 0.0, 0.0, 1.0)) -> Motion:
+    """The motion of what stands still at a position [m] with a rotation x, y, z, w."""
+    placement(lambda time: (position, rotation), 0.0)
+    return lambda time: (position, rotation)
+
+
+def placement(motion: Motion | None, time: float) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Rotation matrix (3, 3) and shift (3,) [m] of a motion at a time.
+
+    Raises:
+        InputError: The motion gives something else than a finite position and a quaternion.
+    """
+    from scipy.spatial.transform import Rotation
+
+    if motion is None:
+        return np.eye(3), np.zeros(3)
+    position, rotation = (np.asarray(part, dtype=np.float64) for part in motion(time))
+    if position.shape != (3,) or rotation.shape != (4,) or not np.isfinite([*position, *rotation]).all():
+        raise InputError(
+            f"motion at time {time:g}: want a finite position (3,) and quaternion x, y, z, w, "
+            f"got {position.tolist()} and {rotation.tolist()}"
+        )
+    if not np.linalg.norm(rotation) > 1e-9:
+        raise InputError(f"motion at time {time:g}: the quaternion has no length")
+    return Rotation.from_quat(rotation).as_matrix(), position
+
+
+def checked_points(points: Any) -> Points:
+    """Points as float64; InputError where they are not finite or not of shape (n, 3)."""
+    array = np.asarray(points, dtype=np.float64)
+    if array.ndim != 2 or array.shape[1] != 3:
+        raise InputError(f"points: want shape (n, 3), got {array.shape}")
+    if not np.isfinite(array).all():
+        raise InputError(f"points: point {int(np.argwhere(~np.isfinite(array))[0][0])} is not finite")
+    return array
+
+
+def checked_vector(name: str, value: ArrayLike, *, above: float = -np.inf) -> NDArray[np.float64]:
+    """Three finite numbers greater than ``above``; InputError otherwise."""
+    array = np.asarray(value, dtype=np.float64)
+    if array.shape != (3,) or not np.isfinite(array).all() or not (array > above).all():
+        more = "" if np.isinf(above) else f" above {above:g}"
+        raise InputError(f"{name}: want three finite numbers{more}, got {array.tolist()}")
+    return array

@@ -1,0 +1,80 @@
+"""What may touch what, and with which friction."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from warpjld.errors import InputError
+from warpjld.fem.contact.obstacles import Obstacle
+
+__all__ = ["Bond", "Exclusion", "Pair"]
+
+
+@dataclass(frozen=True)
+class Bond:
+    """Two surfaces that are one until the traction between them is too much, point by point and for good (R101, R102).
+
+    Attributes:
+        normal: Tension at which they part [Pa].
+        shear: Shear at which they part [Pa].
+    """
+
+    normal: float = np.inf
+    shear: float = np.inf
+
+    def __post_init__(self) -> None:
+        for name, value in (("normal", self.normal), ("shear", self.shear)):
+            if not value > 0.0:
+                raise InputError(f"bond: want a {name} strength above 0 Pa, got {value}")
+
+
+@dataclass(frozen=True, eq=False)
+class Exclusion:
+    """Facets that never meet: neighbouring phalanges, and what touches at rest (R127).
+
+    Attributes:
+        slave: Label of each slave face, shape (F,).
+        master: Label of each master face, shape (G,).
+        never: Pairs of labels that are left out, shape (L, L).
+    """
+
+    slave: NDArray[np.int32]
+    master: NDArray[np.int32]
+    never: NDArray[np.bool_]
+
+
+@dataclass(frozen=True, eq=False)
+class Pair:
+    """Two surfaces that may touch.
+
+    Attributes:
+        slave: Face set, or faces (F, 2), of the body: where pressures live. The softer or the finer side.
+        master: Face set or faces of the same (merged) body, or an obstacle. The same set again is self-contact: of two
+            labels the lower one is then the slave.
+        friction: Coulomb's μ.
+        name: For people.
+        exclusion: Facets that never meet.
+        bond: Surfaces that are tied from the start.
+    """
+
+    slave: str | NDArray[np.int32]
+    master: str | NDArray[np.int32] | Obstacle
+    friction: float = 0.0
+    name: str = ""
+    exclusion: Exclusion | None = None
+    bond: Bond | None = None
+
+    def __post_init__(self) -> None:
+        if not (self.friction >= 0.0 and np.isfinite(self.friction)):
+            raise InputError(f"{self.title}: want a friction of 0 or more, got {self.friction}")
+
+    @property
+    def title(self) -> str:
+        """Its name in messages."""
+        if self.name:
+            return f"contact '{self.name}'"
+        sides = [side if isinstance(side, str) else type(side).__name__.lower() for side in (self.slave, self.master)]
+        return f"contact {sides[0]}–{sides[1]}"

@@ -1,0 +1,260 @@
+"""Bodies pressed against each other and against obstacles, through time (B §3.4, R108–R113, R122, R126)."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from warpjld.errors import InputError
+from warpjld.fem.body import Body
+from warpjld.fem.conjugate import Status
+from warpjld.fem.contact.equilibrium import Equilibrium, Reached, Step
+from warpjld.fem.contact.law import Memory, start_memory
+from warpjld.fem.contact.pairs import Pair
+from warpjld.fem.contact.points import Interface, interfaces_of
+from warpjld.fem.contact.solution import ContactError, ContactInstant, ContactSolution, Touch
+from warpjld.fem.loads import Loads
+from warpjld.fem.prescribed import Prescribed
+
+__all__ = ["press"]
+
+_HALVINGS = 7
+_BREAKS = 100
+
+Guess = Callable[[float, float, NDArray[np.float64]], NDArray[np.float64]]
+"""Time before, time, displacement before (N, 3) → where to begin to look for the displacement at the time (N, 3)."""
+
+
+def press(
+    body: Body,
+    prescribed: Prescribed | Callable[[float], Prescribed],
+    pairs: Sequence[Pair],
+    loads: Loads | Callable[[float], Loads] | None = None,
+    *,
+    times: Sequence[float] = (1.0,),
+    after: ContactSolution | None = None,
+    tolerance: float = 1e-5,
+    penetration: float = 1e-3,
+    guess: Guess | None = None,
+    watch: Callable[[ContactInstant], str | None] | None = None,
+    check: bool = True,
+    progress: Callable[[str], None] | None = None,
+) -> ContactSolution:
+    """Equilibria of bodies in contact at rising times.
+
+    Bodies that only contact holds need no other hold. Surfaces that overlap at the start are parted gradually up to
+    the first time (R112). A step that fails is taken in halves.
+
+    Args:
+        body: All bodies, merged into one mesh.
+        prescribed: Known displacements from rest at the last time, reached in proportion to time; or a function of
+            time.
+        pairs: What may touch what.
+        loads: Loads at the last time, reached in proportion to time; or a function of time.
+        times: Rising times above 0 (above ``after``'s) to find equilibria at.
+        after: Contact and displacement to go on from.
+        tolerance: Residual over the forces that balance.
+        penetration: Overlap left, as a share of an edge.
+        guess: Where to begin to look.
+        watch: Asked after each instant; a text ends the run there with ``Status.STOPPED`` (R118).
+        check: Raise where the last time is not reached; otherwise return the status.
+        progress: Called with a line of text after each instant.
+
+    Raises:
+        InputError: Wrong arguments.
+        ContactError: The last time was not reached; its ``solution`` has what was.
+    """
+    wanted = [float(t) for t in times]
+    first = 0.0 if after is None else after.last.time
+    if (
+        not wanted
+        or not np.isfinite(wanted).all()
+        or any(b <= a for a, b in zip([first, *wanted], wanted, strict=False))
+    ):
+        raise InputError(f"times: want rising times above {first:g}, got {list(times)}")
+    for name, value in (("tolerance", tolerance), ("penetration", penetration)):
+        if not 0.0 < value < 1.0:
+            raise InputError(f"{name}: want a share between 0 and 1, got {value}")
+    if after is not None and len(after.memory) != len(pairs):
+        raise InputError(f"after: was found with {len(after.memory)} pairs, not {len(pairs)}")
+    run = _Run(body, prescribed, list(pairs), loads, wanted, after, tolerance, penetration, guess)
+    solution = run.through(watch, progress)
+    if check and not solution.converged and solution.status is not Status.STOPPED:
+        raise ContactError(solution)
+    return solution
+
+
+class _Run:
+    def __init__(
+        self,
+        body: Body,
+        prescribed: Prescribed | Callable[[float], Prescribed],
+        pairs: list[Pair],
+        loads: Loads | Callable[[float], Loads] | None,
+        times: list[float],
+        after: ContactSolution | None,
+        tolerance: float,
+        penetration: float,
+        guess: Guess | None,
+    ) -> None:
+        self.body = body
+        self.times = times
+        self.prescribed = prescribed
+        self.loads = loads or Loads()
+        self.guess = guess
+        self.interfaces = interfaces_of(body.mesh, pairs, body.threads)
+        self.equilibrium = Equilibrium(body, self.interfaces, tolerance=tolerance, penetration=penetration)
+        if after is None:
+            self.start = 0.0
+            self.u = np.zeros(body.degrees)
+            self.memory = [self._begin(interface) for interface in self.interfaces]
+        else:
+            if after.last.displacement.size != body.degrees:
+                raise InputError(f"after: is of a body with {after.last.displacement.size} degrees of freedom")
+            self.start = after.last.time
+            self.u = after.last.displacement.reshape(-1).copy()
+            self.memory = list(after.memory)
+        self.steps: list[int] = []
+
+    def _begin(self, interface: Interface) -> Memory:
+        """Bonds made, and the overlap noted that there is at the start."""
+        memory = start_memory(len(interface.slave.nodes), interface.pair)
+        points = interface.points(self.body.mesh.nodes, 0.0, 0.0)
+        if interface.pair.bond is not None:
+            memory.seam[points.nodes] = points.gap
+            if len(points.nodes) == 0:
+                raise InputError(f"{interface.pair.title}: a bond to nothing: its two sides do not meet")
+            memory.bonded[np.isnan(memory.seam)] = False
+        else:
+            memory.allowance[points.nodes] = np.maximum(-points.gap, 0.0)
+        return memory
+
+    def step(self, before: float, time: float) -> Step:
+        share = time / self.times[-1]
+        known = self.prescribed
+        now = known(time) if callable(known) else known.scaled(share)
+        loads, part = (self.loads(time), 1.0) if callable(self.loads) else (self.loads, share)
+        allowed = max(0.0, 1.0 - (time - self.start) / (self.times[0] - self.start))
+        return Step(before, time, now, loads, part, allowed)
+
+    def through(
+        self,
+        watch: Callable[[ContactInstant], str | None] | None,
+        progress: Callable[[str], None] | None,
+    ) -> ContactSolution:
+        now, halvings = self.start, 0
+        reached: list[ContactInstant] = []
+        todo = list(self.times)
+        solves, iterations = 0, 0
+        while todo:
+            target = todo[0]
+            self.equilibrium.solves = self.equilibrium.iterations = 0
+            step = self.step(now, target)
+            status, found = self._find(step)
+            solves += self.equilibrium.solves
+            iterations += self.equilibrium.iterations
+            if found is None:
+                halvings += 1
+                if halvings > _HALVINGS:
+                    message = f"no equilibrium found after time {now:.4g} (tried {target:.4g}): {status.value}"
+                    return self._end(status, reached, message, step)
+                if progress:
+                    progress(f"time {target:.3g}: {status.value}; halving the step")
+                todo.insert(0, 0.5 * (now + target))
+                continue
+            self.steps.append(self.equilibrium.solves)
+            self.u, self.memory, now = found.displacement, found.memory, target
+            todo.pop(0)
+            halvings = max(0, halvings - 1)
+            if target not in self.times:
+                continue
+            instant = self._instant(target, found, solves, iterations)
+            reached.append(instant)
+            if progress:
+                progress(f"time {target:.3g}: {solves} solves, {iterations} iterations, residual {found.residual:.1e}")
+            solves = iterations = 0
+            reason = watch(instant) if watch else None
+            if reason:
+                return self._end(Status.STOPPED, reached, reason, step)
+        return self._end(Status.CONVERGED, reached, Status.CONVERGED.value, step)
+
+    def _find(self, step: Step) -> tuple[Status, Reached | None]:
+        """Equilibrium of a step; again after every bond that did not hold."""
+        first = None
+        if self.guess is not None:
+            first = self.guess(step.before, step.time, self.u.reshape(-1, 3))
+        status, found = self.equilibrium.find(self.u, self.memory, step, first)
+        memory = self.memory
+        for _ in range(_BREAKS):
+            if found is None:
+                return status, None
+            broken = [_overstrained(i, f, found) for i, f in enumerate(self.interfaces)]
+            if not any(mask.any() for mask in broken):
+                return status, found
+            memory = [replace(m, bonded=m.bonded & ~mask) for m, mask in zip(found.memory, broken, strict=True)]
+            memory = [_released(m, mask) for m, mask in zip(memory, broken, strict=True)]
+            status, found = self.equilibrium.find(self.u, memory, step, found.displacement)
+        return Status.MAX_ITERATIONS, None
+
+    def _instant(self, time: float, found: Reached, solves: int, iterations: int) -> ContactInstant:
+        x = self.body.mesh.nodes + found.displacement.reshape(-1, 3)
+        touches = []
+        for k, interface in enumerate(self.interfaces):
+            points, response, slip = found.points[k], found.responses[k], found.slips[k]
+            traction = response.traction(points)
+            nodes = interface.slave.nodes[points.nodes]
+            across = slip - np.einsum("mi,mi->m", slip, points.normal)[:, None] * points.normal
+            touches.append(
+                Touch(
+                    interface.pair.title,
+                    nodes,
+                    x[nodes],
+                    points.normal,
+                    response.pressure,
+                    traction,
+                    points.gap,
+                    points.area,
+                    across,
+                    response.sticking,
+                    found.memory[k].bonded[points.nodes],
+                    points.forces(traction),
+                )
+            )
+        shape = (-1, 3)
+        return ContactInstant(
+            time,
+            found.displacement.reshape(shape),
+            found.reactions.reshape(shape),
+            tuple(touches),
+            solves,
+            iterations,
+            found.residual,
+        )
+
+    def _end(self, status: Status, reached: list[ContactInstant], message: str, step: Step) -> ContactSolution:
+        if not reached:
+            nothing = np.zeros((len(self.body.mesh.nodes), 3))
+            reached = [ContactInstant(self.start, self.u.reshape(-1, 3), nothing, (), 0, 0, 0.0)]
+        return ContactSolution(status, tuple(reached), message, tuple(self.memory), tuple(self.steps), step.loads)
+
+
+def _overstrained(k: int, interface: Interface, found: Reached) -> NDArray[np.bool_]:
+    """Nodes whose bond does not hold, shape (m,)."""
+    memory, points, response = found.memory[k], found.points[k], found.responses[k]
+    out = np.zeros(len(memory.bonded), dtype=bool)
+    bond = interface.pair.bond
+    if bond is not None:
+        pull = -response.pressure > bond.normal
+        shear = np.linalg.norm(response.friction, axis=1) > bond.shear
+        out[points.nodes] = (pull | shear) & memory.bonded[points.nodes]
+    return out
+
+
+def _released(memory: Memory, broken: NDArray[np.bool_]) -> Memory:
+    """No pull across what has parted."""
+    pressure = np.where(broken, np.maximum(memory.pressure, 0.0), memory.pressure)
+    friction = np.where(broken[:, None], 0.0, memory.friction)
+    return replace(memory, pressure=pressure, friction=friction)

@@ -1,0 +1,7 @@
+"""A hand as a deformable body: flesh driven by poses, what its muscles can do, and what its skin feels (B §3.3)."""
+
+from warpjld.fem.hand.flesh_hand import FleshHand, build_flesh_hand
+from warpjld.fem.hand.laws import hand_laws
+from warpjld.fem.hand.motion import HandMotion, motion_of
+
+__all__ = ["FleshHand", "HandMotion", "build_flesh_hand", "hand_laws", "motion_of"]

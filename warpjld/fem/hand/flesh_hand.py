@@ -1,0 +1,205 @@
+"""A hand as a deformable body: its volume, bones that follow poses, and skin that knows its segments (R105, R110)."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from warpjld.errors import InputError
+from warpjld.fem.flesh import Flesh, flesh_of
+from warpjld.fem.hand.blend import Moves, moves_of
+from warpjld.fem.hand.labels import WEB, excluded_pairs, segment_name, skin_labels
+from warpjld.fem.hand.weights import bone_weights
+from warpjld.fem.hexmesh import HexMesh
+from warpjld.fem.prescribed import Prescribed
+from warpjld.rig import Rig
+from warpjld.skeleton.kinematics import Poses, rest_poses
+from warpjld.skeleton.tree import Skeleton
+from warpjld.surface import Surface
+
+__all__ = ["FleshHand", "build_flesh_hand"]
+
+
+@dataclass(frozen=True, eq=False)
+class FleshHand:
+    """The volume of a hand, driven by the poses of its skeleton.
+
+    Attributes:
+        name: Begins the names of its regions: ``hand.flesh``, ``hand.skin``, ``hand.bone``; its skin is the face set
+            of this name.
+        flesh: The mesh with its bones, and the rig's own surface carried by it.
+        skeleton: The rest skeleton, as in the rig.
+        surface: The rig's surface at rest, as in the rig.
+        place: Where the hand as a whole rests: rigid motion from the rig's rest (see ``placed``).
+        weights: Share of each bone in every node, rows summing to one, shape (N, B).
+        skin_faces: Element and local face of the skin, shape (F, 2).
+        skin_labels: Label of each of them, shape (F,).
+        label_names: ``left.index.distal``, ``left.palm.index``, ``left.wrist``, …; ``….web`` near another digit.
+        excluded: Pairs of labels that never touch, shape (L, L) (R127).
+    """
+
+    name: str
+    flesh: Flesh
+    skeleton: Skeleton
+    surface: Surface
+    place: Moves
+    weights: NDArray[np.float64]
+    skin_faces: NDArray[np.int32]
+    skin_labels: NDArray[np.int32]
+    label_names: tuple[str, ...]
+    excluded: NDArray[np.bool_]
+
+    @property
+    def mesh(self) -> HexMesh:
+        """Its mesh. Merge it first with others: node numbers of this class then stay valid."""
+        return self.flesh.mesh
+
+    @cached_property
+    def segments(self) -> tuple[str, ...]:
+        """Name of each bone's segment, as in ``label_names``."""
+        return tuple(segment_name(self.skeleton.names[joint]) for joint in self.flesh.bones)
+
+    @cached_property
+    def bone_nodes(self) -> tuple[NDArray[np.int32], ...]:
+        """Nodes of each bone."""
+        return tuple(self.mesh.node_sets[name] for name in self.flesh.names)
+
+    @cached_property
+    def node_labels(self) -> NDArray[np.int32]:
+        """Label of every node of the skin, -1 inside, shape (N,): that of most faces around it, webs counted as the
+        segment they belong to."""
+        plain = np.array([self.label_names.index(name.removesuffix(WEB)) for name in self.label_names])
+        votes = np.zeros((len(self.mesh.nodes), len(self.label_names)), np.int32)
+        np.add.at(votes, (self.mesh.quads(self.skin_faces), plain[self.skin_labels][:, None]), 1)
+        return np.where(votes.any(axis=1), votes.argmax(axis=1), -1).astype(np.int32)
+
+    def self_contact(self) -> tuple[NDArray[np.int32], NDArray[np.int32], NDArray[np.bool_]]:
+        """Labels of slave and master faces and the pairs never tested, for the skin against itself (R126)."""
+        return self.skin_labels, self.skin_labels, self.excluded
+
+    def moves(self, poses: Poses, frame: int = 0) -> Moves:
+        """Rigid motion of every bone from where it rests."""
+        self._check(poses)
+        return self.place.to(moves_of(poses, frame, self.flesh.parents, self.skeleton.rest))
+
+    def rest_pose(self) -> Poses:
+        """The pose in which nothing is displaced."""
+        from scipy.spatial.transform import Rotation
+
+        turn = Rotation.from_quat(self.place.turns[0])
+        rest = rest_poses(self.skeleton)
+        turns = np.tile(self.place.turns[0], (1, len(self.skeleton), 1))
+        return Poses((turn.apply(self.skeleton.rest) + self.place.shifts[0])[None], turns, rest.flexion)
+
+    def skin(self, displacement: NDArray[np.float64] | None = None) -> NDArray[np.float64]:
+        """The rig's own surface, deformed [m], shape (V, 3) (R104); ``displacement`` (N, 3), at rest if left out."""
+        from scipy.spatial.transform import Rotation
+
+        out = Rotation.from_quat(self.place.turns[0]).apply(self.surface.vertices) + self.place.shifts[0]
+        moved: NDArray[np.float64] = out if displacement is None else out + self.flesh.skin.carry(displacement)
+        return moved
+
+    def prescribed(self, poses: Poses, frame: int = 0) -> Prescribed:
+        """Displacements from rest of every bone's nodes under a pose (R110)."""
+        return self.prescribed_by(self.moves(poses, frame))
+
+    def prescribed_by(self, moves: Moves) -> Prescribed:
+        """Displacements from rest of every bone's nodes under rigid motions of the bones."""
+        nodes = np.concatenate(self.bone_nodes)
+        x = self.mesh.nodes[nodes]
+        owner = np.repeat(np.arange(len(self.bone_nodes)), [len(n) for n in self.bone_nodes])
+        moved = moves.of(owner, x) - x
+        order = np.argsort(nodes, kind="stable")
+        degrees = (3 * nodes[order].astype(np.int64)[:, None] + np.arange(3)).ravel()
+        return Prescribed(degrees, moved[order].ravel())
+
+    def guess(
+        self, before: Moves, after: Moves, displacement: NDArray[np.float64] | None = None
+    ) -> NDArray[np.float64]:
+        """First guess of a step's end: bones exact, flesh carried on by their blended motion [m], shape (N, 3).
+
+        Args:
+            before: Where the bones were.
+            after: Where they are going.
+            displacement: Displacement of all nodes where they were, by default what the blend itself gives from rest.
+                Rows beyond this hand's nodes (of bodies merged after it) are kept.
+        """
+        count = len(self.mesh.nodes)
+        if displacement is None:
+            out = np.zeros((count, 3))
+            before = before.still()
+        else:
+            out = np.array(displacement, dtype=np.float64).reshape(-1, 3)
+        rest = self.mesh.nodes
+        out[:count] = before.to(after).blended(self.weights, rest + out[:count]) - rest
+        known = self.prescribed_by(after)
+        out.reshape(-1)[known.degrees] = known.values
+        return out
+
+    def placed(self, poses: Poses, frame: int = 0) -> FleshHand:
+        """The same hand at rest elsewhere: moved as a whole, as the root of a pose is, so that no step has to."""
+        self._check(poses)
+        root = int(np.flatnonzero(self.skeleton.parents < 0)[0])
+        whole = moves_of(poses, frame, [root], self.skeleton.rest)
+        place = Moves(np.repeat(whole.turns, len(self.bone_nodes), 0), np.repeat(whole.shifts, len(self.bone_nodes), 0))
+        first = np.zeros(len(self.mesh.nodes), np.int64)
+        nodes = whole.of(first, self.place.to(self.place.still()).of(first, self.mesh.nodes))
+        mesh = replace(self.mesh, nodes=nodes)
+        return replace(self, flesh=replace(self.flesh, mesh=mesh), place=place)
+
+    def _check(self, poses: Poses) -> None:
+        if poses.positions.shape[1:] != (len(self.skeleton), 3):
+            raise InputError(f"poses: want {len(self.skeleton)} joints, got {poses.positions.shape[1]}")
+
+
+def build_flesh_hand(
+    rig: Rig,
+    spacing: float = 0.003,
+    *,
+    name: str = "hand",
+    bone: float = 0.45,
+    flush: float = 0.4,
+    gap: float = 0.2,
+    head: float = 0.03,
+    least: float = 0.1,
+    apart: float = 2.5,
+) -> FleshHand:
+    """Mesh a hand and get it ready to be driven.
+
+    Args:
+        rig: Surface and skeleton.
+        spacing: Edge length of the elements [m]; 3 mm is as coarse as fingers allow.
+        name: Begins the names of regions, and names the face set of the skin.
+        bone: Radius of a bone over the depth of its segment under the skin.
+        flush: Shift of the bone towards the back over that depth.
+        gap: Part of a segment that is left soft at its near end and at fingertips: the flesh in a flexed joint has to
+            stretch between the bones.
+        head: Part that is left soft at its far end: the head of the bone makes the knuckle.
+        least: Least scaled Jacobian.
+        apart: Skin nearer to another digit than this many spacings at rest is web and never touches what is as near.
+
+    Raises:
+        InputError: A surface or spacing that makes no mesh.
+    """
+    flesh = flesh_of(rig, spacing, bone=bone, flush=flush, gap=gap, head=head, least=least)
+    mesh = flesh.mesh
+    faces = mesh.boundary()
+    layer = np.zeros(len(mesh.elements), dtype=bool)
+    layer[faces[:, 0]] = True
+    regions = np.where(mesh.regions == 1, 2, np.where(layer, 1, 0)).astype(np.int32)
+    mesh = replace(
+        mesh,
+        regions=regions,
+        region_names=(f"{name}.flesh", f"{name}.skin", f"{name}.bone"),
+        faces={name: faces},
+    )
+    flesh = replace(flesh, mesh=mesh)
+    weights = bone_weights(mesh, [mesh.node_sets[n] for n in flesh.names])
+    joints = [rig.skeleton.names[j] for j in flesh.bones]
+    labels, names = skin_labels(mesh, faces, weights, joints, apart * spacing)
+    excluded = excluded_pairs(mesh, faces, labels, names, 0.5 * apart * spacing)
+    place = Moves(np.tile([0.0, 0.0, 0.0, 1.0], (len(joints), 1)), np.zeros((len(joints), 3)))
+    return FleshHand(name, flesh, rig.skeleton, rig.surface, place, weights, faces, labels, names, excluded)

@@ -1,0 +1,36 @@
+"""How hard each digit can press (R118): defaults, overridable."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from difflib import get_close_matches
+
+from warpjld.errors import InputError
+from warpjld.skeleton.hand import DIGITS
+
+__all__ = ["FORCE_LIMITS", "force_limits"]
+
+FORCE_LIMITS: dict[str, float] = {"index": 59.0, "middle": 82.0, "ring": 59.0, "pinky": 33.0, "thumb": 69.0}
+"""Largest force of each digit [N]. Fingers: grip of 235 N on a 45 mm cylinder (PMC3855544), shared 25/35/25/14 %.
+Thumb: tip pinch, the lower end of the 69–103 N that pinch strength tables give for tip and key pinch."""
+
+
+def force_limits(given: Mapping[str, float] | None = None) -> dict[str, float]:
+    """The defaults with some of them replaced.
+
+    Args:
+        given: Digit → largest force [N].
+
+    Raises:
+        InputError: No such digit, or no force above zero.
+    """
+    out = dict(FORCE_LIMITS)
+    for digit, force in (given or {}).items():
+        if digit not in DIGITS:
+            close = get_close_matches(digit, DIGITS, n=1)
+            hint = f"; did you mean '{close[0]}'?" if close else f"; want one of {', '.join(DIGITS)}"
+            raise InputError(f"force limits: no digit '{digit}'{hint}")
+        if not 0.0 < force < float("inf"):
+            raise InputError(f"force limit of the {digit}: want newtons above 0, got {force}")
+        out[digit] = float(force)
+    return out

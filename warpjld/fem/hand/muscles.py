@@ -1,0 +1,177 @@
+"""What muscles have to do, and whether they can (R118, R119).
+
+**Force of a digit**: length of the sum of the forces on its phalanges, the bones beyond its base joint.
+**Torque of a joint**: moment about the joint of the forces on all bones beyond it, along its flexion axis as posed;
+positive where the load opens the digit and its flexors have to work.
+**Limits**: a digit's force limit F is measured pressing with the pad; its joints then bear F times the distance from
+the joint to the middle of the last phalanx at rest, and that product is the joint's torque limit.
+**Share**: the largest of force over limit and torques over their limits; above 1 muscles cannot hold the pose.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from warpjld.errors import InputError
+from warpjld.fem.hand.bone_loads import BoneLoads
+from warpjld.fem.hand.limits import force_limits
+from warpjld.skeleton.hand import DIGITS
+from warpjld.skeleton.kinematics import Poses
+from warpjld.skeleton.tree import Skeleton
+
+__all__ = ["JOINT_WORDS", "DigitEffort", "Effort", "effort_of"]
+
+_KNUCKLES = ("base", "knuckle2", "knuckle3")
+JOINT_WORDS = ("base", "knuckle 2", "knuckle 3")
+"""What the three joints of a digit are called in texts."""
+
+
+@dataclass(frozen=True, eq=False)
+class DigitEffort:
+    """What one digit's muscles have to do.
+
+    Attributes:
+        digit: ``index``, or ``left.index`` where the skeleton has sides.
+        load: Sum of the forces on its phalanges [N], shape (3,).
+        torques: Of base, knuckle 2 and knuckle 3 [N m], positive where flexors work, shape (3,).
+        limit: Largest force [N].
+        torque_limits: [N m], shape (3,).
+    """
+
+    digit: str
+    load: NDArray[np.float64]
+    torques: NDArray[np.float64]
+    limit: float
+    torque_limits: NDArray[np.float64]
+
+    @property
+    def force(self) -> float:
+        """Length of ``load`` [N]."""
+        return float(np.linalg.norm(self.load))
+
+    @property
+    def shares(self) -> NDArray[np.float64]:
+        """Force, then base, knuckle 2, knuckle 3, over their limits, shape (4,)."""
+        return np.concatenate([[self.force / self.limit], np.abs(self.torques) / self.torque_limits])
+
+    @property
+    def share(self) -> float:
+        """The largest of ``shares``."""
+        return float(self.shares.max())
+
+    @property
+    def bound(self) -> str:
+        """What ``share`` is about: ``force``, ``base``, ``knuckle 2`` or ``knuckle 3``."""
+        return ("force", *JOINT_WORDS)[int(self.shares.argmax())]
+
+    @property
+    def levers(self) -> NDArray[np.float64]:
+        """Torque per force of each joint [m]: how far the digit's load moves per radian of that joint, shape (3,)."""
+        return self.torques / max(self.force, 1e-12)
+
+    @property
+    def text(self) -> str:
+        """``index 41 N of 59 N``, with the joint that comes nearer to its limit where one does."""
+        out = f"{self.digit} {self.force:.3g} N of {self.limit:.3g} N"
+        joint = int(self.shares.argmax()) - 1
+        if joint >= 0 and self.share > 1.0:
+            out += f", {JOINT_WORDS[joint]} {abs(self.torques[joint]):.2g} N m of {self.torque_limits[joint]:.2g} N m"
+        return out
+
+
+@dataclass(frozen=True, eq=False)
+class Effort:
+    """What every digit's muscles have to do at one instant."""
+
+    digits: tuple[DigitEffort, ...]
+
+    def __getitem__(self, digit: str) -> DigitEffort:
+        matches = [d for d in self.digits if digit in (d.digit, d.digit.rpartition(".")[2])]
+        if len(matches) != 1:
+            raise InputError(f"no digit '{digit}' here; there are {', '.join(d.digit for d in self.digits)}")
+        return matches[0]
+
+    @property
+    def share(self) -> float:
+        """The largest share of all digits."""
+        return max(d.share for d in self.digits)
+
+    @property
+    def realistic(self) -> bool:
+        """Whether muscles can hold the pose (R112)."""
+        return self.share <= 1.0
+
+    @property
+    def text(self) -> str:
+        """One line: what is too much, or what comes nearest to its limit."""
+        over = [d for d in self.digits if d.share > 1.0]
+        if over:
+            return "more than muscles can do: " + "; ".join(d.text for d in over)
+        most = max(self.digits, key=lambda d: d.share)
+        return f"within what muscles can do; most: {most.text} ({100.0 * most.share:.0f} %)"
+
+    def stop(self) -> str | None:
+        """A text where muscles cannot do it, otherwise None: what the contact solver's ``watch`` returns."""
+        return None if self.realistic else self.text
+
+
+def effort_of(
+    skeleton: Skeleton,
+    poses: Poses,
+    loads: BoneLoads,
+    frame: int = 0,
+    limits: Mapping[str, float] | None = None,
+) -> Effort:
+    """Compare the loads on bones with what muscles can do.
+
+    Args:
+        skeleton: The rest skeleton, which gives axes and levers.
+        poses: Where its joints are.
+        loads: Force and moment on each bone.
+        frame: Frame of the poses.
+        limits: Digit → largest force [N], where it is not the default.
+
+    Raises:
+        InputError: A skeleton without digits, or wrong limits.
+    """
+    from scipy.spatial.transform import Rotation
+
+    allowed = force_limits(limits)
+    chains = _chains(skeleton)
+    if not chains:
+        raise InputError("muscles: this skeleton has no digits")
+    out = []
+    for digit, (joints, tip) in chains.items():
+        limit = allowed[digit.rpartition(".")[2]]
+        pad = 0.5 * (skeleton.rest[joints[-1]] + skeleton.rest[tip])
+        torques, bounds = np.empty(3), np.empty(3)
+        load = np.zeros(3)
+        for k, joint in enumerate(joints):
+            beyond = np.isin(loads.bones, [*joints[k + 1 :], tip])
+            force, moment = loads.force[beyond].sum(axis=0), loads.moment[beyond].sum(axis=0)
+            if k == 0:
+                load = force
+            about = moment - np.cross(poses.positions[frame, joint], force)
+            # the axis turns with the bone before the joint, which this joint's flexion does not move
+            before = int(skeleton.parents[joint])
+            axis = Rotation.from_quat(poses.rotations[frame, max(before, 0)]).apply(skeleton.axes[joint])
+            torques[k] = -float(about @ axis)
+            bounds[k] = limit * float(np.linalg.norm(pad - skeleton.rest[joint]))
+        out.append(DigitEffort(digit, load, torques, limit, bounds))
+    return Effort(tuple(out))
+
+
+def _chains(skeleton: Skeleton) -> dict[str, tuple[tuple[int, int, int], int]]:
+    """Digits of a skeleton: their three joints, and their tip."""
+    found = {}
+    for side in ("left.", "right.", ""):
+        for digit in DIGITS:
+            names = [f"{side}{digit}.{k}" for k in (*_KNUCKLES, "tip")]
+            if all(name in skeleton.names for name in names):
+                base, second, third, tip = (skeleton.names.index(name) for name in names)
+                found[f"{side}{digit}"] = ((base, second, third), tip)
+    return found

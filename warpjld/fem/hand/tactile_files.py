@@ -1,0 +1,113 @@
+"""Tactile readings as tables and as a plot over time."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+from warpjld.fem.hand.tactile import Tactile
+from warpjld.study.columns import Column, checked_values
+
+__all__ = ["TACTILE_COLUMNS", "draw_tactile", "tactile_rows", "write_tactile"]
+
+TACTILE_COLUMNS = (
+    Column("time", "number", "", "Time of the equilibrium: frame number where frames drive the hand."),
+    Column("pad", "text", "", "Segment the skin belongs to: digit and phalanx, or palm and the digit below it."),
+    Column("touching", "truth", "", "Whether anything presses the pad."),
+    Column("force_x", "number", "N", "Force on the pad, friction included, world frame."),
+    Column("force_y", "number", "N", "The same along y."),
+    Column("force_z", "number", "N", "The same along z."),
+    Column("normal_force", "number", "N", "Sum of pressure × area."),
+    Column("centre_x", "number", "m", "Centre of pressure, world frame; missing where nothing presses."),
+    Column("centre_y", "number", "m", "The same along y."),
+    Column("centre_z", "number", "m", "The same along z."),
+    Column("area", "number", "m²", "Area under pressure."),
+    Column("peak_pressure", "number", "Pa", "Highest pressure."),
+    Column("slip", "number", "m", "Sliding since the instant before, mean over the area; missing where unknown."),
+    Column("sticking", "number", "", "Share of the area that sticks; missing where nothing presses or unknown."),
+)
+"""One row for each time and pad."""
+
+_SHADES = ("#1b4965", "#ca6702", "#8fb339", "#9b2226", "#6a4c93", "#555555")
+
+
+def tactile_rows(tactile: Tactile) -> list[dict[str, Any]]:
+    """Rows of the table, pads within times."""
+    out = []
+    for t, time in enumerate(tactile.times):
+        for p, pad in enumerate(tactile.pads):
+            row = {"time": float(time), "pad": pad, "touching": bool(tactile.touching[t, p])}
+            for k, axis in enumerate("xyz"):
+                row[f"force_{axis}"] = float(tactile.force[t, p, k])
+                row[f"centre_{axis}"] = float(tactile.centre[t, p, k])
+            row |= {
+                "normal_force": float(tactile.normal_force[t, p]),
+                "area": float(tactile.area[t, p]),
+                "peak_pressure": float(tactile.peak[t, p]),
+                "slip": float(tactile.slip[t, p]),
+                "sticking": float(tactile.sticking[t, p]),
+            }
+            out.append(checked_values(row, TACTILE_COLUMNS))
+    return out
+
+
+def write_tactile(path: Path, tactile: Tactile) -> None:
+    """Write a table: Parquet where the name ends in ``.parquet``, otherwise CSV with its columns described beside it.
+
+    Raises:
+        MissingExtraError: Parquet without pyarrow.
+    """
+    from warpjld.study.table import write_csv, write_parquet
+
+    if path.suffix == ".parquet":
+        write_parquet(path, tactile_rows(tactile), TACTILE_COLUMNS)
+    else:
+        write_csv(path, tactile_rows(tactile), TACTILE_COLUMNS, described=f"{path.stem}.columns.json")
+
+
+def draw_tactile(path: Path, tactile: Tactile, title: str = "") -> None:
+    """Plot normal force, area, and slip and sticking of every pad that is ever touched, digits in columns."""
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+    from matplotlib.figure import Figure
+
+    used = [p for p in range(len(tactile.pads)) if tactile.touching[:, p].any()]
+    groups: dict[str, list[int]] = {}
+    for p in used:
+        groups.setdefault(_group(tactile.pads[p]), []).append(p)
+    columns = max(1, len(groups))
+    figure = Figure(figsize=(3.1 * columns + 0.8, 8.2), dpi=110, layout="constrained")
+    FigureCanvasAgg(figure)
+    figure.suptitle(title or "What the skin feels", fontsize=13)
+    axes: Any = figure.subplots(4, columns, squeeze=False, sharex=True, sharey="row")
+    rows = (
+        ("normal force, N", tactile.normal_force, 1.0),
+        ("area, mm²", tactile.area, 1e6),
+        ("slip since the last instant, mm", tactile.slip, 1e3),
+        ("share that sticks", tactile.sticking, 1.0),
+    )
+    for column, (group, members) in enumerate(groups.items()):
+        axes[0, column].set_title(group, fontsize=11)
+        axes[-1, column].set_xlabel("time")
+        for row, (label, values, scale) in enumerate(rows):
+            axis = axes[row, column]
+            for shade, p in zip(_SHADES * (1 + len(members) // len(_SHADES)), members, strict=False):
+                name = tactile.pads[p].rpartition(".")[2]
+                axis.plot(tactile.times, scale * values[:, p], color=shade, marker="o", markersize=2.5, label=name)
+            axis.grid(alpha=0.25)
+            if column == 0:
+                axis.set_ylabel(label, fontsize=9)
+            if row == 0:
+                axis.legend(fontsize=8, frameon=False)
+    for axis in axes[3]:
+        axis.set_ylim(-0.05, 1.05)
+    if not groups:
+        axes[0, 0].text(0.5, 0.5, "nothing touches", ha="center", transform=axes[0, 0].transAxes)
+    beside = path.with_name(path.stem + ".part.png")
+    figure.savefig(beside, metadata={"Software": None})
+    beside.replace(path)
+
+
+def _group(pad: str) -> str:
+    """Digit of a pad, or the palm."""
+    parts = pad.split(".")
+    return "palm" if "palm" in parts or len(parts) < 2 or parts[-1] in ("wrist", "forearm") else parts[-2]

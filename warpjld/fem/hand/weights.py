@@ -1,0 +1,48 @@
+"""How much each bone carries of every node at rest: the smooth field a first guess is blended with."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from warpjld.fem.hexmesh import HexMesh
+
+__all__ = ["bone_weights"]
+
+_LOCAL_EDGES = np.array(
+    [[0, 1], [1, 2], [2, 3], [3, 0], [4, 5], [5, 6], [6, 7], [7, 4], [0, 4], [1, 5], [2, 6], [3, 7]], dtype=np.int32
+)
+
+
+def bone_weights(mesh: HexMesh, bones: Sequence[NDArray[np.int32]]) -> NDArray[np.float64]:
+    """Harmonic weights: one on a bone's own nodes, falling smoothly to zero on the others', shape (N, bones).
+
+    Solves L w = 0 between the bones, L the Laplacian of the mesh's edges weighted by 1 / length: an M-matrix, so
+    weights lie in 0…1 and rows sum to one. Flesh beside a finger is not reached through the air, only through flesh.
+
+    Args:
+        mesh: At rest.
+        bones: Nodes of each bone.
+    """
+    from scipy.sparse import coo_array, diags_array
+    from scipy.sparse.linalg import splu
+
+    count = len(mesh.nodes)
+    edges = np.unique(np.sort(mesh.elements[:, _LOCAL_EDGES].reshape(-1, 2), axis=1), axis=0)
+    edges = edges[edges[:, 0] != edges[:, 1]]
+    stiff = 1.0 / np.linalg.norm(mesh.nodes[edges[:, 1]] - mesh.nodes[edges[:, 0]], axis=1)
+    rows, columns = np.concatenate([edges, edges[:, ::-1]]).T
+    links = coo_array((np.concatenate([stiff, stiff]), (rows, columns)), shape=(count, count)).tocsr()
+    out = np.zeros((count, len(bones)))
+    for column, nodes in enumerate(bones):
+        out[nodes, column] = 1.0
+    free = out.sum(axis=1) == 0.0
+    if free.any():
+        laplacian = (diags_array(links.sum(axis=1)) - links).tocsr()
+        factor = splu(laplacian[free][:, free].tocsc(), permc_spec="MMD_AT_PLUS_A", options={"SymmetricMode": True})
+        out[free] = factor.solve(links[free][:, ~free] @ out[~free])
+    out = np.clip(out, 0.0, 1.0)
+    weights: NDArray[np.float64] = out / out.sum(axis=1, keepdims=True)
+    return weights

@@ -1,0 +1,103 @@
+"""Objects deformed by key frames: an animated surface from a file (R94)."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from warpjld.errors import InputError
+from warpjld.grasp.objects import GraspObject, make_object
+
+__all__ = ["KeyframedShape", "load_keyframes"]
+
+_NUMBER = re.compile(r"(\d+)$")
+
+
+@dataclass(frozen=True, eq=False)
+class KeyframedShape:
+    """An object's shapes over time.
+
+    Attributes:
+        thing: The object in its first shape.
+        frames: Frame numbers, increasing, shape (F,).
+        vertices: Vertices of ``thing`` at these frames [m], shape (F, n, 3).
+    """
+
+    thing: GraspObject
+    frames: NDArray[np.float64]
+    vertices: NDArray[np.float64]
+
+    def at(self, frame: float) -> NDArray[np.float64]:
+        """Vertices at a frame: straight between two, the nearest outside."""
+        after = int(np.clip(np.searchsorted(self.frames, frame), 1, max(1, len(self.frames) - 1)))
+        if len(self.frames) == 1:
+            return np.asarray(self.vertices[0])
+        part = np.clip((frame - self.frames[after - 1]) / (self.frames[after] - self.frames[after - 1]), 0.0, 1.0)
+        return np.asarray((1.0 - part) * self.vertices[after - 1] + part * self.vertices[after])
+
+
+def load_keyframes(path: str | Path, *, name: str | None = None, scale: float = 1.0) -> KeyframedShape:
+    """Read an animated surface: an ``.npz`` as exports write it, or the first of numbered surface files.
+
+    ``bag.0010.obj`` is followed by ``bag.0011.obj`` and so on, as far as they go.
+
+    Args:
+        path: The file.
+        name: For messages; the file's stem if left out.
+        scale: Times larger.
+
+    Raises:
+        InputError: Unreadable, or shapes with different numbers of vertices.
+    """
+    from scipy.spatial import cKDTree
+
+    path = Path(path)
+    frames, vertices, faces = _archive(path) if path.suffix.lower() == ".npz" else _numbered(path)
+    vertices = scale * vertices
+    try:
+        thing = make_object(name or path.stem, vertices[0], faces, origin=str(path))
+    except InputError as error:
+        raise InputError(error.message, path=path) from None
+    _, kept = cKDTree(vertices[0]).query(thing.vertices)  # welding leaves out vertices, but moves none
+    return KeyframedShape(thing, frames, np.ascontiguousarray(vertices[:, kept]))
+
+
+def _archive(path: Path) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.int32]]:
+    try:
+        with np.load(path, allow_pickle=False) as file:
+            missing = {"vertices", "faces", "frames"} - set(file.files)
+            if missing:
+                raise InputError(f"no animated surface: '{sorted(missing)[0]}' is missing", path=path)
+            found = file["frames"].astype(float), file["vertices"].astype(float), file["faces"].astype(np.int32)
+    except (OSError, ValueError) as error:
+        raise InputError(f"not an archive of arrays: {error}", path=path) from error
+    frames, vertices, _ = found
+    if vertices.ndim != 3 or vertices.shape[2] != 3 or frames.shape != vertices.shape[:1] or not len(frames):
+        raise InputError(f"vertices: want shape (frames, n, 3), got {vertices.shape}", path=path)
+    if not (np.diff(frames) > 0.0).all() or not np.isfinite(vertices).all():
+        raise InputError("want increasing frames and finite vertices", path=path)
+    return found
+
+
+def _numbered(path: Path) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.int32]]:
+    from warpjld.io.mesh_file import read_mesh
+
+    match = _NUMBER.search(path.stem)
+    if match is None:
+        raise InputError("want a file with a number, as bag.0010.obj, and those that follow", path=path)
+    number, width, head = int(match[1]), len(match[1]), path.stem[: match.start()]
+    frames: list[float] = []
+    shapes: list[NDArray[np.float64]] = []
+    faces = read_mesh(path).faces
+    while (now := path.with_name(f"{head}{number:0{width}d}{path.suffix}")).is_file():
+        shape = read_mesh(now).vertices
+        if shapes and shape.shape != shapes[0].shape:
+            raise InputError(f"want {len(shapes[0])} vertices as in {path.name}, got {len(shape)}", path=now)
+        frames.append(float(number))
+        shapes.append(shape)
+        number += 1
+    return np.array(frames), np.stack(shapes), np.asarray(faces, dtype=np.int32)

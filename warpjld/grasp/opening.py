@@ -1,0 +1,67 @@
+"""How far apart thumb and fingers are while a hand closes in the air, and where: what fits between them."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from warpjld.covering import Covering
+from warpjld.grasp.digits import digit_chains, pad_vertex
+from warpjld.skeleton import CHANNELS, poses_from_angles
+
+__all__ = ["Opening", "closing_in_air"]
+
+_FLEXION = CHANNELS.index("flexion")
+_STEPS = 15
+_CURL = {"finger": (50.0, 45.0, 30.0), "thumb": (20.0, 40.0, 45.0)}  # of the joints at the end [degrees]
+
+
+@dataclass(frozen=True, eq=False)
+class Opening:
+    """A posture from open to curled, S steps; the root at rest.
+
+    Attributes:
+        angles: Joint angles [rad], shape (S, J, 4).
+        thumb: Middle of the thumb's pad [m], shape (S, 3).
+        fingers: Mean of the pads of index and middle finger, and of the ring finger where it closes, shape (S, 3).
+    """
+
+    angles: NDArray[np.float64]
+    thumb: NDArray[np.float64]
+    fingers: NDArray[np.float64]
+
+    @property
+    def width(self) -> NDArray[np.float64]:
+        """Between thumb and fingers [m], shape (S,)."""
+        return np.asarray(np.linalg.norm(self.fingers - self.thumb, axis=1))
+
+    def step_for(self, width: float) -> int:
+        """The last step at which the pads are at least this far apart; 0 where none is."""
+        wide = np.flatnonzero(np.minimum.accumulate(self.width) >= width)
+        return int(wide[-1]) if len(wide) else 0
+
+
+def closing_in_air(covering: Covering, side: str, start: NDArray[np.float64], digits: Sequence[str]) -> Opening:
+    """Curl digits from a posture.
+
+    Args:
+        covering: The hand.
+        side: Which hand of it.
+        start: Angles of the open hand [rad], shape (J, 4).
+        digits: Names of those that close, without side.
+    """
+    skeleton = covering.skeleton
+    angles = np.repeat(start[None], _STEPS, axis=0)
+    share = np.linspace(0.0, 1.0, _STEPS)
+    for digit in digits:
+        (chain,) = digit_chains(skeleton, [f"{side}.{digit}"]).values()
+        for joint, curl in zip(chain, _CURL["thumb" if digit == "thumb" else "finger"], strict=True):
+            bent = start[joint, _FLEXION] + share * np.radians(curl)
+            angles[:, joint, _FLEXION] = np.clip(bent, *skeleton.limits[joint, _FLEXION])
+    opposed = [digit for digit in ("index", "middle", "ring") if digit in digits]
+    pads = np.array([pad_vertex(covering, f"{side}.{digit}") for digit in ("thumb", *opposed)], dtype=np.int32)
+    points = covering.points(poses_from_angles(skeleton, angles), pads).astype(np.float64)
+    return Opening(angles, points[:, 0], points[:, 1:].mean(axis=1))

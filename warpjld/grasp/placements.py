@@ -1,0 +1,205 @@
+"""Placements of an open hand around an object: palm first, or thumb and fingers across a part that fits."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial.transform import Rotation
+
+from warpjld.covering import Covering
+from warpjld.grasp.distance import ObjectSet
+from warpjld.grasp.objects import GraspObject
+from warpjld.grasp.opening import Opening
+from warpjld.grasp.widths import Widths
+from warpjld.skeleton import Poses, Skeleton, poses_from_angles
+
+__all__ = ["Candidates", "across_widths", "palm_frame", "sample_wrists"]
+
+_CLEARANCE = 3e-4  # between the open hand and the object [m]
+_SPARE = 0.02  # by which a hand opens wider than what it takes [m]
+_STEPS = 32
+_COARSE = 4  # at first every fourth vertex keeps the hand away
+
+
+@dataclass(frozen=True, eq=False)
+class Candidates:
+    """Placements of G open hands.
+
+    Attributes:
+        position: Displacement of the skeleton's root [m], shape (G, 3).
+        rotation: Rotation of the root about its rest place, x y z w, shape (G, 4).
+        approach: Direction in which the hand came, shape (G, 3).
+        angles: Joint angles [rad], shape (G, J, 4).
+    """
+
+    position: NDArray[np.float64]
+    rotation: NDArray[np.float64]
+    approach: NDArray[np.float64]
+    angles: NDArray[np.float64]
+
+    def __len__(self) -> int:
+        return len(self.position)
+
+    def __getitem__(self, rows: NDArray | slice) -> Candidates:
+        return Candidates(self.position[rows], self.rotation[rows], self.approach[rows], self.angles[rows])
+
+    def poses(self, skeleton: Skeleton, angles: NDArray[np.float64] | None = None) -> Poses:
+        """The hands, open or with other angles (G, J, 4)."""
+        return poses_from_angles(
+            skeleton,
+            self.angles if angles is None else angles,
+            root_position=self.position,
+            root_rotation=self.rotation,
+        )
+
+    def moved(self, by: NDArray[np.float64]) -> Candidates:
+        """The same farther along their approach by lengths [m], shape (G,)."""
+        return Candidates(self.position + self.approach * by[:, None], self.rotation, self.approach, self.angles)
+
+    @staticmethod
+    def joined(some: list[Candidates]) -> Candidates:
+        """One after another."""
+        names = ("position", "rotation", "approach", "angles")
+        return Candidates(*(np.concatenate([getattr(one, name) for one in some]) for name in names))
+
+
+def palm_frame(skeleton: Skeleton, side: str) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Middle of the palm at rest [m], shape (3,), and rows: where it looks, where the fingers point, their cross
+    product, shape (3, 3)."""
+    knuckle = skeleton.index(f"{side}.middle.base")
+    wrist = skeleton.index(f"{side}.wrist")
+    fingers = skeleton.rest[knuckle] - skeleton.rest[wrist]
+    fingers = fingers / np.linalg.norm(fingers)
+    look = -np.cross(skeleton.directions[knuckle], skeleton.axes[knuckle])
+    look = look - fingers * (look @ fingers)
+    look /= np.linalg.norm(look)
+    middle = 0.75 * skeleton.rest[knuckle] + 0.25 * skeleton.rest[wrist]
+    return middle, np.stack([look, fingers, np.cross(look, fingers)])
+
+
+def sample_wrists(
+    covering: Covering,
+    angles: NDArray[np.float64],
+    thing: GraspObject,
+    side: str,
+    count: int,
+    rng: np.random.Generator,
+    *,
+    ahead: float = 0.0,
+) -> Candidates:
+    """Placements of an open hand with its palm on the object.
+
+    The palm looks against a direction out of the object's centre, evenly spread over the sphere; the fingers point
+    anywhere about it; the palm's middle is aimed at the centre, off by up to a fifth of the object's size. The hand
+    then comes as near as it can without touching: its skin's distance bounds each step. With ``ahead`` [m] the object
+    is met up to that far before the palm's middle towards the fingers, and the palm stays as far away from it.
+    """
+    middle, frame = palm_frame(covering.skeleton, side)
+    part = rng.uniform(0.0, 1.0, size=(count, 1)) if ahead else np.zeros((count, 1))
+    middle = middle + ahead * part * frame[1]
+    golden = np.pi * (3.0 - 5.0**0.5)
+    k = np.arange(count) + 0.5
+    high = 1.0 - 2.0 * k / count
+    out = np.stack([np.sqrt(1 - high**2) * np.cos(golden * k), high, np.sqrt(1 - high**2) * np.sin(golden * k)], axis=1)
+    look = -(Rotation.random(rng=rng).apply(out))
+    fingers = _around(look, rng)
+    target = np.stack([look, fingers, np.cross(look, fingers)], axis=1)
+    rotation = Rotation.from_matrix(np.einsum("gki,kj->gij", target, frame))
+    centre = thing.place.apply(thing.centroid[None])[0, 0]
+    aim = centre + rng.uniform(-0.2, 0.2, size=(count, 3)) * thing.size
+    root = covering.skeleton.rest[0]
+    there = Candidates(
+        aim - (root + rotation.apply(middle - root)),
+        rotation.as_quat(),
+        look,
+        np.repeat(angles[None], count, axis=0),
+    )
+    back = np.full(count, float(np.linalg.norm(thing.size)) + 0.1)
+    near = _come(covering, there.moved(-back), ObjectSet(thing), 2.0 * back)
+    return near.moved(-ahead * part[:, 0])
+
+
+def across_widths(
+    covering: Covering,
+    openings: list[Opening],
+    objects: ObjectSet,
+    widths: Widths,
+    side: str,
+    rng: np.random.Generator,
+    *,
+    into: float = 1.0,
+) -> Candidates:
+    """Placements with the thumb at one end of a width and the fingers at the other, one for each width.
+
+    The hand opens so far that the width fits with 2 cm to spare and comes at right angles to it, the roll about it
+    even. At first the pads are to meet the ends: a precision grip. From there it goes on for a random part of the way
+    on which the palm would reach the width, as far as it does not touch: towards a power grip.
+
+    Args:
+        covering: The hand.
+        openings: Postures; every width takes one of them.
+        objects: The object.
+        widths: N of them.
+        side: Which hand.
+        rng: Source of randomness.
+        into: Largest part of the way to the palm.
+    """
+    count, skeleton = len(widths), covering.skeleton
+    middle, _ = palm_frame(skeleton, side)
+    chosen = rng.integers(len(openings), size=count)
+    rows = [openings[k] for k in chosen]
+    fit = [one.step_for(width) for one, width in zip(rows, widths.width, strict=True)]
+    loose = [one.step_for(width + _SPARE) for one, width in zip(rows, widths.width, strict=True)]
+    thumb = np.stack([one.thumb[k] for one, k in zip(rows, fit, strict=True)])
+    fingers = np.stack([one.fingers[k] for one, k in zip(rows, fit, strict=True)])
+    between = 0.5 * (thumb + fingers)
+    own = _frame(fingers - thumb, between - middle)
+    line = widths.second - widths.first
+    line /= np.linalg.norm(line, axis=1, keepdims=True)
+    wanted = _frame(line, _around(line, rng))
+    rotation = Rotation.from_matrix(np.einsum("gki,gkj->gij", wanted, own))
+    root = skeleton.rest[0]
+    position = 0.5 * (widths.first + widths.second) - (root + rotation.apply(between - root))
+    angles = np.stack([one.angles[k] for one, k in zip(rows, loose, strict=True)])
+    there = Candidates(position, rotation.as_quat(), wanted[:, 1], angles)
+    deeper = ((between - middle) * own[:, 1]).sum(axis=1) * rng.uniform(0.0, into, size=count)
+    (thing,) = objects.objects
+    back = np.full(count, float(np.linalg.norm(thing.size)) + 0.15)
+    return _come(covering, there.moved(-back), objects, back + deeper)
+
+
+def _come(covering: Covering, hands: Candidates, objects: ObjectSet, reach: NDArray[np.float64]) -> Candidates:
+    """Move hands along their approach, as far as ``reach`` (G,) or until their skin is next to the object."""
+    skin = covering.deform(hands.poses(covering.skeleton))
+    moved, which = np.zeros(len(hands)), np.zeros(len(hands), dtype=int)
+    some = skin[:, ::_COARSE]
+    for step in range(_STEPS):
+        going = np.flatnonzero(moved < reach)
+        shift = (hands.approach[going] * moved[going, None])[:, None].astype(np.float32)
+        gap = objects.distances(some[going] + shift, which=which[going]).distance.min(axis=1, initial=np.inf)
+        # with all vertices a hand may have come too near: it goes back by as much
+        ahead = np.minimum(gap - _CLEARANCE, reach[going] - moved[going])
+        moved[going] += np.where(ahead > 0.0, ahead, 1.05 * ahead - 1e-5)
+        if len(some[0]) < len(skin[0]) and (step > _STEPS // 2 or (ahead < 1e-3).all()):
+            some = skin
+        elif not len(going) or (np.abs(ahead) < 1e-5).all():
+            break
+    return hands.moved(moved)
+
+
+def _around(axis: NDArray[np.float64], rng: np.random.Generator) -> NDArray[np.float64]:
+    """Unit vectors normal to others (G, 3), the angle about them even."""
+    aside = np.cross(axis, np.eye(3)[np.abs(axis).argmin(axis=1)])
+    aside /= np.linalg.norm(aside, axis=1, keepdims=True)
+    roll = rng.uniform(0.0, 2.0 * np.pi, size=(len(axis), 1))
+    return np.asarray(np.cos(roll) * aside + np.sin(roll) * np.cross(axis, aside))
+
+
+def _frame(first: NDArray[np.float64], second: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Right-handed frames as rows: along the first vectors, along the second as far as square to them, (G, 3, 3)."""
+    x = first / np.linalg.norm(first, axis=1, keepdims=True)
+    y = second - x * (x * second).sum(axis=1, keepdims=True)
+    y /= np.linalg.norm(y, axis=1, keepdims=True)
+    return np.stack([x, y, np.cross(x, y)], axis=1)

@@ -1,0 +1,262 @@
+"""Everything that may touch, as one body with pairs of surfaces, and what drives it (R103, R109, R110)."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial.transform import Rotation
+
+from warpjld.errors import InputError
+from warpjld.fem import Body, Loads, Material, Prescribed, merge
+from warpjld.fem.contact import Bond, Exclusion, Obstacle, Pair
+from warpjld.fem.hand.blend import Moves
+from warpjld.grasp import Places
+from warpjld.press.rest import Part
+from warpjld.press.volumes import ObjectVolume
+from warpjld.press.wishes import ContactWishes, Prescribing, placed
+
+__all__ = ["Bodies", "HandBody", "ObjectBody", "PairOf", "assemble"]
+
+
+@dataclass(frozen=True, eq=False)
+class HandBody:
+    """A hand that is driven by its bones.
+
+    Attributes:
+        name: Of the actor.
+        part: Its flesh at time 0.
+        laws: By region.
+        moves: Motions of its bones from the rig's rest at a time.
+        softness: Young's modulus of its skin [Pa].
+        itself: Whether its skin may touch itself.
+    """
+
+    name: str
+    part: Part
+    laws: Mapping[str, Material]
+    moves: Callable[[float], Moves]
+    softness: float
+    itself: bool
+
+    def prescribed(self, time: float) -> Prescribed:
+        """Displacements of the bones' nodes and of those where the flesh was cut off."""
+        hand, cut = self.part.hand, self.part.cut
+        moves = self.part.start.to(self.moves(time))
+        known = hand.prescribed_by(moves)
+        cut = np.setdiff1d(cut, known.degrees[::3] // 3)
+        if not len(cut):
+            return known
+        x = hand.mesh.nodes[cut]
+        return known + _whole(cut, moves.blended(hand.weights[cut], x) - x)
+
+    def guess(self, before: float, time: float, displacement: NDArray[np.float64]) -> NDArray[np.float64]:
+        """First guess of a displacement (N, 3) from that at an earlier time."""
+        start = self.part.start
+        return self.part.hand.guess(start.to(self.moves(before)), start.to(self.moves(time)), displacement)
+
+
+@dataclass(frozen=True, eq=False)
+class ObjectBody:
+    """An object that deforms.
+
+    Attributes:
+        volume: Its mesh at time 0.
+        place: Where the script puts it at a time: one placement.
+        states: What is prescribed, and the nodes it is prescribed for.
+        start: Frame of time 0.
+    """
+
+    volume: ObjectVolume
+    place: Callable[[float], Places]
+    states: Sequence[tuple[Prescribing, NDArray[np.int64]]]
+    start: float
+
+    @property
+    def name(self) -> str:
+        """Of the object."""
+        return self.volume.name
+
+    def prescribed(self, time: float) -> Prescribed:
+        """Displacements of its prescribed points (R128)."""
+        out = Prescribed(np.empty(0, np.int64), np.empty(0))
+        frame = self.start + time
+        for state, nodes in self.states:
+            moved = np.zeros((len(nodes), 3))
+            axes = [k for k, axis in enumerate("xyz") if axis in state.tracks]
+            if state.held:
+                axes = [0, 1, 2]
+                moved = self.place(time).apply(self.volume.local[nodes])[0] - self.volume.mesh.nodes[nodes]
+            begun = state.held
+            for axis, track in state.tracks.items():
+                begun = begun or frame >= track.keys[0].frame
+                moved[:, "xyz".index(axis)] += float(track.spline(frame))
+            if begun:
+                degrees = (3 * nodes[:, None] + np.array(axes)).ravel()
+                order = np.argsort(degrees)
+                out = out + Prescribed(degrees[order], moved[:, axes].ravel()[order])
+        return out
+
+
+@dataclass(frozen=True)
+class PairOf:
+    """What a pair of surfaces belongs to: actors' and objects' names, an obstacle's last."""
+
+    slave: str
+    master: str
+
+
+@dataclass(eq=False)
+class Bodies:
+    """All bodies of a scene merged into one, hands first.
+
+    Attributes:
+        hands: In order.
+        objects: In order, after them.
+        obstacles: By name.
+        body: Mesh and laws.
+        spans: Rows of the merged nodes that belong to each hand and object, by name.
+        pairs: What may touch what.
+        owners: Whose surfaces those are.
+        loads: From time 0 on.
+        carried: Objects that only hands hold, by the hand: they go along with it in first guesses.
+    """
+
+    hands: tuple[HandBody, ...]
+    objects: tuple[ObjectBody, ...]
+    obstacles: Mapping[str, Obstacle]
+    body: Body
+    spans: dict[str, slice]
+    pairs: tuple[Pair, ...]
+    owners: tuple[PairOf, ...]
+    loads: Loads
+    carried: dict[str, str] = field(default_factory=dict)
+
+    def prescribed(self, time: float) -> Prescribed:
+        """All known displacements at a time."""
+        out = Prescribed(np.empty(0, np.int64), np.empty(0))
+        movers: list[HandBody | ObjectBody] = [*self.hands, *self.objects]
+        for one in movers:
+            known = one.prescribed(time)
+            out = out + Prescribed(known.degrees + 3 * self.spans[one.name].start, known.values)
+        return out
+
+    def guess(self, before: float, time: float, displacement: NDArray[np.float64]) -> NDArray[np.float64]:
+        """First guess of the displacement (N, 3) at a time from that at an earlier one."""
+        out = displacement.copy()
+        for hand in self.hands:
+            span = self.spans[hand.name]
+            out[span] = hand.guess(before, time, displacement[span])
+        for one in self.objects:
+            span = self.spans[one.name]
+            at = one.volume.mesh.nodes + displacement[span]
+            if any(state.held for state, _ in one.states):
+                out[span] += _rigid(one.place(before), one.place(time), at) - at
+            elif one.name in self.carried:
+                out[span] += self._along(self.carried[one.name], before, time, at) - at
+        known = self.prescribed(time)
+        out.reshape(-1)[known.degrees] = known.values
+        return out
+
+    def note(self, nodal: NDArray[np.float64]) -> None:
+        """Take note of what holds the free objects, from the contact forces of each pair (P, N, 3)."""
+        self.carried.clear()
+        hands = {hand.name for hand in self.hands}
+        for one in self.objects:
+            pushes: dict[str, float] = {}
+            for owner, forces in zip(self.owners, nodal[:, self.spans[one.name]], strict=True):
+                if one.name in (owner.slave, owner.master) and forces.any():
+                    other = owner.master if owner.slave == one.name else owner.slave
+                    pushes[other] = pushes.get(other, 0.0) + float(np.linalg.norm(forces, axis=1).sum())
+            if pushes and set(pushes) <= hands:
+                self.carried[one.name] = max(pushes, key=lambda name: pushes[name])
+
+    def _along(self, name: str, before: float, time: float, points: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Points carried along by a hand as a whole."""
+        hand = next(h for h in self.hands if h.name == name)
+        step = hand.moves(before).to(hand.moves(time))
+        root = np.zeros(len(points), np.int64)
+        return step.of(root, points)
+
+
+def assemble(
+    hands: Sequence[HandBody],
+    objects: Sequence[ObjectBody],
+    obstacles: Mapping[str, Obstacle],
+    wishes: ContactWishes,
+) -> Bodies:
+    """Merge bodies and pair their surfaces: the softer side of two is the one where pressures live.
+
+    Raises:
+        InputError: Nothing that deforms, or a bond to what is not there.
+    """
+    if not hands and not objects:
+        raise InputError("nothing deforms: make a body do so with FLESH or PHYSICAL")
+    meshes = [*(h.part.hand.mesh for h in hands), *(o.volume.mesh for o in objects)]
+    ends = np.cumsum([0, *(len(mesh.nodes) for mesh in meshes)])
+    names = [*(h.name for h in hands), *(o.name for o in objects)]
+    spans = {name: slice(int(a), int(b)) for name, a, b in zip(names, ends[:-1], ends[1:], strict=True)}
+    laws: dict[str, Material] = {}
+    for hand in hands:
+        laws |= hand.laws
+    laws |= {o.name: o.volume.physical.material() for o in objects}
+    stress = np.concatenate(
+        [*(np.zeros((len(h.part.hand.mesh.elements), 6)) for h in hands), *(o.volume.stress for o in objects)]
+    )
+    mesh = merge(*meshes)
+    body = Body(mesh, {name: laws[name] for name in mesh.region_names}, initial_stress=stress)
+    pressure = {o.volume.inside: o.volume.physical.pressure for o in objects if o.volume.physical.pressure}
+    pairs, owners = _pairs(hands, objects, obstacles, wishes)
+    loads = Loads(gravity=wishes.gravity, pressure=pressure)
+    return Bodies(tuple(hands), tuple(objects), obstacles, body, spans, tuple(pairs), tuple(owners), loads)
+
+
+def _pairs(
+    hands: Sequence[HandBody],
+    objects: Sequence[ObjectBody],
+    obstacles: Mapping[str, Obstacle],
+    wishes: ContactWishes,
+) -> tuple[list[Pair], list[PairOf]]:
+    soft = [(h.name, h.part.hand.name, h.softness) for h in hands]
+    soft += [(o.name, o.volume.name, o.volume.physical.young) for o in objects]
+    pairs, owners = [], []
+    for k, (name, faces, modulus) in enumerate(soft):
+        for other, other_faces, other_modulus in soft[k + 1 :]:
+            bonded = wishes.bond(name, other)
+            bond = None if bonded is None else Bond(normal=bonded.normal, shear=bonded.shear)
+            sides = [(name, faces), (other, other_faces)]
+            (slave, one), (master, two) = sides if modulus <= other_modulus else sides[::-1]
+            friction = wishes.coefficient(name, other)
+            pairs.append(Pair(one, two, friction, f"{slave}–{master}", bond=bond))
+            owners.append(PairOf(slave, master))
+        for other, obstacle in obstacles.items():
+            pairs.append(Pair(faces, obstacle, wishes.coefficient(name, other), f"{name}–{other}"))
+            owners.append(PairOf(name, other))
+    for hand in hands:
+        if hand.itself:
+            flesh = hand.part.hand
+            exclusion = Exclusion(flesh.skin_labels, flesh.skin_labels, flesh.excluded)
+            friction = wishes.coefficient(hand.name, hand.name)
+            pairs.append(Pair(flesh.name, flesh.name, friction, f"{hand.name}–{hand.name}", exclusion))
+            owners.append(PairOf(hand.name, hand.name))
+    known = {o.name for o in objects}
+    for bonded in wishes.bonds:
+        for name in (bonded.one, bonded.other):
+            if name not in known:
+                raise placed(InputError(f"a bond to nothing: {name} does not deform here"), bonded.where)
+    return pairs, owners
+
+
+def _whole(nodes: NDArray[np.int64], moved: NDArray[np.float64]) -> Prescribed:
+    """All three displacements of nodes."""
+    order = np.argsort(nodes)
+    degrees = (3 * nodes[order][:, None] + np.arange(3)).ravel()
+    return Prescribed(degrees, moved[order].ravel())
+
+
+def _rigid(before: Places, after: Places, points: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Points of a body that goes from one place to another."""
+    turn = Rotation.from_quat(after.rotation[0])
+    return np.asarray(turn.apply(before.to_local(points)[0]) + after.position[0])

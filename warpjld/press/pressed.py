@@ -1,0 +1,106 @@
+"""Skin and objects as contact deforms them, at any frame (R104)."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from warpjld.fem.embedding import Embedding
+from warpjld.fem.hexmesh import HexMesh
+from warpjld.press.bodies import Bodies
+from warpjld.press.run import Solved
+
+__all__ = ["Pressed"]
+
+
+@dataclass(frozen=True, eq=False)
+class Pressed:
+    """What a contact solve makes of the visible surfaces.
+
+    Attributes:
+        bodies: What was pressed.
+        solved: What came of it.
+    """
+
+    bodies: Bodies
+    solved: Solved
+
+    def moves(self, name: str) -> bool:
+        """Whether an object is shown as contact has it."""
+        return any(one.name == name for one in self.bodies.objects) and len(self.solved.frames) > 0
+
+    def skin(self, actor: str, frame: float, covered: NDArray[np.floating]) -> NDArray[np.float64] | None:
+        """An actor's surface (V, 3) at a frame, of which ``covered`` is as the covering has it; None where contact was
+        not solved."""
+        hand = next((h for h in self.bodies.hands if h.name == actor), None)
+        moved = self._displacement(frame)
+        if hand is None or moved is None:
+            return None
+        return hand.part.worn(moved[self.bodies.spans[actor]], covered)
+
+    def object(self, name: str, frame: float) -> NDArray[np.float64] | None:
+        """An object's surface (V, 3) at a frame; None where contact was not solved."""
+        one = next((o for o in self.bodies.objects if o.name == name), None)
+        moved = self._displacement(frame)
+        if one is None or moved is None:
+            return None
+        return one.volume.worn(moved[self.bodies.spans[name]])
+
+    def pressure(self, name: str, frame: float) -> NDArray[np.float64] | None:
+        """Contact pressure on the visible surface of an actor or object [Pa], shape (V,); None where there is none."""
+        if name not in self.bodies.spans or not len(self._frames):
+            return None
+        whole = self._between(self._pressures, frame)
+        if whole is None:
+            return None
+        values = whole[self.bodies.spans[name]]
+        for hand in self.bodies.hands:
+            if hand.name == name:
+                flesh = hand.part.hand
+                shown = _shown(flesh.mesh, flesh.name, flesh.flesh.skin, values)
+                return np.where(hand.part.blend > 0.0, shown, 0.0)
+        one = next(o for o in self.bodies.objects if o.name == name)
+        return _shown(one.volume.mesh, one.volume.name, one.volume.visible, values)
+
+    @property
+    def highest(self) -> float:
+        """Highest pressure on a node at all frames [Pa]."""
+        return float(self._pressures.max(initial=0.0))
+
+    @cached_property
+    def _frames(self) -> NDArray[np.float64]:
+        return np.array([frame.frame for frame in self.solved.frames])
+
+    @cached_property
+    def _pressures(self) -> NDArray[np.float64]:
+        nothing = np.zeros((1, len(self.bodies.body.mesh.nodes)))
+        return np.concatenate([nothing, *(f.pressure(self.bodies)[None] for f in self.solved.frames)])
+
+    @cached_property
+    def _displacements(self) -> NDArray[np.float64]:
+        nothing = np.zeros((1, len(self.bodies.body.mesh.nodes), 3))
+        return np.concatenate([nothing, *(f.displacement[None] for f in self.solved.frames)])
+
+    def _displacement(self, frame: float) -> NDArray[np.float64] | None:
+        return self._between(self._displacements, frame)
+
+    def _between(self, values: NDArray[np.float64], frame: float) -> NDArray[np.float64] | None:
+        """Values at a frame: straight between two that were solved, None outside."""
+        times = np.concatenate([[self.solved.start], self._frames])
+        if not times[0] <= frame <= times[-1] or len(times) == 1:
+            return None
+        after = int(np.clip(np.searchsorted(times, frame), 1, len(times) - 1))
+        part = (frame - times[after - 1]) / (times[after] - times[after - 1])
+        return np.asarray((1.0 - part) * values[after - 1] + part * values[after])
+
+
+def _shown(mesh: HexMesh, faces: str, surface: Embedding, values: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Values of the outer nodes at the points of a visible surface."""
+    outer = np.zeros(len(mesh.nodes))
+    outer[np.unique(mesh.quads(mesh.face_set(faces)))] = 1.0
+    weights = np.maximum(surface.weights, 0.0) * outer[surface.corners]
+    total = weights.sum(axis=1)
+    return np.asarray((weights * values[surface.corners]).sum(axis=1) / np.maximum(total, 1e-12))

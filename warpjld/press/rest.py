@@ -1,0 +1,184 @@
+"""A hand's flesh in the shape it has before contact: JLD where there is none, finite elements where there is (R91).
+
+The mesh is made at the rig's rest, where digits are apart, and carried to the pose by the covering itself: its skin
+nodes go where the covering puts the skin, its bones move rigidly, what lies between follows smoothly. That shape is
+free of stress: bent joints hold no false forces, and the first frame that is solved looks as the one before it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from warpjld.errors import InputError
+from warpjld.fem.contact.facets import Facets
+from warpjld.fem.hand.blend import Moves
+from warpjld.fem.hand.flesh_hand import FleshHand
+from warpjld.fem.hexmesh import HexMesh
+from warpjld.skeleton import Poses
+
+__all__ = ["Part", "part_of", "posed"]
+
+_LEAST = 0.05
+"""Scaled Jacobian that carried elements must keep; skin nodes stay off the skin where it asks for worse."""
+
+_OWN = 0.5
+"""Share of its digits' bones from which on flesh belongs to a part of a hand."""
+
+
+def posed(hand: FleshHand, poses: Poses, skin: NDArray[np.float64]) -> tuple[FleshHand, float]:
+    """The hand at rest in a pose.
+
+    Args:
+        hand: As built, at the rig's rest.
+        poses: One pose.
+        skin: Its surface in that pose as the covering gives it [m], shape (V, 3).
+
+    Returns:
+        The hand, whose ``moves`` still count from the rig's rest, and the greatest distance of its mesh's skin nodes
+        from that surface [m].
+
+    Raises:
+        InputError: The pose turns elements inside out.
+    """
+    moves = hand.moves(poses)
+    mesh = hand.mesh
+    nodes = moves.blended(hand.weights, mesh.nodes)
+    bone = np.concatenate(hand.bone_nodes)
+    owner = np.repeat(np.arange(len(hand.bone_nodes)), [len(n) for n in hand.bone_nodes])
+    nodes[bone] = moves.of(owner, mesh.nodes[bone])
+
+    surface = Facets(hand.surface.vertices, hand.surface.faces)
+    outer = np.setdiff1d(np.unique(mesh.quads(hand.skin_faces)), bone)
+    found, place = surface.locate(mesh.nodes[outer])
+    offset = np.einsum("nij,nj->ni", surface.frames(place, surface.vertices), mesh.nodes[outer] - found.closest)
+    target = surface.at(place, skin) + np.einsum("nij,ni->nj", surface.frames(place, skin), offset)
+    change = _harmonic(mesh, outer, target - nodes[outer], bone)
+    share = np.ones(len(nodes))
+    least = min(_LEAST, 0.5 * float(mesh.scaled_jacobian().min()))
+    for _ in range(16):
+        moved = replace(mesh, nodes=nodes + share[:, None] * change)
+        bad = moved.scaled_jacobian() < least
+        if not bad.any():
+            break
+        share[np.unique(mesh.elements[bad])] *= 0.6
+    worst = float(moved.scaled_jacobian().min())
+    if worst <= 0.0:
+        raise InputError(
+            f"flesh: {int((moved.scaled_jacobian() <= 0).sum())} elements are turned inside out where contact begins; "
+            "joints are bent too far for elements of this size"
+        )
+    gap = float(np.linalg.norm((1.0 - share[outer])[:, None] * change[outer], axis=1).max())
+    return replace(hand, flesh=replace(hand.flesh, mesh=moved)), gap
+
+
+@dataclass(frozen=True, eq=False)
+class Part:
+    """A hand, or those digits of it whose flesh is meshed.
+
+    Attributes:
+        hand: With the nodes, faces and bones that are left; every bone keeps its number, some have no nodes.
+        start: Motions of the bones, from the rig's rest, at time 0.
+        cut: Nodes where the rest was cut off; they follow the bones.
+        blend: Share of the meshed flesh in every vertex of the rig's surface, shape (V,): 0 where there is none.
+        skin: The rig's surface at time 0 [m], shape (V, 3).
+    """
+
+    hand: FleshHand
+    start: Moves
+    cut: NDArray[np.int64]
+    blend: NDArray[np.float64]
+    skin: NDArray[np.float64]
+
+    def worn(self, displacement: NDArray[np.float64], covered: NDArray[np.floating]) -> NDArray[np.float64]:
+        """The rig's surface [m], shape (V, 3): displaced by the flesh (N, 3) where it is meshed, as the covering has it
+        (V, 3) elsewhere."""
+        inside = self.blend > 0.0
+        out = np.array(covered, dtype=np.float64)
+        embedding = self.hand.flesh.skin
+        carried = self.skin[inside] + np.einsum(
+            "pa,pai->pi", embedding.weights[inside], displacement[embedding.corners[inside]]
+        )
+        share = self.blend[inside, None]
+        out[inside] = share * carried + (1.0 - share) * out[inside]
+        return out
+
+
+def part_of(hand: FleshHand, poses: Poses, skin: NDArray[np.float64], digits: Sequence[str] = ()) -> Part:
+    """A posed hand (see ``posed``) or some digits of it.
+
+    Args:
+        hand: At rest in ``poses``.
+        poses: That pose.
+        skin: Its surface there [m], shape (V, 3).
+        digits: Their names, as ``index``; none for the whole hand.
+
+    Raises:
+        InputError: No bone belongs to a digit.
+    """
+    start = hand.moves(poses)
+    if not digits:
+        return Part(hand, start, np.empty(0, np.int64), np.ones(len(skin)), skin)
+    mine = np.array([bool(set(segment.split(".")[:-1]) & set(digits)) for segment in hand.segments])
+    if not mine.any():
+        raise InputError(f"flesh: no bone belongs to {', '.join(digits)}")
+    own = hand.weights[:, mine].sum(axis=1)
+    mesh = hand.mesh
+    kept = own[mesh.elements].max(axis=1) > _OWN
+    number = np.full(len(mesh.nodes), -1)
+    used = np.unique(mesh.elements[kept])
+    number[used] = np.arange(len(used))
+    row = np.full(len(mesh.elements), -1)
+    row[kept] = np.arange(int(kept.sum()))
+    cut = number[np.intersect1d(used, np.unique(mesh.elements[~kept]))]
+    faces = kept[hand.skin_faces[:, 0]]
+    skin_faces = np.stack([row[hand.skin_faces[faces, 0]], hand.skin_faces[faces, 1]], axis=1).astype(np.int32)
+    sub = HexMesh(
+        mesh.nodes[used],
+        number[mesh.elements[kept]].astype(np.int32),
+        mesh.regions[kept],
+        mesh.region_names,
+        {hand.name: skin_faces},
+        {name: number[nodes[number[nodes] >= 0]].astype(np.int32) for name, nodes in mesh.node_sets.items()},
+        (),
+        None if mesh.lattice is None else mesh.lattice[used],
+    )
+    embedding = hand.flesh.skin
+    corners = number[embedding.corners]
+    whole = np.asarray((corners >= 0).all(axis=1))
+    share = np.einsum("pa,pa->p", embedding.weights, own[embedding.corners])
+    t = np.clip((share - _OWN - 0.05) / 0.35, 0.0, 1.0)
+    blend = np.where(whole, t * t * (3.0 - 2.0 * t), 0.0)
+    flesh = replace(hand.flesh, mesh=sub, skin=replace(embedding, corners=np.where(whole[:, None], corners, 0)))
+    smaller = replace(
+        hand, flesh=flesh, weights=hand.weights[used], skin_faces=skin_faces, skin_labels=hand.skin_labels[faces]
+    )
+    return Part(smaller, start, cut, blend, skin)
+
+
+def _harmonic(
+    mesh: HexMesh, known: NDArray[np.integer], values: NDArray[np.float64], still: NDArray[np.integer]
+) -> NDArray[np.float64]:
+    """The smoothest field over the nodes with these values at ``known`` and zero at ``still``, shape (N, 3)."""
+    from scipy.sparse import coo_array, diags_array
+    from scipy.sparse.linalg import splu
+
+    count = len(mesh.nodes)
+    corners = [[0, 1], [1, 2], [2, 3], [3, 0], [4, 5], [5, 6], [6, 7], [7, 4], [0, 4], [1, 5], [2, 6], [3, 7]]
+    edges = np.unique(np.sort(mesh.elements[:, corners].reshape(-1, 2), axis=1), axis=0)
+    edges = edges[edges[:, 0] != edges[:, 1]]
+    stiff = 1.0 / np.linalg.norm(mesh.nodes[edges[:, 1]] - mesh.nodes[edges[:, 0]], axis=1)
+    rows, columns = np.concatenate([edges, edges[:, ::-1]]).T
+    links = coo_array((np.concatenate([stiff, stiff]), (rows, columns)), shape=(count, count)).tocsr()
+    out = np.zeros((count, 3))
+    out[known] = values
+    free = np.ones(count, dtype=bool)
+    free[known] = free[still] = False
+    if free.any():
+        laplacian = (diags_array(links.sum(axis=1)) - links).tocsr()
+        factor = splu(laplacian[free][:, free].tocsc(), permc_spec="MMD_AT_PLUS_A", options={"SymmetricMode": True})
+        out[free] = factor.solve(links[free][:, ~free] @ out[~free])
+    return out

@@ -1,0 +1,87 @@
+"""What a run that was cut off goes on from: all frames solved so far and the contact's memory, in one file."""
+
+from __future__ import annotations
+
+import zipfile
+from dataclasses import dataclass, fields
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from warpjld.errors import InputError
+from warpjld.fem import Loads, Status
+from warpjld.fem.contact import ContactInstant, ContactSolution
+from warpjld.fem.contact.law import Memory
+from warpjld.press.frames import SolvedFrame, TouchingPoints
+
+__all__ = ["State", "load_state", "save_state"]
+
+
+@dataclass(frozen=True, eq=False)
+class State:
+    """Frames so far, and the solution to go on from.
+
+    Attributes:
+        mark: What it belongs to.
+        frames: In order.
+        solution: Of the last of them.
+    """
+
+    mark: str
+    frames: tuple[SolvedFrame, ...]
+    solution: ContactSolution
+
+
+def save_state(path: Path, state: State) -> None:
+    """Write it beside its place and rename it: a cut leaves the one before.
+
+    Raises:
+        InputError: It cannot be written.
+    """
+    arrays: dict[str, Any] = {"mark": state.mark, "count": len(state.frames), "time": state.solution.last.time}
+    for k, frame in enumerate(state.frames):
+        for one in fields(SolvedFrame):
+            if one.name != "touching":
+                arrays[f"frame{k}.{one.name}"] = getattr(frame, one.name)
+        for one in fields(TouchingPoints):
+            arrays[f"frame{k}.touching.{one.name}"] = getattr(frame.touching, one.name)
+    arrays["memories"] = len(state.solution.memory)
+    for k, memory in enumerate(state.solution.memory):
+        for one in fields(Memory):
+            arrays[f"memory{k}.{one.name}"] = getattr(memory, one.name)
+    part = path.with_name(path.name + ".part")
+    try:
+        with part.open("wb") as file:
+            np.savez(file, **arrays)
+        part.replace(path)
+    except OSError as error:
+        raise InputError(f"cannot write: {error.strerror}", path=path) from error
+    finally:
+        part.unlink(missing_ok=True)
+
+
+def load_state(path: Path) -> State:
+    """Read it.
+
+    Raises:
+        InputError: It is no state.
+    """
+    try:
+        with np.load(path, allow_pickle=False) as file:
+            frames = []
+            for k in range(int(file["count"])):
+                touching = TouchingPoints(*(file[f"frame{k}.touching.{f.name}"] for f in fields(TouchingPoints)))
+                one = {f.name: file[f"frame{k}.{f.name}"] for f in fields(SolvedFrame) if f.name != "touching"}
+                one |= {"frame": float(one["frame"]), "solves": int(one["solves"])}
+                one["penetration"] = float(one["penetration"])
+                frames.append(SolvedFrame(touching=touching, **one))
+            memory = tuple(
+                Memory(*(file[f"memory{k}.{f.name}"] for f in fields(Memory))) for k in range(int(file["memories"]))
+            )
+            mark, time = str(file["mark"]), float(file["time"])
+    except (OSError, KeyError, ValueError, zipfile.BadZipFile) as error:
+        raise InputError(f"no state of a contact solve: {error}", path=path) from error
+    last = frames[-1]
+    instant = ContactInstant(time, last.displacement, last.reactions, (), last.solves, 0, 0.0)
+    return State(mark, tuple(frames), ContactSolution(Status.CONVERGED, (instant,), "", memory, (), Loads()))

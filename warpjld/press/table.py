@@ -1,0 +1,147 @@
+"""A row for each frame and digit (R95, R118, R122)."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass
+from pathlib import Path
+
+import numpy as np
+
+from warpjld.fem.hand.muscles import Effort
+from warpjld.press.bodies import Bodies, HandBody
+from warpjld.press.frames import SolvedFrame
+
+__all__ = ["Row", "rows_of", "write_table"]
+
+
+@dataclass(frozen=True)
+class Row:
+    """What one digit feels and does at one frame.
+
+    Attributes:
+        frame: Number.
+        actor: Whose.
+        digit: ``index`` …, or ``palm``: everything else of the hand.
+        against: What it touches, joined by ``+``.
+        force_n: Length of the sum of its contact forces [N].
+        fx_n, fy_n, fz_n: That sum [N].
+        area_mm2: Area under pressure [mm²].
+        peak_kpa: Highest pressure [kPa].
+        bone_n: Length of what its bones bear [N]; NaN for the palm.
+        limit_n: Largest force its muscles can bear [N]; NaN for the palm.
+        share: Largest share of the limits of its force and its joints' torques; NaN for the palm.
+        sliding: Share of the area under pressure that slides; NaN where nothing touches.
+        state: ``free``, ``sticking``, ``sliding``, or ``partly sliding``.
+    """
+
+    frame: float
+    actor: str
+    digit: str
+    against: str
+    force_n: float
+    fx_n: float
+    fy_n: float
+    fz_n: float
+    area_mm2: float
+    peak_kpa: float
+    bone_n: float
+    limit_n: float
+    share: float
+    sliding: float
+    state: str
+
+
+def rows_of(bodies: Bodies, hand: HandBody, solved: SolvedFrame, effort: Effort) -> list[Row]:
+    """Rows of a hand at a frame: its digits and its palm."""
+    from scipy.spatial import cKDTree
+
+    span = bodies.spans[hand.name]
+    flesh = hand.part.hand
+    labels = [_digit(name) for name in flesh.label_names]
+    digit_of = np.array([*labels, ""])[flesh.node_labels]  # "" for nodes inside
+    touching = solved.touching
+    mine = np.array([hand.name in (o.slave, o.master) for o in bodies.owners], dtype=bool)
+    # points of pairs whose other side is the hand's skin: they belong to the skin node nearest to them
+    own = (touching.node >= span.start) & (touching.node < span.stop)
+    points = np.full(len(touching.node), "", dtype=digit_of.dtype)
+    points[own] = digit_of[touching.node[own] - span.start]
+    others = np.flatnonzero(~own & mine[touching.pair]) if len(mine) else np.empty(0, int)
+    if len(others):
+        skin = np.flatnonzero(flesh.node_labels >= 0)
+        at = flesh.mesh.nodes[skin] + solved.displacement[span][skin]
+        points[others] = digit_of[skin[cKDTree(at).query(touching.position[others])[1]]]
+    rows = []
+    for digit in [*(d.digit.rpartition(".")[2] for d in effort.digits), "palm"]:
+        nodes = np.flatnonzero(digit_of == digit)
+        if not len(nodes):
+            continue
+        pushes = solved.nodal[:, span][:, nodes]
+        force = pushes.sum(axis=(0, 1))
+        against = [
+            owner.master if owner.slave == hand.name else owner.slave
+            for owner, push in zip(bodies.owners, pushes, strict=True)
+            if np.abs(push).max(initial=0.0) > 0.0
+        ]
+        here = np.flatnonzero(points == digit)
+        area = float(touching.area[here].sum())
+        sliding = float(touching.area[here][touching.slides[here]].sum()) / area if area > 0.0 else float("nan")
+        work = None if digit == "palm" else effort[digit]
+        rows.append(
+            Row(
+                solved.frame,
+                hand.name,
+                digit,
+                "+".join(dict.fromkeys(against)),
+                float(np.linalg.norm(force)),
+                float(force[0]),
+                float(force[1]),
+                float(force[2]),
+                1e6 * area,
+                1e-3 * float(touching.pressure[here].max(initial=0.0)),
+                float("nan") if work is None else work.force,
+                float("nan") if work is None else work.limit,
+                float("nan") if work is None else work.share,
+                sliding,
+                _state(sliding),
+            )
+        )
+    return rows
+
+
+def write_table(path: Path, rows: Sequence[Row]) -> None:
+    """Write rows as CSV or, by the suffix, Parquet."""
+    columns = {name: [getattr(row, name) for row in rows] for name in Row.__dataclass_fields__}
+    if path.suffix.lower() == ".parquet":
+        import pyarrow
+        import pyarrow.parquet
+
+        pyarrow.parquet.write_table(pyarrow.table(columns), path)
+        return
+    import csv
+
+    with path.open("w", newline="", encoding="utf-8") as file:
+        writer = csv.DictWriter(file, list(columns))
+        writer.writeheader()
+        writer.writerows({k: _short(v) for k, v in asdict(row).items()} for row in rows)
+
+
+def _short(value: object) -> object:
+    if not isinstance(value, float):
+        return value
+    return "" if np.isnan(value) else f"{value:.6g}"
+
+
+def _digit(label: str) -> str:
+    """Digit of a part of the skin: ``left.index.distal`` → ``index``; ``left.palm.index`` → ``palm``."""
+    from warpjld.skeleton import DIGITS
+
+    parts = label.split(".")
+    found = [part for part in parts if part in DIGITS]
+    return found[0] if found and "palm" not in parts else "palm"
+
+
+def _state(sliding: float) -> str:
+    if np.isnan(sliding):
+        return "free"
+    return "sticking" if sliding < 0.05 else "sliding" if sliding > 0.95 else "partly sliding"

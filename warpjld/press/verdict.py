@@ -1,0 +1,89 @@
+"""Whether a grasp is realistic, in words and numbers (B §3.3, R112, R118, R119)."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from warpjld.fem import Status
+from warpjld.press.run import Solved
+from warpjld.press.table import Row
+
+__all__ = ["Verdict", "verdict_of"]
+
+
+@dataclass(frozen=True)
+class Verdict:
+    """How a contact solve ended.
+
+    Attributes:
+        status: Name of the solver's status.
+        text: One line.
+        lines: One for each digit that touched.
+        suggestions: What to change.
+        frames: First and last frame that were solved.
+    """
+
+    status: str
+    text: str
+    lines: tuple[str, ...]
+    suggestions: tuple[str, ...]
+    frames: tuple[float, float] | None
+
+    def content(self) -> dict[str, Any]:
+        """As plain values."""
+        return {
+            "status": self.status,
+            "verdict": self.text,
+            "digits": list(self.lines),
+            "suggestions": list(self.suggestions),
+            "frames": None if self.frames is None else list(self.frames),
+        }
+
+
+def verdict_of(solved: Solved, rows: Sequence[Row], suggestions: Sequence[str]) -> Verdict:
+    """Judge what was solved.
+
+    Args:
+        solved: The frames.
+        rows: The table.
+        suggestions: What the muscles' report suggests at the frame that strains them most.
+    """
+    frames = (solved.frames[0].frame, solved.frames[-1].frame) if solved.frames else None
+    lines = []
+    most: dict[tuple[str, str], Row] = {}
+    for row in rows:
+        best = most.get((row.actor, row.digit))
+        if row.force_n > 1e-9 and (best is None or row.force_n > best.force_n):
+            most[row.actor, row.digit] = row
+    for (actor, digit), row in most.items():
+        line = (
+            f"{actor} {digit}: {row.force_n:.3g} N against {row.against} at frame {row.frame:g}, "
+            f"{row.area_mm2:.3g} mm², peak {row.peak_kpa:.3g} kPa, {row.state}"
+        )
+        if not np.isnan(row.share):
+            line += (
+                f"; bones bear {row.bone_n:.3g} N of {row.limit_n:.3g} N, {100 * row.share:.0f} % of what muscles can"
+            )
+        lines.append(line)
+    over = [row for row in rows if row.share > 1.0]
+    touched = any(row.force_n > 0.0 for row in rows)
+    if solved.status not in (Status.CONVERGED, Status.STOPPED):
+        text = f"no equilibrium: {solved.message}"
+    elif over:
+        worst = max(over, key=lambda row: row.share)
+        need = f"{100 * worst.share:.0f} % of what muscles can do"
+        text = f"not realistic: at frame {worst.frame:g} {worst.digit} needs {need}"
+    elif solved.status is Status.STOPPED:
+        text = solved.message
+    elif not rows:
+        text = "solved"
+    elif touched:
+        share = max((row.share for row in rows if not np.isnan(row.share)), default=0.0)
+        text = f"realistic: muscles do at most {100 * share:.0f} % of what they can"
+    else:
+        text = "nothing touches at any frame"
+    return Verdict(solved.status.name, text, tuple(lines), tuple(suggestions), frames)

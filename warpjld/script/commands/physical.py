@@ -1,0 +1,158 @@
+"""Bodies that deform: objects, flesh, what holds between them and what pulls at them (B §3, R92, R101, R109)."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, cast
+
+from warpjld.errors import InputError
+from warpjld.press.wishes import LAWS, Bonded, FleshWish, Physical, Where, pair
+from warpjld.script.arguments import Arguments
+from warpjld.script.commands.animation import FINGERS
+from warpjld.script.registry import command
+from warpjld.script.scene import Scene
+from warpjld.script.suggest import did_you_mean
+
+if TYPE_CHECKING:
+    from warpjld.script.props import Prop
+
+_LAWS = tuple(law.upper() for law in LAWS)
+
+
+@command(
+    "PHYSICAL",
+    syntax=(
+        f"PHYSICAL <object> [LAW <{'/'.join(_LAWS)}>] [YOUNG <pascals>] [POISSON <ratio>] [DENSITY <kg/m³>] "
+        "[HOLLOW <wall in metres>] [PRESSURE <pascals>] [ELEMENT <metres>]"
+    ),
+    help="An object deforms: its law and moduli; a wall makes it hollow, with a pressure inside; its elements' size.",
+    group="Contact",
+)
+def physical(scene: Scene, arguments: Arguments) -> None:
+    """R92, R109, R111."""
+    prop = read_object(scene, arguments)
+    where = arguments.last
+    if prop.deforms:
+        raise arguments.error(f"{prop.name} is deformed by key frames or by formula: it cannot be physical as well")
+    options = arguments.options(
+        law=lambda: arguments.choice("the law", _LAWS).lower(),
+        young=lambda: arguments.number("Young's modulus in Pa", above=0.0),
+        poisson=lambda: arguments.number("Poisson's ratio", above=-1.0, maximum=0.4999),
+        density=lambda: arguments.number("the density in kg/m³", minimum=0.0),
+        hollow=lambda: arguments.number("the thickness of the wall in metres", above=0.0),
+        pressure=lambda: arguments.number("the pressure in Pa"),
+        element=lambda: arguments.number("the elements' size in metres", above=0.0),
+    )
+    if "hollow" in options:
+        options["wall"] = options.pop("hollow")
+    if float(cast(float, options.get("wall", 0.0))) >= 0.5 * prop.thing.size.min():
+        raise arguments.error(
+            f"a wall must be thinner than half of {prop.name}, {0.5 * prop.thing.size.min():g} m", where
+        )
+    try:
+        scene.contact.physical[prop.name] = Physical(**options, where=place(arguments))  # type: ignore[arg-type]
+    except InputError as error:
+        raise arguments.error(error.message, where) from None
+
+
+@command(
+    "FLESH",
+    syntax=(
+        "FLESH <actor> [THUMB/INDEX/MIDDLE/RING/PINKY …] [ELEMENT <metres>] [YOUNG <pascals>] [SKIN <pascals>] "
+        "[POISSON <ratio>] [ITSELF <ON/OFF>]"
+    ),
+    help="An actor's flesh deforms, that of some digits only if they are named; ITSELF: whether skin touches skin.",
+    group="Contact",
+)
+def flesh(scene: Scene, arguments: Arguments) -> None:
+    """R91, R105, R126."""
+    name = arguments.name("an actor's name")
+    try:
+        actor = scene.actor(name)
+    except InputError as error:
+        raise arguments.error(error.message) from None
+    digits = []
+    while (digit := arguments.keyword(*FINGERS)) is not None:
+        digits.append(digit.lower())
+    options = arguments.options(
+        element=lambda: arguments.number("the elements' size in metres", above=0.0),
+        young=lambda: arguments.number("the flesh's modulus in Pa", above=0.0),
+        skin=lambda: arguments.number("the skin's modulus in Pa", above=0.0),
+        poisson=lambda: arguments.number("Poisson's ratio", minimum=0.3, maximum=0.49),
+        itself=lambda: arguments.choice("ON or OFF", ("ON", "OFF")) == "ON",
+    )
+    if "young" in options:
+        options["flesh"] = options.pop("young")
+    scene.contact.flesh[actor.name] = FleshWish(tuple(dict.fromkeys(digits)), **options)  # type: ignore[arg-type]
+
+
+@command(
+    "FRICTION",
+    syntax="FRICTION <actor or object> <actor or object> <coefficient> or FRICTION <coefficient>",
+    help="Coulomb's coefficient between two, or between all others; 0.6 at first.",
+    group="Contact",
+)
+def friction(scene: Scene, arguments: Arguments) -> None:
+    """R122."""
+    if arguments.has_number():
+        scene.contact.everywhere = _coefficient(arguments)
+        return
+    one, other = _body(scene, arguments), _body(scene, arguments)
+    scene.contact.friction[pair(one, other)] = _coefficient(arguments)
+
+
+@command(
+    "BOND",
+    syntax="BOND <object> <object> <tension in pascals> [<shear in pascals>]",
+    help="Two physical objects that touch are one, until tension or shear between them is more than this.",
+    group="Contact",
+)
+def bond(scene: Scene, arguments: Arguments) -> None:
+    """R101, R102."""
+    names = []
+    for _ in range(2):
+        prop = read_object(scene, arguments)
+        if prop.name not in scene.contact.physical:
+            raise arguments.error(f"{prop.name} is not physical: a bond wants two objects made so with PHYSICAL")
+        names.append(prop.name)
+    if names[0] == names[1]:
+        raise arguments.error(f"{names[0]} cannot be bonded to itself")
+    normal = arguments.number("the tension in Pa at which they part", above=0.0)
+    shear = arguments.number("the shear in Pa at which they part", above=0.0) if arguments else normal
+    scene.contact.bonds.append(Bonded(names[0], names[1], normal, shear, place(arguments)))
+
+
+@command(
+    "GRAVITY",
+    syntax="GRAVITY <x> <y> <z>",
+    help="Acceleration that pulls at physical objects and flesh [m/s²]; 0 0 0 at first.",
+    group="Contact",
+)
+def gravity(scene: Scene, arguments: Arguments) -> None:
+    """R97."""
+    scene.contact.gravity = arguments.vector("the acceleration's")
+
+
+def read_object(scene: Scene, arguments: Arguments) -> Prop:
+    """Read an object's name."""
+    name = arguments.name("an object's name")
+    try:
+        return scene.prop(name)
+    except InputError as error:
+        raise arguments.error(error.message) from None
+
+
+def place(arguments: Arguments) -> Where:
+    """Where the command stands."""
+    return arguments.position.path, arguments.position.line, arguments.position.column
+
+
+def _body(scene: Scene, arguments: Arguments) -> str:
+    name = arguments.name("an actor's or an object's name").upper()
+    known = [*scene.actors, *scene.props]
+    if name not in known:
+        raise arguments.error(f"there is no actor or object {name}{did_you_mean(name, known)}")
+    return name
+
+
+def _coefficient(arguments: Arguments) -> float:
+    return arguments.number("the coefficient of friction", minimum=0.0, maximum=10.0)

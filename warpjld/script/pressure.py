@@ -1,0 +1,91 @@
+"""Actors and objects in the colours of contact pressure (R95)."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from warpjld import render
+
+if TYPE_CHECKING:
+    from warpjld.script.crowd import Crowd
+
+__all__ = ["PressureView"]
+
+_COLORS = "OrRd"
+_NOTHING = 1.0  # Pa: the scale's top where nothing touches
+
+
+class PressureView:
+    """Everything that deforms as one coloured surface; or one actor or object alone, with nothing before it.
+
+    Args:
+        crowd: Actors and objects, pressed.
+        only: Name of the one to show.
+    """
+
+    def __init__(self, crowd: Crowd, only: str | None) -> None:
+        self.crowd = crowd
+        self._only = only
+        counts = np.cumsum([0, *(len(role.covering.surface.vertices) for role in crowd.roles)])
+        self._roles = [
+            (role, slice(a, b))
+            for role, a, b in zip(crowd.roles, counts[:-1], counts[1:], strict=True)
+            if only in (None, role.actor.name)
+        ]
+        pressed = crowd.pressed
+        colored = [p for p in crowd.props if pressed is not None and pressed.moves(p.name)]
+        self._colored = [k for k, p in enumerate(crowd.props) if p in colored and only in (None, p.name)]
+        self._plain = [k for k, p in enumerate(crowd.props) if k not in self._colored and only in (None, p.name)]
+        faces, start = [], 0
+        for role, span in self._roles:
+            faces.append(role.covering.surface.faces + start)
+            start += span.stop - span.start
+        for k in self._colored:
+            faces.append(crowd.props[k].thing.faces + start)
+            start += len(crowd.props[k].thing.vertices)
+        if not faces:  # an obstacle alone: nothing is known of its own pressure
+            faces, self._colored, self._plain = [crowd.props[self._plain[0]].thing.faces], self._plain[:1], []
+        self._faces = np.concatenate(faces).astype(np.int32)
+        highest = _NOTHING if pressed is None else max(_NOTHING, pressed.highest)
+        self._scale = render.ColorScale(0.0, highest, "contact pressure, kPa", _COLORS, factor=1e-3)
+
+    def stage(
+        self,
+        camera: render.Camera,
+        size: tuple[int, int],
+        quality: render.Quality,
+        shift: NDArray[np.float64] | float,
+    ) -> render.Scene:
+        """A window to draw in."""
+        props = [self.crowd.props[k] for k in self._plain]
+        solids = [
+            render.Solid(vertices - shift, prop.thing.faces, color=prop.color)
+            for prop, vertices in zip(props, self.others(0), strict=True)
+        ]
+        return render.Scene(self._faces, camera, size=size, solids=solids, scale=self._scale, quality=quality)
+
+    def at(self, frame: int, vertices: NDArray[np.float32]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Vertices [m] and pressures [Pa] at the frame of that place, of actors' vertices (V, 3)."""
+        number = float(self.crowd.frames[frame])
+        points: list[NDArray[np.floating]] = []
+        values: list[NDArray[np.float64]] = []
+        for role, span in self._roles:
+            points.append(vertices[span])
+            values.append(self._pressure(role.actor.name, number, span.stop - span.start))
+        solids = self.crowd.solid_vertices(frame)
+        for k in self._colored:
+            points.append(solids[k])
+            values.append(self._pressure(self.crowd.props[k].name, number, len(solids[k])))
+        return np.concatenate(points).astype(np.float64), np.concatenate(values)
+
+    def others(self, frame: int) -> list[NDArray[np.float64]]:
+        """Vertices of what is shown in its own colour."""
+        solids = self.crowd.solid_vertices(frame)
+        return [solids[k] for k in self._plain]
+
+    def _pressure(self, name: str, frame: float, count: int) -> NDArray[np.float64]:
+        found = None if self.crowd.pressed is None else self.crowd.pressed.pressure(name, frame)
+        return np.zeros(count) if found is None else found
