@@ -6,9 +6,10 @@ import pytest
 from warpjld.errors import InputError
 from warpjld.grasp import ObjectSet
 from warpjld.grasp.auto import find_grasp
-from warpjld.grasp.intersection import intersection
+from warpjld.grasp.judge import Judge
 from warpjld.grasp.placements import palm_frame, sample_wrists
 from warpjld.grasp.postures import POSTURES, posture_angles, posture_for
+from warpjld.grasp.quality import penetration
 from warpjld.grasp.shapes import ball, box, cylinder, glass, plate
 from warpjld.skeleton import poses_from_angles
 
@@ -51,16 +52,30 @@ def test_sampled_hands_are_next_to_the_object_and_not_in_it(covering) -> None:
 
 
 def test_finding_a_grasp(covering) -> None:
-    thing = ball(0.06).placed((1.0, 0.5, 0.0))
+    thing = ball(0.06, subdivisions=3).placed((1.0, 0.5, 0.0))
     found = find_grasp(covering, thing, count=8, seed=1)
     assert found.posture == "sphere"
-    assert any(name.endswith("thumb") for name in found.touching)
+    assert found.verdict.closed
+    assert found.verdict.epsilon > 0.05
     assert len(found.touching) >= 3
     skin = covering.deform(found.poses(covering.skeleton))[0]
-    assert intersection(covering, skin, thing).deepest < 1e-3
+    seen = penetration(covering, skin, thing)
+    assert seen.depth <= 1e-3
     again = find_grasp(covering, thing, count=8, seed=1)
     np.testing.assert_array_equal(found.angles, again.angles)
     np.testing.assert_array_equal(found.position, again.position)
+
+
+def test_a_verdict_knows_which_contacts_press(covering) -> None:
+    """A ball that lies on the back of the hand is touched and not held."""
+    skeleton = covering.skeleton
+    knuckle = skeleton.rest[skeleton.index("middle.base")]
+    poses = poses_from_angles(skeleton, np.zeros((1, len(skeleton), 4)))
+    skin = covering.deform(poses)[0]
+    top = skin[np.linalg.norm((skin - knuckle)[:, [0, 2]], axis=1) < 0.005][:, 1].max()
+    lying = ball(0.06).placed([knuckle[0], top + 0.0301, knuckle[2]])
+    verdict = Judge(covering, lying, "left", 0.6).judge(poses, skin)
+    assert (verdict.closed, verdict.digits, verdict.palm, verdict.score) == (False, (), False, 0.0)
 
 
 @pytest.mark.parametrize(
@@ -69,6 +84,7 @@ def test_finding_a_grasp(covering) -> None:
         ({"count": 0}, "want 1 or more"),
         ({"side": "right"}, "want one of left"),
         ({"posture": "fist"}, "no posture 'fist'"),
+        ({"friction": 0.0}, "friction: want a number above 0"),
     ],
 )
 def test_wrong_wishes(covering, options: dict, says: str) -> None:

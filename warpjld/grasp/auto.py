@@ -3,7 +3,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -26,11 +27,11 @@ __all__ = ["AutoGrasp", "find_grasp"]
 _LINES = 400  # through the object, to find where it is narrow
 _PALM_FIRST = 0.25  # share of the placements that are made palm first
 _VARIANTS = 6  # of a posture
-_FINALISTS = 10  # placements that are closed and judged in full, as long as one of them is a grasp
-_MORE = 30  # the same where none is
+_ROUND = 32  # placements looked at together
+_FINALISTS = 6  # of a round, closed and judged in full
 _DEEPEST = 1e-3  # of hand and object in one another, above which a grasp is refused [m]
 _PRESSED = 3e-4  # depth from which an open hand goes back [m]
-_GOOD = 0.14  # score that ends the search early [N]
+_GOOD = 0.12  # score that ends the search early [N]
 
 
 @dataclass(frozen=True, eq=False)
@@ -81,7 +82,7 @@ def find_grasp(
     thing: GraspObject,
     *,
     side: str | None = None,
-    count: int = 64,
+    count: int = 96,
     posture: str | None = None,
     coupling: tuple[float, float] | None = (1.0, 0.7),
     friction: float = 0.6,
@@ -90,18 +91,17 @@ def find_grasp(
     """Place open hands about the object, close them, judge them, keep the best.
 
     A posture is chosen by the object's shape, and varied. Three quarters of the placements put thumb and fingers across
-    a part of the object that fits between them (``across_widths``), the others the palm on it (``sample_wrists``). All
-    are closed roughly and ranked by the force closure of what nearly touches. The best ten are closed in full, without
-    digits that pass through the object or one another, and judged (``Judge``): a grasp that is not force closed, or
-    in which hand and object are more than 1 mm in one another, is refused; of the others the best score is kept. The
-    first with a score of 0.14 N and four digits (of a pinch three) ends the search; where none of ten will do, up to
-    thirty are tried.
+    a part of the object that fits between them (``across_widths``), the others the palm on it (``sample_wrists``).
+    They are taken in rounds of 32: all are closed roughly and ranked by the force closure of what nearly touches; the
+    best six are closed in full, without digits that pass through the object or one another, and judged (``Judge``). A
+    grasp that is not force closed, or in which hand and object are more than 1 mm in one another, is refused; of the
+    others the best score is kept. One with a score of 0.12 N and all digits but one (of a pinch all) ends the search.
 
     Args:
         covering: The hand.
         thing: The object where it stands.
         side: ``left`` or ``right``; may be left out for a single hand.
-        count: Placements.
+        count: Placements at most.
         posture: One of ``POSTURES``; by the object's shape if left out.
         coupling: See :func:`~warpjld.grasp.close.close_hand`.
         friction: Coulomb coefficient.
@@ -123,41 +123,54 @@ def find_grasp(
     closing = [digit for digit in CLOSING.get(chosen, DIGITS) if f"{side}.{digit}" in digit_chains(covering.skeleton)]
     digits = [f"{side}.{digit}" for digit in closing]
     objects, rng = ObjectSet(thing), np.random.default_rng(seed)
-    hands = _placements(covering, objects, side, chosen, start, closing, count, rng)
-    quick = close_hand(
-        covering, hands.poses(covering.skeleton), hands.angles, objects, digits=digits, coupling=coupling, quick=True
-    )
     judge = Judge(covering, thing, side, friction)
-    poses = hands.poses(covering.skeleton, quick.angles)
-    ranks = judge.first_look(poses, covering.deform(poses))
     best: AutoGrasp | None = None
-    for done, row in enumerate(int(k) for k in np.argsort(-ranks, kind="stable")[:_MORE] if ranks[k] > 0.0):
-        if best and done >= _FINALISTS:
-            break
-        hand = _clear_of(judge, side, hands[row : row + 1], quick.angles[row : row + 1])
-        least = best.score if best else 0.0
-        found = _closed(judge, hand, objects, digits, coupling, least)
-        if found is None:
-            continue
-        closed, verdict = found
-        best = AutoGrasp(
-            chosen,
-            hand.position[0],
-            hand.rotation[0],
-            hand.approach[0],
-            hand.angles[0],
-            closed.angles[0],
-            verdict,
-            _touching(side, verdict, closed),
-            len(hands),
-        )
-        if verdict.score >= _GOOD and len(verdict.digits) >= len(digits) - (len(digits) > 3):
-            break
+    for first in range(0, count, _ROUND):
+        hands = _placements(covering, objects, side, chosen, start, closing, min(_ROUND, count - first), rng)
+        for hand in _promising(judge, side, hands, objects, digits, coupling):
+            found = _closed(judge, hand, objects, digits, coupling, best.score if best else 0.0)
+            if found is None:
+                continue
+            closed, verdict = found
+            touching = tuple(name for name in digits if name.removeprefix(f"{side}.") in verdict.digits)
+            best = AutoGrasp(
+                chosen,
+                hand.position[0],
+                hand.rotation[0],
+                hand.approach[0],
+                hand.angles[0],
+                closed.angles[0],
+                verdict,
+                touching,
+                first + len(hands),
+            )
+            if verdict.score >= _GOOD and len(touching) >= len(digits) - (len(digits) > 3):
+                return best
     if best is None:
         raise InputError(
             f"object {thing.name}: none of {count} placements ends in a grasp; it may be too large, too small or thin"
         )
-    return best
+    return replace(best, tried=count)
+
+
+def _promising(
+    judge: Judge,
+    side: str,
+    hands: Candidates,
+    objects: ObjectSet,
+    digits: list[str],
+    coupling: tuple[float, float] | None,
+) -> Iterator[Candidates]:
+    """Open hands that do best when closed roughly, best first, moved out of what they would press into."""
+    covering = judge.covering
+    open_hands = hands.poses(covering.skeleton)
+    quick = close_hand(covering, open_hands, hands.angles, objects, digits=digits, coupling=coupling, quick=True)
+    poses = hands.poses(covering.skeleton, quick.angles)
+    ranks = judge.first_look(poses, covering.deform(poses))
+    for row in np.argsort(-ranks, kind="stable")[:_FINALISTS].tolist():
+        if ranks[row] > 0.0:
+            one = slice(row, row + 1)
+            yield _clear_of(judge, side, hands[one], quick.angles[one])
 
 
 def _closed(
@@ -186,10 +199,6 @@ def _closed(
             return None
     assert verdict is not None
     return closed, verdict
-
-
-def _touching(side: str, verdict: Verdict, closed: Closed) -> tuple[str, ...]:
-    return tuple(name for name in closed.digits if name.removeprefix(f"{side}.") in verdict.digits)
 
 
 def _placements(

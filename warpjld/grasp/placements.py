@@ -177,14 +177,16 @@ def _come(covering: Covering, hands: Candidates, objects: ObjectSet, reach: NDAr
     some = skin[:, ::_COARSE]
     for step in range(_STEPS):
         going = np.flatnonzero(moved < reach)
+        if not len(going):
+            break
         shift = (hands.approach[going] * moved[going, None])[:, None].astype(np.float32)
-        gap = objects.distances(some[going] + shift, which=which[going]).distance.min(axis=1, initial=np.inf)
+        gap = objects.distances(some[going] + shift, which=which[going]).distance.min(axis=1)
         # with all vertices a hand may have come too near: it goes back by as much
         ahead = np.minimum(gap - _CLEARANCE, reach[going] - moved[going])
         moved[going] += np.where(ahead > 0.0, ahead, 1.05 * ahead - 1e-5)
         if len(some[0]) < len(skin[0]) and (step > _STEPS // 2 or (ahead < 1e-3).all()):
             some = skin
-        elif not len(going) or (np.abs(ahead) < 1e-5).all():
+        elif (np.abs(ahead) < 1e-5).all():
             break
     return hands.moved(moved)
 

@@ -23,6 +23,10 @@ if TYPE_CHECKING:
 __all__ = ["Attempt", "close_digits", "contact_reports", "grasp_by_itself", "placed_at", "posture", "search_flexion"]
 
 
+_LOOKS = 6  # frames of a closing hand at which it is looked whether it enters other objects
+_COLLIDES = 1e-4  # deeper than this [m]
+
+
 @dataclass(frozen=True)
 class Attempt:
     """A search or a grasp and how it ended.
@@ -134,8 +138,11 @@ def close_digits(
     if begun:
         message += f"; in the object before closing: {', '.join(begun)}"
     message += f"; {inside}"
+    collisions = _collisions(scene, actor, prop, first, last)
+    message += "".join(f"; {told}" for told in collisions)
     status = "INSIDE" if begun else ("CONVERGED" if touching.any() else "NO_CONTACT")
-    values = {"digits": rows, "penetration_mm": round(1e3 * inside.deepest, 4)}
+    depth = round(1e3 * float(closed.penetration[0]), 4)
+    values = {"digits": rows, "penetration_mm": depth, "collisions": collisions}
     return Attempt(f"GRASP {prop.name}", last, actor.name, prop.name, status, message, values)
 
 
@@ -180,13 +187,38 @@ def grasp_by_itself(
     message = (
         f"the best of {found.tried} placements, posture {found.posture}: {len(found.touching)} digits touch; {inside}"
     )
+    collisions = _collisions(scene, actor, prop, first, last)
+    message += "".join(f"; {told}" for told in collisions)
     values = {
         "posture": found.posture,
         "score": round(found.score, 4),
+        "epsilon": round(found.verdict.epsilon, 4),
         "digits": list(found.touching),
-        "penetration_mm": round(1e3 * inside.deepest, 4),
+        "penetration_mm": round(1e3 * found.penetration, 4),
+        "collisions": collisions,
     }
     return Attempt(f"GRASP {prop.name} AUTO", last, actor.name, prop.name, "CONVERGED", message, values)
+
+
+def _collisions(scene: Scene, actor: Actor, held: Prop, first: float, last: float) -> list[str]:
+    """Objects other than the held one that the hand enters while it closes, in words (R77)."""
+    from warpjld.grasp.both_ways import BothWays
+
+    covering, told = cover(actor), []
+    frames = np.linspace(first, last, _LOOKS)
+    skins = covering.deform(stage(actor, frames, scene.rate))
+    for prop in scene.props.values():
+        if prop is held:
+            continue
+        both = BothWays(covering, prop.thing)
+        depths = np.stack(
+            [both.depths(skin, scene.whereabouts(prop, frames[k : k + 1])) for k, skin in enumerate(skins)]
+        )
+        frame, part = np.unravel_index(depths.argmax(), depths.shape)
+        if depths[frame, part] > _COLLIDES:
+            depth = 1e3 * depths[frame, part]
+            told.append(f"collides with {prop.name}: {both.parts[part]} {depth:.2f} mm deep at frame {frames[frame]:g}")
+    return told
 
 
 def contact_reports(scene: Scene, crowd: Crowd) -> list[dict[str, Any]]:

@@ -151,13 +151,17 @@ class Equilibrium:
         known = step.prescribed.degrees
         free = step.prescribed.free(body.degrees)
         loose = self._unheld(step.prescribed)
-        u = (start if first is None else first.reshape(-1)).copy()
+        pressures: NDArray[np.float64] | None = None
         jump = np.zeros_like(u)
-        if first is None:
+        guessed = self._guessed(first, step.prescribed)
+        if guessed is None:
+            u = start.copy()
             jump[known] = step.prescribed.values - u[known]
         else:
-            u[known] = step.prescribed.values
-        pressures: NDArray[np.float64] | None = None
+            u = guessed
+            # a guess squeezes elements here and there: their false pressures would make K indefinite, those of the
+            # equilibrium before do not
+            pressures = body.at(start, stiffness=False).pressures if body.large_strain else None
         solver: LinearSolver | None = None
         normals = self._normals(u)
         held = (self._points(u, step, normals), u)
@@ -223,6 +227,15 @@ class Equilibrium:
                 held, points = (held, points) if settled else ((fresh, u), fresh)
             contact = self._answered(points, u, start, memory, keep=not careful, allowed=step.allowed)
         return Status.MAX_ITERATIONS, None
+
+    def _guessed(self, first: NDArray[np.float64] | None, prescribed: Prescribed) -> NDArray[np.float64] | None:
+        """A first guess that satisfies what is prescribed, unless it turns an element inside out."""
+        if first is None:
+            return None
+        u = np.array(first, dtype=np.float64).reshape(-1)
+        u[prescribed.degrees] = prescribed.values
+        upright = (self.body.at(u, stiffness=False).lowest > 0).all()
+        return u if upright or self._rest is not None else None
 
     def _solve(
         self, solver: LinearSolver | None, matrix: BlockMatrix, free: NDArray[np.bool_], right: NDArray[np.float64]

@@ -23,6 +23,7 @@ __all__ = ["press"]
 
 _HALVINGS = 7
 _BREAKS = 100
+_METHODS = ("augmented", "paper")
 
 Guess = Callable[[float, float, NDArray[np.float64]], NDArray[np.float64]]
 """Time before, time, displacement before (N, 3) → where to begin to look for the displacement at the time (N, 3)."""
@@ -36,6 +37,8 @@ def press(
     *,
     times: Sequence[float] = (1.0,),
     after: ContactSolution | None = None,
+    method: str = "augmented",
+    aitken: bool = False,
     tolerance: float = 1e-5,
     penetration: float = 1e-3,
     guess: Guess | None = None,
@@ -56,6 +59,9 @@ def press(
         loads: Loads at the last time, reached in proportion to time; or a function of time.
         times: Rising times above 0 (above ``after``'s) to find equilibria at.
         after: Contact and displacement to go on from.
+        method: ``augmented`` (Lagrangian, on bodies and contact together), or ``paper``: objects repelled by the skin
+            and released, in turns (R113; see ``warpjld.fem.contact.paper`` for when it settles). The slave is repelled.
+        aitken: Relax the paper's loop.
         tolerance: Residual over the forces that balance.
         penetration: Overlap left, as a share of an edge.
         guess: Where to begin to look.
@@ -80,11 +86,46 @@ def press(
             raise InputError(f"{name}: want a share between 0 and 1, got {value}")
     if after is not None and len(after.memory) != len(pairs):
         raise InputError(f"after: was found with {len(after.memory)} pairs, not {len(pairs)}")
+    if method not in _METHODS:
+        raise InputError(f"method: want {' or '.join(_METHODS)}, got '{method}'")
+    if method == "paper":
+        solution = _by_turns(body, prescribed, pairs, loads, wanted, after, aitken, penetration, watch, progress)
+        if check and not solution.converged and solution.status is not Status.STOPPED:
+            raise ContactError(solution)
+        return solution
     run = _Run(body, prescribed, list(pairs), loads, wanted, after, tolerance, penetration, guess)
     solution = run.through(watch, progress)
     if check and not solution.converged and solution.status is not Status.STOPPED:
         raise ContactError(solution)
     return solution
+
+
+def _by_turns(
+    body: Body,
+    prescribed: Prescribed | Callable[[float], Prescribed],
+    pairs: Sequence[Pair],
+    loads: Loads | Callable[[float], Loads] | None,
+    times: list[float],
+    after: ContactSolution | None,
+    aitken: bool,
+    threshold: float,
+    watch: Callable[[ContactInstant], str | None] | None,
+    progress: Callable[[str], None] | None,
+) -> ContactSolution:
+    from warpjld.fem.contact.paper import by_turns
+
+    if after is not None:
+        raise InputError("after: the paper's loop begins at rest")
+    if any(pair.friction > 0.0 or pair.bond is not None for pair in pairs):
+        raise InputError("pairs: the paper's loop knows neither friction nor bonds; use method='augmented'")
+
+    def known(time: float) -> Prescribed:
+        return prescribed(time) if callable(prescribed) else prescribed.scaled(time / times[-1])
+
+    def load(time: float) -> Loads:
+        return loads(time) if callable(loads) else (loads or Loads()).scaled(time / times[-1])
+
+    return by_turns(body, known, pairs, load, times, aitken=aitken, threshold=threshold, watch=watch, progress=progress)
 
 
 class _Run:
