@@ -19,17 +19,17 @@ _TORN = 3.0
 
 @dataclass(frozen=True, eq=False)
 class Memory:
-    """What an interface knows of each node of its slave surface.
+    """What an interface knows of each of its s sites.
 
     Attributes:
-        pressure: Multiplier along the normal [Pa], ≥ 0 unless bonded, shape (m,).
-        friction: Multiplier across it, on the slave [Pa], shape (m, 3).
-        allowance: Overlap that is still allowed, where the step began inside the other body [m], shape (m,) (R112).
+        pressure: Multiplier along the normal [Pa], ≥ 0 unless bonded, shape (s,).
+        friction: Multiplier across it, on the slave [Pa], shape (s, 3).
+        allowance: Overlap that is still allowed, where the step began inside the other body [m], shape (s,) (R112).
         gripping: Iterations for which something has pressed; friction acts from the second, when the overlap of the
-            first guess is gone, shape (m,).
-        stuck: Whether friction holds it, or it slides if not, shape (m,).
-        bonded: Whether the bond holds, shape (m,).
-        seam: Gap at which the bond was made [m], shape (m,).
+            first guess is gone, shape (s,).
+        stuck: Whether friction holds it, or it slides if not, shape (s,).
+        bonded: Whether the bond holds, shape (s,).
+        seam: Gap at which the bond was made [m], shape (s,).
     """
 
     pressure: NDArray[np.float64]
@@ -108,7 +108,7 @@ def respond(
         patient: Who sticks is read off the friction, λ − ε s, and not off the memory: tractions are then continuous,
             and with multipliers that stay the problem is convex, so that a search along a line settles it.
     """
-    at = points.nodes
+    at = points.sites
     normal = points.normal
     bonded = memory.bonded[at]
     seam = np.nan_to_num(memory.seam[at])
@@ -172,7 +172,7 @@ def remember(
     is remembered: penalty is not pressure. Nor of pressures under friction far beyond Coulomb's, of a step that slides
     a long way: it would tear off what in truth lies still or slides.
     """
-    at = points.nodes
+    at = points.sites
     count = len(memory.pressure)
     normal, friction = np.zeros(count), np.zeros((count, 3))
     stuck = np.ones(count, dtype=bool)
