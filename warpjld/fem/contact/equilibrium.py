@@ -179,7 +179,11 @@ class Equilibrium:
             scale = max(norm(external), pushed, norm(np.where(free, 0.0, balance)), 1e-300)
             now = norm(residual) / scale
             noise = _ROUNDING * norm(np.repeat(self._stiff, 3) * u)
-            if moved and now <= max(self._tolerance, noise / scale) and self._settled(contact, memory):
+            if (
+                moved
+                and now <= max(self._tolerance, noise / scale)
+                and self._settled(contact, memory, max(self._tolerance * scale, noise))
+            ):
                 normals = self._normals(u)
                 fresh = self._points(u, step, normals)
                 if step.allowed > 0.0 or self._mismatch(fresh, contact.points, contact.responses) <= self._penetration:
@@ -206,6 +210,8 @@ class Equilibrium:
             if done.status in (Status.INDEFINITE, Status.NOT_FINITE):
                 return done.status, None
             move = done.x + jump
+            if not jump.any():
+                move *= self._leash(loose, move)
             watched = free if moved and careful else free & np.repeat(self._falling(loose, contact), 3)
             length = self._search(u, move, contact, memory, step, residual, watched, patient=careful)
             if length == 0.0:
@@ -380,6 +386,7 @@ class Equilibrium:
         residual: float,
     ) -> Reached:
         kept = self._remembered(memory, contact, contact.responses, np.zeros_like(u), patient=True)
+        kept = [replace(m, anchor=np.zeros_like(m.anchor)) for m in kept]
         return Reached(u, reactions, contact.points, contact.responses, contact.slips, kept, residual)
 
     def _stiff_penalty(self, k: int, points: ContactPoints) -> NDArray[np.float64]:
@@ -387,7 +394,8 @@ class Equilibrium:
         edge = self.interfaces[k].edge[points.sites]
         return np.asarray(self._penalty * self._stiff_of[k][points.sites] / edge**2)
 
-    def _settled(self, contact: _Contact, memory: list[Memory]) -> bool:
+    def _settled(self, contact: _Contact, memory: list[Memory], negligible: float) -> bool:
+        """Whether multipliers stay: overlap is gone, and forces change by little, or by what is ``negligible``."""
         for k, (p, r, m) in enumerate(zip(contact.points, contact.responses, memory, strict=True)):
             if not r.active.any():
                 continue
@@ -395,7 +403,7 @@ class Equilibrium:
                 return False
             change = np.abs(r.pressure - m.pressure[p.sites]) + np.linalg.norm(r.friction - m.friction[p.sites], axis=1)
             size = np.abs(r.pressure) + np.linalg.norm(r.friction, axis=1)
-            if p.area @ change > _SETTLED * (p.area @ size):
+            if p.area @ change > max(_SETTLED * (p.area @ size), negligible):
                 return False
         return True
 
@@ -451,6 +459,12 @@ class Equilibrium:
                 self.trouble = f"{what} slides at {touching[0][0]}: friction is not enough to hold it"
                 return Status.SLIDING
         return Status.MAX_ITERATIONS
+
+    def _leash(self, loose: list[NDArray[np.int64]], move: NDArray[np.float64]) -> float:
+        """Share of a move by which loose bodies go no farther than they look ahead."""
+        far = max((float(np.abs(move.reshape(-1, 3)[nodes]).max()) for nodes in loose), default=0.0)
+        reach = min(interface.reach for interface in self.interfaces)
+        return min(1.0, reach / far) if far > 0.0 else 1.0
 
     def _steadied(self, matrix: BlockMatrix, own: BlockMatrix, loose: list[NDArray[np.int64]]) -> BlockMatrix:
         if not loose:
