@@ -191,3 +191,16 @@ def interpolate(
     y_out[3 * row] = s0
     y_out[3 * row + 1] = s1
     y_out[3 * row + 2] = s2
+
+
+# both precisions at once: one module to compile, whichever is asked for first
+for _real in (wp.float32, wp.float64):
+    _values = wp.array(dtype=_real)
+    _table = {"values": _values}
+    wp.overload(product, {**_table, "x": _values, "y_out": _values})
+    wp.overload(residual, {**_table, "b": _values, "x": _values, "r_out": _values})
+    _smoother = {"inverse": _values, "scale": _real, "b": _values}
+    wp.overload(first_step, {**_smoother, "step_out": _values, "x_out": _values})
+    _moving = {"momentum": _real, "x": _values, "step": _values, "x_out": _values}
+    wp.overload(chebyshev_step, {**_table, **_smoother, **_moving})
+    wp.overload(interpolate, {"weights": _values, "x": _values, "y_out": _values})

@@ -18,6 +18,10 @@ step predicted, κ (θ − 1 + Σ G_a·Δu_a / V), it is the tangent of the mixe
 
 import warp as wp
 
+from warpjld_kernels.fem_hexahedron import CORNERS, GRADIENTS
+from warpjld_kernels.fem_laws import STRESS, VOIGT
+from warpjld_kernels.lanes import prelude
+
 wp.set_module_options(
     {
         "enable_backward": False,
@@ -28,238 +32,155 @@ wp.set_module_options(
 LANES = 8
 """Elements computed together."""
 
-LINEAR = 0
-"""Linear elasticity with B-bar. Geometry stays at rest."""
-LINEAR_FULL = 1
-"""Linear elasticity with the volumetric part at every point: locks near ν = ½; for comparison."""
-NEO_HOOKE = 2
-MOONEY_RIVLIN = 3
-FUNG = 4
-"""Neo-Hookean with a shear modulus that grows as exp(β (Ī₁ − 3))."""
+
+@wp.struct
+class Batches:
+    """Ranges of rows; where each range's batches begin; elements, law and count of elements of each batch."""
+
+    ranges: wp.array(dtype=wp.int32)
+    first: wp.array(dtype=wp.int32)
+    elements: wp.array2d(dtype=wp.int32)
+    kinds: wp.array(dtype=wp.int32)
+    counts: wp.array(dtype=wp.int32)
+
+
+@wp.struct
+class Model:
+    """Places of the nodes; corners of the elements, the blocks they add to, c10, c01, κ and β, initial stress."""
+
+    nodes: wp.array(dtype=wp.float64)
+    elements: wp.array2d(dtype=wp.int32)
+    slots: wp.array2d(dtype=wp.int32)
+    laws: wp.array2d(dtype=wp.float64)
+    initial_stress: wp.array2d(dtype=wp.float64)
+
+
+@wp.struct
+class State:
+    """Displacement; pressures that K takes; displacement that is about to be added."""
+
+    displacement: wp.array(dtype=wp.float64)
+    pressures: wp.array(dtype=wp.float64)
+    increment: wp.array(dtype=wp.float64)
+
+
+@wp.struct
+class Sums:
+    """Blocks, internal forces, least Jacobian determinant and foreseen pressure of each element."""
+
+    values: wp.array(dtype=wp.float64)
+    forces: wp.array(dtype=wp.float64)
+    lowest: wp.array(dtype=wp.float64)
+    pressures: wp.array(dtype=wp.float64)
 
 
 @wp.func_native(
-    f"""
-    typedef double V __attribute__((ext_vector_type({LANES})));
-    const int voigt[6][2] = {{{{0, 0}}, {{1, 1}}, {{2, 2}}, {{0, 1}}, {{1, 2}}, {{2, 0}}}};
-    const int at[3][3] = {{{{0, 3, 5}}, {{3, 1, 4}}, {{5, 4, 2}}}};
-    const double side[8][3] = {{{{-1, -1, -1}}, {{1, -1, -1}}, {{1, 1, -1}}, {{-1, 1, -1}},
-                               {{-1, -1, 1}}, {{1, -1, 1}}, {{1, 1, 1}}, {{-1, 1, 1}}}};
+    prelude(LANES)
+    + VOIGT
+    + CORNERS
+    + f"constexpr int LANES = {LANES};"
+    + """
     int pair[8][8];
     for (int a = 0, n = 0; a < 8; ++a)
         for (int b = a; b < 8; ++b) pair[a][b] = pair[b][a] = n++;
-    double dn[8][8][3];
-    for (int q = 0; q < 8; ++q)
-        for (int a = 0; a < 8; ++a) {{
-            double h[3];
-            for (int i = 0; i < 3; ++i) h[i] = 1.0 + side[a][i] * side[q][i] * 0.57735026918962576451;
-            dn[q][a][0] = 0.125 * side[a][0] * h[1] * h[2];
-            dn[q][a][1] = 0.125 * side[a][1] * h[0] * h[2];
-            dn[q][a][2] = 0.125 * side[a][2] * h[0] * h[1];
-        }}
-    const int row0 = ranges.data[range], row1 = ranges.data[range + 1];
+    const int row0 = batches.ranges.data[range], row1 = batches.ranges.data[range + 1];
 
-    for (int batch = range_batches.data[range]; batch < range_batches.data[range + 1]; ++batch) {{
-        const int* ids = batch_elements.data + {LANES} * batch;
-        const int kind = batch_kinds.data[batch], count = batch_counts.data[batch];
-        const bool large = kind >= {NEO_HOOKE};
+    const int begin = LANES * batches.first.data[range], end = LANES * batches.first.data[range + 1];
+    for (int place = begin; place < end; place += N) {
+        const int batch = place / LANES, left = batches.counts.data[batch] - place % LANES;
+        const int* ids = batches.elements.data + place;
+        const int kind = batches.kinds.data[batch], count = left < N ? left : N;
+        const bool large = kind >= NEO_HOOKE;
 
-        V rest[8][3], now[8][3], moved[8][3], c10, c01, kappa, beta, s0[6];
-        for (int l = 0; l < {LANES}; ++l) {{
+        Doubles rest[8][3], now[8][3], moved[8][3], c10, c01, kappa, beta, s0[6];
+        for (int l = 0; l < N; ++l) {
             const int e = ids[l];
-            const double* law = laws.data + 4 * e;
-            c10[l] = law[0];
-            c01[l] = law[1];
-            kappa[l] = law[2];
-            beta[l] = law[3];
-            for (int I = 0; I < 6; ++I) s0[I][l] = initial_stress.data[6 * e + I];
+            const double* law = model.laws.data + 4 * e;
+            PICK(c10, l) = law[0];
+            PICK(c01, l) = law[1];
+            PICK(kappa, l) = law[2];
+            PICK(beta, l) = law[3];
+            for (int I = 0; I < 6; ++I) PICK(s0[I], l) = model.initial_stress.data[6 * e + I];
             for (int a = 0; a < 8; ++a)
-                for (int i = 0; i < 3; ++i) {{
-                    const int at_node = 3 * elements.data[8 * e + a] + i;
-                    rest[a][i][l] = nodes.data[at_node];
-                    moved[a][i][l] = displacement.data[at_node];
-                }}
-        }}
+                for (int i = 0; i < 3; ++i) {
+                    const int at_node = 3 * model.elements.data[8 * e + a] + i;
+                    PICK(rest[a][i], l) = model.nodes.data[at_node];
+                    PICK(moved[a][i], l) = state.displacement.data[at_node];
+                }
+        }
         for (int a = 0; a < 8; ++a)
             for (int i = 0; i < 3; ++i) now[a][i] = large ? rest[a][i] + moved[a][i] : rest[a][i];
 
-        V g[8][8][3], F[8][3][3], dV[8], dv[8], G[8][3];
-        V volume = 0, current = 0, lowest = 1e300;
-        for (int a = 0; a < 8; ++a)
-            for (int i = 0; i < 3; ++i) G[a][i] = 0;
-        for (int q = 0; q < 8; ++q) {{
-            V A[3][3], inverse0[3][3], inverse[3][3];
-            V det = 0;
-            for (int pass = 0; pass < (large ? 2 : 1); ++pass) {{
-                for (int i = 0; i < 3; ++i)
-                    for (int j = 0; j < 3; ++j) {{
-                        V s = 0;
-                        for (int a = 0; a < 8; ++a) s += (pass ? now[a][i] : rest[a][i]) * dn[q][a][j];
-                        A[i][j] = s;
-                    }}
-                for (int i = 0; i < 3; ++i) {{
-                    const int i1 = (i + 1) % 3, i2 = (i + 2) % 3;
-                    for (int j = 0; j < 3; ++j) {{
-                        const int j1 = (j + 1) % 3, j2 = (j + 2) % 3;
-                        inverse[j][i] = A[i1][j1] * A[i2][j2] - A[i1][j2] * A[i2][j1];
-                    }}
-                }}
-                det = A[0][0] * inverse[0][0] + A[0][1] * inverse[1][0] + A[0][2] * inverse[2][0];
-                for (int i = 0; i < 3; ++i)
-                    for (int j = 0; j < 3; ++j) {{
-                        inverse[i][j] /= det;
-                        if (!pass) inverse0[i][j] = inverse[i][j];
-                    }}
-                lowest = __builtin_elementwise_min(lowest, det);
-                if (!pass) dV[q] = det;
-            }}
-            dv[q] = det;
-            volume += dV[q];
-            current += det;
-            if (large)
-                for (int i = 0; i < 3; ++i)
-                    for (int j = 0; j < 3; ++j)
-                        F[q][i][j] = A[i][0] * inverse0[0][j] + A[i][1] * inverse0[1][j] + A[i][2] * inverse0[2][j];
-            for (int a = 0; a < 8; ++a)
-                for (int i = 0; i < 3; ++i) {{
-                    const double* d = dn[q][a];
-                    g[q][a][i] = d[0] * inverse[0][i] + d[1] * inverse[1][i] + d[2] * inverse[2][i];
-                    G[a][i] += g[q][a][i] * det;
-                }}
-        }}
-        for (int l = 0; l < count; ++l) lowest_out.data[ids[l]] = lowest[l];
+"""
+    + GRADIENTS
+    + """
+        for (int l = 0; l < count; ++l) out.lowest.data[ids[l]] = PICK(lowest, l);
 
-        const V pressure = large ? kappa * (current / volume - 1.0) : V(0);
-        V swelling = 0, held;
+        const Doubles pressure = large ? kappa * (current / volume - 1.0) : Doubles(0);
+        Doubles swelling = 0, held;
         for (int a = 0; a < 8; ++a)
-            for (int l = 0; l < {LANES}; ++l) {{
-                const double* step = increment.data + 3 * elements.data[8 * ids[l] + a];
-                for (int i = 0; i < 3; ++i) swelling[l] += G[a][i][l] * step[i];
-            }}
-        for (int l = 0; l < {LANES}; ++l) held[l] = pressures.data[ids[l]];
-        const V following = pressure + kappa * swelling / volume;
-        for (int l = 0; l < count; ++l) pressures_out.data[ids[l]] = following[l];
-        const V bulk = kind == {LINEAR_FULL} ? V(0) : kappa / volume;
-        V K[36][9], f[8][3];
+            for (int l = 0; l < N; ++l) {
+                const double* step = state.increment.data + 3 * model.elements.data[8 * ids[l] + a];
+                for (int i = 0; i < 3; ++i) PICK(swelling, l) += PICK(G[a][i], l) * step[i];
+            }
+        for (int l = 0; l < N; ++l) PICK(held, l) = state.pressures.data[ids[l]];
+        const Doubles following = pressure + kappa * swelling / volume;
+        for (int l = 0; l < count; ++l) out.pressures.data[ids[l]] = PICK(following, l);
+        const Doubles bulk = kind == LINEAR_FULL ? Doubles(0) : kappa / volume;
+        Doubles K[36][9], f[8][3];
         for (int n = 0; n < 36; ++n)
             for (int i = 0; i < 9; ++i) K[n][i] = 0;
         for (int a = 0; a < 8; ++a)
-            for (int i = 0; i < 3; ++i) f[a][i] = large ? pressure * G[a][i] : V(0);
+            for (int i = 0; i < 3; ++i) f[a][i] = large ? pressure * G[a][i] : Doubles(0);
 
-        for (int q = 0; q < 8; ++q) {{
-            V tau[6], D[6][6], total[6];
-            if (!large) {{
-                const V mu = 2.0 * (c10 + c01);
-                for (int I = 0; I < 6; ++I) {{
-                    tau[I] = 0;
-                    total[I] = s0[I];
-                    for (int J = 0; J < 6; ++J) {{
-                        D[I][J] = I < 3 && J < 3 ? mu * (-2.0 / 3.0) : V(0);
-                        if (I == J) D[I][J] += I < 3 ? 2.0 * mu : mu;
-                    }}
-                }}
-                if (kind == {LINEAR_FULL})
-                    for (int I = 0; I < 3; ++I)
-                        for (int J = 0; J < 3; ++J) D[I][J] += kappa;
-            }} else {{
-                const V jacobian = dv[q] / dV[q];
-                V scale;
-                for (int l = 0; l < {LANES}; ++l) {{
-                    const double j = jacobian[l] > 1e-12 ? jacobian[l] : 1e-12;
-                    scale[l] = pow(j, -2.0 / 3.0);
-                }}
-                V b[6], b2[6];
-                for (int I = 0; I < 6; ++I) {{
-                    const int i = voigt[I][0], j = voigt[I][1];
-                    b[I] = scale * (F[q][i][0] * F[q][j][0] + F[q][i][1] * F[q][j][1] + F[q][i][2] * F[q][j][2]);
-                }}
-                for (int I = 0; I < 6; ++I) {{
-                    const int i = voigt[I][0], j = voigt[I][1];
-                    b2[I] = b[at[i][0]] * b[at[0][j]] + b[at[i][1]] * b[at[1][j]] + b[at[i][2]] * b[at[2][j]];
-                }}
-                const V first = b[0] + b[1] + b[2];
-                V trace = 0, slope = c10;
-                if (kind == {FUNG})
-                    for (int l = 0; l < {LANES}; ++l) slope[l] *= exp(beta[l] * (first[l] - 3.0));
-                for (int I = 0; I < 6; ++I) tau[I] = 2.0 * slope * b[I] + 2.0 * c01 * (first * b[I] - b2[I]);
-                trace = tau[0] + tau[1] + tau[2];
-                for (int I = 0; I < 3; ++I) tau[I] -= trace / 3.0;
-                for (int I = 0; I < 6; ++I)
-                    for (int J = 0; J < 6; ++J) {{
-                        const double shape = (I < 3 && J < 3 ? -1.0 / 3.0 : 0.0) + (I == J ? (I < 3 ? 1.0 : 0.5) : 0.0);
-                        D[I][J] = (2.0 / 3.0) * (trace * shape - (I < 3 ? tau[J] : V(0)) - (J < 3 ? tau[I] : V(0)));
-                    }}
-                if (kind == {FUNG})
-                    for (int I = 0; I < 6; ++I)
-                        for (int J = 0; J < 6; ++J) D[I][J] += beta / slope * tau[I] * tau[J];
-                if (kind == {MOONEY_RIVLIN}) {{
-                    // P : 4 c01 (b ⊗ b − b ⊡ b) : P, the second invariant's own tangent
-                    V m[6];
-                    for (int I = 0; I < 6; ++I) m[I] = 4.0 * c01 * (first * b[I] - b2[I]);
-                    const V mm = m[0] + m[1] + m[2];
-                    for (int I = 0; I < 6; ++I)
-                        for (int J = 0; J < 6; ++J) {{
-                            const int i = voigt[I][0], j = voigt[I][1], k = voigt[J][0], n = voigt[J][1];
-                            const V crossed = b[at[i][k]] * b[at[j][n]] + b[at[i][n]] * b[at[j][k]];
-                            D[I][J] += 4.0 * c01 * (b[I] * b[J] - 0.5 * crossed);
-                            if (I < 3) D[I][J] -= m[J] / 3.0;
-                            if (J < 3) D[I][J] -= m[I] / 3.0;
-                            if (I < 3 && J < 3) D[I][J] += mm / 9.0;
-                        }}
-                }}
-                V FS[3][3];
-                for (int i = 0; i < 3; ++i)
-                    for (int j = 0; j < 3; ++j)
-                        FS[i][j] = F[q][i][0] * s0[at[0][j]] + F[q][i][1] * s0[at[1][j]] + F[q][i][2] * s0[at[2][j]];
-                for (int I = 0; I < 6; ++I) {{
-                    const int i = voigt[I][0], j = voigt[I][1];
-                    total[I] = tau[I] + FS[i][0] * F[q][j][0] + FS[i][1] * F[q][j][1] + FS[i][2] * F[q][j][2];
-                }}
-            }}
-            V h[8][3];
-            for (int a = 0; a < 8; ++a) {{
-                const V x = g[q][a][0], y = g[q][a][1], z = g[q][a][2];
+        for (int q = 0; q < 8; ++q) {
+"""
+    + STRESS
+    + """
+            Doubles h[8][3];
+            for (int a = 0; a < 8; ++a) {
+                const Doubles x = g[q][a][0], y = g[q][a][1], z = g[q][a][2];
                 h[a][0] = dV[q] * (total[0] * x + total[3] * y + total[5] * z);
                 h[a][1] = dV[q] * (total[3] * x + total[1] * y + total[4] * z);
                 h[a][2] = dV[q] * (total[5] * x + total[4] * y + total[2] * z);
                 for (int i = 0; i < 3; ++i) f[a][i] += h[a][i];
-            }}
+            }
             if (!want_stiffness && large) continue;
-            const V squeeze = held * dv[q];
-            for (int b = 0; b < 8; ++b) {{
-                const V x = dV[q] * g[q][b][0], y = dV[q] * g[q][b][1], z = dV[q] * g[q][b][2];
-                V C[6][3];
-                for (int I = 0; I < 6; ++I) {{
+            const Doubles squeeze = held * dv[q];
+            for (int b = 0; b < 8; ++b) {
+                const Doubles x = dV[q] * g[q][b][0], y = dV[q] * g[q][b][1], z = dV[q] * g[q][b][2];
+                Doubles C[6][3];
+                for (int I = 0; I < 6; ++I) {
                     C[I][0] = D[I][0] * x + D[I][3] * y + D[I][5] * z;
                     C[I][1] = D[I][3] * x + D[I][1] * y + D[I][4] * z;
                     C[I][2] = D[I][5] * x + D[I][4] * y + D[I][2] * z;
-                }}
-                for (int a = 0; a <= b; ++a) {{
-                    const V gx = g[q][a][0], gy = g[q][a][1], gz = g[q][a][2];
-                    V* k = K[pair[a][b]];
-                    for (int j = 0; j < 3; ++j) {{
+                }
+                for (int a = 0; a <= b; ++a) {
+                    const Doubles gx = g[q][a][0], gy = g[q][a][1], gz = g[q][a][2];
+                    Doubles* k = K[pair[a][b]];
+                    for (int j = 0; j < 3; ++j) {
                         k[j] += gx * C[0][j] + gy * C[3][j] + gz * C[5][j];
                         k[3 + j] += gx * C[3][j] + gy * C[1][j] + gz * C[4][j];
                         k[6 + j] += gx * C[5][j] + gy * C[4][j] + gz * C[2][j];
-                    }}
-                    if (large) {{
-                        const V s = h[a][0] * g[q][b][0] + h[a][1] * g[q][b][1] + h[a][2] * g[q][b][2];
+                    }
+                    if (large) {
+                        const Doubles s = h[a][0] * g[q][b][0] + h[a][1] * g[q][b][1] + h[a][2] * g[q][b][2];
                         k[0] += s;
                         k[4] += s;
                         k[8] += s;
-                        const V xy = squeeze * (gx * g[q][b][1] - gy * g[q][b][0]);
-                        const V yz = squeeze * (gy * g[q][b][2] - gz * g[q][b][1]);
-                        const V zx = squeeze * (gz * g[q][b][0] - gx * g[q][b][2]);
+                        const Doubles xy = squeeze * (gx * g[q][b][1] - gy * g[q][b][0]);
+                        const Doubles yz = squeeze * (gy * g[q][b][2] - gz * g[q][b][1]);
+                        const Doubles zx = squeeze * (gz * g[q][b][0] - gx * g[q][b][2]);
                         k[1] += xy;
                         k[3] -= xy;
                         k[5] += yz;
                         k[7] -= yz;
                         k[6] += zx;
                         k[2] -= zx;
-                    }}
-                }}
-            }}
-        }}
+                    }
+                }
+            }
+        }
         if (want_stiffness || !large)
             for (int b = 0; b < 8; ++b)
                 for (int a = 0; a <= b; ++a)
@@ -267,101 +188,47 @@ FUNG = 4
                         for (int j = 0; j < 3; ++j) K[pair[a][b]][3 * i + j] += bulk * G[a][i] * G[b][j];
         if (!large)
             for (int a = 0; a < 8; ++a)
-                for (int b = 0; b < 8; ++b) {{
-                    const V* k = K[pair[a][b]];
+                for (int b = 0; b < 8; ++b) {
+                    const Doubles* k = K[pair[a][b]];
                     for (int i = 0; i < 3; ++i)
                         for (int j = 0; j < 3; ++j) f[a][i] += (a <= b ? k[3 * i + j] : k[3 * j + i]) * moved[b][j];
-                }}
+                }
 
-        for (int l = 0; l < count; ++l) {{
+        for (int l = 0; l < count; ++l) {
             const int e = ids[l];
-            for (int a = 0; a < 8; ++a) {{
-                const int row = elements.data[8 * e + a];
+            for (int a = 0; a < 8; ++a) {
+                const int row = model.elements.data[8 * e + a];
                 if (row < row0 || row >= row1) continue;
-                for (int i = 0; i < 3; ++i) forces_out.data[3 * row + i] += f[a][i][l];
+                for (int i = 0; i < 3; ++i) out.forces.data[3 * row + i] += PICK(f[a][i], l);
                 if (!want_stiffness) continue;
-                for (int b = 0; b < 8; ++b) {{
-                    double* out = values_out.data + 9 * size_t(slots.data[64 * size_t(e) + 8 * a + b]);
-                    const V* k = K[pair[a][b]];
+                for (int b = 0; b < 8; ++b) {
+                    double* block = out.values.data + 9 * size_t(model.slots.data[64 * size_t(e) + 8 * a + b]);
+                    const Doubles* k = K[pair[a][b]];
                     if (a <= b)
-                        for (int i = 0; i < 9; ++i) out[i] += k[i][l];
+                        for (int i = 0; i < 9; ++i) block[i] += PICK(k[i], l);
                     else
                         for (int i = 0; i < 3; ++i)
-                            for (int j = 0; j < 3; ++j) out[3 * i + j] += k[3 * j + i][l];
-                }}
-            }}
-        }}
-    }}
+                            for (int j = 0; j < 3; ++j) block[3 * i + j] += PICK(k[3 * j + i], l);
+                }
+            }
+        }
+    }
 """
 )
-def add_elements(
-    range: int,
-    ranges: wp.array(dtype=wp.int32),
-    range_batches: wp.array(dtype=wp.int32),
-    batch_elements: wp.array2d(dtype=wp.int32),
-    batch_kinds: wp.array(dtype=wp.int32),
-    batch_counts: wp.array(dtype=wp.int32),
-    nodes: wp.array(dtype=wp.float64),
-    elements: wp.array2d(dtype=wp.int32),
-    slots: wp.array2d(dtype=wp.int32),
-    laws: wp.array2d(dtype=wp.float64),
-    initial_stress: wp.array2d(dtype=wp.float64),
-    displacement: wp.array(dtype=wp.float64),
-    pressures: wp.array(dtype=wp.float64),
-    increment: wp.array(dtype=wp.float64),
-    want_stiffness: wp.bool,
-    values_out: wp.array(dtype=wp.float64),
-    forces_out: wp.array(dtype=wp.float64),
-    lowest_out: wp.array(dtype=wp.float64),
-    pressures_out: wp.array(dtype=wp.float64),
-): ...
+def add_elements(range: int, batches: Batches, model: Model, state: State, want_stiffness: wp.bool, out: Sums): ...
 
 
 @wp.kernel
 def assemble(
     # ranges of rows and their batches of elements
     first: int,
-    ranges: wp.array(dtype=wp.int32),
-    range_batches: wp.array(dtype=wp.int32),
-    batch_elements: wp.array2d(dtype=wp.int32),
-    batch_kinds: wp.array(dtype=wp.int32),
-    batch_counts: wp.array(dtype=wp.int32),
-    # model
-    nodes: wp.array(dtype=wp.float64),
-    elements: wp.array2d(dtype=wp.int32),
-    slots: wp.array2d(dtype=wp.int32),
-    laws: wp.array2d(dtype=wp.float64),
-    initial_stress: wp.array2d(dtype=wp.float64),
-    # state
-    displacement: wp.array(dtype=wp.float64),
-    pressures: wp.array(dtype=wp.float64),
-    increment: wp.array(dtype=wp.float64),
+    batches: Batches,
+    # model and state
+    model: Model,
+    state: State,
     want_stiffness: wp.bool,
-    # out: zero before
-    values_out: wp.array(dtype=wp.float64),
-    forces_out: wp.array(dtype=wp.float64),
-    lowest_out: wp.array(dtype=wp.float64),
-    pressures_out: wp.array(dtype=wp.float64),
+    # out: values and forces are zero before
+    out: Sums,
 ):
     """Tangent blocks, internal forces, and the lowest Jacobian determinant of each element, at a displacement."""
-    add_elements(
-        first + wp.tid(),
-        ranges,
-        range_batches,
-        batch_elements,
-        batch_kinds,
-        batch_counts,
-        nodes,
-        elements,
-        slots,
-        laws,
-        initial_stress,
-        displacement,
-        pressures,
-        increment,
-        want_stiffness,
-        values_out,
-        forces_out,
-        lowest_out,
-        pressures_out,
-    )
+    add_elements(first + wp.tid(), batches, model, state, want_stiffness, out)

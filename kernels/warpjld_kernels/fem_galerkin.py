@@ -14,20 +14,38 @@ wp.set_module_options(
 )
 
 
+@wp.struct
+class Blocks:
+    """Rows of 3×3 blocks: where each begins, columns ascending, nine values a block."""
+
+    rows: wp.array(dtype=wp.int32)
+    columns: wp.array(dtype=wp.int32)
+    values: wp.array(dtype=wp.float64)
+
+
+@wp.struct
+class Weights:
+    """Rows of scalar weights."""
+
+    rows: wp.array(dtype=wp.int32)
+    columns: wp.array(dtype=wp.int32)
+    weights: wp.array(dtype=wp.float64)
+
+
 @wp.func_native(
     """
     int* mark = marker.data + size_t(range) * marker.shape[1];
-    for (int coarse = ranges.data[range]; coarse < ranges.data[range + 1]; ++coarse) {
+    for (int row = ranges.data[range]; row < ranges.data[range + 1]; ++row) {
         int count = 0;
-        int* found = fill ? out_columns.data + out_rows.data[coarse] : mark;
-        for (int k = pt_rows.data[coarse]; k < pt_rows.data[coarse + 1]; ++k) {
-            const int fine = pt_columns.data[k];
-            for (int m = k_rows.data[fine]; m < k_rows.data[fine + 1]; ++m) {
-                const int other = k_columns.data[m];
-                for (int n = p_rows.data[other]; n < p_rows.data[other + 1]; ++n) {
-                    const int column = p_columns.data[n];
-                    if (mark[column] == coarse) continue;
-                    mark[column] = coarse;
+        int* found = fill ? coarse.columns.data + coarse.rows.data[row] : mark;
+        for (int k = down.rows.data[row]; k < down.rows.data[row + 1]; ++k) {
+            const int node = down.columns.data[k];
+            for (int m = fine.rows.data[node]; m < fine.rows.data[node + 1]; ++m) {
+                const int other = fine.columns.data[m];
+                for (int n = up.rows.data[other]; n < up.rows.data[other + 1]; ++n) {
+                    const int column = up.columns.data[n];
+                    if (mark[column] == row) continue;
+                    mark[column] = row;
                     if (fill) {
                         int place = count;
                         while (place > 0 && found[place - 1] > column) {
@@ -40,7 +58,7 @@ wp.set_module_options(
                 }
             }
         }
-        if (!fill) out_rows.data[coarse + 1] = count;
+        if (!fill) coarse.rows.data[row + 1] = count;
     }
 """
 )
@@ -48,15 +66,11 @@ def coarse_rows(
     range: int,
     ranges: wp.array(dtype=wp.int32),
     fill: wp.bool,
-    k_rows: wp.array(dtype=wp.int32),
-    k_columns: wp.array(dtype=wp.int32),
-    p_rows: wp.array(dtype=wp.int32),
-    p_columns: wp.array(dtype=wp.int32),
-    pt_rows: wp.array(dtype=wp.int32),
-    pt_columns: wp.array(dtype=wp.int32),
+    fine: Blocks,
+    up: Weights,
+    down: Weights,
     marker: wp.array2d(dtype=wp.int32),
-    out_rows: wp.array(dtype=wp.int32),
-    out_columns: wp.array(dtype=wp.int32),
+    coarse: Blocks,
 ): ...
 
 
@@ -66,56 +80,39 @@ def coarse_pattern(
     first: int,
     ranges: wp.array(dtype=wp.int32),
     fill: wp.bool,
-    # fine matrix and weights
-    k_rows: wp.array(dtype=wp.int32),
-    k_columns: wp.array(dtype=wp.int32),
-    p_rows: wp.array(dtype=wp.int32),
-    p_columns: wp.array(dtype=wp.int32),
-    pt_rows: wp.array(dtype=wp.int32),
-    pt_columns: wp.array(dtype=wp.int32),
+    # fine matrix, P and its transpose
+    fine: Blocks,
+    up: Weights,
+    down: Weights,
     # scratch
     marker: wp.array2d(dtype=wp.int32),
     # out
-    rows_out: wp.array(dtype=wp.int32),
-    columns_out: wp.array(dtype=wp.int32),
+    coarse_out: Blocks,
 ):
     """Without ``fill``: blocks in each coarse row; with it: their columns, ascending. ``marker`` must hold −1."""
-    coarse_rows(
-        first + wp.tid(),
-        ranges,
-        fill,
-        k_rows,
-        k_columns,
-        p_rows,
-        p_columns,
-        pt_rows,
-        pt_columns,
-        marker,
-        rows_out,
-        columns_out,
-    )
+    coarse_rows(first + wp.tid(), ranges, fill, fine, up, down, marker, coarse_out)
 
 
 @wp.func_native(
     """
     int* place = marker.data + size_t(range) * marker.shape[1];
-    for (int coarse = ranges.data[range]; coarse < ranges.data[range + 1]; ++coarse) {
-        const int begin = c_rows.data[coarse], end = c_rows.data[coarse + 1];
-        for (int m = begin; m < end; ++m) place[c_columns.data[m]] = m;
-        for (int k = pt_rows.data[coarse]; k < pt_rows.data[coarse + 1]; ++k) {
-            const int fine = pt_columns.data[k];
-            const double outer = pt_weights.data[k];
-            const double* keep_row = mask.data + 3 * fine;
-            for (int m = k_rows.data[fine]; m < k_rows.data[fine + 1]; ++m) {
-                const int other = k_columns.data[m];
-                const double* v = k_values.data + 9 * size_t(m);
+    for (int row = ranges.data[range]; row < ranges.data[range + 1]; ++row) {
+        const int begin = coarse.rows.data[row], end = coarse.rows.data[row + 1];
+        for (int m = begin; m < end; ++m) place[coarse.columns.data[m]] = m;
+        for (int k = down.rows.data[row]; k < down.rows.data[row + 1]; ++k) {
+            const int node = down.columns.data[k];
+            const double outer = down.weights.data[k];
+            const double* keep_row = mask.data + 3 * node;
+            for (int m = fine.rows.data[node]; m < fine.rows.data[node + 1]; ++m) {
+                const int other = fine.columns.data[m];
+                const double* v = fine.values.data + 9 * size_t(m);
                 const double* keep = mask.data + 3 * other;
                 double block[9];
                 for (int i = 0; i < 3; ++i)
                     for (int j = 0; j < 3; ++j) block[3 * i + j] = outer * keep_row[i] * keep[j] * v[3 * i + j];
-                for (int n = p_rows.data[other]; n < p_rows.data[other + 1]; ++n) {
-                    const double w = p_weights.data[n];
-                    double* out = c_values.data + 9 * size_t(place[p_columns.data[n]]);
+                for (int n = up.rows.data[other]; n < up.rows.data[other + 1]; ++n) {
+                    const double w = up.weights.data[n];
+                    double* out = coarse.values.data + 9 * size_t(place[up.columns.data[n]]);
                     for (int i = 0; i < 9; ++i) out[i] += w * block[i];
                 }
             }
@@ -126,20 +123,12 @@ def coarse_pattern(
 def coarse_sums(
     range: int,
     ranges: wp.array(dtype=wp.int32),
-    k_rows: wp.array(dtype=wp.int32),
-    k_columns: wp.array(dtype=wp.int32),
-    k_values: wp.array(dtype=wp.float64),
+    fine: Blocks,
     mask: wp.array(dtype=wp.float64),
-    p_rows: wp.array(dtype=wp.int32),
-    p_columns: wp.array(dtype=wp.int32),
-    p_weights: wp.array(dtype=wp.float64),
-    pt_rows: wp.array(dtype=wp.int32),
-    pt_columns: wp.array(dtype=wp.int32),
-    pt_weights: wp.array(dtype=wp.float64),
-    c_rows: wp.array(dtype=wp.int32),
-    c_columns: wp.array(dtype=wp.int32),
+    up: Weights,
+    down: Weights,
     marker: wp.array2d(dtype=wp.int32),
-    c_values: wp.array(dtype=wp.float64),
+    coarse: Blocks,
 ): ...
 
 
@@ -148,41 +137,15 @@ def coarse_values(
     # ranges of coarse rows
     first: int,
     ranges: wp.array(dtype=wp.int32),
-    # fine matrix, its free degrees of freedom (1 free, 0 prescribed), weights and their transpose
-    k_rows: wp.array(dtype=wp.int32),
-    k_columns: wp.array(dtype=wp.int32),
-    k_values: wp.array(dtype=wp.float64),
+    # fine matrix, its free degrees of freedom (1 free, 0 prescribed), P and its transpose
+    fine: Blocks,
     mask: wp.array(dtype=wp.float64),
-    p_rows: wp.array(dtype=wp.int32),
-    p_columns: wp.array(dtype=wp.int32),
-    p_weights: wp.array(dtype=wp.float64),
-    pt_rows: wp.array(dtype=wp.int32),
-    pt_columns: wp.array(dtype=wp.int32),
-    pt_weights: wp.array(dtype=wp.float64),
-    # coarse pattern
-    c_rows: wp.array(dtype=wp.int32),
-    c_columns: wp.array(dtype=wp.int32),
+    up: Weights,
+    down: Weights,
     # scratch
     marker: wp.array2d(dtype=wp.int32),
-    # out, zero before
-    values_out: wp.array(dtype=wp.float64),
+    # out: its pattern is known, its values are zero before
+    coarse_out: Blocks,
 ):
     """Blocks of Pᵀ M K M P, M the mask."""
-    coarse_sums(
-        first + wp.tid(),
-        ranges,
-        k_rows,
-        k_columns,
-        k_values,
-        mask,
-        p_rows,
-        p_columns,
-        p_weights,
-        pt_rows,
-        pt_columns,
-        pt_weights,
-        c_rows,
-        c_columns,
-        marker,
-        values_out,
-    )
+    coarse_sums(first + wp.tid(), ranges, fine, mask, up, down, marker, coarse_out)

@@ -2,21 +2,25 @@
 
 import warp as wp
 
-wp.set_module_options({"max_unroll": 1, "enable_backward": False})
+from warpjld_kernels.triangle_tree import SLIVER, Tree, nearest_triangle
+
+wp.set_module_options(
+    {
+        "max_unroll": 1,
+        "enable_backward": False,
+        "cpu_compiler_flags": "-march=native -ffp-contract=fast -mprefer-vector-width=512",
+    }
+)
 
 FAR = wp.constant(1.0e10)
 # half-width of the band round 1/2 in which a winding number by far-field expansion is not trusted
 _DOUBT = wp.constant(0.15)
 _ACCURACY = wp.constant(2.0)
-# barycentric coordinate below which a nearest point lies on the opposite edge
-_ON_EDGE = wp.constant(1.0e-6)
-CHUNK = wp.constant(64)
-"""Points one thread measures one after another: each gives the next an upper bound of its distance."""
 
 
 @wp.struct
 class Solids:
-    """Surfaces of objects, each in its own frame.
+    """Surfaces of objects, each in its own frame; ``mesh`` serves winding numbers, ``tree`` nearest points.
 
     ``features`` are seven normals a triangle: the face's own, those of its edges opposite to corner 0, 1 and 2, and
     those of its corners; edges take the sum of their faces' normals, corners the sum weighted by angle.
@@ -26,6 +30,7 @@ class Solids:
     first_face: wp.array(dtype=wp.int32)
     solid: wp.array(dtype=wp.int32)
     features: wp.array2d(dtype=wp.vec3)
+    tree: Tree
 
 
 @wp.struct
@@ -68,56 +73,75 @@ def winds_round(mesh: wp.uint64, point: wp.vec3) -> bool:
 
 
 @wp.func
-def feature_of(u: float, v: float) -> int:
-    """Column of ``features`` for a nearest point with these weights of corners 0 and 1."""
-    w = 1.0 - u - v
-    at_edge = int(0)
-    count = int(0)
-    corner = int(0)
-    if u < _ON_EDGE:
-        at_edge = 1
-        count += 1
-    else:
-        corner = 0
-    if v < _ON_EDGE:
-        at_edge = 2
-        count += 1
-    else:
-        corner = 1
-    if w < _ON_EDGE:
-        at_edge = 3
-        count += 1
-    else:
-        corner = 2
-    if count == 2:
-        return 4 + corner
-    if count == 1:
-        return at_edge
-    return 0
+def nearest_on_edge(a: wp.vec3d, b: wp.vec3d) -> wp.vec4d:
+    """Point nearest to the origin on the line from a to b, and where on it: 0 at a, 1 at b, both included."""
+    edge = b - a
+    t = -wp.dot(a, edge) / wp.max(wp.dot(edge, edge), wp.float64(1.0e-300))
+    t = wp.clamp(t, wp.float64(0.0), wp.float64(1.0))
+    x = a + t * edge
+    return wp.vec4d(x[0], x[1], x[2], t)
 
 
 @wp.func
-def nearest(solids: Solids, o: int, point: wp.vec3, limit: float) -> Hit:
-    """Signed distance of a point in an object's frame, negative inside.
+def nearest_on_triangle(a: wp.vec3d, b: wp.vec3d, c: wp.vec3d) -> wp.vec4d:
+    """Point of a triangle nearest to the origin, and the column of ``features`` of what it lies on."""
+    zero = wp.float64(0.0)
+    normal = wp.cross(b - a, c - a)
+    over = wp.min(wp.dot(wp.cross(a, b), normal), wp.dot(wp.cross(b, c), normal))
+    over = wp.min(over, wp.dot(wp.cross(c, a), normal))
+    wide = wp.dot(normal, normal)
+    lengths = wp.dot(b - a, b - a) + wp.dot(c - b, c - b) + wp.dot(a - c, a - c)
+    if over >= zero and wide > wp.float64(SLIVER) * lengths * lengths:
+        foot = (wp.dot(a, normal) / wide) * normal
+        return wp.vec4d(foot[0], foot[1], foot[2], zero)
+    best = wp.vec4d(zero)
+    least = wp.float64(FAR) * wp.float64(FAR)
+    for k in range(3):
+        start = b
+        end = c
+        if k == 1:
+            start = c
+            end = a
+        if k == 2:
+            start = a
+            end = b
+        found = nearest_on_edge(start, end)
+        away = wp.vec3d(found[0], found[1], found[2])
+        if wp.dot(away, away) < least:
+            least = wp.dot(away, away)
+            feature = 1 + k
+            if found[3] <= zero:
+                feature = 4 + (k + 1) % 3
+            if found[3] >= wp.float64(1.0):
+                feature = 4 + (k + 2) % 3
+            best = wp.vec4d(found[0], found[1], found[2], wp.float64(feature))
+    return best
+
+
+@wp.func
+def nearest(solids: Solids, o: int, point: wp.vec3d, limit: wp.float64) -> Hit:
+    """Signed distance of a point in an object's frame, negative inside; within ``limit``.
 
     On the border of a solid the side of the nearest feature's normal tells inside from outside (Bærentzen and Aanæs
     2005); elsewhere the winding number does.
     """
     hit = Hit()
     hit.distance = FAR
-    hit.face = int(-1)
-    mesh = solids.mesh[o]
-    query = wp.mesh_query_point_no_sign(mesh, point, limit)
-    if query.result:
-        hit.face = query.face
-        hit.point = wp.mesh_eval_position(mesh, query.face, query.u, query.v)
-        away = point - hit.point
-        hit.distance = wp.length(away)
+    hit.face = nearest_triangle(solids.tree, o, point, limit)
+    if hit.face >= 0:
+        surface = wp.mesh_get(solids.mesh[o])
+        a = wp.vec3d(surface.points[surface.indices[3 * hit.face]]) - point
+        b = wp.vec3d(surface.points[surface.indices[3 * hit.face + 1]]) - point
+        c = wp.vec3d(surface.points[surface.indices[3 * hit.face + 2]]) - point
+        found = nearest_on_triangle(a, b, c)
+        to_it = wp.vec3d(found[0], found[1], found[2])
+        hit.point = wp.vec3(to_it + point)
+        hit.distance = float(wp.length(to_it))
         if solids.solid[o] == 1:
-            normal = solids.features[solids.first_face[o] + query.face, feature_of(query.u, query.v)]
-            if wp.dot(away, normal) < 0.0:
+            normal = wp.vec3d(solids.features[solids.first_face[o] + hit.face, int(found[3])])
+            if wp.dot(to_it, normal) > wp.float64(0.0):
                 hit.distance = -hit.distance
-        elif winds_round(mesh, point):
+        elif winds_round(solids.mesh[o], wp.vec3(point)):
             hit.distance = -hit.distance
     return hit
 
@@ -128,13 +152,13 @@ def measure(
     solids: Solids,
     # rows
     object_of: wp.array(dtype=wp.int32),
-    position: wp.array(dtype=wp.vec3),
-    rotation: wp.array(dtype=wp.quat),
+    position: wp.array(dtype=wp.vec3d),
+    rotation: wp.array(dtype=wp.quatd),
     set_of: wp.array(dtype=wp.int32),
     # points
     points: wp.array2d(dtype=wp.vec3),
-    limit: float,
-    first_chunk: int,
+    limit: wp.float64,
+    first: int,
     # out
     distance_out: wp.array2d(dtype=float),
     face_out: wp.array2d(dtype=wp.int32),
@@ -145,25 +169,11 @@ def measure(
     ``point_out`` may be empty.
     """
     row, part = wp.tid()
-    o = object_of[row]
+    i = first + part
     turn = rotation[row]
     origin = position[row]
-    start = (first_chunk + part) * CHUNK
-    end = wp.min(start + CHUNK, points.shape[1])
-    bound = limit
-    last = wp.vec3(0.0)
-    for i in range(start, end):
-        local = wp.quat_rotate_inv(turn, points[set_of[row], i] - origin)
-        if i > start:
-            bound = limit
-            if last[0] < FAR:
-                # the last point's nearest one is on the surface as well; the margin covers rounding
-                bound = wp.min(limit, 1.0001 * wp.length(local - last) + 1.0e-6)
-        hit = nearest(solids, o, local, bound)
-        distance_out[row, i] = hit.distance
-        face_out[row, i] = hit.face
-        last = wp.vec3(FAR, 0.0, 0.0)
-        if hit.face >= 0:
-            last = hit.point
-            if point_out.shape[0] > 0:
-                point_out[row, i] = wp.quat_rotate(turn, hit.point) + origin
+    hit = nearest(solids, object_of[row], wp.quat_rotate_inv(turn, wp.vec3d(points[set_of[row], i]) - origin), limit)
+    distance_out[row, i] = hit.distance
+    face_out[row, i] = hit.face
+    if hit.face >= 0 and point_out.shape[0] > 0:
+        point_out[row, i] = wp.vec3(wp.quat_rotate(turn, wp.vec3d(hit.point)) + origin)

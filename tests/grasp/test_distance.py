@@ -42,7 +42,7 @@ def samples(thing, count: int, seed: int = 0) -> np.ndarray:
     size = np.linalg.norm(high - low)
     near = on + rng.normal(size=(count, 3)) * size * 0.01
     around = rng.uniform(low - 0.2 * size, high + 0.2 * size, size=(count, 3))
-    far = rng.normal(size=(count // 10, 3)) * min(3 * size, 1.0)  # float32 tells 1e-6 m up to 8 m
+    far = rng.normal(size=(count // 10, 3)) * 3 * size
     return np.concatenate([near, around, far]).astype(np.float32).astype(np.float64)
 
 
@@ -113,7 +113,7 @@ def test_limit_leaves_far_points_out_and_changes_nothing_near() -> None:
 
 
 @settings(max_examples=25, deadline=None)
-@given(st.tuples(*[st.floats(-0.2, 0.2)] * 3), st.tuples(*[st.floats(-1, 1)] * 4), st.integers(0, 3099))
+@given(st.tuples(*[st.floats(-0.2, 0.2)] * 3), st.tuples(*[st.floats(-1, 1)] * 4), st.integers(0, 2999))
 def test_a_facet_basis_moves_with_its_object(shift, turn, facet) -> None:
     if np.linalg.norm(turn) < 0.1:
         return

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -14,35 +13,11 @@ from warpjld.fem.contact.barr import Barr
 from warpjld.fem.contact.meshes import Keyframed
 from warpjld.fem.contact.solids import Box, Sphere
 from warpjld.press.wishes import Points
-from warpjld.rig import Rig
-from warpjld.script import Interpreter, Scene
 from warpjld.script.pressing import prop_obstacle
 from warpjld.script.props import prop_places
 from warpjld.script.staging import frame_numbers
 
 READY = "OBJECT ball BALL 0.06 AT 0.1 0.2 0.3\nOBJECT table BOX 0.4 0.02 0.3\nPHYSICAL ball YOUNG 1e6"
-
-
-@pytest.fixture(scope="module")
-def rig() -> Rig:
-    """A coarse hand."""
-    from warpjld.hand import build_hand
-
-    return build_hand("left", resolution=1500)
-
-
-@pytest.fixture
-def run(rig: Rig) -> Callable[[str], Scene]:
-    """Runs lines on a stage with a left hand."""
-    scene = Scene(say=lambda text: None)
-    scene.add("left", rig)
-    interpreter = Interpreter(scene)
-
-    def run_text(text: str) -> Scene:
-        interpreter.run_text(text)
-        return scene
-
-    return run_text
 
 
 def test_a_physical_ball(run) -> None:
@@ -156,7 +131,7 @@ def test_built_in_shapes_are_exact_obstacles(run) -> None:
         ("PHYSICAL ball HOLLOW 0.03", r"a wall must be thinner than half of BALL, 0.03 m"),
         ("PHYSICAL ball PRESSURE 1000", r"only a hollow object has an inside"),
         ("FLESH right", r"4:7: there is no actor right"),
-        ("FLESH left TOE", r"expected an option \(ELEMENT/YOUNG/SKIN/POISSON/ITSELF\), found TOE"),
+        ("FLESH left TOE", r"expected an option \(ELEMENT/YOUNG/SKIN/POISSON/STIFFENING/ITSELF\), found TOE"),
         ("FRICTION left ball nan", r"expected the coefficient of friction, found nan"),
         ("FRICTION left ball -1", r"must be 0 or more, got -1"),
         ("FRICTION left bal 1", r"there is no actor or object BAL; did you mean BALL"),

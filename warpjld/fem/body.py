@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -14,7 +13,7 @@ from warpjld.fem.blockmatrix import BlockMatrix
 from warpjld.fem.hexmesh import HexMesh
 from warpjld.fem.materials import NEO_HOOKE, Material, laws_of
 from warpjld.fem.pattern import Pattern, batches_of, pattern_of
-from warpjld.fem.rows import on_rows, shared, threads_of
+from warpjld.fem.rows import grouped, on_rows, threads_of
 
 __all__ = ["Body", "Tangent"]
 
@@ -120,18 +119,25 @@ class Body:
         lowest = np.empty(len(self._elements))
         found = np.empty(len(self._elements))
         b = self._batches
-        tables: list[NDArray[Any]] = [
-            b.ranges,
-            b.range_batches,
-            b.elements,
-            b.kinds,
-            b.counts,
-            self._nodes,
-            self._elements,
-        ]
-        tables += [self.pattern.slots, self.constants, self.initial_stress, u, pressures, step]
-        outputs: list[NDArray[Any]] = [values.reshape(-1), forces, lowest, found]
-        arguments: list[Any] = [*(shared(t) for t in tables), stiffness, *(shared(o) for o in outputs)]
+        batches = grouped(
+            fem_element.Batches,
+            ranges=b.ranges,
+            first=b.range_batches,
+            elements=b.elements,
+            kinds=b.kinds,
+            counts=b.counts,
+        )
+        model = grouped(
+            fem_element.Model,
+            nodes=self._nodes,
+            elements=self._elements,
+            slots=self.pattern.slots,
+            laws=self.constants,
+            initial_stress=self.initial_stress,
+        )
+        state = grouped(fem_element.State, displacement=u, pressures=pressures, increment=step)
+        out = grouped(fem_element.Sums, values=values.reshape(-1), forces=forces, lowest=lowest, pressures=found)
+        arguments = [batches, model, state, stiffness, out]
         on_rows(fem_element.assemble, len(b.ranges) - 1, arguments, threads=self.threads, least=2)
         matrix = BlockMatrix(self.pattern.rows, self.pattern.columns, values) if stiffness else None
         return Tangent(matrix, forces, lowest, found)

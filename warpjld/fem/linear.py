@@ -21,6 +21,7 @@ from warpjld.fem.rows import Launch, shared, threads_of
 __all__ = ["METHODS", "LinearSolver"]
 
 METHODS = ("auto", "multigrid", "aggregation", "jacobi", "direct")
+PRECISIONS = ("float64", "float32")
 _SMALL = 1500
 """Degrees of freedom below which ``auto`` solves directly."""
 _STIFF = 0.4
@@ -63,8 +64,8 @@ class LinearSolver:
     ) -> None:
         if method not in METHODS:
             raise InputError(f"method: want one of {', '.join(METHODS)}, got '{method}'")
-        if precision not in {"float32", "float64"}:
-            raise InputError(f"precision: want float32 or float64, got '{precision}'")
+        if precision not in PRECISIONS:
+            raise InputError(f"precision: want {' or '.join(PRECISIONS)}, got '{precision}'")
         if method == "auto":
             method = "direct" if int(free.sum()) < _SMALL else "multigrid"
         self.method = method

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -54,6 +54,18 @@ class Loads:
     traction: Mapping[str, tuple[float, float, float]] = field(default_factory=dict)
     forces: Mapping[str, tuple[float, float, float]] = field(default_factory=dict)
     nodal: NDArray[np.float64] | None = None
+
+    def scaled(self, share: float) -> Loads:
+        """A share of the loads: forces in proportion, and a slower turn."""
+        turn = self.centrifugal
+        return Loads(
+            gravity=_scaled(self.gravity, share),
+            centrifugal=turn and replace(turn, speed=turn.speed * float(np.sqrt(share))),
+            pressure={name: share * p for name, p in self.pressure.items()},
+            traction={name: _scaled(t, share) for name, t in self.traction.items()},
+            forces={name: _scaled(f, share) for name, f in self.forces.items()},
+            nodal=None if self.nodal is None else share * self.nodal,
+        )
 
 
 def external_forces(body: Body, loads: Loads, displacement: NDArray[np.float64] | None = None) -> NDArray[np.float64]:
@@ -171,6 +183,11 @@ def _faces(mesh: HexMesh, name: str, kind: str) -> NDArray[np.int32]:
     if len(faces) == 0:
         raise InputError(f"loads: {kind} on face set '{name}', which is empty")
     return faces
+
+
+def _scaled(vector: tuple[float, float, float], share: float) -> tuple[float, float, float]:
+    x, y, z = (share * float(v) for v in vector)
+    return x, y, z
 
 
 def _vector(value: ArrayLike, name: str) -> NDArray[np.float64]:

@@ -27,7 +27,7 @@ class Material:
     """What an element needs to know.
 
     Attributes:
-        kind: Law, as ``warpjld_kernels.fem_element`` numbers them.
+        kind: Law, as ``warpjld_kernels.fem_laws`` numbers them.
         c10: Half the shear modulus, or Mooney and Rivlin's first constant [Pa].
         c01: Mooney and Rivlin's second constant [Pa].
         bulk: Bulk modulus [Pa].

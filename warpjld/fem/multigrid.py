@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from warpjld.errors import WarpjldError
 from warpjld.fem.blockmatrix import BlockMatrix, padded
 from warpjld.fem.dots import dot
-from warpjld.fem.rows import Launch, on_rows, shared, threads_of
+from warpjld.fem.rows import Launch, grouped, on_rows, shared, threads_of
 
 __all__ = ["IndefiniteError", "Multigrid", "block_inverse", "coarse_matrix"]
 
@@ -35,28 +35,24 @@ def coarse_matrix(
     parts = threads if count >= 64 else 1
     edges = np.searchsorted(work, np.linspace(0, work[-1], parts + 1)).astype(np.int32)
     edges[0], edges[-1] = 0, count
-    kept = [
-        np.ascontiguousarray(a)
-        for a in (fine.rows, fine.columns, weights.indptr, weights.indices, transposed.indptr, transposed.indices)
-    ]
-    ranges = shared(edges)
     rows = np.zeros(count + 1, np.int32)
+    ranges, mask = shared(edges), shared(free.astype(np.float64))
+    model = grouped(fem_galerkin.Blocks, rows=fine.rows, columns=fine.columns, values=fine.values.reshape(-1))
+    up, down = (
+        grouped(fem_galerkin.Weights, rows=w.indptr, columns=w.indices, weights=w.data) for w in (weights, transposed)
+    )
     marker = np.full((parts, count), -1, np.int32)
-    tables = [shared(a) for a in kept]
-    nothing = np.zeros(1, np.int32)
-    arguments = [ranges, False, *tables, shared(marker), shared(rows), shared(nothing)]
+    table = shared(marker)
+    coarse = grouped(fem_galerkin.Blocks, rows=rows, columns=np.zeros(1, np.int32), values=np.zeros(1))
+    arguments = [ranges, False, model, up, down, table, coarse]
     on_rows(fem_galerkin.coarse_pattern, parts, arguments, threads=threads, least=2)
     np.cumsum(rows, out=rows)
-    columns = np.empty(rows[-1], np.int32)
+    columns, values = np.empty(rows[-1], np.int32), np.zeros((rows[-1], 3, 3))
+    coarse = grouped(fem_galerkin.Blocks, rows=rows, columns=columns, values=values.reshape(-1))
     marker.fill(-1)
-    arguments = [ranges, True, *tables, shared(marker), shared(rows), shared(columns)]
+    arguments = [ranges, True, model, up, down, table, coarse]
     on_rows(fem_galerkin.coarse_pattern, parts, arguments, threads=threads, least=2)
-    values = np.zeros((rows[-1], 3, 3))
-    k_rows, k_columns, p_rows, p_columns, t_rows, t_columns = tables
-    mask = free.astype(np.float64)
-    arguments = [ranges, k_rows, k_columns, shared(fine.values.reshape(-1)), shared(mask)]
-    arguments += [p_rows, p_columns, shared(weights.data), t_rows, t_columns, shared(transposed.data)]
-    arguments += [shared(rows), shared(columns), shared(marker), shared(values.reshape(-1))]
+    arguments = [ranges, model, mask, up, down, table, coarse]
     on_rows(fem_galerkin.coarse_values, parts, arguments, threads=threads, least=2)
     return BlockMatrix(rows, columns, values)
 

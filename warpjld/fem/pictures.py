@@ -85,7 +85,7 @@ def _panel(
     plotter.camera.parallel_scale = 1.12 * float(np.abs(spread).max())
     plotter.camera.clipping_range = (0.1 * reach, 10 * reach)
     if title:
-        plotter.add_text(title, font_size=20, color="black", position="upper_left")
+        plotter.add_text(title, font_size=32, color="black", position="upper_left")
     image = np.asarray(plotter.screenshot(return_img=True))
     plotter.close()
     return image
@@ -99,7 +99,7 @@ def _bar(moved: Any, limits: tuple[float, float], label: str) -> NDArray[np.uint
     plotter.add_mesh(moved, scalars="value", cmap="viridis", clim=limits, opacity=0.0, show_scalar_bar=False)
     plotter.add_scalar_bar(
         label, n_labels=6, color="black", fmt="%.3g", vertical=True, position_x=0.1, position_y=0.15, height=0.7,
-        width=0.5, title_font_size=34, label_font_size=38,
+        width=0.5, title_font_size=34, label_font_size=46,
     )  # fmt: skip
     image = np.asarray(plotter.screenshot(return_img=True))
     plotter.close()

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["Launch", "on_rows", "shared", "threads_of"]
+__all__ = ["Launch", "grouped", "on_rows", "shared", "threads_of"]
 
 _LEAST_ROWS = 3000
 """Rows below which handing a part to another thread costs more than it saves."""
@@ -32,6 +32,14 @@ def shared(values: NDArray[Any]) -> Any:
     if not values.flags.c_contiguous:
         raise ValueError("want a contiguous array")
     return wp.from_numpy(values, device="cpu") if values.size == 0 else wp.array(values, device="cpu", copy=False)
+
+
+def grouped(kind: Any, **arrays: NDArray[Any]) -> Any:
+    """A struct of a kernel whose members are Warp arrays over the memory of NumPy arrays, made contiguous first."""
+    group = kind()
+    for name, values in arrays.items():
+        setattr(group, name, shared(np.ascontiguousarray(values)))
+    return group
 
 
 class Launch:

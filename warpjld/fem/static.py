@@ -21,7 +21,7 @@ from warpjld.fem.solution import Instant, Solution, SolveError
 
 __all__ = ["solve"]
 
-_FREE = ("refuse", "hold")
+FREE = ("refuse", "hold")
 _HALVINGS = 8
 _NEWTON = 16
 _CAUTIOUS = 25
@@ -69,8 +69,8 @@ def solve(
         InputError: Wrong arguments, or a free body (``FreeBodyError``).
         SolveError: The full load was not reached; its ``solution`` has what was.
     """
-    if free not in _FREE:
-        raise InputError(f"free: want {' or '.join(_FREE)}, got '{free}'")
+    if free not in FREE:
+        raise InputError(f"free: want {' or '.join(FREE)}, got '{free}'")
     steps = _steps(instants)
     if after is not None and after.displacement.size != body.degrees:
         raise InputError(f"after: is of a body with {after.displacement.size} degrees of freedom, not {body.degrees}")

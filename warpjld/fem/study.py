@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import tomllib
 from collections.abc import Callable, Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from difflib import get_close_matches
 from pathlib import Path
 from typing import Any
@@ -16,12 +16,14 @@ from warpjld.errors import InputError
 from warpjld.fem.ball import ball, cylinder, finger
 from warpjld.fem.body import Body
 from warpjld.fem.box import box
+from warpjld.fem.entries import like, one_of, three_numbers, whole
 from warpjld.fem.hexmesh import HexMesh
+from warpjld.fem.linear import METHODS, PRECISIONS
 from warpjld.fem.loads import Centrifugal, Loads, external_forces
 from warpjld.fem.materials import Fung, LinearElastic, Material, MooneyRivlin, NeoHooke
 from warpjld.fem.prescribed import Prescribed, prescribe
 from warpjld.fem.solution import Instant, Solution
-from warpjld.fem.static import solve
+from warpjld.fem.static import FREE, solve
 
 __all__ = ["Reached", "Step", "Study", "load_study"]
 
@@ -155,6 +157,9 @@ def load_study(path: Path) -> Study:
                 _prescribed(mesh, entry)
         solver = table.get("solver", {})
         _known("[solver]", solver, ("method", "precision"))
+        for key, words in (("method", METHODS), ("precision", PRECISIONS)):
+            if key in solver:
+                one_of(f"[solver] {key}", solver[key], words)
         return Study(str(table.get("title", path.stem)), body, steps, path, notes=notes, **solver)
     except InputError as error:
         if error.path is None:
@@ -189,7 +194,10 @@ def _mesh(table: Mapping[str, Any], folder: Path) -> tuple[HexMesh, tuple[str, .
         raise InputError(f"[mesh] kind: {_choice(kind, [*makers, 'file', 'surface'])}")
     import inspect
 
-    _known("[mesh]", options, tuple(inspect.signature(makers[kind]).parameters))
+    parameters = inspect.signature(makers[kind]).parameters
+    _known("[mesh]", options, tuple(parameters))
+    for key, value in options.items():
+        like(f"[mesh] {key}", value, parameters[key].default)
     return makers[kind](**options), ()
 
 
@@ -226,16 +234,18 @@ def _step(number: int, table: Mapping[str, Any]) -> Step:
     where = f"[[step]] '{name}'"
     _known(where, table, _STEP_KEYS)
     centrifugal = table.get("centrifugal")
+    if centrifugal is not None:
+        _known(f"{where} centrifugal", centrifugal, tuple(f.name for f in fields(Centrifugal)))
     loads = Loads(
-        gravity=tuple(table.get("gravity", (0.0, 0.0, 0.0))),
+        gravity=three_numbers(f"{where} gravity", table.get("gravity", (0.0, 0.0, 0.0))),
         centrifugal=None if centrifugal is None else Centrifugal(**centrifugal),
         pressure=table.get("pressure", {}),
         traction=table.get("traction", {}),
         forces=table.get("force", {}),
     )
-    return Step(
-        name, loads, tuple(table.get("prescribed", ())), int(table.get("instants", 1)), str(table.get("free", "hold"))
-    )
+    instants = whole(f"{where} instants", table.get("instants", 1), least=1)
+    free = one_of(f"{where} free", table.get("free", "hold"), FREE)
+    return Step(name, loads, tuple(table.get("prescribed", ())), instants, free)
 
 
 def _prescribed(mesh: HexMesh, entry: Mapping[str, Any]) -> Prescribed:

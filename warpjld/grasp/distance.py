@@ -6,6 +6,8 @@ import os
 from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
+from functools import cache
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -14,6 +16,7 @@ from numpy.typing import ArrayLike, NDArray
 from warpjld.covering.device import checked_device
 from warpjld.errors import InputError
 from warpjld.grasp.objects import GraspObject, Places
+from warpjld.grasp.triangle_tree import build_tree, join_trees
 
 __all__ = ["Distances", "FacetDistances", "ObjectSet", "facet_basis", "facet_distance", "feature_normals"]
 
@@ -107,6 +110,7 @@ class ObjectSet:
     def __init__(self, objects: Sequence[GraspObject] | GraspObject, *, device: str = "cpu") -> None:
         import warp as wp
         from warpjld_kernels.surface_distance import Solids
+        from warpjld_kernels.triangle_tree import Tree
 
         self.objects = (objects,) if isinstance(objects, GraspObject) else tuple(objects)
         if not self.objects:
@@ -128,6 +132,16 @@ class ObjectSet:
         solids.solid = wp.array(flags, dtype=wp.int32, device=self.device)
         features = np.concatenate([_features(thing) for thing in self.objects])
         solids.features = wp.array(features.astype(np.float32), dtype=wp.vec3, device=self.device)
+        tree, built = Tree(), join_trees([build_tree(thing.vertices, thing.faces) for thing in self.objects])
+        for name, kind in (
+            ("root", wp.int32),
+            ("child", wp.int32),
+            ("boxes", float),
+            ("corners", float),
+            ("face", wp.int32),
+        ):
+            setattr(tree, name, wp.array(getattr(built, name).ravel(), dtype=kind, device=self.device))
+        solids.tree = tree
         self.solids: Any = solids
         """``warpjld_kernels.surface_distance.Solids`` on the device."""
 
@@ -169,7 +183,7 @@ class ObjectSet:
             InputError: Wrong shapes, no such object or set, or points that are not finite.
         """
         import warp as wp
-        from warpjld_kernels.surface_distance import CHUNK, measure
+        from warpjld_kernels.surface_distance import measure
 
         cloud = np.ascontiguousarray(_finite_points(points), dtype=np.float32)
         cloud = cloud[None] if cloud.ndim == 2 else cloud
@@ -182,7 +196,7 @@ class ObjectSet:
         point = np.zeros((count, size, 3) if nearest else (0, 0, 3), dtype=np.float32)
         if not distance.size:
             return Distances(distance, face, point if nearest else None)
-        kinds = (wp.int32, wp.vec3, wp.quat, wp.int32)
+        kinds = (wp.int32, wp.vec3d, wp.quatd, wp.int32)
         inputs = [wp.array(a, dtype=k, device=self.device) for a, k in zip(rows, kinds, strict=True)]
         inputs.append(wp.array(cloud, dtype=wp.vec3, device=self.device, copy=False))
         outs = [
@@ -190,7 +204,6 @@ class ObjectSet:
             for a, k in ((distance, float), (face, wp.int32), (point, wp.vec3))
         ]
         reach = float(min(limit, 1e9))
-        chunks = -(-size // int(CHUNK))
 
         def span(begin: int, end: int) -> None:
             wp.launch(
@@ -203,7 +216,7 @@ class ObjectSet:
 
         if threads is None:
             threads = min(os.cpu_count() or 1, max(1, distance.size // _SPLIT_BELOW))
-        in_threads(span, chunks, threads if self.device.is_cpu else 1, measure, self.device)
+        in_threads(span, size, threads if self.device.is_cpu else 1, measure, self.device)
         if not self.device.is_cpu:
             distance, face, point = (out.numpy() for out in outs)
         distance[face < 0] = np.inf
@@ -211,7 +224,7 @@ class ObjectSet:
 
     def _rows(
         self, count: int, which: ArrayLike, places: Places | None, sets: ArrayLike | None
-    ) -> tuple[NDArray[np.int32], NDArray[np.float32], NDArray[np.float32], NDArray[np.int32]]:
+    ) -> tuple[NDArray[np.int32], NDArray[np.float64], NDArray[np.float64], NDArray[np.int32]]:
         numbers = self.check(which)
         chosen = np.arange(count) if sets is None else np.atleast_1d(np.asarray(sets, dtype=np.int32))
         if chosen.size and (chosen.min() < 0 or chosen.max() >= count):
@@ -228,8 +241,8 @@ class ObjectSet:
             )
         return (
             np.broadcast_to(numbers, rows).astype(np.int32),
-            np.broadcast_to(places.position, (rows, 3)).astype(np.float32),
-            np.broadcast_to(places.rotation, (rows, 4)).astype(np.float32),
+            np.broadcast_to(places.position, (rows, 3)).copy(),
+            np.broadcast_to(places.rotation, (rows, 4)).copy(),
             np.broadcast_to(chosen, rows).astype(np.int32),
         )
 
@@ -238,23 +251,31 @@ def in_threads(span: Any, count: int, threads: int, kernel: Any, device: Any) ->
     """``span(begin, end)`` over 0 … count cut into pieces, in threads of their own (launches release the GIL)."""
     import warp as wp
 
-    cuts = np.unique(np.linspace(0, count, max(1, min(threads, count)) + 1).astype(int))
+    cuts = np.unique(np.linspace(0, count, max(1, min(threads, count)) + 1).astype(int)).tolist()
     if len(cuts) <= 2:
         span(0, count)
         return
     wp.load_module(kernel.module, device=device)  # compiling is not safe from several threads
-    with ThreadPoolExecutor(len(cuts) - 1) as pool:
-        list(pool.map(span, cuts[:-1].tolist(), cuts[1:].tolist()))
+    others = [_pool(threads).submit(span, begin, end) for begin, end in pairwise(cuts[1:])]
+    span(cuts[0], cuts[1])
+    for other in others:
+        other.result()
+
+
+@cache
+def _pool(threads: int) -> ThreadPoolExecutor:
+    """Kept for the next call."""
+    return ThreadPoolExecutor(threads - 1, thread_name_prefix="warpjld-grasp")
 
 
 def feature_normals(vertices: NDArray[np.float64], faces: NDArray[np.int32]) -> NDArray[np.float64]:
     """Normals of a triangle, of its edges opposite to corner 0, 1, 2, and of its corners, shape (t, 7, 3).
 
     An edge has the sum of the normals at it, a corner their sum weighted by angle (Bærentzen and Aanæs 2005).
+    Triangles without area have none and add none.
     """
     corner = vertices[faces]
-    normal = np.cross(corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0])
-    normal /= np.linalg.norm(normal, axis=1, keepdims=True)
+    normal = _face_normals(corner)
     out = np.empty((len(faces), 7, 3))
     out[:, 0] = normal
     edges = np.sort(faces[:, [[1, 2], [2, 0], [0, 1]]].reshape(-1, 2), axis=1)
@@ -273,10 +294,17 @@ def feature_normals(vertices: NDArray[np.float64], faces: NDArray[np.int32]) -> 
 
 
 def _features(thing: GraspObject) -> NDArray[np.float64]:
-    """Feature normals; zeros where winding numbers tell inside from outside and nobody asks for them."""
-    if not thing.report.solid:
-        return np.zeros((len(thing.faces), 7, 3))
-    return feature_normals(thing.vertices, thing.faces)
+    """Feature normals; only the faces' own where winding numbers tell inside from outside."""
+    if thing.report.solid:
+        return feature_normals(thing.vertices, thing.faces)
+    out = np.zeros((len(thing.faces), 7, 3))
+    out[:, 0] = _face_normals(thing.vertices[thing.faces])
+    return out
+
+
+def _face_normals(corner: NDArray[np.float64]) -> NDArray[np.float64]:
+    normal = np.cross(corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0])
+    return np.asarray(normal / np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), 1e-300))
 
 
 def _finite_points(points: ArrayLike) -> NDArray[np.float64]:

@@ -54,11 +54,11 @@ class Chains:
 
 
 def skin_on(device: Any, coverings: Sequence[Covering]) -> Any:
-    """``warpjld_kernels.flexion_search.Skin``: the operators of coverings of one skeleton and surface, one below the
+    """``warpjld_kernels.closing_chain.Skin``: the operators of coverings of one skeleton and surface, one below the
     other, so that vertex v of the c-th is row c · V + v."""
     import warp as wp
     from warpjld_kernels.anchored import pack_coefficients
-    from warpjld_kernels.flexion_search import Skin
+    from warpjld_kernels.closing_chain import Skin
 
     first = coverings[0]
     columns: dict[str, list[NDArray]] = {n: [] for n in ("offset", "rotation", "rounding", "muscle")}
@@ -101,9 +101,9 @@ def skin_on(device: Any, coverings: Sequence[Covering]) -> Any:
 
 
 def posture_on(device: Any, skeleton: Skeleton, poses: Poses, origin: NDArray[np.float64]) -> Any:
-    """``warpjld_kernels.flexion_search.Posture``, relative to a point of every frame, shape (F, 3)."""
+    """``warpjld_kernels.closing_chain.Posture``, relative to a point of every frame, shape (F, 3)."""
     import warp as wp
-    from warpjld_kernels.flexion_search import Posture
+    from warpjld_kernels.closing_chain import Posture
 
     posture = Posture()
     posture.positions = array_on(device, poses.positions - origin[:, None], wp.vec3)
@@ -113,9 +113,9 @@ def posture_on(device: Any, skeleton: Skeleton, poses: Poses, origin: NDArray[np
 
 
 def drives_on(device: Any, skeleton: Skeleton, poses: Poses, angles: NDArray[np.float64], chains: Chains) -> Any:
-    """``warpjld_kernels.flexion_search.Drives``."""
+    """``warpjld_kernels.closing_chain.Drives``."""
     import warp as wp
-    from warpjld_kernels.flexion_search import Drives
+    from warpjld_kernels.closing_chain import Drives
 
     frame, joints = chains.frame, chains.joints
     used = joints >= 0

@@ -10,6 +10,7 @@ from warpjld.errors import InputError
 from warpjld.fem import Status
 from warpjld.fem.contact import ContactSolution, press
 from warpjld.press.bodies import Bodies
+from warpjld.press.checks import why_not
 from warpjld.press.frames import SolvedFrame, solved_frame
 from warpjld.press.state import State, load_state, save_state
 
@@ -84,7 +85,8 @@ def solve_frames(
             check=False,
         )
         if not solution.converged:
-            return Solved(solution.status, f"at frame {frame:g}: {solution.message}", start, tuple(done), resumed)
+            reason = why_not(bodies, frame - start) or solution.message
+            return Solved(solution.status, f"at frame {frame:g}: {reason}", start, tuple(done), resumed)
         after = solution
         solved = solved_frame(float(frame), solution.last)
         bodies.note(solved.nodal)

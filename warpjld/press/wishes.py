@@ -98,6 +98,7 @@ class FleshWish:
         flesh: Young's modulus of what lies between skin and bone [Pa].
         skin: Young's modulus of the outermost layer of elements [Pa].
         poisson: Poisson's ratio of both.
+        stiffening: Exponent of Fung's law; 0 is neo-Hookean.
         itself: Whether the skin may touch itself (R126).
     """
 
@@ -106,6 +107,7 @@ class FleshWish:
     flesh: float = 34e3
     skin: float = 80e3
     poisson: float = 0.48
+    stiffening: float = 3.0
     itself: bool = True
 
 

@@ -72,6 +72,7 @@ def run_press(scene: Scene, folder: Path, progress: Report = lambda what, done, 
 
 def _run(scene: Scene, pressing: Pressing, folder: Path, progress: Report) -> PressReport:
     from warpjld.press.bodies import assemble
+    from warpjld.press.checks import refuse_hopeless
     from warpjld.press.pressed import Pressed
     from warpjld.press.run import solve_frames
     from warpjld.press.verdict import verdict_of
@@ -85,6 +86,7 @@ def _run(scene: Scene, pressing: Pressing, folder: Path, progress: Report) -> Pr
     rigid = [prop for prop in scene.props.values() if prop.name not in scene.contact.physical]
     obstacles = {prop.name: prop_obstacle(scene, prop, start) for prop in rigid}
     bodies = assemble(hands, objects, obstacles, scene.contact)
+    refuse_hopeless(bodies, scene.contact)
     frames = [f for f in range(pressing.first, pressing.last + 1, pressing.every) if f > start]
     if frames[-1:] != [pressing.last]:
         frames.append(pressing.last)
@@ -155,7 +157,13 @@ def _hand(scene: Scene, actor: Actor, wish: FleshWish, start: float, notes: list
     if gap > 0.5 * wish.element:
         notes.append(f"{actor.name}: the volume stays up to {1e3 * gap:.1f} mm off the skin where it folds")
     part = part_of(hand, poses, skin, wish.digits)
-    laws = hand_laws(part.hand.mesh.region_names, flesh=wish.flesh, skin=wish.skin, poisson=wish.poisson)
+    laws = hand_laws(
+        part.hand.mesh.region_names,
+        flesh=wish.flesh,
+        skin=wish.skin,
+        poisson=wish.poisson,
+        stiffening=wish.stiffening,
+    )
 
     @lru_cache(maxsize=8)
     def moves(time: float) -> Moves:

@@ -6,7 +6,6 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.spatial.transform import Rotation
 
 from warpjld.errors import InputError
 from warpjld.skeleton.tree import CHANNELS, Skeleton
@@ -61,20 +60,12 @@ def poses_from_angles(
     if not np.isfinite(angles).all():
         frame, joint, channel = np.argwhere(~np.isfinite(angles))[0]
         raise InputError(f"angles: {skeleton.names[joint]}.{CHANNELS[channel]} is not finite at frame {frame}")
-    frames = len(angles)
-    local = np.empty((frames, count, 4))
-    directions, mirror = skeleton.directions, skeleton.mirror
-    for j in range(count):
-        axis, direction = skeleton.axes[j], directions[j]
-        normal = np.cross(direction, axis)
-        flexion, pivot, twisting, abduction = angles[:, j].T
-        pivoted = Rotation.from_rotvec(np.outer(mirror[j] * pivot, direction)).apply(axis)
-        turn = (
-            Rotation.from_rotvec(np.outer(mirror[j] * abduction, normal))
-            * Rotation.from_rotvec(pivoted * flexion[:, None])
-            * Rotation.from_rotvec(np.outer(-mirror[j] * twisting, direction))
-        )
-        local[:, j] = turn.as_quat()
+    axes, directions, mirror = skeleton.axes, skeleton.directions, skeleton.mirror[:, None]
+    normals = np.cross(directions, axes)
+    flexion, pivot, twisting, abduction = (angles[..., k, None] for k in range(len(CHANNELS)))
+    pivoted = _turned(_about(mirror * pivot * directions), axes)
+    local = _multiply(_about(mirror * abduction * normals), _about(flexion * pivoted))
+    local = _multiply(local, _about(-mirror * twisting * directions))
     return _compose(skeleton, local, root_position, root_rotation)
 
 
@@ -137,16 +128,15 @@ def _compose(
     local = local * np.where(local[..., 3:] < 0.0, -1.0, 1.0)
     rotations = np.empty((frames, count, 4))
     positions = np.empty((frames, count, 3))
-    for j in range(count):
-        parent = int(skeleton.parents[j])
-        if parent < 0:
-            turn = local[:, j] if root_rotation is None else _multiply(root_rotation, local[:, j])
-            rotations[:, j] = turn
-            positions[:, j] = skeleton.rest[j] + (0.0 if root_position is None else root_position)
+    for joints, parents in _levels(skeleton.parents):
+        if parents[0] < 0:
+            turn = local[:, joints] if root_rotation is None else _multiply(root_rotation[:, None], local[:, joints])
+            rotations[:, joints] = turn
+            positions[:, joints] = skeleton.rest[joints] + (0.0 if root_position is None else root_position[:, None])
         else:
-            rotations[:, j] = _multiply(rotations[:, parent], local[:, j])
-            offset = Rotation.from_quat(rotations[:, parent]).apply(skeleton.rest[j] - skeleton.rest[parent])
-            positions[:, j] = positions[:, parent] + offset
+            rotations[:, joints] = _multiply(rotations[:, parents], local[:, joints])
+            offset = _turned(rotations[:, parents], skeleton.rest[joints] - skeleton.rest[parents])
+            positions[:, joints] = positions[:, parents] + offset
     return Poses(positions, rotations, vertical_flexion(skeleton, local))
 
 
@@ -158,18 +148,39 @@ def vertical_flexion(skeleton: Skeleton, local: NDArray[np.float64]) -> NDArray[
         skeleton: The rest skeleton.
         local: Joint rotations relative to the parent's bone, quaternions x, y, z, w, shape (F, J, 4).
     """
-    out = np.empty(local.shape[:2])
-    for j in range(len(skeleton)):
-        axis, direction = skeleton.axes[j], skeleton.directions[j]
-        moved = Rotation.from_quat(local[:, j]).apply(direction)
-        initial = direction - axis * (axis @ direction)
-        length = np.linalg.norm(initial)
-        if length < 1e-6:  # the axis lies along the segment: nothing bends
-            out[:, j] = 0.0
-            continue
-        initial = initial / length
-        out[:, j] = np.arctan2(moved @ np.cross(axis, initial), moved @ initial)
-    return out
+    axes, directions = skeleton.axes, skeleton.directions
+    initial = directions - axes * (axes * directions).sum(axis=1, keepdims=True)
+    length = np.linalg.norm(initial, axis=1, keepdims=True)
+    bends = length[:, 0] >= 1e-6  # elsewhere the axis lies along the segment
+    initial = initial / np.where(length >= 1e-6, length, 1.0)
+    moved = _turned(local, directions)
+    angle = np.arctan2((moved * np.cross(axes, initial)).sum(axis=-1), (moved * initial).sum(axis=-1))
+    return np.asarray(np.where(bends, angle, 0.0))
+
+
+def _levels(parents: NDArray[np.int32]) -> list[tuple[NDArray[np.int64], NDArray[np.int32]]]:
+    """Joints with their parents, those first that are nearer to a root: one level may be computed at once."""
+    depth = np.zeros(len(parents), dtype=np.int64)
+    for j, parent in enumerate(parents.tolist()):
+        depth[j] = depth[parent] + 1 if parent >= 0 else 0
+    levels = (np.flatnonzero(depth == d) for d in range(int(depth.max(initial=-1)) + 1))
+    return [(joints, parents[joints]) for joints in levels]
+
+
+def _about(vector: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Quaternions of rotations about vectors by their length [rad]."""
+    half = 0.5 * np.linalg.norm(vector, axis=-1, keepdims=True)
+    return np.concatenate([0.5 * np.sinc(half / np.pi) * vector, np.cos(half)], axis=-1)
+
+
+def _turned(q: NDArray[np.float64], v: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Vectors turned by quaternions of any length: v + 2 u × (u × v + w v) / |q|², u the vector part."""
+    x, y, z, w = np.moveaxis(q, -1, 0)
+    vx, vy, vz = np.moveaxis(v, -1, 0)
+    tx, ty, tz = y * vz - z * vy + w * vx, z * vx - x * vz + w * vy, x * vy - y * vx + w * vz
+    twice = 2.0 / (x * x + y * y + z * z + w * w)
+    turned = (vx + twice * (y * tz - z * ty), vy + twice * (z * tx - x * tz), vz + twice * (x * ty - y * tx))
+    return np.stack(turned, axis=-1)
 
 
 def _multiply(a: NDArray[np.float64], b: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -133,8 +133,8 @@ class Equilibrium:
         self._stiff_of = [self._meeting(interface) for interface in interfaces]
 
     def _meeting(self, interface: Interface) -> NDArray[np.float64]:
-        """Stiffness of slave nodes against what they meet [N/m], shape (m,)."""
-        own = self._stiff[interface.slave.nodes]
+        """Stiffness of sites against what they meet [N/m], shape (s,)."""
+        own = interface.share @ self._stiff[interface.slave.nodes]
         if len(interface.opposite) == 0:
             return own
         return np.asarray(np.minimum(own, float(np.median(self._stiff[interface.opposite]))))
@@ -151,13 +151,17 @@ class Equilibrium:
         known = step.prescribed.degrees
         free = step.prescribed.free(body.degrees)
         loose = self._unheld(step.prescribed)
-        u = (start if first is None else first.reshape(-1)).copy()
+        pressures: NDArray[np.float64] | None = None
         jump = np.zeros_like(u)
-        if first is None:
+        guessed = self._guessed(first, step.prescribed)
+        if guessed is None:
+            u = start.copy()
             jump[known] = step.prescribed.values - u[known]
         else:
-            u[known] = step.prescribed.values
-        pressures: NDArray[np.float64] | None = None
+            u = guessed
+            # a guess squeezes elements here and there: their false pressures would make K indefinite, those of the
+            # equilibrium before do not
+            pressures = body.at(start, stiffness=False).pressures if body.large_strain else None
         solver: LinearSolver | None = None
         normals = self._normals(u)
         held = (self._points(u, step, normals), u)
@@ -223,6 +227,15 @@ class Equilibrium:
                 held, points = (held, points) if settled else ((fresh, u), fresh)
             contact = self._answered(points, u, start, memory, keep=not careful, allowed=step.allowed)
         return Status.MAX_ITERATIONS, None
+
+    def _guessed(self, first: NDArray[np.float64] | None, prescribed: Prescribed) -> NDArray[np.float64] | None:
+        """A first guess that satisfies what is prescribed, unless it turns an element inside out."""
+        if first is None:
+            return None
+        u = np.array(first, dtype=np.float64).reshape(-1)
+        u[prescribed.degrees] = prescribed.values
+        upright = (self.body.at(u, stiffness=False).lowest > 0).all()
+        return u if upright or self._rest is not None else None
 
     def _solve(
         self, solver: LinearSolver | None, matrix: BlockMatrix, free: NDArray[np.bool_], right: NDArray[np.float64]
@@ -343,16 +356,16 @@ class Equilibrium:
 
     def _stiff_penalty(self, k: int, points: ContactPoints) -> NDArray[np.float64]:
         """ε of points [Pa/m]: a multiple of the stiffness of their nodes, over the area they would have whole."""
-        edge = self.interfaces[k].slave.edge[points.nodes]
-        return np.asarray(self._penalty * self._stiff_of[k][points.nodes] / edge**2)
+        edge = self.interfaces[k].edge[points.sites]
+        return np.asarray(self._penalty * self._stiff_of[k][points.sites] / edge**2)
 
     def _settled(self, contact: _Contact, memory: list[Memory]) -> bool:
         for k, (p, r, m) in enumerate(zip(contact.points, contact.responses, memory, strict=True)):
             if not r.active.any():
                 continue
-            if (r.error / self.interfaces[k].slave.edge[p.nodes]).max() > self._penetration:
+            if (r.error / self.interfaces[k].edge[p.sites]).max() > self._penetration:
                 return False
-            change = np.abs(r.pressure - m.pressure[p.nodes]) + np.linalg.norm(r.friction - m.friction[p.nodes], axis=1)
+            change = np.abs(r.pressure - m.pressure[p.sites]) + np.linalg.norm(r.friction - m.friction[p.sites], axis=1)
             size = np.abs(r.pressure) + np.linalg.norm(r.friction, axis=1)
             if p.area @ change > _SETTLED * (p.area @ size):
                 return False
@@ -362,14 +375,14 @@ class Equilibrium:
         """How far gaps as they are differ from those believed, where surfaces press or overlap, over an edge."""
         worst = 0.0
         for k, (p, r, q) in enumerate(zip(points, responses, fresh, strict=True)):
-            edge = self.interfaces[k].slave.edge
+            edge = self.interfaces[k].edge
             active = np.zeros(len(edge), dtype=bool)
-            active[p.nodes] = r.active
+            active[p.sites] = r.active
             believed = np.full(len(edge), np.inf)
-            believed[p.nodes] = p.gap
-            off = np.abs(q.gap - believed[q.nodes])
-            off = np.where(active[q.nodes], off, np.minimum(off, np.maximum(-q.gap, 0.0)))
-            worst = max(worst, float((off / edge[q.nodes]).max(initial=0.0)))
+            believed[p.sites] = p.gap
+            off = np.abs(q.gap - believed[q.sites])
+            off = np.where(active[q.sites], off, np.minimum(off, np.maximum(-q.gap, 0.0)))
+            worst = max(worst, float((off / edge[q.sites]).max(initial=0.0)))
         return worst
 
     def _unheld(self, prescribed: Prescribed) -> NDArray[np.bool_]:

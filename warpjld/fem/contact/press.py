@@ -15,7 +15,8 @@ from warpjld.fem.contact.equilibrium import Equilibrium, Reached, Step
 from warpjld.fem.contact.law import Memory, start_memory
 from warpjld.fem.contact.pairs import Pair
 from warpjld.fem.contact.points import Interface, interfaces_of
-from warpjld.fem.contact.solution import ContactError, ContactInstant, ContactSolution, Touch
+from warpjld.fem.contact.solution import ContactError, ContactInstant, ContactSolution
+from warpjld.fem.contact.touches import touch_of
 from warpjld.fem.loads import Loads
 from warpjld.fem.prescribed import Prescribed
 
@@ -23,6 +24,7 @@ __all__ = ["press"]
 
 _HALVINGS = 7
 _BREAKS = 100
+_METHODS = ("augmented", "paper")
 
 Guess = Callable[[float, float, NDArray[np.float64]], NDArray[np.float64]]
 """Time before, time, displacement before (N, 3) → where to begin to look for the displacement at the time (N, 3)."""
@@ -36,6 +38,8 @@ def press(
     *,
     times: Sequence[float] = (1.0,),
     after: ContactSolution | None = None,
+    method: str = "augmented",
+    aitken: bool = False,
     tolerance: float = 1e-5,
     penetration: float = 1e-3,
     guess: Guess | None = None,
@@ -56,6 +60,9 @@ def press(
         loads: Loads at the last time, reached in proportion to time; or a function of time.
         times: Rising times above 0 (above ``after``'s) to find equilibria at.
         after: Contact and displacement to go on from.
+        method: ``augmented`` (Lagrangian, on bodies and contact together), or ``paper``: objects repelled by the skin
+            and released, in turns (R113; see ``warpjld.fem.contact.paper`` for when it settles). The slave is repelled.
+        aitken: Relax the paper's loop.
         tolerance: Residual over the forces that balance.
         penetration: Overlap left, as a share of an edge.
         guess: Where to begin to look.
@@ -80,11 +87,46 @@ def press(
             raise InputError(f"{name}: want a share between 0 and 1, got {value}")
     if after is not None and len(after.memory) != len(pairs):
         raise InputError(f"after: was found with {len(after.memory)} pairs, not {len(pairs)}")
+    if method not in _METHODS:
+        raise InputError(f"method: want {' or '.join(_METHODS)}, got '{method}'")
+    if method == "paper":
+        solution = _by_turns(body, prescribed, pairs, loads, wanted, after, aitken, penetration, watch, progress)
+        if check and not solution.converged and solution.status is not Status.STOPPED:
+            raise ContactError(solution)
+        return solution
     run = _Run(body, prescribed, list(pairs), loads, wanted, after, tolerance, penetration, guess)
     solution = run.through(watch, progress)
     if check and not solution.converged and solution.status is not Status.STOPPED:
         raise ContactError(solution)
     return solution
+
+
+def _by_turns(
+    body: Body,
+    prescribed: Prescribed | Callable[[float], Prescribed],
+    pairs: Sequence[Pair],
+    loads: Loads | Callable[[float], Loads] | None,
+    times: list[float],
+    after: ContactSolution | None,
+    aitken: bool,
+    threshold: float,
+    watch: Callable[[ContactInstant], str | None] | None,
+    progress: Callable[[str], None] | None,
+) -> ContactSolution:
+    from warpjld.fem.contact.paper import by_turns
+
+    if after is not None:
+        raise InputError("after: the paper's loop begins at rest")
+    if any(pair.friction > 0.0 or pair.bond is not None for pair in pairs):
+        raise InputError("pairs: the paper's loop knows neither friction nor bonds; use method='augmented'")
+
+    def known(time: float) -> Prescribed:
+        return prescribed(time) if callable(prescribed) else prescribed.scaled(time / times[-1])
+
+    def load(time: float) -> Loads:
+        return loads(time) if callable(loads) else (loads or Loads()).scaled(time / times[-1])
+
+    return by_turns(body, known, pairs, load, times, aitken=aitken, threshold=threshold, watch=watch, progress=progress)
 
 
 class _Run:
@@ -121,15 +163,15 @@ class _Run:
 
     def _begin(self, interface: Interface) -> Memory:
         """Bonds made, and the overlap noted that there is at the start."""
-        memory = start_memory(len(interface.slave.nodes), interface.pair)
+        memory = start_memory(len(interface.edge), interface.pair)
         points = interface.points(self.body.mesh.nodes, 0.0, 0.0)
         if interface.pair.bond is not None:
-            memory.seam[points.nodes] = points.gap
-            if len(points.nodes) == 0:
+            memory.seam[points.sites] = points.gap
+            if len(points.sites) == 0:
                 raise InputError(f"{interface.pair.title}: a bond to nothing: its two sides do not meet")
             memory.bonded[np.isnan(memory.seam)] = False
         else:
-            memory.allowance[points.nodes] = np.maximum(-points.gap, 0.0)
+            memory.allowance[points.sites] = np.maximum(-points.gap, 0.0)
         return memory
 
     def step(self, before: float, time: float) -> Step:
@@ -203,26 +245,8 @@ class _Run:
         x = self.body.mesh.nodes + found.displacement.reshape(-1, 3)
         touches = []
         for k, interface in enumerate(self.interfaces):
-            points, response, slip = found.points[k], found.responses[k], found.slips[k]
-            traction = response.traction(points)
-            nodes = interface.slave.nodes[points.nodes]
-            across = slip - np.einsum("mi,mi->m", slip, points.normal)[:, None] * points.normal
-            touches.append(
-                Touch(
-                    interface.pair.title,
-                    nodes,
-                    x[nodes],
-                    points.normal,
-                    response.pressure,
-                    traction,
-                    points.gap,
-                    points.area,
-                    across,
-                    response.sticking,
-                    found.memory[k].bonded[points.nodes],
-                    points.forces(traction),
-                )
-            )
+            bonded = found.memory[k].bonded
+            touches.append(touch_of(interface, found.points[k], found.responses[k], found.slips[k], bonded, x))
         shape = (-1, 3)
         return ContactInstant(
             time,
@@ -249,7 +273,7 @@ def _overstrained(k: int, interface: Interface, found: Reached) -> NDArray[np.bo
     if bond is not None:
         pull = -response.pressure > bond.normal
         shear = np.linalg.norm(response.friction, axis=1) > bond.shear
-        out[points.nodes] = (pull | shear) & memory.bonded[points.nodes]
+        out[points.sites] = (pull | shear) & memory.bonded[points.sites]
     return out
 
 

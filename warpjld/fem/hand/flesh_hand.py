@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -16,11 +17,15 @@ from warpjld.fem.hand.weights import bone_weights
 from warpjld.fem.hexmesh import HexMesh
 from warpjld.fem.prescribed import Prescribed
 from warpjld.rig import Rig
+from warpjld.skeleton.hand import DIGITS
 from warpjld.skeleton.kinematics import Poses, rest_poses
 from warpjld.skeleton.tree import Skeleton
 from warpjld.surface import Surface
 
 __all__ = ["FleshHand", "build_flesh_hand"]
+
+_SHARED = 0.1
+"""Share of both bones from which on flesh between them has to stretch with their joint."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -28,8 +33,8 @@ class FleshHand:
     """The volume of a hand, driven by the poses of its skeleton.
 
     Attributes:
-        name: Begins the names of its regions: ``hand.flesh``, ``hand.skin``, ``hand.bone``; its skin is the face set
-            of this name.
+        name: Begins the names of its regions: ``hand.flesh``, ``hand.skin``, ``hand.joint`` (flesh and skin between
+            the bones of a joint, and where digits part), ``hand.bone``; its skin is the face set of this name.
         flesh: The mesh with its bones, and the rig's own surface carried by it.
         skeleton: The rest skeleton, as in the rig.
         surface: The rig's surface at rest, as in the rig.
@@ -187,19 +192,35 @@ def build_flesh_hand(
     flesh = flesh_of(rig, spacing, bone=bone, flush=flush, gap=gap, head=head, least=least)
     mesh = flesh.mesh
     faces = mesh.boundary()
+    joints = [rig.skeleton.names[j] for j in flesh.bones]
+    weights = bone_weights(mesh, [mesh.node_sets[n] for n in flesh.names])
     layer = np.zeros(len(mesh.elements), dtype=bool)
     layer[faces[:, 0]] = True
-    regions = np.where(mesh.regions == 1, 2, np.where(layer, 1, 0)).astype(np.int32)
+    soft = np.where(_between(mesh, weights, flesh, joints), 2, np.where(layer, 1, 0))
     mesh = replace(
         mesh,
-        regions=regions,
-        region_names=(f"{name}.flesh", f"{name}.skin", f"{name}.bone"),
+        regions=np.where(mesh.regions == 1, 3, soft).astype(np.int32),
+        region_names=(f"{name}.flesh", f"{name}.skin", f"{name}.joint", f"{name}.bone"),
         faces={name: faces},
     )
     flesh = replace(flesh, mesh=mesh)
-    weights = bone_weights(mesh, [mesh.node_sets[n] for n in flesh.names])
-    joints = [rig.skeleton.names[j] for j in flesh.bones]
     labels, names = skin_labels(mesh, faces, weights, joints, apart * spacing)
     excluded = excluded_pairs(mesh, faces, labels, names, 0.5 * apart * spacing)
     place = Moves(np.tile([0.0, 0.0, 0.0, 1.0], (len(joints), 1)), np.zeros((len(joints), 3)))
     return FleshHand(name, flesh, rig.skeleton, rig.surface, place, weights, faces, labels, names, excluded)
+
+
+def _between(mesh: HexMesh, weights: NDArray[np.float64], flesh: Flesh, joints: Sequence[str]) -> NDArray[np.bool_]:
+    """Elements of flesh shared by two bones that meet at a joint, or by two digits where they part."""
+    share = weights[mesh.elements].mean(axis=1)
+    out = np.zeros(len(mesh.elements), dtype=bool)
+    names = [segment_name(joint).split(".") for joint in joints]
+    for bone, near in enumerate(flesh.parents):
+        for before, far in enumerate(flesh.bones):
+            one, other = names[bone], names[before]
+            fingers = "palm" in one and "palm" in other and "thumb" not in (one[-1], other[-1])
+            digits = [name[-1] if "palm" in name else name[-2] if len(name) > 1 else "" for name in (one, other)]
+            parted = not fingers and digits[0] != digits[1] and digits[0] in DIGITS and digits[1] in DIGITS
+            if bone != before and (near == far or parted):
+                out |= np.minimum(share[:, bone], share[:, before]) > _SHARED
+    return out

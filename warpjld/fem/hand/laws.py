@@ -15,6 +15,7 @@ def hand_laws(
     *,
     flesh: float = 34e3,
     skin: float = 80e3,
+    joint: float = 15e3,
     bone: float = 17e9,
     poisson: float = 0.48,
     stiffening: float = 3.0,
@@ -30,6 +31,8 @@ def hand_laws(
         mesh_regions: Region names, e.g. ``hand.flesh``, ``hand.skin``, ``hand.bone``; others are left out.
         flesh: Young's modulus at small strain of what lies between skin and bone [Pa].
         skin: The same of the outermost layer [Pa].
+        joint: Young's modulus of what lies between the bones of a joint [Pa]: soft, since there it stands for
+            cartilage that slides and skin that unfolds.
         bone: Young's modulus of bone [Pa].
         poisson: Poisson's ratio of flesh and skin.
         stiffening: Exponent β of Fung's law; 0 is neo-Hookean.
@@ -50,6 +53,8 @@ def hand_laws(
         "pulp": flesh_law,
         "flesh": flesh_law,
         "skin": soft(skin, 1100.0),
+        # what slides and unfolds in a real joint stretches here: it may not stiffen
+        "joint": NeoHooke(joint, poisson, 1050.0),
         "bone": NeoHooke(bone, 0.3, 1900.0),
     }
     return {name: made[kind] for name in mesh_regions if (kind := name.rpartition(".")[2]) in made}

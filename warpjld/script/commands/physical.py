@@ -58,7 +58,7 @@ def physical(scene: Scene, arguments: Arguments) -> None:
     "FLESH",
     syntax=(
         "FLESH <actor> [THUMB/INDEX/MIDDLE/RING/PINKY …] [ELEMENT <metres>] [YOUNG <pascals>] [SKIN <pascals>] "
-        "[POISSON <ratio>] [ITSELF <ON/OFF>]"
+        "[POISSON <ratio>] [STIFFENING <exponent>] [ITSELF <ON/OFF>]"
     ),
     help="An actor's flesh deforms, that of some digits only if they are named; ITSELF: whether skin touches skin.",
     group="Contact",
@@ -78,6 +78,7 @@ def flesh(scene: Scene, arguments: Arguments) -> None:
         young=lambda: arguments.number("the flesh's modulus in Pa", above=0.0),
         skin=lambda: arguments.number("the skin's modulus in Pa", above=0.0),
         poisson=lambda: arguments.number("Poisson's ratio", minimum=0.3, maximum=0.49),
+        stiffening=lambda: arguments.number("the exponent of Fung's law", minimum=0.0, maximum=100.0),
         itself=lambda: arguments.choice("ON or OFF", ("ON", "OFF")) == "ON",
     )
     if "young" in options:

@@ -1,0 +1,218 @@
+"""A vertex mapped while one chain of joints closes, by the same operators as the animation (R74).
+
+What moves between two poses of a search is one chain of joints, so the pose need not be computed again: a joint beyond
+k moving ones is carried along by the product of their turns about the axes they had at the start.
+"""
+
+import warp as wp
+
+wp.set_module_options({"max_unroll": 1, "enable_backward": False})
+
+MOVERS = wp.constant(4)
+"""Joints that may move together, each beyond the one before."""
+
+# row k: rotation x y z w and translation of everything beyond k moving joints, and the k-th one's flexion ratio
+Chain = wp.types.matrix(shape=(MOVERS + 1, 8), dtype=float)
+
+
+@wp.struct
+class Skin:
+    """Packed operators of the vertices of one or more coverings; see ``warpjld_kernels.anchored``."""
+
+    ends: wp.array2d(dtype=wp.int32)
+    parents: wp.array(dtype=wp.int32)
+    offset: wp.array(dtype=wp.vec3)
+    segment: wp.array2d(dtype=wp.int32)
+    weight: wp.array2d(dtype=float)
+    ratio: wp.array2d(dtype=float)
+    rotation: wp.array2d(dtype=wp.vec3)
+    rounding: wp.array2d(dtype=wp.vec2)
+    muscle: wp.array2d(dtype=wp.vec3)
+    pair: wp.array2d(dtype=wp.int32)
+    between: wp.array2d(dtype=float)
+    station: wp.array2d(dtype=float)
+    pairs: wp.array2d(dtype=wp.int32)
+    across: wp.array2d(dtype=float)
+    palm: wp.array2d(dtype=float)
+    vertices: int
+
+
+@wp.struct
+class Posture:
+    """Joints of F frames, relative to a point of each frame."""
+
+    positions: wp.array2d(dtype=wp.vec3)
+    rotations: wp.array2d(dtype=wp.quat)
+    flexion_ratio: wp.array2d(dtype=float)
+
+
+@wp.struct
+class Drives:
+    """Chains of joints that close together in some frame, one a row.
+
+    The k-th joint goes from ``start`` at ``rate`` up to ``stop`` about ``axis``; its local rotation is
+    ``before`` · turn about ``bend`` · ``after``.
+    """
+
+    frame: wp.array(dtype=wp.int32)
+    reach: wp.array(dtype=float)
+    count: wp.array(dtype=wp.int32)
+    joint: wp.array2d(dtype=wp.int32)
+    rate: wp.array2d(dtype=float)
+    start: wp.array2d(dtype=float)
+    stop: wp.array2d(dtype=float)
+    axis: wp.array2d(dtype=wp.vec3)
+    before: wp.array2d(dtype=wp.quat)
+    bend: wp.array2d(dtype=wp.vec3)
+    after: wp.array2d(dtype=wp.quat)
+    direction: wp.array2d(dtype=wp.vec3)
+    upright: wp.array2d(dtype=wp.vec3)
+    level: wp.array2d(dtype=wp.vec3)
+    largest: wp.array2d(dtype=float)
+    depth: wp.array2d(dtype=wp.int32)
+
+
+@wp.func
+def turned(axis: wp.vec3, angle: float) -> wp.quat:
+    half = 0.5 * angle
+    s = wp.sin(half)
+    return wp.quat(s * axis[0], s * axis[1], s * axis[2], wp.cos(half))
+
+
+@wp.func
+def scaled(w: float, q: wp.quat) -> wp.quat:
+    return wp.quat(w * q[0], w * q[1], w * q[2], w * q[3])
+
+
+@wp.func
+def closing_angle(drives: Drives, r: int, k: int, s: float) -> float:
+    """Angle of the k-th joint when the chain has closed by s."""
+    start = drives.start[r, k]
+    stop = drives.stop[r, k]
+    angle = start + drives.rate[r, k] * s
+    return wp.clamp(angle, wp.min(start, stop), wp.max(start, stop))
+
+
+@wp.func
+def chain_at(posture: Posture, drives: Drives, r: int, s: float) -> Chain:
+    """Turns of everything beyond the moving joints when the chain has closed by s."""
+    chain = Chain()
+    chain[0, 3] = 1.0
+    q = wp.quat(0.0, 0.0, 0.0, 1.0)
+    t = wp.vec3(0.0)
+    f = drives.frame[r]
+    for k in range(drives.count[r]):
+        start = drives.start[r, k]
+        angle = closing_angle(drives, r, k, s)
+        at = posture.positions[f, drives.joint[r, k]]
+        local = drives.before[r, k] * turned(drives.bend[r, k], angle) * drives.after[r, k]
+        first = drives.before[r, k] * turned(drives.bend[r, k], start) * drives.after[r, k]
+        turn = turned(drives.axis[r, k], angle - start)
+        if local[3] * first[3] < 0.0:  # poses keep local rotations on the side of w ≥ 0
+            turn = scaled(-1.0, turn)
+        t = t + wp.quat_rotate(q, at - wp.quat_rotate(turn, at))
+        q = q * turn
+        moved = wp.quat_rotate(local, drives.direction[r, k])
+        flexion = wp.atan2(wp.dot(moved, drives.level[r, k]), wp.dot(moved, drives.upright[r, k]))
+        for i in range(4):
+            chain[k + 1, i] = q[i]
+        for i in range(3):
+            chain[k + 1, 4 + i] = t[i]
+        chain[k + 1, 7] = wp.clamp(flexion * drives.largest[r, k], 0.0, 1.0)
+    return chain
+
+
+@wp.func
+def rotation_at(chain: Chain, k: int, q: wp.quat) -> wp.quat:
+    return wp.quat(chain[k, 0], chain[k, 1], chain[k, 2], chain[k, 3]) * q
+
+
+@wp.func
+def place_at(chain: Chain, k: int, x: wp.vec3) -> wp.vec3:
+    q = wp.quat(chain[k, 0], chain[k, 1], chain[k, 2], chain[k, 3])
+    return wp.quat_rotate(q, x) + wp.vec3(chain[k, 4], chain[k, 5], chain[k, 6])
+
+
+@wp.func
+def joint_place(posture: Posture, drives: Drives, chain: Chain, r: int, j: int) -> wp.vec3:
+    return place_at(chain, drives.depth[r, j], posture.positions[drives.frame[r], j])
+
+
+@wp.func
+def joint_halfway(skin: Skin, posture: Posture, drives: Drives, chain: Chain, r: int, j: int) -> wp.quat:
+    """normalise(q_parent + q_joint) (C22)."""
+    f = drives.frame[r]
+    own = rotation_at(chain, drives.depth[r, j], posture.rotations[f, j])
+    p = skin.parents[j]
+    if p < 0:
+        return own
+    return wp.normalize(own + rotation_at(chain, drives.depth[r, p], posture.rotations[f, p]))
+
+
+@wp.func
+def joint_flexion_ratio(posture: Posture, drives: Drives, chain: Chain, r: int, j: int) -> float:
+    k = drives.depth[r, j]
+    if k > 0 and drives.joint[r, k - 1] == j:
+        return chain[k, 7]
+    return posture.flexion_ratio[drives.frame[r], j]
+
+
+@wp.func
+def palm_share(skin: Skin, posture: Posture, drives: Drives, chain: Chain, r: int, v: int) -> float:
+    """What approaching palm segments add to the offset's length, as a portion of it: λ^(−k) − 1 (R44, C3)."""
+    total = float(0.0)
+    stations = skin.across.shape[1]
+    for k in range(skin.between.shape[1]):
+        amount = skin.between[v, k]
+        if amount > 0.0:
+            n = skin.pair[v, k]
+            a = skin.pairs[n, 0]
+            b = skin.pairs[n, 1]
+            starts = joint_place(posture, drives, chain, r, skin.ends[b, 0]) - joint_place(
+                posture, drives, chain, r, skin.ends[a, 0]
+            )
+            ends = joint_place(posture, drives, chain, r, skin.ends[b, 1]) - joint_place(
+                posture, drives, chain, r, skin.ends[a, 1]
+            )
+            low = wp.min(int(skin.station[v, k]), stations - 2)
+            part = skin.station[v, k] - float(low)
+            exponent = skin.palm[v // skin.vertices, n]
+            for i in range(2):
+                at = float(low + i) / float(stations - 1)
+                length = wp.max(wp.length((1.0 - at) * starts + at * ends), 1.0e-9)
+                closing = wp.min(wp.log(length / skin.across[n, low + i]), 0.0)
+                share = part
+                if i == 0:
+                    share = 1.0 - part
+                total += amount * share * (wp.exp(-exponent * closing) - 1.0)
+    return total
+
+
+@wp.func
+def mapped(skin: Skin, posture: Posture, drives: Drives, r: int, v: int, s: float) -> wp.vec3:
+    """The covering formula at one vertex when the chain has closed by s."""
+    chain = chain_at(posture, drives, r, s)
+    f = drives.frame[r]
+    foot = wp.vec3(0.0)
+    q = wp.quat(0.0, 0.0, 0.0, 0.0)
+    scale = 1.0 + palm_share(skin, posture, drives, chain, r, v)
+    added = wp.vec3(0.0)
+    for k in range(skin.weight.shape[1]):
+        weight = skin.weight[v, k]
+        if weight > 0.0:
+            p = skin.ends[skin.segment[v, k], 0]
+            d = skin.ends[skin.segment[v, k], 1]
+            start = joint_place(posture, drives, chain, r, p)
+            end = joint_place(posture, drives, chain, r, d)
+            foot += weight * (start + skin.ratio[v, k] * (end - start))
+            w = skin.rotation[v, k]
+            q += scaled(w[1], rotation_at(chain, drives.depth[r, p], posture.rotations[f, p]))
+            if w[0] != 0.0:
+                q += scaled(w[0], joint_halfway(skin, posture, drives, chain, r, p))
+            if w[2] != 0.0:
+                q += scaled(w[2], joint_halfway(skin, posture, drives, chain, r, d))
+            at_p = joint_flexion_ratio(posture, drives, chain, r, p)
+            at_d = joint_flexion_ratio(posture, drives, chain, r, d)
+            scale += skin.rounding[v, k][0] * at_p + skin.rounding[v, k][1] * at_d
+            added += 0.5 * (at_p + at_d) * skin.muscle[v, k]
+    return foot + wp.quat_rotate(wp.normalize(q), scale * skin.offset[v] + added)

@@ -1,0 +1,45 @@
+"""C++ for arithmetic on several numbers at once, one source for the CPU and for a GPU.
+
+On the CPU ``Doubles`` and ``Floats`` are vectors that the compiler spreads over registers; on a GPU they are single
+numbers. ``N`` is how many numbers they hold, so that ``for (int base = 0; base < lanes; base += N)`` takes all lanes on
+either.
+
+| word | meaning |
+|---|---|
+| ``Stored`` | floats in an array, as a pointer's target: they need not be aligned |
+| ``PICK(x, l)`` | lane l of x |
+| ``LOWEST(x, y)``, ``HIGHEST(x, y)`` | lane by lane |
+| ``WIDENED(x)`` | floats as doubles |
+| ``LANES_OF(test)`` | bits of the lanes in which a comparison holds |
+| ``FIRST_OF(bits)`` | number of the lowest bit set |
+"""
+
+
+def prelude(lanes: int) -> str:
+    """What a native function's body begins with."""
+    return f"""
+#if defined(__CUDA_ARCH__)
+    typedef double Doubles;
+    typedef float Floats;
+    typedef float Stored;
+    constexpr int N = 1;
+#define PICK(x, l) (x)
+#define LOWEST(x, y) ((x) < (y) ? (x) : (y))
+#define HIGHEST(x, y) ((x) > (y) ? (x) : (y))
+#define WIDENED(x) ((double)(x))
+#define LANES_OF(test) ((test) ? 1u : 0u)
+#define FIRST_OF(bits) (__ffs(bits) - 1)
+#else
+    typedef double Doubles __attribute__((ext_vector_type({lanes})));
+    typedef float Floats __attribute__((ext_vector_type({lanes})));
+    typedef float Stored __attribute__((ext_vector_type({lanes}), aligned(4)));
+    typedef bool Bits __attribute__((ext_vector_type({lanes})));
+    constexpr int N = {lanes};
+#define PICK(x, l) (x)[l]
+#define LOWEST(x, y) __builtin_elementwise_min(x, y)
+#define HIGHEST(x, y) __builtin_elementwise_max(x, y)
+#define WIDENED(x) __builtin_convertvector(x, Doubles)
+#define LANES_OF(test) (unsigned int)__builtin_bit_cast(uint{lanes}_t, __builtin_convertvector(test, Bits))
+#define FIRST_OF(bits) __builtin_ctz(bits)
+#endif
+"""

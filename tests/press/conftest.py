@@ -1,0 +1,32 @@
+"""A hand on a stage, and scripts run on it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import pytest
+
+from warpjld.rig import Rig
+from warpjld.script import Interpreter, Scene
+
+
+@pytest.fixture(scope="session")
+def rig() -> Rig:
+    """A left hand."""
+    from warpjld.hand import build_hand
+
+    return build_hand("left")
+
+
+@pytest.fixture
+def run(rig: Rig) -> Callable[[str], Scene]:
+    """Runs lines on a stage with that hand."""
+    scene = Scene(say=lambda text: None)
+    scene.add("left", rig)
+    interpreter = Interpreter(scene)
+
+    def run_text(text: str) -> Scene:
+        interpreter.run_text(text)
+        return scene
+
+    return run_text

@@ -1,0 +1,84 @@
+"""Flesh carried to a pose by the covering."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from warpjld.covering import Covering, bind
+from warpjld.fem.contact.facets import Facets
+from warpjld.fem.hand.flesh_hand import FleshHand, build_flesh_hand
+from warpjld.press.rest import part_of, posed
+from warpjld.rig import Rig
+from warpjld.skeleton import Poses, poses_from_angles
+from warpjld.skeleton.kinematics import rest_poses
+
+
+@pytest.fixture(scope="module")
+def hand(rig: Rig) -> FleshHand:
+    return build_flesh_hand(rig, 0.003)
+
+
+@pytest.fixture(scope="module")
+def covering(rig: Rig) -> Covering:
+    return bind(rig.skeleton, rig.surface)
+
+
+@pytest.fixture(scope="module")
+def bent(rig: Rig) -> Poses:
+    """Index finger half closed, the hand moved as a whole."""
+    angles = np.zeros((1, len(rig.skeleton), 4))
+    for joint, degrees in (("base", 40), ("knuckle2", 60), ("knuckle3", 40)):
+        angles[0, rig.skeleton.index(f"left.index.{joint}"), 0] = np.radians(degrees)
+    return poses_from_angles(rig.skeleton, angles, root_position=np.array([[0.1, 0.2, 0.3]]))
+
+
+def test_at_rest_nothing_moves(hand: FleshHand, rig: Rig) -> None:
+    still, gap = posed(hand, rest_poses(rig.skeleton), rig.surface.vertices)
+    np.testing.assert_allclose(still.mesh.nodes, hand.mesh.nodes, atol=1e-7)
+    assert gap < 1e-7
+
+
+def test_skin_nodes_lie_on_the_covered_skin_and_bones_stay_rigid(
+    hand: FleshHand, covering: Covering, bent: Poses
+) -> None:
+    skin = covering.deform(bent)[0].astype(np.float64)
+    there, gap = posed(hand, bent, skin)
+    assert there.mesh.scaled_jacobian().min() > 0.02
+    assert gap < 1.5e-3
+    outer = np.setdiff1d(np.unique(there.mesh.quads(there.skin_faces)), np.concatenate(there.bone_nodes))
+    away = np.abs(Facets(skin, hand.surface.faces).project(there.mesh.nodes[outer]).distance)
+    assert np.percentile(away, 95) < 1e-4
+    for nodes in hand.bone_nodes:
+        before, after = hand.mesh.nodes[nodes], there.mesh.nodes[nodes]
+        np.testing.assert_allclose(
+            np.linalg.norm(after - after[0], axis=1), np.linalg.norm(before - before[0], axis=1), atol=1e-12
+        )
+
+
+def test_a_part_is_one_digit_and_blends_into_the_covering(hand: FleshHand, covering: Covering, bent: Poses) -> None:
+    skin = covering.deform(bent)[0].astype(np.float64)
+    there, _ = posed(hand, bent, skin)
+    part = part_of(there, bent, skin, ("index",))
+    assert len(part.hand.mesh.nodes) < 0.15 * len(hand.mesh.nodes)
+    assert len(part.cut)
+    assert part.hand.mesh.scaled_jacobian().min() == pytest.approx(there.mesh.scaled_jacobian().min(), abs=0.5)
+    elsewhere = skin + 1.0
+    still = part.worn(np.zeros_like(part.hand.mesh.nodes), elsewhere)
+    np.testing.assert_allclose(still[part.blend == 0.0], elsewhere[part.blend == 0.0])
+    np.testing.assert_allclose(still[part.blend == 1.0], skin[part.blend == 1.0])
+    assert (part.blend == 1.0).sum() > 50
+    tip = skin[part.blend == 1.0]
+    assert np.ptp(tip, axis=0).max() < 0.08
+    moved = part.worn(np.tile([0.0, 0.002, 0.0], (len(part.hand.mesh.nodes), 1)), skin)
+    np.testing.assert_allclose((moved - skin)[:, 1], 0.002 * part.blend, atol=1e-6)
+    # what drives the whole hand drives the part in the same way
+    again = part.start.to(part.hand.moves(bent))
+    np.testing.assert_allclose(part.hand.prescribed_by(again).values, 0.0, atol=1e-12)
+
+
+def test_a_whole_hand_is_its_own_part(hand: FleshHand, rig: Rig) -> None:
+    part = part_of(hand, rest_poses(rig.skeleton), rig.surface.vertices)
+    assert len(part.cut) == 0
+    assert (part.blend == 1.0).all()
+    assert part.hand is hand

@@ -1,0 +1,115 @@
+"""A tree of boxes round the triangles of a surface, eight children a node and eight triangles a leaf.
+
+Triangles are halved at the median of their centres along the longest side of their box, over and over, down to groups
+of eight; eight groups that follow one another are a node's children, and so on up. All groups but the last are full, so
+the whole tree is built by sorting rows of arrays.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+__all__ = ["TriangleTree", "build_tree", "join_trees"]
+
+_WIDTH = 8
+_MARGIN = np.float32(4e-7)  # of the largest coordinate: points are rounded to float32 for the boxes
+_NOWHERE = np.float32(1e18)  # a box that no point is near to
+
+
+@dataclass(frozen=True, eq=False)
+class TriangleTree:
+    """Trees in the form that ``warpjld_kernels.triangle_tree.Tree`` describes.
+
+    Attributes:
+        root: Root of every surface's tree, shape (O,).
+        child: First child of every node, shape (n,).
+        boxes: Lower and upper corners of the children's boxes, shape (n, 2, 3, 8).
+        corners: Corners of the leaves' triangles, shape (leaves, 3, 3, 8).
+        face: Their numbers, shape (leaves, 8).
+    """
+
+    root: NDArray[np.int32]
+    child: NDArray[np.int32]
+    boxes: NDArray[np.float32]
+    corners: NDArray[np.float32]
+    face: NDArray[np.int32]
+
+
+def build_tree(vertices: NDArray[np.float64], faces: NDArray[np.int32]) -> TriangleTree:
+    """The tree of one surface.
+
+    Args:
+        vertices: Positions [m], shape (n, 3).
+        faces: Triangles, shape (t, 3), t > 0.
+    """
+    corner = vertices.astype(np.float32)[faces]
+    order = _halved(corner.mean(axis=1, dtype=np.float64))
+    leaves = -(-len(faces) // _WIDTH)
+    # the last leaf is filled up with its last triangle
+    order = np.concatenate([order, np.repeat(order[-1:], leaves * _WIDTH - len(order))]).reshape(leaves, _WIDTH)
+    inside = corner[order]
+    margin = _MARGIN * np.abs(corner).max()
+    low, high = inside.min(axis=(1, 2)) - margin, inside.max(axis=(1, 2)) + margin
+    levels: list[NDArray[np.float32]] = []
+    while not levels or len(low) > 1:
+        nodes = -(-len(low) // _WIDTH)
+        spare = nodes * _WIDTH - len(low)
+        lower = np.concatenate([low, np.full((spare, 3), _NOWHERE)]).reshape(nodes, _WIDTH, 3)
+        upper = np.concatenate([high, np.full((spare, 3), _NOWHERE)]).reshape(nodes, _WIDTH, 3)
+        levels.append(np.stack([lower, upper], axis=1).transpose(0, 1, 3, 2).astype(np.float32))
+        filled = np.arange(nodes * _WIDTH).reshape(nodes, _WIDTH, 1) < len(low)
+        low = lower.min(axis=1)
+        high = np.where(filled, upper, -_NOWHERE).max(axis=1)
+    # nodes of the top level first
+    child, after = [], 0
+    for depth, boxes in enumerate(reversed(levels)):
+        count = len(boxes)
+        after += count
+        last = depth == len(levels) - 1
+        child.append(-1 - _WIDTH * np.arange(count) if last else after + _WIDTH * np.arange(count))
+    return TriangleTree(
+        root=np.zeros(1, dtype=np.int32),
+        child=np.concatenate(child).astype(np.int32),
+        boxes=np.ascontiguousarray(np.concatenate(levels[::-1])),
+        corners=np.ascontiguousarray(inside.transpose(0, 2, 3, 1)),
+        face=order.astype(np.int32),
+    )
+
+
+def join_trees(trees: list[TriangleTree]) -> TriangleTree:
+    """Several surfaces' trees one after another."""
+    nodes = np.cumsum([0, *(len(t.child) for t in trees)])
+    leaves = np.cumsum([0, *(len(t.face) for t in trees)])
+    return TriangleTree(
+        root=np.concatenate([t.root + n for t, n in zip(trees, nodes, strict=False)]).astype(np.int32),
+        child=np.concatenate(
+            [np.where(t.child < 0, t.child - k, t.child + n) for t, n, k in zip(trees, nodes, leaves, strict=False)]
+        ).astype(np.int32),
+        boxes=np.concatenate([t.boxes for t in trees]),
+        corners=np.concatenate([t.corners for t in trees]),
+        face=np.concatenate([t.face for t in trees]),
+    )
+
+
+def _halved(centre: NDArray[np.float64]) -> NDArray[np.int64]:
+    """Order of points in which every aligned group of 8 · 2^k is one side of a cut."""
+    count = len(centre)
+    size = _WIDTH
+    while size < count:
+        size *= 2
+    order = np.arange(size)
+    padded = np.concatenate([centre, np.full((size - count, 3), np.inf)])
+    while size > _WIDTH:
+        rows = order.reshape(-1, size)
+        rows = rows[: -(-count // size)]  # the rest is padding
+        points = padded[rows]
+        finite = np.isfinite(points)
+        extent = np.where(finite, points, -np.inf).max(axis=1) - np.where(finite, points, np.inf).min(axis=1)
+        along = np.take_along_axis(points, extent.argmax(axis=1)[:, None, None], axis=2)[..., 0]
+        cut = np.argpartition(along, size // 2 - 1, axis=1)
+        order[: rows.size] = np.take_along_axis(rows, cut, axis=1).ravel()
+        size //= 2
+    return order[order < count]

@@ -1,0 +1,70 @@
+"""What cannot work, found before it is tried, and why something did not, found afterwards."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from warpjld.errors import InputError
+from warpjld.fem import HexMesh
+from warpjld.fem.contact.facets import Facets
+from warpjld.press.bodies import Bodies
+from warpjld.press.wishes import ContactWishes, placed
+
+__all__ = ["refuse_hopeless", "why_not"]
+
+_APART = 0.3
+"""Gap, in elements, that a bond still bridges."""
+
+_DEEP = 5e-4
+"""Depth of a bone in a rigid object that the flesh between cannot bear [m]."""
+
+
+def refuse_hopeless(bodies: Bodies, wishes: ContactWishes) -> None:
+    """Refuse bonds between bodies that do not meet, and objects inside flesh.
+
+    Raises:
+        InputError: Names the command's line.
+    """
+    surfaces = {one.name: _surface(one.volume.mesh, one.volume.name) for one in bodies.objects}
+    for bonded in wishes.bonds:
+        one, other = surfaces[bonded.one], surfaces[bonded.other]
+        gap = float(other.project(one.vertices).distance.min())
+        edge = np.linalg.norm(one.vertices[one.faces[:, 1]] - one.vertices[one.faces[:, 0]], axis=1).mean()
+        if gap > _APART * float(edge):
+            raise placed(
+                InputError(f"a bond to nothing: {bonded.one} and {bonded.other} are {1e3 * gap:.3g} mm apart"),
+                bonded.where,
+            )
+    for hand in bodies.hands:
+        flesh = Facets(hand.part.skin, hand.part.hand.surface.faces)
+        shapes = {one.name: one.volume.surface for one in bodies.objects}
+        shapes |= {name: obstacle.mesh(0.0)[0] for name, obstacle in bodies.obstacles.items()}
+        for name, vertices in shapes.items():
+            if (flesh.project(np.asarray(vertices)).distance < 0.0).all():
+                raise InputError(f"{name} lies inside {hand.name}: nothing can press it out; move it out of the flesh")
+
+
+def why_not(bodies: Bodies, time: float) -> str:
+    """What keeps bodies from equilibrium at a time, as far as it shows: bones inside rigid objects; or nothing."""
+    worst, found = 0.0, ""
+    for hand in bodies.hands:
+        known = hand.prescribed(time)
+        nodes = known.degrees[::3] // 3
+        x = hand.part.hand.mesh.nodes[nodes] + known.values.reshape(-1, 3)
+        for name, obstacle in bodies.obstacles.items():
+            depth = -float(obstacle.project(x, time).distance.min())
+            if depth > max(worst, _DEEP):
+                worst, found = (
+                    depth,
+                    f"bones of {hand.name} are {1e3 * depth:.2g} mm inside {name}, which cannot give way",
+                )
+    return found
+
+
+def _surface(mesh: HexMesh, name: str) -> Facets:
+    quads = mesh.quads(mesh.face_set(name))
+    used, corners = np.unique(quads, return_inverse=True)
+    corners = corners.reshape(-1, 4)
+    triangles: NDArray[np.int32] = np.concatenate([corners[:, [0, 1, 2]], corners[:, [0, 2, 3]]]).astype(np.int32)
+    return Facets(mesh.nodes[used], triangles)
