@@ -34,8 +34,10 @@ _SETTLED = 2e-3
 """Share of the contact forces by which the multipliers may still change."""
 _ROUNDING = 1e-13
 """Part of stiffness times displacement that is rounding, where bodies move without a force."""
-_HELD = 1e-4
-"""Stiffness given to bodies that only contact holds, over their own: it slows them down, and leaves no force."""
+_HELD = (3e-2, 0.4, 1e-4)
+"""Stiffness given to bodies that only contact holds, over their own: it slows them down, and leaves no force. At first,
+so that contact is found before they fly off; by which factor it then falls with each iteration; and the least.
+"""
 _TURNING = 1
 """Iterations after which normals stay; weights follow until they no longer change the gaps. That both are right is
 looked at once forces balance. (Newton's method without their derivatives converges slowly, with them not symmetric.)"""
@@ -200,7 +202,7 @@ class Equilibrium:
             matrix = with_contact(
                 stiffness, contact.points, [r.blocks for r in contact.responses], threads=body.threads
             )
-            matrix = self._steadied(matrix, stiffness, loose)
+            matrix = self._steadied(matrix, stiffness, loose, iteration - since)
             try:
                 solver, done = self._solve(solver, matrix, free, residual - matrix.product(jump, threads=body.threads))
             except IndefiniteError:
@@ -466,7 +468,9 @@ class Equilibrium:
         reach = min(interface.reach for interface in self.interfaces)
         return min(1.0, reach / far) if far > 0.0 else 1.0
 
-    def _steadied(self, matrix: BlockMatrix, own: BlockMatrix, loose: list[NDArray[np.int64]]) -> BlockMatrix:
+    def _steadied(
+        self, matrix: BlockMatrix, own: BlockMatrix, loose: list[NDArray[np.int64]], turn: int
+    ) -> BlockMatrix:
         if not loose:
             return matrix
         nodes = np.sort(np.concatenate(loose))
@@ -474,7 +478,9 @@ class Equilibrium:
             matrix = BlockMatrix(own.rows, own.columns, own.values.copy())
         row = np.repeat(np.arange(matrix.size, dtype=np.int32), np.diff(matrix.rows))
         place = np.flatnonzero(row == matrix.columns)[nodes]
-        matrix.values[place] += (_HELD * self._stiff[nodes])[:, None, None] * np.eye(3)
+        first, falls, least = _HELD
+        held = max(least, first * falls**turn)
+        matrix.values[place] += (held * self._stiff[nodes])[:, None, None] * np.eye(3)
         return matrix
 
 
