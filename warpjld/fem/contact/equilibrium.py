@@ -44,6 +44,7 @@ looked at once forces balance. (Newton's method without their derivatives conver
 _CARELESS = 8
 """Iterations with full steps and multipliers brought up to date at once; what has not settled by then takes turns."""
 _LINE_SEARCH = 8
+_STIFFENED = (0.0, 0.02, 0.1, 0.5)
 _INNER = 1e-4
 _PATIENCE = 25
 """Iterations after which a preconditioner made for an earlier matrix has served its time."""
@@ -254,14 +255,37 @@ class Equilibrium:
     def _solve(
         self, solver: LinearSolver | None, matrix: BlockMatrix, free: NDArray[np.bool_], right: NDArray[np.float64]
     ) -> tuple[LinearSolver, Iteration]:
-        """With the preconditioner of the step's first matrix while it serves."""
+        """With the preconditioner of the step's first matrix while it serves.
+
+        Flesh that is about to fold has a K that is not positive definite on the way to its fold. A share of each node's
+        own stiffness is then added until it is: the step is shorter, where it leads is not changed.
+        """
         if solver is not None:
             done = solver.of(matrix).solve(right, tolerance=_INNER, iterations=_PATIENCE)
             if done.status is Status.CONVERGED:
                 return solver, done
-        solver = LinearSolver(matrix, free, self.body.mesh, hierarchy=self._hierarchy, **self._options)
+        for share in _STIFFENED:
+            if share:
+                matrix = self._stiffened(matrix, share)
+            try:
+                solver = LinearSolver(matrix, free, self.body.mesh, hierarchy=self._hierarchy, **self._options)
+                done = solver.solve(right, tolerance=_INNER)
+            except IndefiniteError:
+                if share == _STIFFENED[-1]:
+                    raise
+                continue
+            if done.status is not Status.INDEFINITE:
+                break
+        assert solver is not None
         self._hierarchy = solver.hierarchy
-        return solver, solver.solve(right, tolerance=_INNER)
+        return solver, done
+
+    def _stiffened(self, matrix: BlockMatrix, share: float) -> BlockMatrix:
+        """A matrix with a share of the nodes' stiffness at rest added."""
+        values = matrix.values.copy()
+        row = np.repeat(np.arange(matrix.size, dtype=np.int32), np.diff(matrix.rows))
+        values[np.flatnonzero(row == matrix.columns)] += (share * self._stiff)[:, None, None] * np.eye(3)
+        return BlockMatrix(matrix.rows, matrix.columns, values)
 
     def _search(
         self,
