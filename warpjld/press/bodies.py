@@ -15,6 +15,7 @@ from warpjld.fem.contact import Bond, Exclusion, Obstacle, Pair
 from warpjld.fem.hand.blend import Moves
 from warpjld.grasp import Places
 from warpjld.press.rest import Part
+from warpjld.press.settle import settle
 from warpjld.press.volumes import ObjectVolume
 from warpjld.press.wishes import ContactWishes, Prescribing, placed
 
@@ -154,8 +155,10 @@ class Bodies:
             at = one.volume.mesh.nodes + displacement[span]
             if any(state.held for state, _ in one.states):
                 out[span] += _rigid(one.place(before), one.place(time), at) - at
-            elif one.name in self.carried:
-                out[span] += self._along(self.carried[one.name], before, time, at) - at
+            elif not one.states:
+                if one.name in self.carried:
+                    at = self._along(self.carried[one.name], before, time, at)
+                out[span] = self._settled(one, at, time, out) - one.volume.mesh.nodes
         known = self.prescribed(time)
         out.reshape(-1)[known.degrees] = known.values
         return out
@@ -172,6 +175,21 @@ class Bodies:
                     pushes[other] = pushes.get(other, 0.0) + float(np.linalg.norm(forces, axis=1).sum())
             if pushes and set(pushes) <= hands:
                 self.carried[one.name] = max(pushes, key=lambda name: pushes[name])
+
+    def _settled(
+        self, one: ObjectBody, at: NDArray[np.float64], time: float, displacement: NDArray[np.float64]
+    ) -> NDArray[np.float64]:
+        """Where an object that nothing holds goes among hands and obstacles, from where its nodes are."""
+        mesh = one.volume.mesh
+        quads = mesh.quads(mesh.face_set(one.name))
+        triangles = np.concatenate([quads[:, [0, 1, 2]], quads[:, [0, 2, 3]]])
+        skins = [np.empty((0, 3))]
+        for hand in self.hands:
+            flesh = hand.part.hand
+            skin = np.unique(flesh.mesh.quads(flesh.skin_faces))
+            skins.append(flesh.mesh.nodes[skin] + displacement[self.spans[hand.name]][skin])
+        found = settle(at, triangles, np.concatenate(skins), list(self.obstacles.values()), time)
+        return found.of(at)
 
     def _along(self, name: str, before: float, time: float, points: NDArray[np.float64]) -> NDArray[np.float64]:
         """Points carried along by a hand as a whole."""
