@@ -46,7 +46,7 @@ class Batches:
 
 @wp.struct
 class Model:
-    """Places of the nodes; corners of the elements, the blocks they add to, law constants, initial stress."""
+    """Places of the nodes; corners of the elements, the blocks they add to, c10, c01, κ and β, initial stress."""
 
     nodes: wp.array(dtype=wp.float64)
     elements: wp.array2d(dtype=wp.int32)

@@ -94,6 +94,6 @@ STRESS = """
                 }
             }
 """
-"""Reads the constants ``c10``, ``c01``, ``kappa``, ``beta`` and initial stress ``s0``, ``kind``, ``large``, and at point
-q ``F``, ``dv``, ``dV``. Defines ``tau`` (τ), ``D`` (c) and ``total`` (τ with the initial stress carried along).
+"""Reads the constants ``c10``, ``c01``, ``kappa``, ``beta`` and initial stress ``s0``, ``kind``, ``large``, and at
+point q ``F``, ``dv``, ``dV``. Defines ``tau`` (τ), ``D`` (c) and ``total`` (τ with the initial stress carried along).
 """

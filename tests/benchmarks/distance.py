@@ -73,17 +73,8 @@ def distances(thing: GraspObject, count: int, repeats: int) -> Table:
         if scene := open3d_scene(thing):
             methods[f"Open3D, all distances, {threads}"] = lambda t=threads: scene.signed(points, t)
     times = in_turn(methods, repeats)
-    table = Table(title=f"signed distance to {len(thing.faces):,} triangles, thousand points per second (median)")
-    for heading in ("", "1 thread", "2 threads"):
-        table.add_column(heading, justify="left" if not heading else "right")
-    for name in ("warpjld, all distances", "warpjld, those within 5 mm", "Open3D, all distances"):
-        if f"{name}, 1" in times:
-            table.add_row(name, *(f"{count / 1e3 / np.median(times[f'{name}, {t}']):.0f}" for t in (1, 2)))
-    for name in ("warpjld, all distances", "warpjld, those within 5 mm"):
-        if "Open3D, all distances, 1" in times:
-            ratios = [np.median(np.divide(times[f"Open3D, all distances, {t}"], times[f"{name}, {t}"])) for t in (1, 2)]
-            table.add_row(f"{name} / Open3D", *(f"{r:.2f} ×" for r in ratios))
-    return table
+    title = f"signed distance to {len(thing.faces):,} triangles, thousand points per second (median)"
+    return beside_open3d(title, times, count / 1e3)
 
 
 def deforming_hand(thing: GraspObject, repeats: int) -> Table:
@@ -119,15 +110,21 @@ def deforming_hand(thing: GraspObject, repeats: int) -> Table:
     title = (
         f"hand of {count:,} vertices against {len(thing.faces):,} triangles, deformed and measured, frames per second"
     )
+    return beside_open3d(title, times, frames)
+
+
+def beside_open3d(title: str, times: dict[str, list[float]], done: float) -> Table:
+    """What is done a second by each method on 1 and 2 threads, and the ratios of ours to Open3D."""
+    peer, ours = "Open3D, all distances", ("warpjld, all distances", "warpjld, those within 5 mm")
     table = Table(title=title)
     for heading in ("", "1 thread", "2 threads"):
         table.add_column(heading, justify="left" if not heading else "right")
-    for name in ("warpjld, all distances", "warpjld, those within 5 mm", "Open3D, all distances"):
+    for name in (*ours, peer):
         if f"{name}, 1" in times:
-            table.add_row(name, *(f"{frames / np.median(times[f'{name}, {t}']):.0f}" for t in (1, 2)))
-    for name in ("warpjld, all distances", "warpjld, those within 5 mm"):
-        if "Open3D, all distances, 1" in times:
-            ratios = [np.median(np.divide(times[f"Open3D, all distances, {t}"], times[f"{name}, {t}"])) for t in (1, 2)]
+            table.add_row(name, *(f"{done / np.median(times[f'{name}, {t}']):.0f}" for t in (1, 2)))
+    for name in ours:
+        if f"{peer}, 1" in times:
+            ratios = [np.median(np.divide(times[f"{peer}, {t}"], times[f"{name}, {t}"])) for t in (1, 2)]
             table.add_row(f"{name} / Open3D", *(f"{r:.2f} ×" for r in ratios))
     return table
 

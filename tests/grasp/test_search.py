@@ -272,3 +272,18 @@ def test_other_wrong_input(stiff) -> None:
     paper = bind(stiff.skeleton, stiff.surface, method="paper")
     with pytest.raises(InputError, match="smooth method only"):
         FlexionSearch(paper, ObjectSet(ball()))
+
+
+def test_facets_of_an_open_surface_are_met_like_those_of_a_closed_one(stiff) -> None:
+    floor = PLANE.placed((0, -0.016, 0))
+    above = int(np.flatnonzero(floor.normals[:, 1] > 0.9)[0])
+    sheet = make_object("sheet", floor.vertices[floor.faces[above]], [[0, 1, 2]]).placed((0, -0.016, 0))
+    vertex = top(stiff, 0.6)
+    results = [
+        FlexionSearch(stiff, ObjectSet(thing)).run(*straight(stiff), Searches(vertex=vertex, joint=1, facet=[facet]))
+        for thing, facet in ((floor, above), (sheet, 0))
+    ]
+    closed, opened = results
+    assert not sheet.report.solid
+    assert (opened.status == Status.CONVERGED).all()
+    np.testing.assert_allclose(opened.angles, closed.angles, atol=1e-7)

@@ -275,8 +275,7 @@ def feature_normals(vertices: NDArray[np.float64], faces: NDArray[np.int32]) -> 
     Triangles without area have none and add none.
     """
     corner = vertices[faces]
-    normal = np.cross(corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0])
-    normal /= np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), 1e-300)
+    normal = _face_normals(corner)
     out = np.empty((len(faces), 7, 3))
     out[:, 0] = normal
     edges = np.sort(faces[:, [[1, 2], [2, 0], [0, 1]]].reshape(-1, 2), axis=1)
@@ -295,10 +294,17 @@ def feature_normals(vertices: NDArray[np.float64], faces: NDArray[np.int32]) -> 
 
 
 def _features(thing: GraspObject) -> NDArray[np.float64]:
-    """Feature normals; zeros where winding numbers tell inside from outside and nobody asks for them."""
-    if not thing.report.solid:
-        return np.zeros((len(thing.faces), 7, 3))
-    return feature_normals(thing.vertices, thing.faces)
+    """Feature normals; only the faces' own where winding numbers tell inside from outside."""
+    if thing.report.solid:
+        return feature_normals(thing.vertices, thing.faces)
+    out = np.zeros((len(thing.faces), 7, 3))
+    out[:, 0] = _face_normals(thing.vertices[thing.faces])
+    return out
+
+
+def _face_normals(corner: NDArray[np.float64]) -> NDArray[np.float64]:
+    normal = np.cross(corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0])
+    return np.asarray(normal / np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), 1e-300))
 
 
 def _finite_points(points: ArrayLike) -> NDArray[np.float64]:

@@ -133,8 +133,8 @@ class Equilibrium:
         self._stiff_of = [self._meeting(interface) for interface in interfaces]
 
     def _meeting(self, interface: Interface) -> NDArray[np.float64]:
-        """Stiffness of slave nodes against what they meet [N/m], shape (m,)."""
-        own = self._stiff[interface.slave.nodes]
+        """Stiffness of sites against what they meet [N/m], shape (s,)."""
+        own = interface.share @ self._stiff[interface.slave.nodes]
         if len(interface.opposite) == 0:
             return own
         return np.asarray(np.minimum(own, float(np.median(self._stiff[interface.opposite]))))
@@ -356,16 +356,16 @@ class Equilibrium:
 
     def _stiff_penalty(self, k: int, points: ContactPoints) -> NDArray[np.float64]:
         """ε of points [Pa/m]: a multiple of the stiffness of their nodes, over the area they would have whole."""
-        edge = self.interfaces[k].slave.edge[points.nodes]
-        return np.asarray(self._penalty * self._stiff_of[k][points.nodes] / edge**2)
+        edge = self.interfaces[k].edge[points.sites]
+        return np.asarray(self._penalty * self._stiff_of[k][points.sites] / edge**2)
 
     def _settled(self, contact: _Contact, memory: list[Memory]) -> bool:
         for k, (p, r, m) in enumerate(zip(contact.points, contact.responses, memory, strict=True)):
             if not r.active.any():
                 continue
-            if (r.error / self.interfaces[k].slave.edge[p.nodes]).max() > self._penetration:
+            if (r.error / self.interfaces[k].edge[p.sites]).max() > self._penetration:
                 return False
-            change = np.abs(r.pressure - m.pressure[p.nodes]) + np.linalg.norm(r.friction - m.friction[p.nodes], axis=1)
+            change = np.abs(r.pressure - m.pressure[p.sites]) + np.linalg.norm(r.friction - m.friction[p.sites], axis=1)
             size = np.abs(r.pressure) + np.linalg.norm(r.friction, axis=1)
             if p.area @ change > _SETTLED * (p.area @ size):
                 return False
@@ -375,14 +375,14 @@ class Equilibrium:
         """How far gaps as they are differ from those believed, where surfaces press or overlap, over an edge."""
         worst = 0.0
         for k, (p, r, q) in enumerate(zip(points, responses, fresh, strict=True)):
-            edge = self.interfaces[k].slave.edge
+            edge = self.interfaces[k].edge
             active = np.zeros(len(edge), dtype=bool)
-            active[p.nodes] = r.active
+            active[p.sites] = r.active
             believed = np.full(len(edge), np.inf)
-            believed[p.nodes] = p.gap
-            off = np.abs(q.gap - believed[q.nodes])
-            off = np.where(active[q.nodes], off, np.minimum(off, np.maximum(-q.gap, 0.0)))
-            worst = max(worst, float((off / edge[q.nodes]).max(initial=0.0)))
+            believed[p.sites] = p.gap
+            off = np.abs(q.gap - believed[q.sites])
+            off = np.where(active[q.sites], off, np.minimum(off, np.maximum(-q.gap, 0.0)))
+            worst = max(worst, float((off / edge[q.sites]).max(initial=0.0)))
         return worst
 
     def _unheld(self, prescribed: Prescribed) -> NDArray[np.bool_]:

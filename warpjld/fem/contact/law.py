@@ -17,17 +17,17 @@ _GRIPS = 2
 
 @dataclass(frozen=True, eq=False)
 class Memory:
-    """What an interface knows of each node of its slave surface.
+    """What an interface knows of each of its s sites.
 
     Attributes:
-        pressure: Multiplier along the normal [Pa], ≥ 0 unless bonded, shape (m,).
-        friction: Multiplier across it, on the slave [Pa], shape (m, 3).
-        allowance: Overlap that is still allowed, where the step began inside the other body [m], shape (m,) (R112).
+        pressure: Multiplier along the normal [Pa], ≥ 0 unless bonded, shape (s,).
+        friction: Multiplier across it, on the slave [Pa], shape (s, 3).
+        allowance: Overlap that is still allowed, where the step began inside the other body [m], shape (s,) (R112).
         gripping: Iterations for which something has pressed; friction acts from the second, when the overlap of the
-            first guess is gone, shape (m,).
-        stuck: Whether friction holds it, or it slides if not, shape (m,).
-        bonded: Whether the bond holds, shape (m,).
-        seam: Gap at which the bond was made [m], shape (m,).
+            first guess is gone, shape (s,).
+        stuck: Whether friction holds it, or it slides if not, shape (s,).
+        bonded: Whether the bond holds, shape (s,).
+        seam: Gap at which the bond was made [m], shape (s,).
     """
 
     pressure: NDArray[np.float64]
@@ -103,7 +103,7 @@ def respond(
             then for the linear solve to say, and not for the second-order error of the move before, which the penalty
             makes large (primal–dual active set).
     """
-    at = points.nodes
+    at = points.sites
     normal = points.normal
     bonded = memory.bonded[at]
     seam = np.nan_to_num(memory.seam[at])
@@ -157,7 +157,7 @@ def remember(
     What stuck slides where its friction exceeds μ p; what slid sticks where friction would push it along its path. Of
     points that the solve did not know of (``known``, shape (m,)), nothing is remembered: penalty is not pressure.
     """
-    at = points.nodes
+    at = points.sites
     count = len(memory.pressure)
     pressure, friction = np.zeros(count), np.zeros((count, 3))
     pressure[at] = np.where(known, response.pressure, 0.0)

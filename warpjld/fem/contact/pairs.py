@@ -58,6 +58,8 @@ class Pair:
         name: For people.
         exclusion: Facets that never meet.
         bond: Surfaces that are tied from the start.
+        sites: Where an obstacle is looked for: at the slave's ``nodes``; or at the integration points of its ``faces``,
+            which takes more iterations, and meets obstacles with edges or tips smaller than a face.
     """
 
     slave: str | NDArray[np.int32]
@@ -66,10 +68,14 @@ class Pair:
     name: str = ""
     exclusion: Exclusion | None = None
     bond: Bond | None = None
+    sites: str = "nodes"
 
     def __post_init__(self) -> None:
         if not (self.friction >= 0.0 and np.isfinite(self.friction)):
             raise InputError(f"{self.title}: want a friction of 0 or more, got {self.friction}")
+
+        if self.sites not in {"nodes", "faces"}:
+            raise InputError(f"{self.title}: want sites 'nodes' or 'faces', got '{self.sites}'")
 
     @property
     def title(self) -> str:

@@ -10,23 +10,33 @@ from numpy.typing import NDArray
 
 from warpjld.errors import InputError
 from warpjld.fem.contact.mortar import Mortar
-from warpjld.fem.contact.obstacles import Obstacle
+from warpjld.fem.contact.obstacles import Obstacle, Touching
 from warpjld.fem.contact.pairs import Pair
 from warpjld.fem.contact.surface import ContactSurface, surface_of
 from warpjld.fem.hexmesh import HexMesh
 
 __all__ = ["ContactPoints", "Interface", "interfaces_of"]
 
+_NEAR, _FAR = 0.5 * (1.0 + 1.0 / np.sqrt(3.0)), 0.5 * (1.0 - 1.0 / np.sqrt(3.0))
+_GAUSS = np.array(
+    [
+        [_NEAR * _NEAR, _NEAR * _FAR, _FAR * _FAR, _NEAR * _FAR],
+        [_NEAR * _FAR, _NEAR * _NEAR, _NEAR * _FAR, _FAR * _FAR],
+        [_FAR * _FAR, _NEAR * _FAR, _NEAR * _NEAR, _NEAR * _FAR],
+        [_NEAR * _FAR, _FAR * _FAR, _NEAR * _FAR, _NEAR * _NEAR],
+    ]
+)
+"""Weights of a face's corners at its four integration points."""
+
 
 @dataclass(frozen=True, eq=False)
 class ContactPoints:
-    """Where one pair may touch at one configuration; one point for each slave node that has something before it.
+    """Where one pair may touch at one configuration; one point for each site that has something before it.
 
-    The relative position of the two sides at a point is Σ_i c_i x_i (less the obstacle's own), averaged over the slave
-    node's share of the surface (mortar method, Puso & Laursen 2004; rigid obstacles are asked at the node itself).
+    The relative position of the two sides at a point is Σ_i c_i x_i, less the obstacle's own.
 
     Attributes:
-        nodes: Slave node of each point, as an index into the surface's nodes, shape (m,).
+        sites: Which of the interface's sites each point is, ascending, shape (m,).
         weights: c, one row a point, positive for the slave side, ``csr_array`` (m, N).
         normal: Direction to the other side, unit, shape (m, 3).
         area: Slave area the point stands for [m²], shape (m,).
@@ -34,7 +44,7 @@ class ContactPoints:
         carried: What the other side, if an obstacle, moved at the point since the start of the step [m], shape (m, 3).
     """
 
-    nodes: NDArray[np.int64]
+    sites: NDArray[np.int64]
     weights: Any
     normal: NDArray[np.float64]
     area: NDArray[np.float64]
@@ -53,24 +63,48 @@ class ContactPoints:
 
 
 class Interface:
-    """A pair, ready to be asked for its points at any configuration."""
+    """A pair, ready to be asked for its points at any configuration.
+
+    Between surfaces that both deform, a site is a slave node, and its point averages over the node's share of the
+    surface (mortar method, Puso & Laursen 2004). Against an obstacle, sites are the slave nodes themselves, or the
+    2 × 2 Gauss points of each slave face: an edge of the obstacle that passes between nodes is then met all the same.
+
+    Attributes:
+        pair: The pair.
+        slave: Its slave surface.
+        opposite: Nodes of the master surface; none of an obstacle.
+        edge: Edge of the slave faces at each site, at rest [m], shape (sites,).
+        share: Sites as weighted slave nodes, ``csr_array`` (sites, m), rows sum to one.
+    """
 
     def __init__(self, mesh: HexMesh, pair: Pair, threads: int) -> None:
+        from scipy.sparse import csr_array, eye_array
+
         self.pair = pair
         self.slave: ContactSurface = surface_of(mesh, pair.slave, f"{pair.title}: slave")
         self._count = len(mesh.nodes)
         self._mortar: Mortar | None = None
+        self.share: Any
         if not isinstance(pair.master, Obstacle):
             master = surface_of(mesh, pair.master, f"{pair.title}: master")
             self._mortar = Mortar(self.slave, master, pair, self._count, threads)
             self.opposite = master.nodes
+            self.edge = self.slave.edge
+            self.share = eye_array(len(self.slave.nodes), format="csr")
+        elif pair.sites == "nodes":
+            self.opposite = np.empty(0, np.int32)
+            self.edge = self.slave.edge
+            self.share = eye_array(len(self.slave.nodes), format="csr")
         else:
             self.opposite = np.empty(0, np.int32)
-
-    @property
-    def reach(self) -> float:
+            faces = len(self.slave.quads)
+            area = np.linalg.norm(self.slave.area_vectors(mesh.nodes), axis=1)
+            self.edge = np.repeat(np.sqrt(area), 4)
+            table = (np.tile(_GAUSS, (faces, 1)).ravel(), np.repeat(self.slave.corners, 4, axis=0).ravel())
+            rows = 4 * np.arange(4 * faces + 1)
+            self.share = csr_array((*table, rows), shape=(4 * faces, len(self.slave.nodes)))
+        self.reach = 2.0 * float(self.slave.edge.max())
         """How far ahead a point looks [m]."""
-        return 2.0 * float(self.slave.edge.max())
 
     def points(
         self, x: NDArray[np.float64], before: float, time: float, normals: NDArray[np.float64] | None = None
@@ -80,25 +114,66 @@ class Interface:
         ``normals`` of the slave nodes (m, 3) are taken from x unless they are given.
         """
         if self._mortar is None:
-            return self._against_obstacle(x, before, time)
+            found = self._at_nodes(x, time) if self.pair.sites == "nodes" else self._at_faces(x, time)
+            return self._against(found, before, time)
         return self._mortar.points(x, self.reach, self.slave.normals(x) if normals is None else normals)
 
-    def _against_obstacle(self, x: NDArray[np.float64], before: float, time: float) -> ContactPoints:
+    def _at_nodes(self, x: NDArray[np.float64], time: float) -> _Probe:
+        surface = self.slave
+        vectors = surface.at_nodes(surface.area_vectors(x))
+        area = surface.at_nodes(np.linalg.norm(surface.area_vectors(x), axis=1))
+        found = self._obstacle.project(x[surface.nodes], time)
+        near = self._near(found, vectors)
+        columns, rows = surface.nodes[near], np.arange(len(near) + 1)
+        return _Probe(near, np.ones(len(near)), columns, rows, area[near], _picked(found, near))
+
+    def _at_faces(self, x: NDArray[np.float64], time: float) -> _Probe:
+        surface = self.slave
+        at_nodes = self._obstacle.project(x[surface.nodes], time).distance
+        close = at_nodes[surface.corners].min(axis=1) < 2.0 * self.reach
+        sites = np.flatnonzero(np.repeat(close, 4))
+        found = self._obstacle.project(self.share[sites] @ x[surface.nodes], time)
+        vectors = surface.area_vectors(x)[sites // 4]
+        near = self._near(found, vectors)
+        sites = sites[near]
+        columns, rows = surface.quads[sites // 4].ravel(), 4 * np.arange(len(near) + 1)
+        area = np.linalg.norm(vectors[near], axis=1) / 4.0
+        return _Probe(sites, _GAUSS[sites % 4].ravel(), columns, rows, area, _picked(found, near))
+
+    @property
+    def _obstacle(self) -> Obstacle:
+        assert isinstance(self.pair.master, Obstacle)
+        return self.pair.master
+
+    def _near(self, found: Touching, vectors: NDArray[np.float64]) -> NDArray[np.int64]:
+        """Within reach; of what is inside, only what faces the obstacle's surface: the far side does not touch it."""
+        against = np.einsum("ni,ni->n", vectors, found.normal) < 0.5 * np.linalg.norm(vectors, axis=1)
+        return np.flatnonzero((found.distance < self.reach) & (against | (found.distance > 0.0)))
+
+    def _against(self, probe: _Probe, before: float, time: float) -> ContactPoints:
         from scipy.sparse import csr_array
 
-        obstacle = self.pair.master
-        assert isinstance(obstacle, Obstacle)
-        surface = self.slave
-        found = obstacle.project(x[surface.nodes], time)
-        # the side that looks away from the obstacle's surface is not the one that touches it
-        facing = np.einsum("ni,ni->n", surface.normals(x), found.normal) < 0.5
-        near = np.flatnonzero((found.distance < self.reach) & (facing | (found.distance > 0.0)))
-        area = surface.at_nodes(np.linalg.norm(surface.area_vectors(x), axis=1))[near]
-        rows = np.arange(len(near) + 1)
-        weights = csr_array((np.ones(len(near)), surface.nodes[near], rows), shape=(len(near), self._count))
-        closest = found.closest[near]
-        carried = closest - obstacle.carried(closest, time, before)
-        return ContactPoints(near, weights, -found.normal[near], area, found.distance[near], carried)
+        weights = csr_array((probe.values, probe.columns, probe.rows), shape=(len(probe.sites), self._count))
+        weights.sum_duplicates()  # corners of a degenerate face coincide
+        found = probe.found
+        carried = found.closest - self._obstacle.carried(found.closest, time, before)
+        return ContactPoints(probe.sites, weights, -found.normal, probe.area, found.distance, carried)
+
+
+@dataclass(frozen=True, eq=False)
+class _Probe:
+    """Sites near an obstacle: their rows of weights, areas, and what is there."""
+
+    sites: NDArray[np.int64]
+    values: NDArray[np.float64]
+    columns: NDArray[np.int32]
+    rows: NDArray[np.int64]
+    area: NDArray[np.float64]
+    found: Touching
+
+
+def _picked(found: Touching, rows: NDArray[np.int64]) -> Touching:
+    return Touching(found.distance[rows], found.closest[rows], found.normal[rows])
 
 
 def interfaces_of(mesh: HexMesh, pairs: list[Pair], threads: int) -> list[Interface]:

@@ -15,7 +15,8 @@ from warpjld.fem.contact.equilibrium import Equilibrium, Reached, Step
 from warpjld.fem.contact.law import Memory, start_memory
 from warpjld.fem.contact.pairs import Pair
 from warpjld.fem.contact.points import Interface, interfaces_of
-from warpjld.fem.contact.solution import ContactError, ContactInstant, ContactSolution, Touch
+from warpjld.fem.contact.solution import ContactError, ContactInstant, ContactSolution
+from warpjld.fem.contact.touches import touch_of
 from warpjld.fem.loads import Loads
 from warpjld.fem.prescribed import Prescribed
 
@@ -162,15 +163,15 @@ class _Run:
 
     def _begin(self, interface: Interface) -> Memory:
         """Bonds made, and the overlap noted that there is at the start."""
-        memory = start_memory(len(interface.slave.nodes), interface.pair)
+        memory = start_memory(len(interface.edge), interface.pair)
         points = interface.points(self.body.mesh.nodes, 0.0, 0.0)
         if interface.pair.bond is not None:
-            memory.seam[points.nodes] = points.gap
-            if len(points.nodes) == 0:
+            memory.seam[points.sites] = points.gap
+            if len(points.sites) == 0:
                 raise InputError(f"{interface.pair.title}: a bond to nothing: its two sides do not meet")
             memory.bonded[np.isnan(memory.seam)] = False
         else:
-            memory.allowance[points.nodes] = np.maximum(-points.gap, 0.0)
+            memory.allowance[points.sites] = np.maximum(-points.gap, 0.0)
         return memory
 
     def step(self, before: float, time: float) -> Step:
@@ -244,26 +245,8 @@ class _Run:
         x = self.body.mesh.nodes + found.displacement.reshape(-1, 3)
         touches = []
         for k, interface in enumerate(self.interfaces):
-            points, response, slip = found.points[k], found.responses[k], found.slips[k]
-            traction = response.traction(points)
-            nodes = interface.slave.nodes[points.nodes]
-            across = slip - np.einsum("mi,mi->m", slip, points.normal)[:, None] * points.normal
-            touches.append(
-                Touch(
-                    interface.pair.title,
-                    nodes,
-                    x[nodes],
-                    points.normal,
-                    response.pressure,
-                    traction,
-                    points.gap,
-                    points.area,
-                    across,
-                    response.sticking,
-                    found.memory[k].bonded[points.nodes],
-                    points.forces(traction),
-                )
-            )
+            bonded = found.memory[k].bonded
+            touches.append(touch_of(interface, found.points[k], found.responses[k], found.slips[k], bonded, x))
         shape = (-1, 3)
         return ContactInstant(
             time,
@@ -290,7 +273,7 @@ def _overstrained(k: int, interface: Interface, found: Reached) -> NDArray[np.bo
     if bond is not None:
         pull = -response.pressure > bond.normal
         shear = np.linalg.norm(response.friction, axis=1) > bond.shear
-        out[points.nodes] = (pull | shear) & memory.bonded[points.nodes]
+        out[points.sites] = (pull | shear) & memory.bonded[points.sites]
     return out
 
 
