@@ -87,10 +87,11 @@ class ObjectBody:
         for state, nodes in self.states:
             moved = np.zeros((len(nodes), 3))
             axes = [k for k, axis in enumerate("xyz") if axis in state.tracks]
-            if state.held:
+            held = state.holds(frame)
+            if held:
                 axes = [0, 1, 2]
                 moved = self.place(time).apply(self.volume.local[nodes])[0] - self.volume.mesh.nodes[nodes]
-            begun = state.held
+            begun = held
             for axis, track in state.tracks.items():
                 begun = begun or frame >= track.keys[0].frame
                 moved[:, "xyz".index(axis)] += float(track.spline(frame))
@@ -122,6 +123,7 @@ class Bodies:
         pairs: What may touch what.
         owners: Whose surfaces those are.
         loads: From time 0 on.
+        start: Frame of time 0.
         carried: Objects that only hands hold, by the hand: they go along with it in first guesses.
     """
 
@@ -133,6 +135,7 @@ class Bodies:
     pairs: tuple[Pair, ...]
     owners: tuple[PairOf, ...]
     loads: Loads
+    start: float = 0.0
     carried: dict[str, str] = field(default_factory=dict)
 
     def prescribed(self, time: float) -> Prescribed:
@@ -153,9 +156,9 @@ class Bodies:
         for one in self.objects:
             span = self.spans[one.name]
             at = one.volume.mesh.nodes + displacement[span]
-            if any(state.held for state, _ in one.states):
+            if any(state.holds(self.start + time) for state, _ in one.states):
                 out[span] += _rigid(one.place(before), one.place(time), at) - at
-            elif not one.states:
+            elif not any(state.tracks for state, _ in one.states):
                 if one.name in self.carried:
                     at = self._along(self.carried[one.name], before, time, at)
                 out[span] = self._settled(one, at, time, out) - one.volume.mesh.nodes
@@ -228,7 +231,8 @@ def assemble(
     pressure = {o.volume.inside: o.volume.physical.pressure for o in objects if o.volume.physical.pressure}
     pairs, owners = _pairs(hands, objects, obstacles, wishes)
     loads = Loads(gravity=wishes.gravity, pressure=pressure)
-    return Bodies(tuple(hands), tuple(objects), obstacles, body, spans, tuple(pairs), tuple(owners), loads)
+    start = objects[0].start if objects else 0.0
+    return Bodies(tuple(hands), tuple(objects), obstacles, body, spans, tuple(pairs), tuple(owners), loads, start)
 
 
 def _pairs(

@@ -133,8 +133,9 @@ def approach(scene: Scene, pressing: Pressing) -> Approach:
     nothing pushes it any more.
     """
     free = [n for n in scene.contact.physical if not any(o == n for o, _ in scene.contact.prescribed)]
+    keyed = any(state.tracks for state in scene.contact.prescribed.values())
     moved: dict[str, tuple[list[float], list[Places]]] = {}
-    if any(scene.contact.gravity) or len(free) < len(scene.contact.physical):
+    if keyed or any(scene.contact.gravity):
         return Approach(float(pressing.first), moved)
     for frame in range(pressing.first, pressing.last + 1):
         held, places = _held(scene, float(frame), free, moved)
