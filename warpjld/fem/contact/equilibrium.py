@@ -412,7 +412,7 @@ class Equilibrium:
         residual: float,
     ) -> Reached:
         kept = self._remembered(memory, contact, contact.responses, np.zeros_like(u), patient=True)
-        kept = [replace(m, anchor=np.zeros_like(m.anchor)) for m in kept]
+        kept = [replace(m, anchor=np.zeros_like(m.anchor), rooted=m.pressure > 0.0) for m in kept]
         return Reached(u, reactions, contact.points, contact.responses, contact.slips, kept, residual)
 
     def _stiff_penalty(self, k: int, points: ContactPoints) -> NDArray[np.float64]:
