@@ -34,6 +34,8 @@ _SETTLED = 2e-3
 """Share of the contact forces by which the multipliers may still change."""
 _ROUNDING = 1e-13
 """Part of stiffness times displacement that is rounding, where bodies move without a force."""
+_PLACES = 0.03
+"""The same of positions, over that of displacements: gaps are differences of positions."""
 _HELD = (3e-2, 0.4, 1e-4)
 """Stiffness given to bodies that only contact holds, over their own: it slows them down, and leaves no force. At first,
 so that contact is found before they fly off; by which factor it then falls with each iteration; and the least.
@@ -181,12 +183,10 @@ class Equilibrium:
             pushed = norm(np.where(free, contact.forces, 0.0))
             scale = max(norm(external), pushed, norm(np.where(free, 0.0, balance)), 1e-300)
             now = norm(residual) / scale
-            noise = _ROUNDING * norm(np.repeat(self._stiff, 3) * u)
-            if (
-                moved
-                and now <= max(self._tolerance, noise / scale)
-                and self._settled(contact, memory, max(self._tolerance * scale, noise))
-            ):
+            noise = _ROUNDING * (norm(np.repeat(self._stiff, 3) * u) + _PLACES * norm(self._stiff) * body.mesh.size)
+            negligible = max(self._tolerance * scale, noise)
+            settled_down = pushed <= noise or self._settled(contact, memory, negligible)
+            if moved and now <= max(self._tolerance, noise / scale) and settled_down:
                 normals = self._normals(u)
                 fresh = self._points(u, step, normals)
                 if step.allowed > 0.0 or self._mismatch(fresh, contact.points, contact.responses) <= self._penetration:

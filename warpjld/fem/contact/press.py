@@ -238,6 +238,8 @@ class _Run:
         """Equilibrium of a step; again after every bond that did not hold."""
         first = self._first(step)
         status, found = self.equilibrium.find(self.u, self.memory, step, first)
+        if found is None and first is not None and self.guess is None:
+            status, found = self.equilibrium.find(self.u, self.memory, step)
         memory = self.memory
         for _ in range(_BREAKS):
             if found is None:
