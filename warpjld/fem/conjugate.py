@@ -26,6 +26,8 @@ class Status(Enum):
     NOT_FINITE = "a number became infinite or undefined"
     MAX_ITERATIONS = "the iterations allowed were not enough"
     INVERTED = "elements were turned inside out, however small the step"
+    SLIDING = "slides: friction is not enough to hold it"
+    UNHELD = "nothing holds it"
     STOPPED = "stopped as asked"
 
 

@@ -34,9 +34,13 @@ _SETTLED = 2e-3
 """Share of the contact forces by which the multipliers may still change."""
 _ROUNDING = 1e-13
 """Part of stiffness times displacement that is rounding, where bodies move without a force."""
-_HELD = 1e-4
-"""Stiffness given to bodies that only contact holds, over their own: it slows them down, and leaves no force."""
-_TURNING = 2
+_PLACES = 0.03
+"""The same of positions, over that of displacements: gaps are differences of positions."""
+_HELD = (3e-2, 0.4, 1e-4)
+"""Stiffness given to bodies that only contact holds, over their own: it slows them down, and leaves no force. At first,
+so that contact is found before they fly off; by which factor it then falls with each iteration; and the least.
+"""
+_TURNING = 1
 """Iterations after which normals stay; weights follow until they no longer change the gaps. That both are right is
 looked at once forces balance. (Newton's method without their derivatives converges slowly, with them not symmetric.)"""
 _CARELESS = 8
@@ -117,6 +121,7 @@ class Equilibrium:
         self.interfaces = interfaces
         self.solves = 0
         self.iterations = 0
+        self.trouble = ""
         self._tolerance = tolerance
         self._penetration = penetration
         self._penalty = penalty
@@ -126,7 +131,7 @@ class Equilibrium:
         self._hierarchy: list[Any] | None = None
         self._tangent: Tangent | None = None
         self._rest = None if body.large_strain else body.at()
-        self._loose: tuple[bytes, NDArray[np.bool_]] | None = None
+        self._loose: tuple[bytes, list[NDArray[np.int64]]] | None = None
         tangent = self._rest or body.at()
         assert tangent.stiffness is not None
         blocks = tangent.stiffness.diagonal()
@@ -166,7 +171,7 @@ class Equilibrium:
         solver: LinearSolver | None = None
         normals = self._normals(u)
         held = (self._points(u, step, normals), u)
-        settled, since = False, 0
+        settled, since, falls = False, 0, 0
         contact = self._answered(held[0], u, start, memory, keep=True, allowed=step.allowed)
         for iteration in range(_ITERATIONS):
             careful = iteration - since >= _CARELESS
@@ -178,8 +183,10 @@ class Equilibrium:
             pushed = norm(np.where(free, contact.forces, 0.0))
             scale = max(norm(external), pushed, norm(np.where(free, 0.0, balance)), 1e-300)
             now = norm(residual) / scale
-            noise = _ROUNDING * norm(np.repeat(self._stiff, 3) * u)
-            if moved and now <= max(self._tolerance, noise / scale) and self._settled(contact, memory):
+            noise = _ROUNDING * (norm(np.repeat(self._stiff, 3) * u) + _PLACES * norm(self._stiff) * body.mesh.size)
+            negligible = max(self._tolerance * scale, noise)
+            settled_down = pushed <= noise or self._settled(contact, memory, negligible)
+            if moved and now <= max(self._tolerance, noise / scale) and settled_down:
                 normals = self._normals(u)
                 fresh = self._points(u, step, normals)
                 if step.allowed > 0.0 or self._mismatch(fresh, contact.points, contact.responses) <= self._penetration:
@@ -196,7 +203,7 @@ class Equilibrium:
             matrix = with_contact(
                 stiffness, contact.points, [r.blocks for r in contact.responses], threads=body.threads
             )
-            matrix = self._steadied(matrix, stiffness, loose)
+            matrix = self._steadied(matrix, stiffness, loose, iteration - since)
             try:
                 solver, done = self._solve(solver, matrix, free, residual - matrix.product(jump, threads=body.threads))
             except IndefiniteError:
@@ -206,7 +213,10 @@ class Equilibrium:
             if done.status in (Status.INDEFINITE, Status.NOT_FINITE):
                 return done.status, None
             move = done.x + jump
-            length = self._search(u, move, contact, memory, step, residual if moved and careful else None)
+            if not jump.any():
+                move *= self._leash(loose, move)
+            watched = free if moved and careful else free & np.repeat(self._falling(loose, contact), 3)
+            length = self._search(u, move, contact, memory, step, residual, watched, patient=careful)
             if length == 0.0:
                 return Status.INVERTED, None
             move *= length
@@ -217,17 +227,21 @@ class Equilibrium:
             if length == 1.0:
                 u[known] = step.prescribed.values
                 jump[:] = 0.0
-            foreseen = self._foreseen(contact, memory, move, step.allowed)
+            foreseen = self._foreseen(contact, memory, move, step.allowed, patient=careful)
             if not careful or _alike(contact.responses, foreseen):
-                memory = self._remembered(memory, contact, foreseen, move)
+                memory = self._remembered(memory, contact, foreseen, move, patient=careful)
             points = [_shifted(p, (u - held[1]).reshape(-1, 3)) for p in held[0]]
             if not settled:
                 normals = self._normals(u) if iteration < _TURNING else normals
                 fresh = self._points(u, step, normals)
-                settled = iteration > _TURNING and self._mismatch(fresh, points, foreseen) <= 0.3 * self._penetration
+                settled = iteration > _TURNING and self._mismatch(fresh, points, foreseen) <= 0.5 * self._penetration
                 held, points = (held, points) if settled else ((fresh, u), fresh)
+            careful = iteration + 1 - since >= _CARELESS
             contact = self._answered(points, u, start, memory, keep=not careful, allowed=step.allowed)
-        return Status.MAX_ITERATIONS, None
+            falls = falls + 1 if self._falling(loose, contact).any() else 0
+            if falls > _CARELESS:
+                break
+        return self._unresolved(loose, contact), None
 
     def _guessed(self, first: NDArray[np.float64] | None, prescribed: Prescribed) -> NDArray[np.float64] | None:
         """A first guess that satisfies what is prescribed, unless it turns an element inside out."""
@@ -280,11 +294,14 @@ class Equilibrium:
         contact: _Contact,
         memory: list[Memory],
         step: Step,
-        residual: NDArray[np.float64] | None,
+        residual: NDArray[np.float64],
+        watched: NDArray[np.bool_],
+        *,
+        patient: bool,
     ) -> float:
-        """How far to go, zero for nowhere: no element inside out; and, where the residual here is given and forces
-        there pull back harder than half of what drives here, to where they balance along the way. A contact that opens
-        and closes in turn settles so.
+        """How far to go, zero for nowhere: no element inside out; and, where forces on the watched degrees of freedom
+        (3N,) pull back there harder than half of what drives here, to where they balance along the way. A contact that
+        opens and closes in turn settles so, and what falls freely stops where it first touches.
         """
         body = self.body
         length = 1.0
@@ -296,16 +313,27 @@ class Equilibrium:
             length *= 0.5
         else:
             return 0.0
-        if residual is None or length < 1.0:
+        if not watched.any() or length < 1.0:
             return length
-        pushed = np.zeros_like(body.mesh.nodes)
-        for p, r in zip(contact.points, self._foreseen(contact, memory, move, step.allowed), strict=True):
-            pushed += p.forces(r.traction(p))
         external = step.share * external_forces(body, step.loads, there if body.large_strain else None)
-        free = step.prescribed.free(body.degrees)
-        ahead = dot(np.where(free, external + pushed.reshape(-1) - trial.forces, 0.0), move)
-        here = dot(residual, move)
-        return here / (here - ahead) if here > 0.0 and ahead < -0.5 * here else 1.0
+        along = np.where(watched, move, 0.0)
+        here = dot(residual - contact.forces, along)
+        ahead = dot(external - trial.forces, along)
+
+        def pull(part: float) -> float:
+            """What drives on after part of the way: the bodies' forces change linearly, contact as it must."""
+            pushed = np.zeros_like(body.mesh.nodes)
+            foreseen = self._foreseen(contact, memory, part * move, step.allowed, patient=patient)
+            for p, r in zip(contact.points, foreseen, strict=True):
+                pushed += p.forces(r.traction(p))
+            return here + part * (ahead - here) + dot(pushed.reshape(-1), along)
+
+        start, end = pull(0.0), pull(1.0)
+        if not (start > 0.0 and end < -0.5 * start):
+            return 1.0
+        from scipy.optimize import brentq
+
+        return max(float(brentq(pull, 0.0, 1.0, xtol=1e-14, rtol=1e-6, maxiter=60, disp=False)), 1e-12)
 
     def _at(self, u: NDArray[np.float64], pressures: NDArray[np.float64] | None) -> Tangent:
         if self._rest is None:
@@ -339,7 +367,7 @@ class Equilibrium:
         since = (u - start).reshape(-1, 3)
         slips = [p.relative(since) - p.carried for p in points]
         responses = [
-            respond(i.pair, p, m, slip, self._stiff_penalty(k, p), allowed, keep=keep)
+            respond(i.pair, p, m, slip, self._stiff_penalty(k, p), allowed, keep=keep, patient=not keep)
             for k, (i, p, m, slip) in enumerate(zip(self.interfaces, points, memory, slips, strict=True))
         ]
         total = np.zeros_like(self.body.mesh.nodes)
@@ -348,23 +376,31 @@ class Equilibrium:
         return _Contact(points, slips, responses, total.reshape(-1))
 
     def _foreseen(
-        self, contact: _Contact, memory: list[Memory], move: NDArray[np.float64], allowed: float
+        self, contact: _Contact, memory: list[Memory], move: NDArray[np.float64], allowed: float, *, patient: bool
     ) -> list[Response]:
         """What points answer after a move, by the linear model: the multipliers to go on with."""
         out = []
         for k, (p, m, slip) in enumerate(zip(contact.points, memory, contact.slips, strict=True)):
             there = _shifted(p, move.reshape(-1, 3))
             slip = slip + p.relative(move.reshape(-1, 3))
-            out.append(respond(self.interfaces[k].pair, there, m, slip, self._stiff_penalty(k, p), allowed))
+            penalty = self._stiff_penalty(k, p)
+            out.append(respond(self.interfaces[k].pair, there, m, slip, penalty, allowed, patient=patient))
         return out
 
     def _remembered(
-        self, memory: list[Memory], contact: _Contact, foreseen: list[Response], move: NDArray[np.float64]
+        self,
+        memory: list[Memory],
+        contact: _Contact,
+        foreseen: list[Response],
+        move: NDArray[np.float64],
+        *,
+        patient: bool,
     ) -> list[Memory]:
         out = []
         for k, (m, p, r) in enumerate(zip(memory, contact.points, foreseen, strict=True)):
             slip = contact.slips[k] + p.relative(move.reshape(-1, 3))
-            out.append(remember(self.interfaces[k].pair, m, p, r, slip, contact.responses[k].active))
+            pair, known, penalty = self.interfaces[k].pair, contact.responses[k].active, self._stiff_penalty(k, p)
+            out.append(remember(pair, m, p, r, slip, penalty, known, patient=patient))
         return out
 
     def _reached(
@@ -375,7 +411,8 @@ class Equilibrium:
         memory: list[Memory],
         residual: float,
     ) -> Reached:
-        kept = self._remembered(memory, contact, contact.responses, np.zeros_like(u))
+        kept = self._remembered(memory, contact, contact.responses, np.zeros_like(u), patient=True)
+        kept = [replace(m, anchor=np.zeros_like(m.anchor), rooted=m.pressure > 0.0) for m in kept]
         return Reached(u, reactions, contact.points, contact.responses, contact.slips, kept, residual)
 
     def _stiff_penalty(self, k: int, points: ContactPoints) -> NDArray[np.float64]:
@@ -383,7 +420,8 @@ class Equilibrium:
         edge = self.interfaces[k].edge[points.sites]
         return np.asarray(self._penalty * self._stiff_of[k][points.sites] / edge**2)
 
-    def _settled(self, contact: _Contact, memory: list[Memory]) -> bool:
+    def _settled(self, contact: _Contact, memory: list[Memory], negligible: float) -> bool:
+        """Whether multipliers stay: overlap is gone, and forces change by little, or by what is ``negligible``."""
         for k, (p, r, m) in enumerate(zip(contact.points, contact.responses, memory, strict=True)):
             if not r.active.any():
                 continue
@@ -391,7 +429,7 @@ class Equilibrium:
                 return False
             change = np.abs(r.pressure - m.pressure[p.sites]) + np.linalg.norm(r.friction - m.friction[p.sites], axis=1)
             size = np.abs(r.pressure) + np.linalg.norm(r.friction, axis=1)
-            if p.area @ change > _SETTLED * (p.area @ size):
+            if p.area @ change > max(_SETTLED * (p.area @ size), negligible):
                 return False
         return True
 
@@ -409,24 +447,64 @@ class Equilibrium:
             worst = max(worst, float((off / edge[q.sites]).max(initial=0.0)))
         return worst
 
-    def _unheld(self, prescribed: Prescribed) -> NDArray[np.bool_]:
-        """Nodes of bodies that the prescribed displacements do not hold, shape (N,)."""
+    def _unheld(self, prescribed: Prescribed) -> list[NDArray[np.int64]]:
+        """Nodes of each body that the prescribed displacements do not hold."""
         key = prescribed.degrees.tobytes()
         if self._loose is None or self._loose[0] != key:
-            mask = np.zeros(len(self.body.mesh.nodes), dtype=bool)
-            for nodes, _ in free_motions(self.body, prescribed):
-                mask[nodes] = True
-            self._loose = (key, mask)
+            self._loose = (key, [nodes for nodes, _ in free_motions(self.body, prescribed)])
         return self._loose[1]
 
-    def _steadied(self, matrix: BlockMatrix, own: BlockMatrix, loose: NDArray[np.bool_]) -> BlockMatrix:
-        if not loose.any():
+    def _falling(self, loose: list[NDArray[np.int64]], contact: _Contact) -> NDArray[np.bool_]:
+        """Nodes of loose bodies that nothing touches, shape (N,)."""
+        out = np.zeros(len(self.body.mesh.nodes), dtype=bool)
+        if loose:
+            touched = np.zeros(len(out), dtype=bool)
+            for p, r in zip(contact.points, contact.responses, strict=True):
+                touched[p.weights[np.flatnonzero(r.active)].indices] = True
+            for nodes in loose:
+                out[nodes] = not touched[nodes].any()
+        return out
+
+    def _unresolved(self, loose: list[NDArray[np.int64]], contact: _Contact) -> Status:
+        """Why no equilibrium was found: a loose body that nothing touches, or that slides wherever it is touched."""
+        for nodes in loose:
+            mine = np.zeros(len(self.body.mesh.nodes), dtype=bool)
+            mine[nodes] = True
+            element = int(np.flatnonzero(mine[self.body.mesh.elements[:, 0]])[0])
+            what = f"'{self.body.mesh.region_names[self.body.mesh.regions[element]]}'"
+            touching = []
+            for interface, p, r in zip(self.interfaces, contact.points, contact.responses, strict=True):
+                rows = np.flatnonzero(r.active)
+                rows = rows[(p.weights[rows] @ mine.astype(float) != 0.0)] if len(rows) else rows
+                if len(rows):
+                    touching.append((interface.pair.title, bool(r.sticking[rows].any())))
+            if not touching:
+                self.trouble = f"nothing holds {what}"
+                return Status.UNHELD
+            if not any(sticks for _, sticks in touching):
+                self.trouble = f"{what} slides at {touching[0][0]}: friction is not enough to hold it"
+                return Status.SLIDING
+        return Status.MAX_ITERATIONS
+
+    def _leash(self, loose: list[NDArray[np.int64]], move: NDArray[np.float64]) -> float:
+        """Share of a move by which loose bodies go no farther than they look ahead."""
+        far = max((float(np.abs(move.reshape(-1, 3)[nodes]).max()) for nodes in loose), default=0.0)
+        reach = min(interface.reach for interface in self.interfaces)
+        return min(1.0, reach / far) if far > 0.0 else 1.0
+
+    def _steadied(
+        self, matrix: BlockMatrix, own: BlockMatrix, loose: list[NDArray[np.int64]], turn: int
+    ) -> BlockMatrix:
+        if not loose:
             return matrix
+        nodes = np.sort(np.concatenate(loose))
         if matrix is own:
             matrix = BlockMatrix(own.rows, own.columns, own.values.copy())
         row = np.repeat(np.arange(matrix.size, dtype=np.int32), np.diff(matrix.rows))
-        place = np.flatnonzero(row == matrix.columns)[loose]
-        matrix.values[place] += (_HELD * self._stiff[loose])[:, None, None] * np.eye(3)
+        place = np.flatnonzero(row == matrix.columns)[nodes]
+        first, falls, least = _HELD
+        held = max(least, first * falls**turn)
+        matrix.values[place] += (held * self._stiff[nodes])[:, None, None] * np.eye(3)
         return matrix
 
 

@@ -10,9 +10,12 @@ from numpy.typing import NDArray
 from warpjld.fem.contact.pairs import Pair
 from warpjld.fem.contact.points import ContactPoints
 
-__all__ = ["Memory", "Response", "remember", "respond", "start_memory"]
+__all__ = ["GRIPS", "Memory", "Response", "remember", "respond", "start_memory"]
 
-_GRIPS = 2
+GRIPS = 2
+"""Iterations under pressure from which friction acts."""
+_TORN = 3.0
+"""Friction in excess of Coulomb's, over Coulomb's, from which pressures found beside it say nothing."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -25,6 +28,9 @@ class Memory:
         allowance: Overlap that is still allowed, where the step began inside the other body [m], shape (s,) (R112).
         gripping: Iterations for which something has pressed; friction acts from the second, when the overlap of the
             first guess is gone, shape (s,).
+        anchor: Slip at which friction took hold of what was not pressed when the step began [m], shape (s, 3): on its
+            way there it slid freely.
+        rooted: Whether it was pressed when the step began: its slip counts from there, shape (s,).
         stuck: Whether friction holds it, or it slides if not, shape (s,).
         bonded: Whether the bond holds, shape (s,).
         seam: Gap at which the bond was made [m], shape (s,).
@@ -34,6 +40,8 @@ class Memory:
     friction: NDArray[np.float64]
     allowance: NDArray[np.float64]
     gripping: NDArray[np.int32]
+    anchor: NDArray[np.float64]
+    rooted: NDArray[np.bool_]
     stuck: NDArray[np.bool_]
     bonded: NDArray[np.bool_]
     seam: NDArray[np.float64]
@@ -72,6 +80,8 @@ def start_memory(count: int, pair: Pair) -> Memory:
         friction=np.zeros((count, 3)),
         allowance=np.zeros(count),
         gripping=np.zeros(count, np.int32),
+        anchor=np.zeros((count, 3)),
+        rooted=np.zeros(count, dtype=bool),
         stuck=np.ones(count, dtype=bool),
         bonded=bonded,
         seam=np.full(count, np.nan),
@@ -87,6 +97,7 @@ def respond(
     allowed: float,
     *,
     keep: bool = False,
+    patient: bool = False,
 ) -> Response:
     """Tractions and stiffness at points, p = max(0, λ − ε g), friction returned to Coulomb's cone (R122).
 
@@ -102,6 +113,8 @@ def respond(
         keep: What pressed, by its multiplier, presses, or pulls for the moment, whatever its gap: whether it lets go is
             then for the linear solve to say, and not for the second-order error of the move before, which the penalty
             makes large (primal–dual active set).
+        patient: Who sticks is read off the friction, λ − ε s, and not off the memory: tractions are then continuous,
+            and with multipliers that stay the problem is convex, so that a search along a line settles it.
     """
     at = points.sites
     normal = points.normal
@@ -123,20 +136,25 @@ def respond(
     blocks += np.where(active, points.area * penalty, 0.0)[:, None, None] * outer
     if pair.friction > 0.0 or bonded.any():
         across = np.eye(3) - outer
-        slip = np.einsum("mij,mj->mi", across, slip)
+        slip = np.einsum("mij,mj->mi", across, slip - memory.anchor[at])
         carried = np.einsum("mij,mj->mi", across, memory.friction[at])
         # the pressure of the iterate before bounds the friction of this one: each iterate is then a convex problem
-        bound = np.maximum(memory.pressure[at] if keep else pressure, 0.0)
-        grips = active & ((memory.gripping[at] >= _GRIPS) | bonded)
+        bound = np.maximum(memory.pressure[at] if keep or patient else pressure, 0.0)
+        grips = active & ((memory.gripping[at] >= GRIPS) | bonded)
         limit = np.where(grips, pair.friction * bound, 0.0)
-        sticking = grips & (memory.stuck[at] | bonded)
         held = carried - penalty[:, None] * slip
-        along = _unit(carried)
+        size = np.linalg.norm(held, axis=1)
+        if patient:
+            sticking = grips & ((size <= limit) | bonded)
+            along = _unit(held)
+            turning = penalty * np.divide(limit, size, out=np.zeros(count), where=size > 0.0)
+        else:
+            sticking = grips & (memory.stuck[at] | bonded)
+            along = _unit(carried)
+            # a sliding point resists what would turn its path, as much as it slides
+            far = np.linalg.norm(slip, axis=1)
+            turning = np.minimum(penalty, np.divide(limit, far, out=penalty.copy(), where=far > 0.0))
         friction = np.where(sticking[:, None], held, limit[:, None] * along)
-        # a sliding point resists what would turn its path, as much as it slides
-        turning = np.minimum(
-            penalty, np.divide(limit, np.linalg.norm(slip, axis=1), out=penalty.copy(), where=slip.any(axis=1))
-        )
         turning = np.where(limit > 0.0, turning, 0.0)
         beside = across - along[:, :, None] * along[:, None, :]
         tangent = np.where(sticking[:, None, None], penalty[:, None, None] * across, turning[:, None, None] * beside)
@@ -150,33 +168,65 @@ def remember(
     points: ContactPoints,
     response: Response,
     slip: NDArray[np.float64],
+    penalty: NDArray[np.float64],
     known: NDArray[np.bool_],
+    *,
+    patient: bool = False,
 ) -> Memory:
     """Multipliers after a linear solve that foresees a response and a slip (m, 3), and who sticks from now on (R122).
 
-    What stuck slides where its friction exceeds μ p; what slid sticks where friction would push it along its path. Of
-    points that the solve did not know of (``known``, shape (m,)), nothing is remembered: penalty is not pressure.
+    What stuck slides where its friction exceeds μ p; what slid sticks where friction would push it along its path
+    (``patient``: both as the response says). Of points that the solve did not know of (``known``, shape (m,)), nothing
+    is remembered: penalty is not pressure. Nor of pressures under friction far beyond Coulomb's, of a step that slides
+    a long way: it would tear off what in truth lies still or slides.
     """
     at = points.sites
     count = len(memory.pressure)
-    pressure, friction = np.zeros(count), np.zeros((count, 3))
-    pressure[at] = np.where(known, response.pressure, 0.0)
-    gripping = np.where(pressure > 0.0, memory.gripping + 1, 0).astype(np.int32)
+    normal, friction = np.zeros(count), np.zeros((count, 3))
     stuck = np.ones(count, dtype=bool)
+    pressure = np.where(known, response.pressure, 0.0)
     if pair.friction > 0.0 or memory.bonded.any():
-        limit = pair.friction * np.maximum(pressure[at], 0.0)
+        bonded = memory.bonded[at]
+        limit = pair.friction * np.maximum(pressure, 0.0)
+        whole, slip = slip, slip - memory.anchor[at]
         slip = slip - np.einsum("mi,mi->m", slip, points.normal)[:, None] * points.normal
         size = np.linalg.norm(response.friction, axis=1)
-        bonded = memory.bonded[at]
-        held = bonded | (response.sticking & (size <= limit))
-        against = np.einsum("mi,mi->m", slip, response.friction) < 0.0
-        sliding = ~response.sticking & against
-        path = np.where(sliding[:, None], _unit(_unit(response.friction) - _unit(slip)), _unit(response.friction))
-        fresh = memory.gripping[at] < _GRIPS
-        stuck[at] = held | (~response.sticking & ~against) | fresh
-        friction[at] = np.where(bonded[:, None] | held[:, None], response.friction, limit[:, None] * path)
+        if patient:
+            held = bonded | response.sticking
+            stuck[at] = held | ~response.active
+            friction[at] = (
+                response.friction
+                * np.minimum(1.0, np.divide(limit, size, out=np.ones(len(at)), where=~bonded & (size > 0.0)))[:, None]
+            )
+        else:
+            loaded = pair.friction * np.maximum(memory.pressure[at], 0.0)
+            stick, traction = response.sticking, response.friction
+            torn = np.where(stick & ~bonded & known, np.maximum(size - loaded, 0.0), 0.0)
+            if points.area @ torn > _TORN * (points.area @ loaded) > 0.0:
+                pressure, limit = np.where(known, memory.pressure[at], 0.0), loaded
+                stick = memory.stuck[at] & (memory.gripping[at] >= GRIPS)
+                traction = np.where(stick[:, None], memory.friction[at] - penalty[:, None] * slip, traction)
+                size = np.linalg.norm(traction, axis=1)
+            held = bonded | (stick & (size <= limit))
+            against = np.einsum("mi,mi->m", slip, traction) < 0.0
+            sliding = ~stick & against
+            far = penalty * np.linalg.norm(slip, axis=1)
+            turn = np.minimum(1.0, np.divide(far, limit, out=np.ones(len(at)), where=limit > 0.0))
+            path = _unit(traction)
+            path = np.where(sliding[:, None], _unit(path - turn[:, None] * _unit(slip)), path)
+            fresh = memory.gripping[at] < GRIPS
+            stuck[at] = held | (~stick & ~against) | fresh
+            friction[at] = np.where(held[:, None], traction, limit[:, None] * path)
         friction[at] *= known[:, None]
-    return replace(memory, pressure=pressure, friction=friction, gripping=gripping, stuck=stuck)
+    normal[at] = pressure
+    gripping = np.where(normal > 0.0, memory.gripping + 1, np.where(memory.pressure > 0.0, 0, memory.gripping))
+    gripping = gripping.astype(np.int32)
+    anchor = memory.anchor
+    seizing = (gripping[at] == GRIPS) & (memory.gripping[at] < GRIPS) & ~memory.rooted[at]
+    if seizing.any() and pair.friction > 0.0:
+        anchor = anchor.copy()
+        anchor[at[seizing]] = whole[seizing]
+    return replace(memory, pressure=normal, friction=friction, gripping=gripping, anchor=anchor, stuck=stuck)
 
 
 def _unit(vectors: NDArray[np.float64]) -> NDArray[np.float64]:

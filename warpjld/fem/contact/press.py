@@ -12,7 +12,7 @@ from warpjld.errors import InputError
 from warpjld.fem.body import Body
 from warpjld.fem.conjugate import Status
 from warpjld.fem.contact.equilibrium import Equilibrium, Reached, Step
-from warpjld.fem.contact.law import Memory, start_memory
+from warpjld.fem.contact.law import GRIPS, Memory, start_memory
 from warpjld.fem.contact.pairs import Pair
 from warpjld.fem.contact.points import Interface, interfaces_of
 from warpjld.fem.contact.solution import ContactError, ContactInstant, ContactSolution
@@ -23,7 +23,11 @@ from warpjld.fem.prescribed import Prescribed
 __all__ = ["press"]
 
 _HALVINGS = 7
+_HALVINGS_UNHELD = 3
+"""A body that slides away, or falls, seldom does so because the step is long."""
 _BREAKS = 100
+_TOUCHING = 1e-3
+"""Gap over an edge at which surfaces touch from the start: friction holds them where they are."""
 _METHODS = ("augmented", "paper")
 
 Guess = Callable[[float, float, NDArray[np.float64]], NDArray[np.float64]]
@@ -160,6 +164,7 @@ class _Run:
             self.u = after.last.displacement.reshape(-1).copy()
             self.memory = list(after.memory)
         self.steps: list[int] = []
+        self.course: NDArray[np.float64] | None = None
 
     def _begin(self, interface: Interface) -> Memory:
         """Bonds made, and the overlap noted that there is at the start."""
@@ -172,6 +177,9 @@ class _Run:
             memory.bonded[np.isnan(memory.seam)] = False
         else:
             memory.allowance[points.sites] = np.maximum(-points.gap, 0.0)
+            touching = np.abs(points.gap) < _TOUCHING * interface.edge[points.sites]
+            memory.gripping[points.sites[touching]] = GRIPS
+            memory.rooted[points.sites[touching]] = True
         return memory
 
     def step(self, before: float, time: float) -> Step:
@@ -200,14 +208,17 @@ class _Run:
             iterations += self.equilibrium.iterations
             if found is None:
                 halvings += 1
-                if halvings > _HALVINGS:
-                    message = f"no equilibrium found after time {now:.4g} (tried {target:.4g}): {status.value}"
+                unheld = status in (Status.SLIDING, Status.UNHELD)
+                if halvings > (_HALVINGS_UNHELD if unheld else _HALVINGS):
+                    reason = self.equilibrium.trouble if unheld else status.value
+                    message = f"no equilibrium found after time {now:.4g} (tried {target:.4g}): {reason}"
                     return self._end(status, reached, message, step)
                 if progress:
                     progress(f"time {target:.3g}: {status.value}; halving the step")
                 todo.insert(0, 0.5 * (now + target))
                 continue
             self.steps.append(self.equilibrium.solves)
+            self.course = (found.displacement - self.u) / (target - now)
             self.u, self.memory, now = found.displacement, found.memory, target
             todo.pop(0)
             halvings = max(0, halvings - 1)
@@ -218,17 +229,17 @@ class _Run:
             if progress:
                 progress(f"time {target:.3g}: {solves} solves, {iterations} iterations, residual {found.residual:.1e}")
             solves = iterations = 0
-            reason = watch(instant) if watch else None
-            if reason:
-                return self._end(Status.STOPPED, reached, reason, step)
+            wish = watch(instant) if watch else None
+            if wish:
+                return self._end(Status.STOPPED, reached, wish, step)
         return self._end(Status.CONVERGED, reached, Status.CONVERGED.value, step)
 
     def _find(self, step: Step) -> tuple[Status, Reached | None]:
         """Equilibrium of a step; again after every bond that did not hold."""
-        first = None
-        if self.guess is not None:
-            first = self.guess(step.before, step.time, self.u.reshape(-1, 3))
+        first = self._first(step)
         status, found = self.equilibrium.find(self.u, self.memory, step, first)
+        if found is None and first is not None and self.guess is None:
+            status, found = self.equilibrium.find(self.u, self.memory, step)
         memory = self.memory
         for _ in range(_BREAKS):
             if found is None:
@@ -240,6 +251,16 @@ class _Run:
             memory = [_released(m, mask) for m, mask in zip(memory, broken, strict=True)]
             status, found = self.equilibrium.find(self.u, memory, step, found.displacement)
         return Status.MAX_ITERATIONS, None
+
+    def _first(self, step: Step) -> NDArray[np.float64] | None:
+        """Where to begin: as asked, or where things go if they go on as in the step before."""
+        if self.guess is not None:
+            return self.guess(step.before, step.time, self.u.reshape(-1, 3))
+        if self.course is None:
+            return None
+        first = self.u + (step.time - step.before) * self.course
+        upright = not self.body.large_strain or bool((self.body.at(first, stiffness=False).lowest > 0.0).all())
+        return first if upright else None
 
     def _instant(self, time: float, found: Reached, solves: int, iterations: int) -> ContactInstant:
         x = self.body.mesh.nodes + found.displacement.reshape(-1, 3)
