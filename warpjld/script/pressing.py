@@ -97,6 +97,8 @@ def _run(scene: Scene, pressing: Pressing, folder: Path, progress: Report) -> Pr
         bodies,
         start,
         frames,
+        method=pressing.method,
+        aitken=pressing.aitken,
         watch=table.take if pressing.stop else table.note,
         state=None if pressing.state is None else folder / pressing.state,
         progress=progress,
