@@ -10,9 +10,10 @@ from numpy.typing import NDArray
 from warpjld.fem.contact.pairs import Pair
 from warpjld.fem.contact.points import ContactPoints
 
-__all__ = ["Memory", "Response", "remember", "respond", "start_memory"]
+__all__ = ["GRIPS", "Memory", "Response", "remember", "respond", "start_memory"]
 
-_GRIPS = 2
+GRIPS = 2
+"""Iterations under pressure from which friction acts."""
 _TORN = 3.0
 """Friction in excess of Coulomb's, over Coulomb's, from which pressures found beside it say nothing."""
 
@@ -29,6 +30,7 @@ class Memory:
             first guess is gone, shape (s,).
         anchor: Slip at which friction took hold of what was not pressed when the step began [m], shape (s, 3): on its
             way there it slid freely.
+        rooted: Whether it was pressed when the step began: its slip counts from there, shape (s,).
         stuck: Whether friction holds it, or it slides if not, shape (s,).
         bonded: Whether the bond holds, shape (s,).
         seam: Gap at which the bond was made [m], shape (s,).
@@ -39,6 +41,7 @@ class Memory:
     allowance: NDArray[np.float64]
     gripping: NDArray[np.int32]
     anchor: NDArray[np.float64]
+    rooted: NDArray[np.bool_]
     stuck: NDArray[np.bool_]
     bonded: NDArray[np.bool_]
     seam: NDArray[np.float64]
@@ -78,6 +81,7 @@ def start_memory(count: int, pair: Pair) -> Memory:
         allowance=np.zeros(count),
         gripping=np.zeros(count, np.int32),
         anchor=np.zeros((count, 3)),
+        rooted=np.zeros(count, dtype=bool),
         stuck=np.ones(count, dtype=bool),
         bonded=bonded,
         seam=np.full(count, np.nan),
@@ -136,7 +140,7 @@ def respond(
         carried = np.einsum("mij,mj->mi", across, memory.friction[at])
         # the pressure of the iterate before bounds the friction of this one: each iterate is then a convex problem
         bound = np.maximum(memory.pressure[at] if keep or patient else pressure, 0.0)
-        grips = active & ((memory.gripping[at] >= _GRIPS) | bonded)
+        grips = active & ((memory.gripping[at] >= GRIPS) | bonded)
         limit = np.where(grips, pair.friction * bound, 0.0)
         held = carried - penalty[:, None] * slip
         size = np.linalg.norm(held, axis=1)
@@ -200,7 +204,7 @@ def remember(
             torn = np.where(stick & ~bonded & known, np.maximum(size - loaded, 0.0), 0.0)
             if points.area @ torn > _TORN * (points.area @ loaded) > 0.0:
                 pressure, limit = np.where(known, memory.pressure[at], 0.0), loaded
-                stick = memory.stuck[at] & (memory.gripping[at] >= _GRIPS)
+                stick = memory.stuck[at] & (memory.gripping[at] >= GRIPS)
                 traction = np.where(stick[:, None], memory.friction[at] - penalty[:, None] * slip, traction)
                 size = np.linalg.norm(traction, axis=1)
             held = bonded | (stick & (size <= limit))
@@ -210,14 +214,15 @@ def remember(
             turn = np.minimum(1.0, np.divide(far, limit, out=np.ones(len(at)), where=limit > 0.0))
             path = _unit(traction)
             path = np.where(sliding[:, None], _unit(path - turn[:, None] * _unit(slip)), path)
-            fresh = memory.gripping[at] < _GRIPS
+            fresh = memory.gripping[at] < GRIPS
             stuck[at] = held | (~stick & ~against) | fresh
             friction[at] = np.where(held[:, None], traction, limit[:, None] * path)
         friction[at] *= known[:, None]
     normal[at] = pressure
-    gripping = np.where(normal > 0.0, memory.gripping + 1, 0).astype(np.int32)
+    gripping = np.where(normal > 0.0, memory.gripping + 1, np.where(memory.pressure > 0.0, 0, memory.gripping))
+    gripping = gripping.astype(np.int32)
     anchor = memory.anchor
-    seizing = (gripping[at] == _GRIPS) & (memory.gripping[at] < _GRIPS)
+    seizing = (gripping[at] == GRIPS) & (memory.gripping[at] < GRIPS) & ~memory.rooted[at]
     if seizing.any() and pair.friction > 0.0:
         anchor = anchor.copy()
         anchor[at[seizing]] = whole[seizing]

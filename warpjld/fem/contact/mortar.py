@@ -49,7 +49,9 @@ class Mortar:
                     f"{pair.title}: want one label for each of {len(slave.quads)} slave and {len(master.quads)} "
                     f"master faces, got {mine.shape} and {other.shape}"
                 )
-            if max(mine.max(), other.max()) >= len(never):
+            if never.ndim != 2 or never.shape[0] != never.shape[1]:
+                raise InputError(f"{pair.title}: never: want a square table of labels, got shape {never.shape}")
+            if max(mine.max(), other.max()) >= len(never) or min(mine.min(), other.min()) < 0:
                 raise InputError(f"{pair.title}: labels must lie in 0…{len(never) - 1}")
         same = slave.quads.shape == master.quads.shape and bool((slave.quads == master.quads).all())
         if same:

@@ -12,7 +12,7 @@ from warpjld.errors import InputError
 from warpjld.fem.body import Body
 from warpjld.fem.conjugate import Status
 from warpjld.fem.contact.equilibrium import Equilibrium, Reached, Step
-from warpjld.fem.contact.law import Memory, start_memory
+from warpjld.fem.contact.law import GRIPS, Memory, start_memory
 from warpjld.fem.contact.pairs import Pair
 from warpjld.fem.contact.points import Interface, interfaces_of
 from warpjld.fem.contact.solution import ContactError, ContactInstant, ContactSolution
@@ -26,6 +26,8 @@ _HALVINGS = 7
 _HALVINGS_UNHELD = 3
 """A body that slides away, or falls, seldom does so because the step is long."""
 _BREAKS = 100
+_TOUCHING = 1e-3
+"""Gap over an edge at which surfaces touch from the start: friction holds them where they are."""
 _METHODS = ("augmented", "paper")
 
 Guess = Callable[[float, float, NDArray[np.float64]], NDArray[np.float64]]
@@ -175,6 +177,9 @@ class _Run:
             memory.bonded[np.isnan(memory.seam)] = False
         else:
             memory.allowance[points.sites] = np.maximum(-points.gap, 0.0)
+            touching = np.abs(points.gap) < _TOUCHING * interface.edge[points.sites]
+            memory.gripping[points.sites[touching]] = GRIPS
+            memory.rooted[points.sites[touching]] = True
         return memory
 
     def step(self, before: float, time: float) -> Step:
@@ -233,6 +238,8 @@ class _Run:
         """Equilibrium of a step; again after every bond that did not hold."""
         first = self._first(step)
         status, found = self.equilibrium.find(self.u, self.memory, step, first)
+        if found is None and first is not None and self.guess is None:
+            status, found = self.equilibrium.find(self.u, self.memory, step)
         memory = self.memory
         for _ in range(_BREAKS):
             if found is None:

@@ -1,0 +1,100 @@
+"""Two balls that both deform: softer and stiffer by ten, nearly incompressible, with friction."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from tests.fem.contact.bodies import mean_gaps, named, together
+from warpjld.fem import Body, NeoHooke, Prescribed, ball, prescribe
+from warpjld.fem.contact import ContactSolution, Pair, press
+
+STEPS = np.arange(1, 6) / 5
+EDGE = 0.25
+"""Of the finer ball's faces, about; a step of STEPS is a quarter of it."""
+SAG = (0.25**2 + 0.35**2) / 8
+"""By which faces of the two polyhedra stay behind the balls they stand for."""
+
+
+def balls(ratio: float, poisson: float, finer: int = 8, coarser: int = 6) -> tuple[Body, Prescribed]:
+    """One over the other, a little aside, pressed together by 0.3 radii beyond the gap of 0.0007 between them."""
+    a, b = named(ball(1.0, n=finer), "a"), named(ball(1.0, n=coarser), "b", (0.03, 0.02, 2.0))
+    body = together({"a": (a, NeoHooke(1.0, poisson)), "b": (b, NeoHooke(ratio, poisson))})
+    height = body.mesh.nodes[:, 2]
+    low, top = np.flatnonzero(height < -0.5), np.flatnonzero(height > 2.5)
+    held = prescribe(body.mesh, low, x=0.0, y=0.0, z=0.0) + prescribe(body.mesh, top, x=0.0, y=0.0, z=-0.3)
+    return body, held
+
+
+def solved(ratio: float, poisson: float, friction: float = 0.0) -> tuple[Body, ContactSolution]:
+    body, held = balls(ratio, poisson)
+    return body, press(body, held, [Pair("a.outer", "b.outer", friction=friction)], times=STEPS)
+
+
+def check(body: Body, found: ContactSolution) -> None:
+    """Action and reaction, bodies' reactions, overlap."""
+    lower = np.isin(np.arange(len(body.mesh.nodes)), body.mesh.node_set("a"))
+    for instant in found.instants:
+        touch = instant.touches[0]
+        size = np.linalg.norm(touch.force)
+        assert size > 0.0
+        on_a, on_b = (touch.nodal[half].sum(axis=0) for half in (lower, ~lower))
+        np.testing.assert_allclose(on_a, touch.force, rtol=0, atol=1e-10 * size)
+        np.testing.assert_allclose(on_b, -touch.force, rtol=0, atol=1e-10 * size)
+        below, above = (instant.reactions[half].sum(axis=0) for half in (lower, ~lower))
+        np.testing.assert_allclose(below, -touch.force, rtol=0, atol=1e-4 * size)  # as far as forces balance
+        np.testing.assert_allclose(above, touch.force, rtol=0, atol=1e-4 * size)
+        assert touch.penetration <= 1e-3 * EDGE
+    gaps = mean_gaps(body, found.last, "a.outer", "b.outer")
+    assert abs(gaps.mean()) < 1e-3 * EDGE
+    assert np.abs(gaps).max() < 0.15 * SAG  # distances along the polyhedra's normals, not the solver's smooth ones
+
+
+@pytest.mark.parametrize("poisson", [0.3, 0.49])
+def test_stiffness_ratios(poisson: float) -> None:
+    """Steps of a quarter of an edge: five coupled solves a step in the median, Newton's for large strain included."""
+    solves: list[int] = []
+    forces = []
+    for ratio in (0.1, 1.0, 10.0):
+        body, found = solved(ratio, poisson)
+        check(body, found)
+        assert len(found.steps) == len(STEPS)  # none was halved
+        solves += found.steps
+        forces.append(float(np.linalg.norm(found.last.touches[0].force)))
+    assert np.median(solves) <= 5
+    assert max(solves) <= 10
+    assert forces[0] < forces[1] < forces[2]
+
+
+def test_friction() -> None:
+    body, found = solved(1.0, 0.49, friction=0.5)
+    check(body, found)
+    touch = found.last.touches[0]
+    across = touch.traction - np.einsum("mi,mi->m", touch.traction, touch.normal)[:, None] * touch.normal
+    assert (np.linalg.norm(across, axis=1) <= 0.5 * touch.pressure * (1 + 1e-3) + 1e-9).all()
+    assert touch.sticking[touch.active].any()
+
+
+def test_action_is_reaction_to_a_millionth() -> None:
+    """Forces on the nodes of either body, and what holds them, with residuals to match."""
+    body, held = balls(1.0, 0.3, 4, 3)
+    found = press(body, held, [Pair("a.outer", "b.outer", friction=0.3)], times=(0.5, 1.0), tolerance=1e-7)
+    lower = np.isin(np.arange(len(body.mesh.nodes)), body.mesh.node_set("a"))
+    touch = found.last.touches[0]
+    size = np.linalg.norm(touch.force)
+    for half, sign in ((lower, 1.0), (~lower, -1.0)):
+        np.testing.assert_allclose(touch.nodal[half].sum(axis=0), sign * touch.force, rtol=0, atol=1e-12 * size)
+        np.testing.assert_allclose(
+            found.last.reactions[half].sum(axis=0), -sign * touch.force, rtol=0, atol=1e-6 * size
+        )
+
+
+def test_the_same_run_twice_is_the_same_bit_by_bit() -> None:
+    runs = []
+    for _ in range(2):
+        body, held = balls(1.0, 0.45, 4, 3)
+        runs.append(press(body, held, [Pair("a.outer", "b.outer", friction=0.4)], times=(0.5, 1.0)))
+    for one, other in zip(runs[0].instants, runs[1].instants, strict=True):
+        assert one.displacement.tobytes() == other.displacement.tobytes()
+        assert one.reactions.tobytes() == other.reactions.tobytes()
+        assert one.touches[0].traction.tobytes() == other.touches[0].traction.tobytes()
