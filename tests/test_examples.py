@@ -73,6 +73,20 @@ def test_python_api(tmp_path, capsys) -> None:
     assert "31 frames" in capsys.readouterr().out
 
 
+def test_grasp_objects(tmp_path, capsys) -> None:
+    """One ball; the example's other objects and the real ones take the same way."""
+    study = tmp_path / "one.toml"
+    text = (EXAMPLES / "grasp_objects.toml").read_text(encoding="utf-8")
+    one = text[: text.index('[[objects]]\nbuiltin = "box"')].replace("trials = 4", "trials = 1")
+    study.write_text(one + "[wrist]\nbest_of = 16\n", encoding="utf-8")
+    (row,) = runpy.run_path(str(EXAMPLES / "grasp_objects.py"))["main"](tmp_path / "out", study)
+    assert row["success"]
+    assert row["penetration"] <= 1e-3
+    assert "1 of 1 grasps hold" in capsys.readouterr().out
+    assert (tmp_path / "out" / "built-in.png").stat().st_size > 0
+    assert "| built-in | ball | yes |" in (tmp_path / "out" / "grasps.md").read_text(encoding="utf-8")
+
+
 @pytest.mark.slow
 def test_the_main_example_whole(tmp_path) -> None:
     with pytest.raises(SystemExit) as ended:

@@ -71,7 +71,7 @@ def test_digits_touch_and_do_not_enter(covering, open_hand, make, coupling) -> N
 
 def test_batches_are_single_hands(covering, open_hand) -> None:
     poses, angles = open_hand
-    things = ObjectSet([ball(0.065), ball(0.05)])
+    things = ObjectSet([ball(0.065, subdivisions=3), ball(0.05, subdivisions=3)])
     places = [below_the_palm(covering, poses, thing) for thing in things.objects]
     both = Places.of(np.concatenate([p.position for p in places]))
     from warpjld.skeleton import Poses

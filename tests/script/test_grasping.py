@@ -174,3 +174,11 @@ def test_grasp_auto(run) -> None:
     assert np.linalg.norm(away - there) == pytest.approx(0.12, abs=1e-6)
     with pytest.raises(InputError, match="did you mean PLATE"):
         run("GRASP 35 45 LEFT apple AUTO POSTURE PLATES")
+
+
+def test_what_else_a_closing_hand_runs_into_is_told(run) -> None:
+    boxes = "OBJECT table BOX 0.4 0.02 0.4 AT 0 -0.092 0\nOBJECT floor BOX 0.4 0.02 0.4 AT 0 -0.3 0\n"
+    scene = run(f"{READY}{boxes}GRASP 5 15 LEFT apple")
+    (told,) = scene.attempts[0].values["collisions"]
+    assert told.startswith("collides with TABLE: left.")
+    assert told in scene.attempts[0].message

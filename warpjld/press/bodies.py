@@ -15,6 +15,7 @@ from warpjld.fem.contact import Bond, Exclusion, Obstacle, Pair
 from warpjld.fem.hand.blend import Moves
 from warpjld.grasp import Places
 from warpjld.press.rest import Part
+from warpjld.press.settle import settle
 from warpjld.press.volumes import ObjectVolume
 from warpjld.press.wishes import ContactWishes, Prescribing, placed
 
@@ -86,10 +87,11 @@ class ObjectBody:
         for state, nodes in self.states:
             moved = np.zeros((len(nodes), 3))
             axes = [k for k, axis in enumerate("xyz") if axis in state.tracks]
-            if state.held:
+            held = state.holds(frame)
+            if held:
                 axes = [0, 1, 2]
                 moved = self.place(time).apply(self.volume.local[nodes])[0] - self.volume.mesh.nodes[nodes]
-            begun = state.held
+            begun = held
             for axis, track in state.tracks.items():
                 begun = begun or frame >= track.keys[0].frame
                 moved[:, "xyz".index(axis)] += float(track.spline(frame))
@@ -121,6 +123,7 @@ class Bodies:
         pairs: What may touch what.
         owners: Whose surfaces those are.
         loads: From time 0 on.
+        start: Frame of time 0.
         carried: Objects that only hands hold, by the hand: they go along with it in first guesses.
     """
 
@@ -132,6 +135,7 @@ class Bodies:
     pairs: tuple[Pair, ...]
     owners: tuple[PairOf, ...]
     loads: Loads
+    start: float = 0.0
     carried: dict[str, str] = field(default_factory=dict)
 
     def prescribed(self, time: float) -> Prescribed:
@@ -152,10 +156,12 @@ class Bodies:
         for one in self.objects:
             span = self.spans[one.name]
             at = one.volume.mesh.nodes + displacement[span]
-            if any(state.held for state, _ in one.states):
+            if any(state.holds(self.start + time) for state, _ in one.states):
                 out[span] += _rigid(one.place(before), one.place(time), at) - at
-            elif one.name in self.carried:
-                out[span] += self._along(self.carried[one.name], before, time, at) - at
+            elif not any(state.tracks for state, _ in one.states):
+                if one.name in self.carried:
+                    at = self._along(self.carried[one.name], before, time, at)
+                out[span] = self._settled(one, at, time, out) - one.volume.mesh.nodes
         known = self.prescribed(time)
         out.reshape(-1)[known.degrees] = known.values
         return out
@@ -172,6 +178,21 @@ class Bodies:
                     pushes[other] = pushes.get(other, 0.0) + float(np.linalg.norm(forces, axis=1).sum())
             if pushes and set(pushes) <= hands:
                 self.carried[one.name] = max(pushes, key=lambda name: pushes[name])
+
+    def _settled(
+        self, one: ObjectBody, at: NDArray[np.float64], time: float, displacement: NDArray[np.float64]
+    ) -> NDArray[np.float64]:
+        """Where an object that nothing holds goes among hands and obstacles, from where its nodes are."""
+        mesh = one.volume.mesh
+        quads = mesh.quads(mesh.face_set(one.name))
+        triangles = np.concatenate([quads[:, [0, 1, 2]], quads[:, [0, 2, 3]]])
+        skins = [np.empty((0, 3))]
+        for hand in self.hands:
+            flesh = hand.part.hand
+            skin = np.unique(flesh.mesh.quads(flesh.skin_faces))
+            skins.append(flesh.mesh.nodes[skin] + displacement[self.spans[hand.name]][skin])
+        found = settle(at, triangles, np.concatenate(skins), list(self.obstacles.values()), time)
+        return found.of(at)
 
     def _along(self, name: str, before: float, time: float, points: NDArray[np.float64]) -> NDArray[np.float64]:
         """Points carried along by a hand as a whole."""
@@ -210,7 +231,8 @@ def assemble(
     pressure = {o.volume.inside: o.volume.physical.pressure for o in objects if o.volume.physical.pressure}
     pairs, owners = _pairs(hands, objects, obstacles, wishes)
     loads = Loads(gravity=wishes.gravity, pressure=pressure)
-    return Bodies(tuple(hands), tuple(objects), obstacles, body, spans, tuple(pairs), tuple(owners), loads)
+    start = objects[0].start if objects else 0.0
+    return Bodies(tuple(hands), tuple(objects), obstacles, body, spans, tuple(pairs), tuple(owners), loads, start)
 
 
 def _pairs(

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
 from functools import cached_property
 
 import numpy as np
@@ -10,6 +11,7 @@ from numpy.typing import NDArray
 
 from warpjld.fem.embedding import Embedding
 from warpjld.fem.hexmesh import HexMesh
+from warpjld.grasp import Places
 from warpjld.press.bodies import Bodies
 from warpjld.press.run import Solved
 
@@ -23,10 +25,14 @@ class Pressed:
     Attributes:
         bodies: What was pressed.
         solved: What came of it.
+        pushed: Objects that were pushed about before: frames and placements, by name.
+        shapes: Their vertices in their own frame [m].
     """
 
     bodies: Bodies
     solved: Solved
+    pushed: Mapping[str, tuple[NDArray[np.float64], Sequence[Places]]] = field(default_factory=dict)
+    shapes: Mapping[str, NDArray[np.float64]] = field(default_factory=dict)
 
     def moves(self, name: str) -> bool:
         """Whether an object is shown as contact has it."""
@@ -45,8 +51,13 @@ class Pressed:
         """An object's surface (V, 3) at a frame; None where contact was not solved."""
         one = next((o for o in self.bodies.objects if o.name == name), None)
         moved = self._displacement(frame)
-        if one is None or moved is None:
+        if one is None:
             return None
+        if moved is None:
+            frames, places = self.pushed.get(name, (np.empty(0), ()))
+            if not len(frames) or not frames[0] <= frame <= frames[-1]:
+                return None
+            return np.asarray(places[int(np.searchsorted(frames, frame))].apply(self.shapes[name])[0])
         return one.volume.worn(moved[self.bodies.spans[name]])
 
     def pressure(self, name: str, frame: float) -> NDArray[np.float64] | None:

@@ -16,6 +16,9 @@ from warpjld.press.state import State, load_state, save_state
 
 __all__ = ["Solved", "solve_frames"]
 
+_TOLERANCE = 1e-4
+"""Residual over the forces that balance: what a film and a table of newtons need."""
+
 
 @dataclass(frozen=True, eq=False)
 class Solved:
@@ -81,6 +84,7 @@ def solve_frames(
             lambda time: bodies.loads,
             times=(frame - start,),
             after=after,
+            tolerance=_TOLERANCE,
             guess=bodies.guess,
             check=False,
         )

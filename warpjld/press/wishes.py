@@ -157,11 +157,17 @@ class Prescribing:
         points: Which.
         tracks: Keys of the prescribed axes ``x``, ``y``, ``z`` [m]: three of them (VECTOR) or fewer.
         held: Whether the points go where the object's place goes; ``tracks`` then displace them from there.
+        until: Frame after which points that are held are free.
     """
 
     points: Points
     tracks: dict[str, Track] = field(default_factory=dict)
     held: bool = False
+    until: float = float("inf")
+
+    def holds(self, frame: float) -> bool:
+        """Whether the points go with the object at a frame."""
+        return self.held and frame <= self.until
 
 
 @dataclass(frozen=True)

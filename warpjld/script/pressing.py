@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.spatial.transform import Rotation
 
 from warpjld.errors import InputError
 from warpjld.press.wishes import FleshWish, Pressing, placed
@@ -28,12 +29,12 @@ if TYPE_CHECKING:
     from warpjld.script.props import Prop
     from warpjld.script.scene import Actor, Scene
 
-__all__ = ["PressReport", "first_moment", "prop_obstacle", "run_press"]
+__all__ = ["Approach", "PressReport", "approach", "prop_obstacle", "run_press"]
 
 Report = Callable[[str, int, int], None]
 
 _CLEAR = 2e-4
-"""Skin deeper inside an object than this touches it [m]."""
+"""Skin deeper than this inside an object that cannot get out of the way presses on it [m]."""
 
 _ROUNDED = 1e-3
 """Radius of the edges of boxes and cylinders as contact feels them [m]: skin has no corner to lie around."""
@@ -78,11 +79,12 @@ def _run(scene: Scene, pressing: Pressing, folder: Path, progress: Report) -> Pr
     from warpjld.press.verdict import verdict_of
 
     progress("looking for the first touch", 0, 1)
-    start = first_moment(scene, pressing)
+    before = approach(scene, pressing)
+    start = before.start
     notes: list[str] = []
     progress("meshing", 0, 1)
     hands = [_hand(scene, scene.actor(name), wish, start, notes) for name, wish in scene.contact.flesh.items()]
-    objects = [_object(scene, scene.prop(name), start) for name in scene.contact.physical]
+    objects = [_object(scene, scene.prop(name), start, before.place(name)) for name in scene.contact.physical]
     rigid = [prop for prop in scene.props.values() if prop.name not in scene.contact.physical]
     obstacles = {prop.name: prop_obstacle(scene, prop, start) for prop in rigid}
     bodies = assemble(hands, objects, obstacles, scene.contact)
@@ -102,44 +104,82 @@ def _run(scene: Scene, pressing: Pressing, folder: Path, progress: Report) -> Pr
     if solved.resumed:
         notes.append(f"{solved.resumed} of {len(solved.frames)} frames were in {pressing.state} already")
     verdict = verdict_of(solved, table.rows, table.suggestions())
-    return PressReport(Pressed(bodies, solved), table.rows, verdict, notes)
+    pushed = {name: (np.array(frames), places) for name, (frames, places) in before.moved.items()}
+    shapes = {name: scene.prop(name).thing.vertices for name in pushed}
+    return PressReport(Pressed(bodies, solved, pushed, shapes), table.rows, verdict, notes)
 
 
-def first_moment(scene: Scene, pressing: Pressing) -> float:
-    """The last frame from which on contact has to be solved: the one before skin or an object first touches something;
-    the first one where something touches there already (R91, R112)."""
-    physical = [scene.prop(name) for name in scene.contact.physical]
-    if scene.contact.prescribed or any(scene.contact.gravity):
-        return float(pressing.first)
+@dataclass(frozen=True, eq=False)
+class Approach:
+    """How a scene comes to the moment from which on contact has to be solved.
+
+    Attributes:
+        start: That frame: the one before anything is held; the first one where something is held there already.
+        moved: Places of free objects that hands push before they hold them, by name: frames and placements.
+    """
+
+    start: float
+    moved: dict[str, tuple[list[float], list[Places]]]
+
+    def place(self, name: str) -> Places | None:
+        """Where a free object is at the start, if not where the script has it."""
+        return self.moved[name][1][-1] if name in self.moved else None
+
+
+def approach(scene: Scene, pressing: Pressing) -> Approach:
+    """Look for the first moment that needs solving (R91, R112).
+
+    Before it nothing touches, or what is touched gives way: a free object that is pushed from one side only goes where
+    nothing pushes it any more.
+    """
+    free = [n for n in scene.contact.physical if not any(o == n for o, _ in scene.contact.prescribed)]
+    keyed = any(state.tracks for state in scene.contact.prescribed.values())
+    moved: dict[str, tuple[list[float], list[Places]]] = {}
+    if keyed or any(scene.contact.gravity):
+        return Approach(float(pressing.first), moved)
     for frame in range(pressing.first, pressing.last + 1):
-        if _touches(scene, float(frame), physical):
-            return float(max(pressing.first, frame - 1))
-    return float(pressing.last - 1)
+        held, places = _held(scene, float(frame), free, moved)
+        if held:
+            return Approach(float(max(pressing.first, frame - 1)), moved)
+        for name, place in places.items():
+            frames, sequence = moved.setdefault(name, ([], []))
+            frames.append(float(frame))
+            sequence.append(place)
+    return Approach(float(pressing.last - 1), moved)
 
 
-def _touches(scene: Scene, frame: float, physical: list[Prop]) -> bool:
+def _held(
+    scene: Scene, frame: float, free: list[str], moved: dict[str, tuple[list[float], list[Places]]]
+) -> tuple[bool, dict[str, Places]]:
+    """Whether anything is held at a frame, and where free objects are that are pushed."""
+    from warpjld.press.settle import settle
+
     moment = np.array([frame])
-    solids = {prop.name: prop_obstacle(scene, prop, frame) for prop in scene.props.values()}
-    for name in scene.contact.flesh:
-        actor = scene.actor(name)
-        skin = cover(actor).deform(stage(actor, moment, scene.rate))[0].astype(np.float64)
-        if any(_inside(solid, skin, _CLEAR) for solid in solids.values()):
-            return True
-    for prop in physical:
-        vertices = scene.whereabouts(prop, moment).apply(prop.thing.vertices)[0]
-        others = [other for other in scene.props.values() if other is not prop and (_driven(prop) or _driven(other))]
-        if any(_inside(solids[other.name], vertices, -_CLEAR) for other in others):
-            return True
-    return False
+    skins = {
+        name: cover(actor).deform(stage(actor, moment, scene.rate))[0].astype(np.float64)
+        for name in scene.contact.flesh
+        for actor in (scene.actor(name),)
+    }
+    obstacles = {p.name: prop_obstacle(scene, p, frame) for p in scene.props.values() if p.name not in free}
+    if any(_inside(solid, skin) for solid in obstacles.values() for skin in skins.values()):
+        return True, {}
+    places: dict[str, Places] = {}
+    for name in free:
+        prop = scene.prop(name)
+        place = moved[name][1][-1] if name in moved else scene.whereabouts(prop, moment)
+        vertices = place.apply(prop.thing.vertices)[0]
+        near = [solid for solid in obstacles.values() if float(solid.project(vertices, 0.0).distance.min()) < _CLEAR]
+        found = settle(vertices, prop.thing.faces, np.concatenate([*skins.values(), np.empty((0, 3))]), near, 0.0)
+        if found.overlap > _CLEAR:
+            return True, {}
+        if name in moved or np.linalg.norm(found.of(vertices) - vertices, axis=1).max() > 1e-6:
+            turn = found.turn * Rotation.from_quat(place.rotation[0])
+            places[name] = type(place)(found.of(place.position), turn.as_quat()[None])
+    return False, places
 
 
-def _driven(prop: Prop) -> bool:
-    """Whether the script moves or deforms an object; what only lies on something waits for a hand."""
-    return bool(prop.placement.tracks or prop.associations or prop.deforms)
-
-
-def _inside(solid: Obstacle, points: NDArray[np.float64], depth: float) -> bool:
-    return bool((solid.project(points, 0.0).distance < -depth).any())
+def _inside(solid: Obstacle, points: NDArray[np.float64]) -> bool:
+    return bool((solid.project(points, 0.0).distance < -_CLEAR).any())
 
 
 def _hand(scene: Scene, actor: Actor, wish: FleshWish, start: float, notes: list[str]) -> HandBody:
@@ -172,14 +212,14 @@ def _hand(scene: Scene, actor: Actor, wish: FleshWish, start: float, notes: list
     return HandBody(actor.name, part, laws, moves, wish.skin, wish.itself)
 
 
-def _object(scene: Scene, prop: Prop, start: float) -> ObjectBody:
+def _object(scene: Scene, prop: Prop, start: float, place: Places | None = None) -> ObjectBody:
     from warpjld.press.bodies import ObjectBody
     from warpjld.press.volumes import object_volume
 
     physical = scene.contact.physical[prop.name]
     at = _places(scene, prop, start)
     try:
-        volume = object_volume(prop.name, prop.thing, physical, at(0.0))
+        volume = object_volume(prop.name, prop.thing, physical, at(0.0) if place is None else place)
         states = []
         stage_at_first = prop.thing.place.apply(volume.local)[0]
         for (name, points), state in scene.contact.prescribed.items():

@@ -36,14 +36,17 @@ _ROUNDING = 1e-13
 """Part of stiffness times displacement that is rounding, where bodies move without a force."""
 _PLACES = 0.03
 """The same of positions, over that of displacements: gaps are differences of positions."""
-_HELD = 1e-4
-"""Stiffness given to bodies that only contact holds, over their own: it slows them down, and leaves no force."""
+_HELD = (3e-2, 0.4, 1e-4)
+"""Stiffness given to bodies that only contact holds, over their own: it slows them down, and leaves no force. At first,
+so that contact is found before they fly off; by which factor it then falls with each iteration; and the least.
+"""
 _TURNING = 1
 """Iterations after which normals stay; weights follow until they no longer change the gaps. That both are right is
 looked at once forces balance. (Newton's method without their derivatives converges slowly, with them not symmetric.)"""
 _CARELESS = 8
 """Iterations with full steps and multipliers brought up to date at once; what has not settled by then takes turns."""
 _LINE_SEARCH = 8
+_STIFFENED = (0.0, 0.02, 0.1, 0.5)
 _INNER = 1e-4
 _PATIENCE = 25
 """Iterations after which a preconditioner made for an earlier matrix has served its time."""
@@ -154,6 +157,7 @@ class Equilibrium:
         known = step.prescribed.degrees
         free = step.prescribed.free(body.degrees)
         loose = self._unheld(step.prescribed)
+        memory = self._begun(memory, start, step)
         pressures: NDArray[np.float64] | None = None
         jump = np.zeros_like(u)
         guessed = self._guessed(first, step.prescribed)
@@ -181,8 +185,11 @@ class Equilibrium:
             scale = max(norm(external), pushed, norm(np.where(free, 0.0, balance)), 1e-300)
             now = norm(residual) / scale
             noise = _ROUNDING * (norm(np.repeat(self._stiff, 3) * u) + _PLACES * norm(self._stiff) * body.mesh.size)
-            settled_down = pushed <= noise or self._settled(contact, memory)
-            if moved and now <= max(self._tolerance, noise / scale) and settled_down:
+            if (
+                moved
+                and now <= max(self._tolerance, noise / scale)
+                and self._settled(contact, memory, max(self._tolerance * scale, noise))
+            ):
                 normals = self._normals(u)
                 fresh = self._points(u, step, normals)
                 if step.allowed > 0.0 or self._mismatch(fresh, contact.points, contact.responses) <= self._penetration:
@@ -199,7 +206,7 @@ class Equilibrium:
             matrix = with_contact(
                 stiffness, contact.points, [r.blocks for r in contact.responses], threads=body.threads
             )
-            matrix = self._steadied(matrix, stiffness, loose)
+            matrix = self._steadied(matrix, stiffness, loose, iteration - since)
             try:
                 solver, done = self._solve(solver, matrix, free, residual - matrix.product(jump, threads=body.threads))
             except IndefiniteError:
@@ -209,6 +216,8 @@ class Equilibrium:
             if done.status in (Status.INDEFINITE, Status.NOT_FINITE):
                 return done.status, None
             move = done.x + jump
+            if not jump.any():
+                move *= self._leash(loose, move)
             watched = free if moved and careful else free & np.repeat(self._falling(loose, contact), 3)
             length = self._search(u, move, contact, memory, step, residual, watched, patient=careful)
             if length == 0.0:
@@ -249,14 +258,37 @@ class Equilibrium:
     def _solve(
         self, solver: LinearSolver | None, matrix: BlockMatrix, free: NDArray[np.bool_], right: NDArray[np.float64]
     ) -> tuple[LinearSolver, Iteration]:
-        """With the preconditioner of the step's first matrix while it serves."""
+        """With the preconditioner of the step's first matrix while it serves.
+
+        Flesh that is about to fold has a K that is not positive definite on the way to its fold. A share of each node's
+        own stiffness is then added until it is: the step is shorter, where it leads is not changed.
+        """
         if solver is not None:
             done = solver.of(matrix).solve(right, tolerance=_INNER, iterations=_PATIENCE)
             if done.status is Status.CONVERGED:
                 return solver, done
-        solver = LinearSolver(matrix, free, self.body.mesh, hierarchy=self._hierarchy, **self._options)
+        for share in _STIFFENED:
+            if share:
+                matrix = self._stiffened(matrix, share)
+            try:
+                solver = LinearSolver(matrix, free, self.body.mesh, hierarchy=self._hierarchy, **self._options)
+                done = solver.solve(right, tolerance=_INNER)
+            except IndefiniteError:
+                if share == _STIFFENED[-1]:
+                    raise
+                continue
+            if done.status is not Status.INDEFINITE:
+                break
+        assert solver is not None
         self._hierarchy = solver.hierarchy
-        return solver, solver.solve(right, tolerance=_INNER)
+        return solver, done
+
+    def _stiffened(self, matrix: BlockMatrix, share: float) -> BlockMatrix:
+        """A matrix with a share of the nodes' stiffness at rest added."""
+        values = matrix.values.copy()
+        row = np.repeat(np.arange(matrix.size, dtype=np.int32), np.diff(matrix.rows))
+        values[np.flatnonzero(row == matrix.columns)] += (share * self._stiff)[:, None, None] * np.eye(3)
+        return BlockMatrix(matrix.rows, matrix.columns, values)
 
     def _search(
         self,
@@ -383,6 +415,7 @@ class Equilibrium:
         residual: float,
     ) -> Reached:
         kept = self._remembered(memory, contact, contact.responses, np.zeros_like(u), patient=True)
+        kept = [replace(m, anchor=np.zeros_like(m.anchor)) for m in kept]
         return Reached(u, reactions, contact.points, contact.responses, contact.slips, kept, residual)
 
     def _stiff_penalty(self, k: int, points: ContactPoints) -> NDArray[np.float64]:
@@ -390,7 +423,21 @@ class Equilibrium:
         edge = self.interfaces[k].edge[points.sites]
         return np.asarray(self._penalty * self._stiff_of[k][points.sites] / edge**2)
 
-    def _settled(self, contact: _Contact, memory: list[Memory]) -> bool:
+    def _begun(self, memory: list[Memory], start: NDArray[np.float64], step: Step) -> list[Memory]:
+        """Memory that knows what is apart as the step begins, where friction asks for it."""
+        x = self.body.mesh.nodes + start.reshape(-1, 3)
+        out = []
+        for interface, m in zip(self.interfaces, memory, strict=True):
+            if interface.pair.friction > 0.0:
+                points = interface.points(x, step.before, step.before)
+                apart = np.ones(len(m.apart), dtype=bool)
+                apart[points.sites] = points.gap > self._penetration * interface.edge[points.sites]
+                m = replace(m, apart=apart)
+            out.append(m)
+        return out
+
+    def _settled(self, contact: _Contact, memory: list[Memory], negligible: float) -> bool:
+        """Whether multipliers stay: overlap is gone, and forces change by little, or by what is ``negligible``."""
         for k, (p, r, m) in enumerate(zip(contact.points, contact.responses, memory, strict=True)):
             if not r.active.any():
                 continue
@@ -398,7 +445,7 @@ class Equilibrium:
                 return False
             change = np.abs(r.pressure - m.pressure[p.sites]) + np.linalg.norm(r.friction - m.friction[p.sites], axis=1)
             size = np.abs(r.pressure) + np.linalg.norm(r.friction, axis=1)
-            if p.area @ change > _SETTLED * (p.area @ size):
+            if p.area @ change > max(_SETTLED * (p.area @ size), negligible):
                 return False
         return True
 
@@ -455,7 +502,15 @@ class Equilibrium:
                 return Status.SLIDING
         return Status.MAX_ITERATIONS
 
-    def _steadied(self, matrix: BlockMatrix, own: BlockMatrix, loose: list[NDArray[np.int64]]) -> BlockMatrix:
+    def _leash(self, loose: list[NDArray[np.int64]], move: NDArray[np.float64]) -> float:
+        """Share of a move by which loose bodies go no farther than they look ahead."""
+        far = max((float(np.abs(move.reshape(-1, 3)[nodes]).max()) for nodes in loose), default=0.0)
+        reach = min(interface.reach for interface in self.interfaces)
+        return min(1.0, reach / far) if far > 0.0 else 1.0
+
+    def _steadied(
+        self, matrix: BlockMatrix, own: BlockMatrix, loose: list[NDArray[np.int64]], turn: int
+    ) -> BlockMatrix:
         if not loose:
             return matrix
         nodes = np.sort(np.concatenate(loose))
@@ -463,7 +518,9 @@ class Equilibrium:
             matrix = BlockMatrix(own.rows, own.columns, own.values.copy())
         row = np.repeat(np.arange(matrix.size, dtype=np.int32), np.diff(matrix.rows))
         place = np.flatnonzero(row == matrix.columns)[nodes]
-        matrix.values[place] += (_HELD * self._stiff[nodes])[:, None, None] * np.eye(3)
+        first, falls, least = _HELD
+        held = max(least, first * falls**turn)
+        matrix.values[place] += (held * self._stiff[nodes])[:, None, None] * np.eye(3)
         return matrix
 
 

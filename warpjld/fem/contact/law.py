@@ -27,6 +27,9 @@ class Memory:
         allowance: Overlap that is still allowed, where the step began inside the other body [m], shape (s,) (R112).
         gripping: Iterations for which something has pressed; friction acts from the second, when the overlap of the
             first guess is gone, shape (s,).
+        apart: Whether the sides were apart when the step began, shape (s,).
+        anchor: Slip at which friction took hold of what was apart when the step began [m], shape (s, 3): on its way
+            there it slid freely.
         stuck: Whether friction holds it, or it slides if not, shape (s,).
         bonded: Whether the bond holds, shape (s,).
         seam: Gap at which the bond was made [m], shape (s,).
@@ -36,6 +39,8 @@ class Memory:
     friction: NDArray[np.float64]
     allowance: NDArray[np.float64]
     gripping: NDArray[np.int32]
+    apart: NDArray[np.bool_]
+    anchor: NDArray[np.float64]
     stuck: NDArray[np.bool_]
     bonded: NDArray[np.bool_]
     seam: NDArray[np.float64]
@@ -74,6 +79,8 @@ def start_memory(count: int, pair: Pair) -> Memory:
         friction=np.zeros((count, 3)),
         allowance=np.zeros(count),
         gripping=np.zeros(count, np.int32),
+        apart=np.zeros(count, dtype=bool),
+        anchor=np.zeros((count, 3)),
         stuck=np.ones(count, dtype=bool),
         bonded=bonded,
         seam=np.full(count, np.nan),
@@ -128,7 +135,7 @@ def respond(
     blocks += np.where(active, points.area * penalty, 0.0)[:, None, None] * outer
     if pair.friction > 0.0 or bonded.any():
         across = np.eye(3) - outer
-        slip = np.einsum("mij,mj->mi", across, slip)
+        slip = np.einsum("mij,mj->mi", across, slip - memory.anchor[at])
         carried = np.einsum("mij,mj->mi", across, memory.friction[at])
         # the pressure of the iterate before bounds the friction of this one: each iterate is then a convex problem
         bound = np.maximum(memory.pressure[at] if keep or patient else pressure, 0.0)
@@ -180,6 +187,7 @@ def remember(
     if pair.friction > 0.0 or memory.bonded.any():
         bonded = memory.bonded[at]
         limit = pair.friction * np.maximum(pressure, 0.0)
+        whole, slip = slip, slip - memory.anchor[at]
         slip = slip - np.einsum("mi,mi->m", slip, points.normal)[:, None] * points.normal
         size = np.linalg.norm(response.friction, axis=1)
         if patient:
@@ -211,7 +219,12 @@ def remember(
         friction[at] *= known[:, None]
     normal[at] = pressure
     gripping = np.where(normal > 0.0, memory.gripping + 1, 0).astype(np.int32)
-    return replace(memory, pressure=normal, friction=friction, gripping=gripping, stuck=stuck)
+    anchor = memory.anchor
+    seizing = memory.apart[at] & (gripping[at] == _GRIPS) & (memory.gripping[at] < _GRIPS)
+    if seizing.any() and pair.friction > 0.0:
+        anchor = anchor.copy()
+        anchor[at[seizing]] = whole[seizing]
+    return replace(memory, pressure=normal, friction=friction, gripping=gripping, anchor=anchor, stuck=stuck)
 
 
 def _unit(vectors: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -8,6 +8,8 @@ from warpjld.fem.materials import Fung, Material, NeoHooke
 __all__ = ["hand_laws"]
 
 _POISSON = (0.3, 0.49)
+_CREASE = 1.0
+"""Fung's exponent between the bones of a joint."""
 
 
 def hand_laws(
@@ -53,8 +55,8 @@ def hand_laws(
         "pulp": flesh_law,
         "flesh": flesh_law,
         "skin": soft(skin, 1100.0),
-        # what slides and unfolds in a real joint stretches here: it may not stiffen
-        "joint": NeoHooke(joint, poisson, 1050.0),
+        # it has to stiffen a little all the same: neo-Hookean flesh buckles in the crease of a joint beyond 60°
+        "joint": NeoHooke(joint, poisson, 1050.0) if stiffening == 0.0 else Fung(joint, _CREASE, poisson, 1050.0),
         "bone": NeoHooke(bone, 0.3, 1900.0),
     }
     return {name: made[kind] for name in mesh_regions if (kind := name.rpartition(".")[2]) in made}

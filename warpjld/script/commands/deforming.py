@@ -80,13 +80,16 @@ def partial(scene: Scene, arguments: Arguments) -> None:
 
 @command(
     "HOLD",
-    syntax="HOLD <object> <points>",
-    help="Object points go where the object goes: MOVE, TURN and OBJECTS take them along, the rest follows.",
+    syntax="HOLD <object> <points> [<last frame>]",
+    help="Object points go where the object goes: MOVE, TURN, OBJECTS take them along; free after the last frame.",
     group="Contact",
 )
 def hold(scene: Scene, arguments: Arguments) -> None:
     """R129: deformable bodies are actors."""
-    _state(scene, arguments).held = True
+    state = _state(scene, arguments)
+    state.held = True
+    if arguments:
+        state.until = arguments.number("the last frame they are held at")
 
 
 @command(

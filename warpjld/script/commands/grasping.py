@@ -202,7 +202,7 @@ def _grasp_auto(  # type: ignore[no-untyped-def]
         tries=lambda: arguments.integer("the number of placements to try", minimum=1, maximum=100_000),
         posture=lambda: arguments.choice("the posture", [name.upper() for name in POSTURES]).lower(),
     )
-    tries, posture = int(cast(int, options.get("tries", 48))), cast("str | None", options.get("posture"))
+    tries, posture = int(cast(int, options.get("tries", 96))), cast("str | None", options.get("posture"))
     actor = scene.actor_with(side)
     scene.attempts.append(grasp_by_itself(scene, actor, prop, side, first, last, tries, posture))
 

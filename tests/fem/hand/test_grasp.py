@@ -1,0 +1,112 @@
+"""The built-in hand's flesh closes on a ball: contact, muscles and touch together."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from warpjld.covering import bind
+from warpjld.fem import Body, NeoHooke, Status, merge
+from warpjld.fem import ball as ball_mesh
+from warpjld.fem.contact import ContactInstant, Pair, press
+from warpjld.fem.contact.solids import Sphere
+from warpjld.fem.hand import FleshHand, HandMotion, build_flesh_hand, hand_laws, motion_of
+from warpjld.fem.hand.bone_loads import loads_from_contact, loads_from_reactions
+from warpjld.fem.hand.muscles import Effort, effort_of
+from warpjld.fem.hand.tactile import tactile_of
+from warpjld.grasp import ObjectSet, Places
+from warpjld.grasp.close import close_hand, digit_chains
+from warpjld.grasp.postures import posture_angles
+from warpjld.grasp.shapes import ball
+from warpjld.hand import build_hand
+from warpjld.skeleton import poses_from_angles
+
+pytestmark = pytest.mark.slow
+
+CENTRE = np.array([0.004, -0.0495, -0.062])
+RADIUS = 0.0325
+
+
+@pytest.fixture(scope="module")
+def closing() -> HandMotion:
+    """The hand closes until its skin touches at time 3, and on by 5° in every joint until time 4."""
+    rig = build_hand("left")
+    hand = build_flesh_hand(rig)
+    skeleton = rig.skeleton
+    start = posture_angles(skeleton, "left", "sphere")[None]
+    closed = close_hand(
+        bind(skeleton, rig.surface),
+        poses_from_angles(skeleton, start),
+        start,
+        ObjectSet(ball(2.0 * RADIUS)),
+        places=Places.of(CENTRE),
+        coupling=(1.0, 0.7),
+    ).angles
+    more = closed.copy()
+    more[:, np.unique(list(digit_chains(skeleton).values())), 0] += np.radians(5.0)
+    shares = np.array([1.0, 2.0, 3.0])[:, None, None] / 3.0
+    angles = np.concatenate([start + shares * (closed - start), more])
+    return motion_of(hand, poses_from_angles(skeleton, angles))
+
+
+def effort(motion: HandMotion, instant: ContactInstant) -> Effort:
+    nodal = np.sum([t.nodal for t in instant.touches], axis=0)
+    loads = loads_from_contact(motion.hand, instant.displacement, nodal)
+    return effort_of(motion.hand.skeleton, motion.pose(instant.time), loads)
+
+
+def balanced(hand: FleshHand, instant: ContactInstant) -> None:
+    """Contact and bones hold the flesh between them."""
+    touch = instant.touches[0].nodal[: len(hand.mesh.nodes)].sum(axis=0)
+    bones = loads_from_reactions(hand, instant.displacement, instant.reactions).force.sum(axis=0)
+    np.testing.assert_allclose(touch, bones, atol=1e-3 * instant.touches[0].normal_force + 1e-6)
+
+
+def test_rigid_ball(closing: HandMotion) -> None:
+    hand = closing.hand
+    found = press(
+        Body(hand.mesh, hand_laws(hand.mesh.region_names)),
+        closing.prescribed,
+        [Pair("hand", Sphere(CENTRE, RADIUS), name="ball")],
+        times=[1.0, 2.0, 3.0, 3.1, 3.2, 3.3, 3.4],
+        guess=closing.guess,
+        watch=lambda instant: effort(closing, instant).stop(),
+        check=False,
+    )
+    assert found.status in (Status.CONVERGED, Status.STOPPED)
+    assert found.last.time >= 3.2
+    for instant in found.instants:
+        assert instant.touches[0].penetration < 1e-3 * 0.003
+        balanced(hand, instant)
+    read = tactile_of(hand, found.instants)
+    assert not read.touching[:2].any()
+    for digit in ("pinky", "ring", "middle", "index", "thumb"):
+        assert read.touching[-1, read.pads.index(f"left.{digit}.distal")]
+    assert (np.diff(read.normal_force[2:].sum(axis=1)) > 0.0).all()
+    assert read.normal_force[-1].sum() == pytest.approx(found.last.touches[0].normal_force, rel=1e-9)
+
+
+def test_deformable_ball(closing: HandMotion) -> None:
+    from dataclasses import replace
+
+    hand = closing.hand
+    thing = ball_mesh(RADIUS, n=4)
+    thing = replace(
+        thing, nodes=thing.nodes + CENTRE, region_names=("ball",), faces={"ball": thing.boundary()}, node_sets={}
+    )
+    mesh = merge(hand.mesh, thing)
+    laws = hand_laws(mesh.region_names) | {"ball": NeoHooke(60e3, 0.45)}
+    found = press(
+        Body(mesh, laws),
+        closing.prescribed,
+        [Pair("hand", "ball", name="ball")],
+        times=[1.0, 2.0, 3.0, 3.2, 3.4],
+        guess=closing.guess,
+        check=False,
+    )
+    assert found.status is Status.CONVERGED
+    balanced(hand, found.last)
+    touch = found.last.touches[0]
+    both = touch.nodal.sum(axis=0)
+    np.testing.assert_allclose(both, 0.0, atol=1e-6 * touch.normal_force)
+    assert touch.normal_force > 1.0
