@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from warpjld.errors import InputError
 from warpjld.fem.body import Body
 from warpjld.fem.conjugate import Status
+from warpjld.fem.contact.border import contact_modulus
 from warpjld.fem.contact.equilibrium import Equilibrium, Reached, Step
 from warpjld.fem.contact.law import Memory, start_memory
 from warpjld.fem.contact.pairs import Pair
@@ -150,6 +151,7 @@ class _Run:
         self.loads = loads or Loads()
         self.guess = guess
         self.interfaces = interfaces_of(body.mesh, pairs, body.threads)
+        self.moduli = [contact_modulus(body, interface) for interface in self.interfaces]
         self.equilibrium = Equilibrium(body, self.interfaces, tolerance=tolerance, penetration=penetration)
         if after is None:
             self.start = 0.0
@@ -262,7 +264,8 @@ class _Run:
         touches = []
         for k, interface in enumerate(self.interfaces):
             bonded = found.memory[k].bonded
-            touches.append(touch_of(interface, found.points[k], found.responses[k], found.slips[k], bonded, x))
+            points, response, slip = found.points[k], found.responses[k], found.slips[k]
+            touches.append(touch_of(interface, points, response, slip, bonded, self.moduli[k], x))
         shape = (-1, 3)
         return ContactInstant(
             time,
