@@ -157,6 +157,7 @@ class Equilibrium:
         known = step.prescribed.degrees
         free = step.prescribed.free(body.degrees)
         loose = self._unheld(step.prescribed)
+        memory = self._begun(memory, start, step)
         pressures: NDArray[np.float64] | None = None
         jump = np.zeros_like(u)
         guessed = self._guessed(first, step.prescribed)
@@ -412,13 +413,26 @@ class Equilibrium:
         residual: float,
     ) -> Reached:
         kept = self._remembered(memory, contact, contact.responses, np.zeros_like(u), patient=True)
-        kept = [replace(m, anchor=np.zeros_like(m.anchor), rooted=m.pressure > 0.0) for m in kept]
+        kept = [replace(m, anchor=np.zeros_like(m.anchor)) for m in kept]
         return Reached(u, reactions, contact.points, contact.responses, contact.slips, kept, residual)
 
     def _stiff_penalty(self, k: int, points: ContactPoints) -> NDArray[np.float64]:
         """ε of points [Pa/m]: a multiple of the stiffness of their nodes, over the area they would have whole."""
         edge = self.interfaces[k].edge[points.sites]
         return np.asarray(self._penalty * self._stiff_of[k][points.sites] / edge**2)
+
+    def _begun(self, memory: list[Memory], start: NDArray[np.float64], step: Step) -> list[Memory]:
+        """Memory that knows what is apart as the step begins, where friction asks for it."""
+        x = self.body.mesh.nodes + start.reshape(-1, 3)
+        out = []
+        for interface, m in zip(self.interfaces, memory, strict=True):
+            if interface.pair.friction > 0.0:
+                points = interface.points(x, step.before, step.before)
+                apart = np.ones(len(m.apart), dtype=bool)
+                apart[points.sites] = points.gap > self._penetration * interface.edge[points.sites]
+                m = replace(m, apart=apart)
+            out.append(m)
+        return out
 
     def _settled(self, contact: _Contact, memory: list[Memory], negligible: float) -> bool:
         """Whether multipliers stay: overlap is gone, and forces change by little, or by what is ``negligible``."""

@@ -10,10 +10,9 @@ from numpy.typing import NDArray
 from warpjld.fem.contact.pairs import Pair
 from warpjld.fem.contact.points import ContactPoints
 
-__all__ = ["GRIPS", "Memory", "Response", "remember", "respond", "start_memory"]
+__all__ = ["Memory", "Response", "remember", "respond", "start_memory"]
 
-GRIPS = 2
-"""Iterations under pressure from which friction acts."""
+_GRIPS = 2
 _TORN = 3.0
 """Friction in excess of Coulomb's, over Coulomb's, from which pressures found beside it say nothing."""
 
@@ -28,9 +27,9 @@ class Memory:
         allowance: Overlap that is still allowed, where the step began inside the other body [m], shape (s,) (R112).
         gripping: Iterations for which something has pressed; friction acts from the second, when the overlap of the
             first guess is gone, shape (s,).
-        anchor: Slip at which friction took hold of what was not pressed when the step began [m], shape (s, 3): on its
-            way there it slid freely.
-        rooted: Whether it was pressed when the step began: its slip counts from there, shape (s,).
+        apart: Whether the sides were apart when the step began, shape (s,).
+        anchor: Slip at which friction took hold of what was apart when the step began [m], shape (s, 3): on its way
+            there it slid freely.
         stuck: Whether friction holds it, or it slides if not, shape (s,).
         bonded: Whether the bond holds, shape (s,).
         seam: Gap at which the bond was made [m], shape (s,).
@@ -40,8 +39,8 @@ class Memory:
     friction: NDArray[np.float64]
     allowance: NDArray[np.float64]
     gripping: NDArray[np.int32]
+    apart: NDArray[np.bool_]
     anchor: NDArray[np.float64]
-    rooted: NDArray[np.bool_]
     stuck: NDArray[np.bool_]
     bonded: NDArray[np.bool_]
     seam: NDArray[np.float64]
@@ -80,8 +79,8 @@ def start_memory(count: int, pair: Pair) -> Memory:
         friction=np.zeros((count, 3)),
         allowance=np.zeros(count),
         gripping=np.zeros(count, np.int32),
+        apart=np.zeros(count, dtype=bool),
         anchor=np.zeros((count, 3)),
-        rooted=np.zeros(count, dtype=bool),
         stuck=np.ones(count, dtype=bool),
         bonded=bonded,
         seam=np.full(count, np.nan),
@@ -140,7 +139,7 @@ def respond(
         carried = np.einsum("mij,mj->mi", across, memory.friction[at])
         # the pressure of the iterate before bounds the friction of this one: each iterate is then a convex problem
         bound = np.maximum(memory.pressure[at] if keep or patient else pressure, 0.0)
-        grips = active & ((memory.gripping[at] >= GRIPS) | bonded)
+        grips = active & ((memory.gripping[at] >= _GRIPS) | bonded)
         limit = np.where(grips, pair.friction * bound, 0.0)
         held = carried - penalty[:, None] * slip
         size = np.linalg.norm(held, axis=1)
@@ -204,7 +203,7 @@ def remember(
             torn = np.where(stick & ~bonded & known, np.maximum(size - loaded, 0.0), 0.0)
             if points.area @ torn > _TORN * (points.area @ loaded) > 0.0:
                 pressure, limit = np.where(known, memory.pressure[at], 0.0), loaded
-                stick = memory.stuck[at] & (memory.gripping[at] >= GRIPS)
+                stick = memory.stuck[at] & (memory.gripping[at] >= _GRIPS)
                 traction = np.where(stick[:, None], memory.friction[at] - penalty[:, None] * slip, traction)
                 size = np.linalg.norm(traction, axis=1)
             held = bonded | (stick & (size <= limit))
@@ -214,15 +213,14 @@ def remember(
             turn = np.minimum(1.0, np.divide(far, limit, out=np.ones(len(at)), where=limit > 0.0))
             path = _unit(traction)
             path = np.where(sliding[:, None], _unit(path - turn[:, None] * _unit(slip)), path)
-            fresh = memory.gripping[at] < GRIPS
+            fresh = memory.gripping[at] < _GRIPS
             stuck[at] = held | (~stick & ~against) | fresh
             friction[at] = np.where(held[:, None], traction, limit[:, None] * path)
         friction[at] *= known[:, None]
     normal[at] = pressure
-    gripping = np.where(normal > 0.0, memory.gripping + 1, np.where(memory.pressure > 0.0, 0, memory.gripping))
-    gripping = gripping.astype(np.int32)
+    gripping = np.where(normal > 0.0, memory.gripping + 1, 0).astype(np.int32)
     anchor = memory.anchor
-    seizing = (gripping[at] == GRIPS) & (memory.gripping[at] < GRIPS) & ~memory.rooted[at]
+    seizing = memory.apart[at] & (gripping[at] == _GRIPS) & (memory.gripping[at] < _GRIPS)
     if seizing.any() and pair.friction > 0.0:
         anchor = anchor.copy()
         anchor[at[seizing]] = whole[seizing]

@@ -11,8 +11,9 @@ from numpy.typing import NDArray
 from warpjld.errors import InputError
 from warpjld.fem.body import Body
 from warpjld.fem.conjugate import Status
+from warpjld.fem.contact.border import contact_modulus
 from warpjld.fem.contact.equilibrium import Equilibrium, Reached, Step
-from warpjld.fem.contact.law import GRIPS, Memory, start_memory
+from warpjld.fem.contact.law import Memory, start_memory
 from warpjld.fem.contact.pairs import Pair
 from warpjld.fem.contact.points import Interface, interfaces_of
 from warpjld.fem.contact.solution import ContactError, ContactInstant, ContactSolution
@@ -26,8 +27,6 @@ _HALVINGS = 7
 _HALVINGS_UNHELD = 3
 """A body that slides away, or falls, seldom does so because the step is long."""
 _BREAKS = 100
-_TOUCHING = 1e-3
-"""Gap over an edge at which surfaces touch from the start: friction holds them where they are."""
 _METHODS = ("augmented", "paper")
 
 Guess = Callable[[float, float, NDArray[np.float64]], NDArray[np.float64]]
@@ -152,6 +151,7 @@ class _Run:
         self.loads = loads or Loads()
         self.guess = guess
         self.interfaces = interfaces_of(body.mesh, pairs, body.threads)
+        self.moduli = [contact_modulus(body, interface) for interface in self.interfaces]
         self.equilibrium = Equilibrium(body, self.interfaces, tolerance=tolerance, penetration=penetration)
         if after is None:
             self.start = 0.0
@@ -177,9 +177,6 @@ class _Run:
             memory.bonded[np.isnan(memory.seam)] = False
         else:
             memory.allowance[points.sites] = np.maximum(-points.gap, 0.0)
-            touching = np.abs(points.gap) < _TOUCHING * interface.edge[points.sites]
-            memory.gripping[points.sites[touching]] = GRIPS
-            memory.rooted[points.sites[touching]] = True
         return memory
 
     def step(self, before: float, time: float) -> Step:
@@ -267,7 +264,8 @@ class _Run:
         touches = []
         for k, interface in enumerate(self.interfaces):
             bonded = found.memory[k].bonded
-            touches.append(touch_of(interface, found.points[k], found.responses[k], found.slips[k], bonded, x))
+            points, response, slip = found.points[k], found.responses[k], found.slips[k]
+            touches.append(touch_of(interface, points, response, slip, bonded, self.moduli[k], x))
         shape = (-1, 3)
         return ContactInstant(
             time,

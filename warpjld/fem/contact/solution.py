@@ -28,6 +28,7 @@ class Touch:
         traction: Force per area on the slave, friction included [Pa], shape (m, 3).
         gap: Distance, negative where the surfaces overlap [m], shape (m,).
         area: Slave area of each row [m²], shape (m,).
+        pressed: The part of it inside the border of contact, which runs between nodes [m²], shape (m,).
         slip: Tangential displacement relative to the other side since the instant before [m], shape (m, 3).
         sticking: Whether friction or a bond holds, shape (m,).
         bonded: Whether the bond still holds, shape (m,).
@@ -42,6 +43,7 @@ class Touch:
     traction: NDArray[np.float64]
     gap: NDArray[np.float64]
     area: NDArray[np.float64]
+    pressed: NDArray[np.float64]
     slip: NDArray[np.float64]
     sticking: NDArray[np.bool_]
     bonded: NDArray[np.bool_]
@@ -65,8 +67,8 @@ class Touch:
 
     @property
     def contact_area(self) -> float:
-        """Area under pressure [m²]. The share of a point at the border is taken whole."""
-        return float(self.area[self.active].sum())
+        """Area under pressure [m²], inside a border that is finer than the mesh."""
+        return float(self.pressed.sum())
 
     @property
     def peak(self) -> float:
@@ -84,7 +86,7 @@ class Touch:
     def sliding(self) -> float:
         """Share of the area under pressure that slides; NaN where nothing presses."""
         total = self.contact_area
-        return float(self.area[self.active & ~self.sticking].sum()) / total if total > 0.0 else float("nan")
+        return float(self.pressed[~self.sticking].sum()) / total if total > 0.0 else float("nan")
 
     @property
     def penetration(self) -> float:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from warpjld.fem.contact.border import pressed_at_nodes
 from warpjld.fem.contact.law import Response
 from warpjld.fem.contact.points import ContactPoints, Interface
 from warpjld.fem.contact.solution import Touch
@@ -18,6 +19,7 @@ def touch_of(
     response: Response,
     slip: NDArray[np.float64],
     bonded: NDArray[np.bool_],
+    modulus: NDArray[np.float64],
     x: NDArray[np.float64],
 ) -> Touch:
     """A pair at an instant, from its points (m) to its slave nodes (n): averages by area; of gaps the least.
@@ -28,6 +30,7 @@ def touch_of(
         response: Their tractions.
         slip: Relative displacement in the step [m], shape (m, 3).
         bonded: Whether the bond holds, one for each site.
+        modulus: E* at all slave nodes [Pa], for the border of contact (see ``border``).
         x: Positions of the body's nodes [m], shape (N, 3).
     """
     share = interface.share[points.sites]
@@ -42,18 +45,23 @@ def touch_of(
     normal = mean @ points.normal
     size = np.linalg.norm(normal, axis=1, keepdims=True)
     nodes = interface.slave.nodes[near]
+    pressure = mean @ response.pressure
+    gap = np.minimum.reduceat(points.gap[mean.indices], mean.indptr[:-1]) if len(near) else np.empty(0)
+    holds = mean @ bonded[points.sites].astype(float) > 0.0
+    pressed = np.where(holds, area, pressed_at_nodes(interface, near, pressure, gap, area, modulus, x))
     return Touch(
         name=interface.pair.title,
         nodes=nodes,
         position=x[nodes],
         normal=np.divide(normal, size, out=np.zeros_like(normal), where=size > 0.0),
-        pressure=mean @ response.pressure,
+        pressure=pressure,
         traction=mean @ traction,
-        gap=np.minimum.reduceat(points.gap[mean.indices], mean.indptr[:-1]) if len(near) else np.empty(0),
+        gap=gap,
         area=area,
+        pressed=pressed,
         slip=mean @ across,
         sticking=mean @ (response.sticking & response.active).astype(float)
         > 0.5 * (mean @ response.active.astype(float)),
-        bonded=mean @ bonded[points.sites].astype(float) > 0.0,
+        bonded=holds,
         nodal=points.forces(traction),
     )
