@@ -2,10 +2,10 @@
 
 Radius 1, E = 1, no friction. CalculiX: full integration (C3D8), face-to-face penalty contact.
 
-Contact radius: 0.309 and 0.465 (linear), 0.323 and 0.474 (rubber) are noted of CalculiX, not how they were taken. They
-are 3 to 8 % less than its own force allows (Hertz: a³ = 3 F R / 4 E*), and less than ours goes to as the mesh is refined
-(0.334 and 0.477, linear): an extent of contact elements that press, it seems, which stays behind the border. The tests
-ask for no less than that extent, no more than half an edge beyond it, and for Hertz's radius to 3 %.
+Contact radius: 0.309 and 0.465 (linear), 0.323 and 0.474 (rubber) are noted of CalculiX, not how they were taken.
+They are 3 to 8 % less than its own force allows (Hertz: a³ = 3 F R / 4 E*), and less than ours goes to as the mesh is
+refined (0.334 and 0.477, linear): an extent of contact elements that press, it seems, which stays behind the border.
+The tests ask for no less than that, no more than half an edge beyond it, and for Hertz's radius to 3 %.
 
 The hollow ball (inner radius 0.8, ν 0.45; CalculiX with neo-Hooke 0.0093 and 0.0206 at 0.1 and 0.2): with full
 integration a thin shell is too stiff, with one pressure per element (ours) a little too soft. At small strain and 0.1
