@@ -1,6 +1,8 @@
 """Every example, drawn small and of a few frames; the main one whole under the mark ``slow``."""
 
+import csv
 import runpy
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -15,7 +17,8 @@ from warpjld.skeleton import DIGITS
 pytestmark = pytest.mark.usefixtures("quick_hands")
 
 EXAMPLES = Path(__file__).resolve().parents[1] / "examples"
-SCRIPTS = sorted(path.name for path in EXAMPLES.glob("*.jld"))
+SCRIPTS = sorted(path.name for path in EXAMPLES.glob("*.jld") if not path.name.startswith("press_"))
+PRESSED = sorted(path.name for path in EXAMPLES.glob("press_*.jld"))
 
 
 def run_small(name: str, out: Path, frames: tuple[int, int] | None = None) -> dict:
@@ -41,6 +44,29 @@ def test_scripts(name: str, tmp_path, grip) -> None:
     summary = run_small(name, tmp_path, frames=(20, 22))
     assert summary["notes"] == []
     assert {Path(file["name"]).suffix for file in summary["files"]} >= {".mp4", ".png"}
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", PRESSED)
+def test_pressing(name: str, tmp_path) -> None:
+    scene = Scene(folder=tmp_path, say=lambda text: None)
+    Interpreter(scene).run_file(EXAMPLES / name)
+    scene.size = (120, 90)
+    last = {"press_ball.jld": 34, "press_ball_on_table.jld": 14, "press_plate.jld": 16}[name]
+    scene.first, scene.last = last - 2, last
+    scene.contact.pressing = replace(scene.contact.pressing, last=last)
+    summary = run_scene(scene, tmp_path)
+    assert summary["press"]["status"] == "CONVERGED"
+    assert summary["press"]["verdict"].startswith("realistic")
+    assert summary["press"]["digits"]
+    assert summary["notes"] == []
+    rows = list(csv.DictReader((tmp_path / "contact.csv").open(encoding="utf-8")))
+    total = [
+        sum(float(r["force_n"]) for r in rows if r["frame"] == frame)
+        for frame in dict.fromkeys(r["frame"] for r in rows)
+    ]
+    assert total[-1] > total[0]
+    assert 0.05 < total[-1] < 100.0
 
 
 def test_the_fist_closes_thumb_last_and_opens_again() -> None:

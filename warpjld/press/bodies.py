@@ -21,6 +21,9 @@ from warpjld.press.wishes import ContactWishes, Prescribing, placed
 
 __all__ = ["Bodies", "HandBody", "ObjectBody", "PairOf", "assemble"]
 
+_ON = 2e-4
+"""An object nearer to an obstacle than this lies on it [m]."""
+
 
 @dataclass(frozen=True, eq=False)
 class HandBody:
@@ -125,6 +128,7 @@ class Bodies:
         loads: From time 0 on.
         start: Frame of time 0.
         carried: Objects that only hands hold, by the hand: they go along with it in first guesses.
+        touched: Objects that something touches.
     """
 
     hands: tuple[HandBody, ...]
@@ -137,6 +141,7 @@ class Bodies:
     loads: Loads
     start: float = 0.0
     carried: dict[str, str] = field(default_factory=dict)
+    touched: set[str] = field(default_factory=set)
 
     def prescribed(self, time: float) -> Prescribed:
         """All known displacements at a time."""
@@ -160,8 +165,9 @@ class Bodies:
                 out[span] += _rigid(one.place(before), one.place(time), at) - at
             elif not any(state.tracks for state, _ in one.states):
                 if one.name in self.carried:
-                    at = self._along(self.carried[one.name], before, time, at)
-                out[span] = self._settled(one, at, time, out) - one.volume.mesh.nodes
+                    out[span] += self._along(self.carried[one.name], before, time, at) - at
+                elif one.name not in self.touched:
+                    out[span] = self._settled(one, at, time, out) - one.volume.mesh.nodes
         known = self.prescribed(time)
         out.reshape(-1)[known.degrees] = known.values
         return out
@@ -169,6 +175,7 @@ class Bodies:
     def note(self, nodal: NDArray[np.float64]) -> None:
         """Take note of what holds the free objects, from the contact forces of each pair (P, N, 3)."""
         self.carried.clear()
+        self.touched.clear()
         hands = {hand.name for hand in self.hands}
         for one in self.objects:
             pushes: dict[str, float] = {}
@@ -176,13 +183,17 @@ class Bodies:
                 if one.name in (owner.slave, owner.master) and forces.any():
                     other = owner.master if owner.slave == one.name else owner.slave
                     pushes[other] = pushes.get(other, 0.0) + float(np.linalg.norm(forces, axis=1).sum())
+            if pushes:
+                self.touched.add(one.name)
             if pushes and set(pushes) <= hands:
                 self.carried[one.name] = max(pushes, key=lambda name: pushes[name])
 
     def _settled(
         self, one: ObjectBody, at: NDArray[np.float64], time: float, displacement: NDArray[np.float64]
     ) -> NDArray[np.float64]:
-        """Where an object that nothing holds goes among hands and obstacles, from where its nodes are."""
+        """Where an object that nothing holds goes among hands; friction holds it on obstacles."""
+        if any(float(obstacle.project(at, time).distance.min()) < _ON for obstacle in self.obstacles.values()):
+            return at
         mesh = one.volume.mesh
         quads = mesh.quads(mesh.face_set(one.name))
         triangles = np.concatenate([quads[:, [0, 1, 2]], quads[:, [0, 2, 3]]])

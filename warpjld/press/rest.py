@@ -114,7 +114,7 @@ def part_of(hand: FleshHand, poses: Poses, skin: NDArray[np.float64], digits: Se
         hand: At rest in ``poses``.
         poses: That pose.
         skin: Its surface there [m], shape (V, 3).
-        digits: Their names, as ``index``; none for the whole hand.
+        digits: Their names, as ``index``, or ``palm``; none for the whole hand.
 
     Raises:
         InputError: No bone belongs to a digit.

@@ -44,6 +44,8 @@ def solve_frames(
     start: float,
     frames: Sequence[float],
     *,
+    method: str = "augmented",
+    aitken: bool = False,
     watch: Callable[[SolvedFrame], str | None] | None = None,
     state: Path | None = None,
     progress: Callable[[str, int, int], None] = lambda what, done, total: None,
@@ -54,6 +56,7 @@ def solve_frames(
         bodies: What may touch, at rest at ``start``.
         start: Frame of time 0, before anything touches or where overlaps begin to be parted (R112).
         frames: Rising, after ``start``.
+        method: The solver's; ``aitken`` relaxes the paper's loop.
         watch: Asked after each frame; a text stops the run there (R118).
         state: File that holds what was solved so far; an earlier run's is gone on from.
         progress: Told what is being done, how much of it is done, and how much there is.
@@ -84,6 +87,8 @@ def solve_frames(
             lambda time: bodies.loads,
             times=(frame - start,),
             after=after,
+            method=method,
+            aitken=aitken,
             tolerance=_TOLERANCE,
             guess=bodies.guess,
             check=False,

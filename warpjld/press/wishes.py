@@ -93,7 +93,7 @@ class FleshWish:
     """An actor whose flesh deforms (R105).
 
     Attributes:
-        digits: Those whose flesh is meshed, as ``index``; empty for the whole hand.
+        digits: Those whose flesh is meshed, as ``index``, or ``palm``; empty for the whole hand.
         element: Edge length of the elements [m].
         flesh: Young's modulus of what lies between skin and bone [Pa].
         skin: Young's modulus of the outermost layer of elements [Pa].

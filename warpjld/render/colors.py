@@ -22,14 +22,14 @@ class ColorScale:
         low: Number of the first colour.
         high: Number of the last colour.
         title: What the numbers are, with their unit.
-        colormap: Matplotlib's name of the colours.
+        colormap: Matplotlib's name of the colours, or colours to go through.
         factor: Multiplies the numbers where they are written, e.g. 1000 for metres shown in mm.
     """
 
     low: float
     high: float
     title: str = ""
-    colormap: str = "viridis"
+    colormap: str | tuple[str, ...] = "viridis"
     factor: float = 1.0
 
     def __post_init__(self) -> None:
@@ -77,6 +77,11 @@ class ColorScale:
     def _table(self) -> NDArray[np.uint8]:
         import matplotlib
 
+        if isinstance(self.colormap, tuple):
+            from matplotlib.colors import LinearSegmentedColormap
+
+            mixed = LinearSegmentedColormap.from_list("own", self.colormap)
+            return np.asarray(np.rint(255 * mixed(np.arange(256) / 255)[:, :3]), np.uint8)
         if self.colormap not in matplotlib.colormaps:
             near = difflib.get_close_matches(self.colormap, list(matplotlib.colormaps), n=1)
             hint = f", did you mean '{near[0]}'?" if near else ""

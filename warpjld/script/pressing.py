@@ -97,6 +97,8 @@ def _run(scene: Scene, pressing: Pressing, folder: Path, progress: Report) -> Pr
         bodies,
         start,
         frames,
+        method=pressing.method,
+        aitken=pressing.aitken,
         watch=table.take if pressing.stop else table.note,
         state=None if pressing.state is None else folder / pressing.state,
         progress=progress,
@@ -152,6 +154,7 @@ def _held(
     scene: Scene, frame: float, free: list[str], moved: dict[str, tuple[list[float], list[Places]]]
 ) -> tuple[bool, dict[str, Places]]:
     """Whether anything is held at a frame, and where free objects are that are pushed."""
+    from warpjld.fem.contact.facets import Facets
     from warpjld.press.settle import settle
 
     moment = np.array([frame])
@@ -168,8 +171,14 @@ def _held(
         prop = scene.prop(name)
         place = moved[name][1][-1] if name in moved else scene.whereabouts(prop, moment)
         vertices = place.apply(prop.thing.vertices)[0]
-        near = [solid for solid in obstacles.values() if float(solid.project(vertices, 0.0).distance.min()) < _CLEAR]
-        found = settle(vertices, prop.thing.faces, np.concatenate([*skins.values(), np.empty((0, 3))]), near, 0.0)
+        skin = np.concatenate([*skins.values(), np.empty((0, 3))])
+        if any(float(solid.project(vertices, 0.0).distance.min()) < _CLEAR for solid in obstacles.values()):
+            # friction holds what lies on something: the first push is already a grip
+            pushed = Facets(vertices, prop.thing.faces).project(skin).distance.min(initial=1.0) if len(skin) else 1.0
+            if pushed < -_CLEAR:
+                return True, {}
+            continue
+        found = settle(vertices, prop.thing.faces, skin, [], 0.0)
         if found.overlap > _CLEAR:
             return True, {}
         if name in moved or np.linalg.norm(found.of(vertices) - vertices, axis=1).max() > 1e-6:

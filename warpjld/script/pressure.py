@@ -14,7 +14,7 @@ if TYPE_CHECKING:
 
 __all__ = ["PressureView"]
 
-_COLORS = "OrRd"
+_COLORS = ("#b9b3aa", "#e8b04a", "#d4452b", "#7a1030", "#3a0520")
 _NOTHING = 1.0  # Pa: the scale's top where nothing touches
 
 
@@ -49,7 +49,7 @@ class PressureView:
         if not faces:  # an obstacle alone: nothing is known of its own pressure
             faces, self._colored, self._plain = [crowd.props[self._plain[0]].thing.faces], self._plain[:1], []
         self._faces = np.concatenate(faces).astype(np.int32)
-        highest = _NOTHING if pressed is None else max(_NOTHING, pressed.highest)
+        highest = _NOTHING if pressed is None else max(_NOTHING, pressed.high)
         self._scale = render.ColorScale(0.0, highest, "contact pressure, kPa", _COLORS, factor=1e-3)
 
     def stage(

@@ -185,11 +185,9 @@ class Equilibrium:
             scale = max(norm(external), pushed, norm(np.where(free, 0.0, balance)), 1e-300)
             now = norm(residual) / scale
             noise = _ROUNDING * (norm(np.repeat(self._stiff, 3) * u) + _PLACES * norm(self._stiff) * body.mesh.size)
-            if (
-                moved
-                and now <= max(self._tolerance, noise / scale)
-                and self._settled(contact, memory, max(self._tolerance * scale, noise))
-            ):
+            negligible = max(self._tolerance * scale, noise)
+            settled_down = pushed <= noise or self._settled(contact, memory, negligible)
+            if moved and now <= max(self._tolerance, noise / scale) and settled_down:
                 normals = self._normals(u)
                 fresh = self._points(u, step, normals)
                 if step.allowed > 0.0 or self._mismatch(fresh, contact.points, contact.responses) <= self._penetration:

@@ -57,10 +57,10 @@ def physical(scene: Scene, arguments: Arguments) -> None:
 @command(
     "FLESH",
     syntax=(
-        "FLESH <actor> [THUMB/INDEX/MIDDLE/RING/PINKY …] [ELEMENT <metres>] [YOUNG <pascals>] [SKIN <pascals>] "
+        "FLESH <actor> [THUMB/INDEX/MIDDLE/RING/PINKY/PALM …] [ELEMENT <metres>] [YOUNG <pascals>] [SKIN <pascals>] "
         "[POISSON <ratio>] [STIFFENING <exponent>] [ITSELF <ON/OFF>]"
     ),
-    help="An actor's flesh deforms, that of some digits only if they are named; ITSELF: whether skin touches skin.",
+    help="An actor's flesh deforms, of some digits or the palm only if named; ITSELF: whether skin touches skin.",
     group="Contact",
 )
 def flesh(scene: Scene, arguments: Arguments) -> None:
@@ -71,7 +71,7 @@ def flesh(scene: Scene, arguments: Arguments) -> None:
     except InputError as error:
         raise arguments.error(error.message) from None
     digits = []
-    while (digit := arguments.keyword(*FINGERS)) is not None:
+    while (digit := arguments.keyword(*FINGERS, "PALM")) is not None:
         digits.append(digit.lower())
     options = arguments.options(
         element=lambda: arguments.number("the elements' size in metres", above=0.0),

@@ -1,0 +1,182 @@
+"""A finger pressed on a plate from a script: forces, tables, pictures, going on, and what cannot work."""
+
+from __future__ import annotations
+
+import csv
+import json
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from warpjld.errors import InputError
+from warpjld.fem import Status
+from warpjld.grasp import Places
+from warpjld.press.settle import settle
+from warpjld.press.state import load_state
+from warpjld.script import Scene
+from warpjld.script.pressing import approach, run_press
+from warpjld.script.runner import run_scene
+
+PLATE = """
+OBJECT plate BOX 0.036 0.006 0.036 AT 0.034 -0.0275 -0.165
+MOVE LEFT 0  0  0.002 0
+MOVE LEFT 10 0 -0.008 0
+FLESH LEFT INDEX ELEMENT 0.003
+FRAMES 0 8
+"""
+
+
+@pytest.fixture(scope="module")
+def pressed(rig, tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, dict]:
+    """The script made once: its folder and its summary."""
+    from warpjld.script import Interpreter
+
+    scene = Scene(say=lambda text: None)
+    scene.add("left", rig)
+    Interpreter(scene).run_text(
+        PLATE + "PRESS 0 8 EVERY 2 STATE 'state.npz'\nSIZE 160 120\nPICTURE 8 'a.png' PRESSURE LEFT\n"
+        "PICTURE 8 'b.png' PRESSURE\nPICTURE 8 'c.png' SHADED\nTABLE 't.csv'\nTABLE 't.parquet'\nVOLUME 'v.pvd'\n"
+        "EXPORT 'e.npz'"
+    )
+    out = tmp_path_factory.mktemp("plate")
+    return out, run_scene(scene, out)
+
+
+def test_a_finger_presses_harder_and_harder(pressed: tuple[Path, dict]) -> None:
+    out, summary = pressed
+    assert summary["press"]["status"] == "CONVERGED"
+    assert summary["press"]["verdict"].startswith("realistic: muscles do at most")
+    with (out / "t.csv").open(encoding="utf-8") as file:
+        rows = [row for row in csv.DictReader(file) if row["digit"] == "index"]
+    force = [float(row["force_n"]) for row in rows]
+    area = [float(row["area_mm2"]) for row in rows]
+    assert (np.diff(force) > 0).all()
+    assert (np.diff(area) >= 0).all()
+    assert 0.2 < force[-1] < 20.0
+    assert float(rows[-1]["fy_n"]) > 0.9 * force[-1]
+    assert float(rows[-1]["bone_n"]) == pytest.approx(force[-1], rel=1e-3)
+    assert float(rows[-1]["share"]) >= force[-1] / float(rows[-1]["limit_n"]) - 1e-6
+    assert {row["against"] for row in rows} == {"PLATE"}
+    # force is pressure times area, as far as the highest pressure tells
+    assert float(rows[-1]["peak_kpa"]) * area[-1] * 1e-3 > force[-1]
+
+
+def test_everything_asked_for_is_made(pressed: tuple[Path, dict]) -> None:
+    import pyarrow.parquet
+
+    out, summary = pressed
+    names = {file["name"] for file in summary["files"]}
+    assert {"a.png", "b.png", "c.png", "t.csv", "t.parquet", "v.pvd"} <= names
+    table = pyarrow.parquet.read_table(out / "t.parquet").to_pylist()
+    assert table[-1]["frame"] == 8
+    assert json.loads((out / "summary.json").read_text())["press"]["digits"]
+    assert not list(out.glob("*.part"))
+
+
+def test_the_skin_stays_out_of_the_plate(pressed: tuple[Path, dict]) -> None:
+    out, _ = pressed
+    with np.load(out / "e-left.npz" if (out / "e-left.npz").is_file() else out / "e.npz") as file:
+        vertices = file["vertices"]
+    top = -0.0245
+    over = (np.abs(vertices[-1, :, 0] - 0.034) < 0.017) & (np.abs(vertices[-1, :, 2] + 0.165) < 0.017)
+    assert (vertices[-1, over, 1] < top + 2e-4).sum() > 20  # it lies on the plate
+    assert vertices[-1, over, 1].min() > top - 6e-4  # what elements of 3 mm leave
+
+
+@pytest.mark.slow
+def test_a_finished_state_is_gone_on_from(pressed: tuple[Path, dict], rig, tmp_path: Path) -> None:
+    import shutil
+
+    from warpjld.script import Interpreter
+
+    out, _ = pressed
+    shutil.copy(out / "state.npz", tmp_path / "state.npz")
+    scene = Scene(say=lambda text: None)
+    scene.add("left", rig)
+    Interpreter(scene).run_text(PLATE + "PRESS 0 8 EVERY 2 STATE 'state.npz'")
+    again = run_press(scene, tmp_path)
+    assert again.pressed.solved.resumed == len(again.pressed.solved.frames)
+    with (out / "t.csv").open(encoding="utf-8") as file:
+        force = [float(row["force_n"]) for row in csv.DictReader(file) if row["digit"] == "index"]
+    np.testing.assert_allclose([r.force_n for r in again.rows if r.digit == "index"], force, rtol=1e-5)
+    Interpreter(scene).run_text("PRESS 0 7 EVERY 2 STATE 'state.npz'")
+    with pytest.raises(InputError, match=r"state.npz: this state belongs to another scene"):
+        run_press(scene, tmp_path)
+
+
+def test_what_is_no_state_is_refused(tmp_path: Path) -> None:
+    (tmp_path / "state.npz").write_text("nonsense")
+    with pytest.raises(InputError, match="no state of a contact solve"):
+        load_state(tmp_path / "state.npz")
+
+
+def test_solving_begins_before_the_first_touch(run: Callable[[str], Scene]) -> None:
+    scene = run(PLATE + "PRESS 0 8")
+    found = approach(scene, scene.contact.pressing)
+    assert 1 <= found.start <= 5
+    far = run("OBJECT moon BALL 0.02 AT 1 0 0\nPHYSICAL moon")
+    assert approach(far, far.contact.pressing).start == found.start
+
+
+@pytest.mark.slow
+def test_bones_in_a_rigid_object_are_named(run: Callable[[str], Scene], tmp_path: Path) -> None:
+    scene = run(
+        "OBJECT plate BOX 0.036 0.006 0.036 AT 0.034 -0.0275 -0.165\nMOVE LEFT 0 0 0.002 0\nMOVE LEFT 2 0 -0.016 0\n"
+        "FLESH LEFT INDEX\nPRESS 0 2 EVERY 2"
+    )
+    report = run_press(scene, tmp_path)
+    assert report.pressed.solved.status is not Status.CONVERGED
+    assert "mm inside PLATE, which cannot give way" in report.verdict.text
+
+
+@pytest.mark.parametrize(
+    ("lines", "message"),
+    [
+        (
+            "OBJECT pea BALL 0.006 AT 0 0 -0.06\nPHYSICAL pea\nFLESH LEFT",
+            r"PEA lies inside LEFT: nothing can press it out",
+        ),
+        (
+            "OBJECT a BOX 0.02 0.02 0.02 AT 1 0 0\nOBJECT b BOX 0.02 0.02 0.02 AT 1 0.05 0\n"
+            "PHYSICAL a\nPHYSICAL b\nBOND a b 1e4",
+            r"<script>:5:1: a bond to nothing: A and B are 30 mm apart",
+        ),
+        (
+            "OBJECT a BOX 0.02 0.02 0.02\nPHYSICAL a\nPOINTS a p NEAR 5 5 5 0.01\nVECTOR a p AT 0 0 0 0",
+            r"<script>:2:1: A: points P: no point of the object lies there",
+        ),
+        ("OBJECT a GLASS\nPHYSICAL a ELEMENT 0.01", r"<script>:2:1: A: "),
+    ],
+)
+def test_hopeless_scenes_are_refused(run: Callable[[str], Scene], tmp_path: Path, lines: str, message: str) -> None:
+    scene = run(lines + "\nPRESS 0 4")
+    with pytest.raises(InputError, match=message):
+        run_press(scene, tmp_path)
+
+
+def test_pressure_wants_a_press(run: Callable[[str], Scene], tmp_path: Path) -> None:
+    with pytest.raises(InputError, match=r"'a.png' shows contact, but none is solved"):
+        run_scene(run("PICTURE 0 'a.png' PRESSURE"), tmp_path, dry=True)
+
+
+def test_a_free_ball_settles_between_what_closes_on_it() -> None:
+    from warpjld.fem.contact.solids import Plane
+    from warpjld.grasp.shapes import ball
+
+    thing = ball(0.02)
+    at = Places.of((0.0, 0.0095, 0.0)).apply(thing.vertices)[0]
+    ground = Plane()
+    lifted = settle(at, thing.faces, np.empty((0, 3)), [ground], 0.0)
+    assert ground.project(lifted.of(at), 0.0).distance.min() > -1e-6
+    assert lifted.overlap < 1e-6
+    assert np.abs(lifted.shift[[0, 2]]).max() < 1e-6
+    # a point pushes from one side: the ball goes; a point on either side: it stays in the middle, held
+    pushed = settle(at, thing.faces, np.array([[0.009, 0.0095, 0.0]]), [], 0.0)
+    assert pushed.overlap < 1e-5
+    assert pushed.shift[0] == pytest.approx(-0.001, rel=0.05)
+    walls = [Plane((-0.0095, 0.0, 0.0), (1.0, 0.0, 0.0)), Plane((0.009, 0.0, 0.0), (-1.0, 0.0, 0.0))]
+    held = settle(at, thing.faces, np.empty((0, 3)), walls, 0.0)
+    assert held.shift[0] == pytest.approx(-0.00025, rel=0.1)
+    assert held.overlap == pytest.approx(0.00075, rel=0.05)
