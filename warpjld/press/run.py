@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
+import numpy as np
+
 from warpjld.errors import InputError
-from warpjld.fem import Status
-from warpjld.fem.contact import ContactSolution, press
+from warpjld.fem import Instant, Solution, Status, solve
+from warpjld.fem.contact import ContactInstant, ContactSolution, press
 from warpjld.press.bodies import Bodies
 from warpjld.press.checks import why_not
 from warpjld.press.frames import SolvedFrame, solved_frame
@@ -78,6 +80,8 @@ def solve_frames(
         reason = watch(solved) if watch else None
         if reason:
             return Solved(Status.STOPPED, reason, start, tuple(done), resumed)
+    if not bodies.pairs:
+        return _alone(bodies, start, frames, watch, progress)
     for frame in frames[len(done) :]:
         progress(f"contact, frame {frame:g}", len(done), len(frames))
         solution = press(
@@ -106,3 +110,34 @@ def solve_frames(
         if reason:
             return Solved(Status.STOPPED, reason, start, tuple(done), resumed)
     return Solved(Status.CONVERGED, Status.CONVERGED.value, start, tuple(done), resumed)
+
+
+def _alone(
+    bodies: Bodies,
+    start: float,
+    frames: Sequence[float],
+    watch: Callable[[SolvedFrame], str | None] | None,
+    progress: Callable[[str, int, int], None],
+) -> Solved:
+    """Frames of bodies with nothing to touch."""
+    done: list[SolvedFrame] = []
+    nothing = np.zeros_like(bodies.body.mesh.nodes)
+    rest = Instant(1.0, nothing, nothing, 0, 0, 0.0)
+    after, before = Solution(Status.CONVERGED, (rest,), "", np.empty(0, np.int64), bodies.loads), 0.0
+    for frame in frames:
+        progress(f"frame {frame:g}", len(done), len(frames))
+        known = bodies.prescribed(frame - start)
+        ahead = bodies.guess(before, frame - start, after.displacement)
+        first = replace(after, instants=(replace(after.last, displacement=ahead),), loads=bodies.loads)
+        solution = solve(bodies.body, known, bodies.loads, after=first, free="hold", check=False)
+        if not solution.converged:
+            return Solved(solution.status, f"at frame {frame:g}: {solution.message}", start, tuple(done))
+        after, last, before = solution, solution.last, frame - start
+        instant = ContactInstant(
+            frame - start, last.displacement, last.reactions, (), last.newton, last.iterations, last.residual
+        )
+        done.append(solved_frame(float(frame), instant))
+        reason = watch(done[-1]) if watch else None
+        if reason:
+            return Solved(Status.STOPPED, reason, start, tuple(done))
+    return Solved(Status.CONVERGED, Status.CONVERGED.value, start, tuple(done))

@@ -166,6 +166,11 @@ def _held(
     obstacles = {p.name: prop_obstacle(scene, p, frame) for p in scene.props.values() if p.name not in free}
     if any(_inside(solid, skin) for solid in obstacles.values() for skin in skins.values()):
         return True, {}
+    for name in scene.contact.physical:
+        if name not in free:
+            shape = obstacles[name].mesh(0.0)[0]
+            if any(_inside(solid, shape) for other, solid in obstacles.items() if other != name):
+                return True, {}
     places: dict[str, Places] = {}
     for name in free:
         prop = scene.prop(name)

@@ -24,6 +24,7 @@ from warpjld.surface import Surface
 
 __all__ = ["FleshHand", "build_flesh_hand"]
 
+_CARPAL = ("wrist", "forearm")
 _SHARED = 0.1
 """Share of both bones from which on flesh between them has to stretch with their joint."""
 
@@ -211,7 +212,10 @@ def build_flesh_hand(
 
 
 def _between(mesh: HexMesh, weights: NDArray[np.float64], flesh: Flesh, joints: Sequence[str]) -> NDArray[np.bool_]:
-    """Elements of flesh shared by two bones that meet at a joint, or by two digits where they part."""
+    """Elements of flesh shared by two bones that meet at a joint, or by two digits where they part.
+
+    The wrist's own joints hardly move but for the thumb's: the palm keeps its flesh.
+    """
     share = weights[mesh.elements].mean(axis=1)
     out = np.zeros(len(mesh.elements), dtype=bool)
     names = [segment_name(joint).split(".") for joint in joints]
@@ -221,6 +225,8 @@ def _between(mesh: HexMesh, weights: NDArray[np.float64], flesh: Flesh, joints: 
             fingers = "palm" in one and "palm" in other and "thumb" not in (one[-1], other[-1])
             digits = [name[-1] if "palm" in name else name[-2] if len(name) > 1 else "" for name in (one, other)]
             parted = not fingers and digits[0] != digits[1] and digits[0] in DIGITS and digits[1] in DIGITS
-            if bone != before and (near == far or parted):
+            carpal = one[-1] in _CARPAL or other[-1] in _CARPAL
+            meet = near == far and (not carpal or "thumb" in (one[-1], other[-1]))
+            if bone != before and (meet or parted):
                 out |= np.minimum(share[:, bone], share[:, before]) > _SHARED
     return out
