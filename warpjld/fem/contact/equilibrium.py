@@ -261,16 +261,25 @@ class Equilibrium:
         Flesh that is about to fold has a K that is not positive definite on the way to its fold. A share of each node's
         own stiffness is then added until it is: the step is shorter, where it leads is not changed.
         """
+        sofar = None
         if solver is not None:
-            done = solver.of(matrix).solve(right, tolerance=_INNER, iterations=_PATIENCE)
+            before = solver.of(matrix)
+            done = before.solve(right, tolerance=_INNER, iterations=_PATIENCE)
             if done.status is Status.CONVERGED:
                 return solver, done
+            if done.status is Status.MAX_ITERATIONS and done.residual < 1.0:
+                sofar = done
+                left = right - before.masked_product(done.x)
         for share in _STIFFENED:
             if share:
                 matrix = self._stiffened(matrix, share)
             try:
                 solver = LinearSolver(matrix, free, self.body.mesh, hierarchy=self._hierarchy, **self._options)
-                done = solver.solve(right, tolerance=_INNER)
+                if sofar is not None and not share:  # go on from where the old preconditioner got to
+                    done = solver.solve(left, tolerance=_INNER / sofar.residual)
+                    done = replace(done, x=done.x + sofar.x, iterations=done.iterations + sofar.iterations)
+                else:
+                    done = solver.solve(right, tolerance=_INNER)
             except IndefiniteError:
                 if share == _STIFFENED[-1]:
                     raise
@@ -306,6 +315,8 @@ class Equilibrium:
         """
         body = self.body
         length = 1.0
+        if self._rest is not None and not watched.any():
+            return length
         for _ in range(_LINE_SEARCH):
             there = u + length * move
             trial = self._at(there, None) if self._rest is not None else body.at(there, stiffness=False)
