@@ -79,7 +79,7 @@ def posed(hand: FleshHand, poses: Poses, skin: NDArray[np.float64]) -> tuple[Fle
     return replace(hand, flesh=replace(hand.flesh, mesh=moved)), gap
 
 
-def _untangled(mesh: HexMesh, skin: NDArray[np.int64], bone: NDArray[np.int64]) -> HexMesh:
+def _untangled(mesh: HexMesh, skin: NDArray[np.integer], bone: NDArray[np.integer]) -> HexMesh:
     """Elements that a sharp bend turned inside out, turned back: nodes leave their places as little as that takes."""
     edges = np.linalg.norm(mesh.nodes[mesh.elements[:, 1]] - mesh.nodes[mesh.elements[:, 0]], axis=1)
     kept = np.concatenate([skin, bone])
