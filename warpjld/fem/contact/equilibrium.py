@@ -8,48 +8,38 @@ leaves of overlap and slip is gone when forces balance (Simo & Laursen 1992; ref
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from warpjld.fem.blockmatrix import BlockMatrix
 from warpjld.fem.body import Body, Tangent
-from warpjld.fem.conjugate import Iteration, Status
-from warpjld.fem.contact.law import Memory, Response, remember, respond
+from warpjld.fem.conjugate import Status
+from warpjld.fem.contact.interplay import Contact, Interplay, alike, shifted
+from warpjld.fem.contact.law import Memory, Response
+from warpjld.fem.contact.loose import Loose
 from warpjld.fem.contact.points import ContactPoints, Interface
+from warpjld.fem.contact.step_solver import StepSolver
 from warpjld.fem.contact.stiffness import with_contact
 from warpjld.fem.dots import dot, norm
-from warpjld.fem.linear import LinearSolver
 from warpjld.fem.loads import Loads, external_forces, subtract_pressure_stiffness
 from warpjld.fem.multigrid import IndefiniteError
-from warpjld.fem.prescribed import Prescribed, free_motions
+from warpjld.fem.prescribed import Prescribed
 
 __all__ = ["Equilibrium", "Reached", "Step"]
 
 _ITERATIONS = 40
 _PENALTY = 300.0
 """Contact stiffness over the stiffness of a node: more makes the linear solves slow, less makes them many."""
-_SETTLED = 2e-3
-"""Share of the contact forces by which the multipliers may still change."""
 _ROUNDING = 1e-13
 """Part of stiffness times displacement that is rounding, where bodies move without a force."""
 _PLACES = 0.03
 """The same of positions, over that of displacements: gaps are differences of positions."""
-_HELD = (3e-2, 0.4, 1e-4)
-"""Stiffness given to bodies that only contact holds, over their own: it slows them down, and leaves no force. At first,
-so that contact is found before they fly off; by which factor it then falls with each iteration; and the least.
-"""
 _TURNING = 1
 """Iterations after which normals stay; weights follow until they no longer change the gaps. That both are right is
 looked at once forces balance. (Newton's method without their derivatives converges slowly, with them not symmetric.)"""
 _CARELESS = 8
 """Iterations with full steps and multipliers brought up to date at once; what has not settled by then takes turns."""
 _LINE_SEARCH = 8
-_STIFFENED = (0.0, 0.02, 0.1, 0.5)
-_INNER = 1e-4
-_PATIENCE = 25
-"""Iterations after which a preconditioner made for an earlier matrix has served its time."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -86,16 +76,6 @@ class Reached:
     residual: float
 
 
-@dataclass(frozen=True, eq=False)
-class _Contact:
-    """Every interface's points, slips [m] and responses, and their nodal forces together [N], shape (3N,)."""
-
-    points: list[ContactPoints]
-    slips: list[NDArray[np.float64]]
-    responses: list[Response]
-    forces: NDArray[np.float64]
-
-
 class Equilibrium:
     """The bodies and interfaces of a contact problem, and the matrices kept between steps.
 
@@ -124,26 +104,15 @@ class Equilibrium:
         self.trouble = ""
         self._tolerance = tolerance
         self._penetration = penetration
-        self._penalty = penalty
-        bulk, shear = body.constants[:, 2], 2.0 * body.constants[:, :2].sum(axis=1)
-        poisson = float(((3 * bulk - 2 * shear) / (6 * bulk + 2 * shear)).max())
-        self._options: dict[str, Any] = {"precision": precision, "threads": body.threads, "poisson": poisson}
-        self._hierarchy: list[Any] | None = None
         self._tangent: Tangent | None = None
         self._rest = None if body.large_strain else body.at()
-        self._loose: tuple[bytes, list[NDArray[np.int64]]] | None = None
+        self._loose: tuple[bytes, Loose] | None = None
         tangent = self._rest or body.at()
         assert tangent.stiffness is not None
         blocks = tangent.stiffness.diagonal()
         self._stiff = np.einsum("nii->n", blocks) / 3.0
-        self._stiff_of = [self._meeting(interface) for interface in interfaces]
-
-    def _meeting(self, interface: Interface) -> NDArray[np.float64]:
-        """Stiffness of sites against what they meet [N/m], shape (s,)."""
-        own = interface.share @ self._stiff[interface.slave.nodes]
-        if len(interface.opposite) == 0:
-            return own
-        return np.asarray(np.minimum(own, float(np.median(self._stiff[interface.opposite]))))
+        self._solver = StepSolver(body, self._stiff, precision)
+        self._interplay = Interplay(body.mesh.nodes, interfaces, self._stiff, penalty=penalty, penetration=penetration)
 
     def find(
         self,
@@ -157,7 +126,9 @@ class Equilibrium:
         known = step.prescribed.degrees
         free = step.prescribed.free(body.degrees)
         loose = self._unheld(step.prescribed)
-        memory = self._begun(memory, start, step)
+        play = self._interplay
+        self._solver.begin()
+        memory = play.begun(memory, start, step.before)
         pressures: NDArray[np.float64] | None = None
         jump = np.zeros_like(u)
         guessed = self._guessed(first, step.prescribed)
@@ -169,11 +140,10 @@ class Equilibrium:
             # a guess squeezes elements here and there: their false pressures would make K indefinite, those of the
             # equilibrium before do not
             pressures = body.at(start, stiffness=False).pressures if body.large_strain else None
-        solver: LinearSolver | None = None
-        normals = self._normals(u)
-        held = (self._points(u, step, normals), u)
+        normals = play.normals(u)
+        held = (play.points(u, step.before, step.time, normals), u)
         settled, since, falls = False, 0, 0
-        contact = self._answered(held[0], u, start, memory, keep=True, allowed=step.allowed)
+        contact = play.answered(held[0], u, start, memory, keep=True, allowed=step.allowed)
         for iteration in range(_ITERATIONS):
             careful = iteration - since >= _CARELESS
             tangent = self._at(u, pressures)
@@ -186,14 +156,14 @@ class Equilibrium:
             now = norm(residual) / scale
             noise = _ROUNDING * (norm(np.repeat(self._stiff, 3) * u) + _PLACES * norm(self._stiff) * body.mesh.size)
             negligible = max(self._tolerance * scale, noise)
-            settled_down = pushed <= noise or self._settled(contact, memory, negligible)
+            settled_down = pushed <= noise or play.settled(contact, memory, negligible)
             if moved and now <= max(self._tolerance, noise / scale) and settled_down:
-                normals = self._normals(u)
-                fresh = self._points(u, step, normals)
-                if step.allowed > 0.0 or self._mismatch(fresh, contact.points, contact.responses) <= self._penetration:
+                normals = play.normals(u)
+                fresh = play.points(u, step.before, step.time, normals)
+                if step.allowed > 0.0 or play.mismatch(fresh, contact.points, contact.responses) <= self._penetration:
                     return Status.CONVERGED, self._reached(u, np.where(free, 0.0, balance), contact, memory, now)
                 held, settled, since = (fresh, u), False, iteration
-                contact = self._answered(fresh, u, start, memory, keep=True, allowed=step.allowed)
+                contact = play.answered(fresh, u, start, memory, keep=True, allowed=step.allowed)
                 continue
             if not np.isfinite(now):
                 return Status.NOT_FINITE, None
@@ -204,9 +174,9 @@ class Equilibrium:
             matrix = with_contact(
                 stiffness, contact.points, [r.blocks for r in contact.responses], threads=body.threads
             )
-            matrix = self._steadied(matrix, stiffness, loose, iteration - since)
+            matrix = loose.steadied(matrix, iteration - since)
             try:
-                solver, done = self._solve(solver, matrix, free, residual - matrix.product(jump, threads=body.threads))
+                done = self._solver.solve(matrix, free, residual - matrix.product(jump, threads=body.threads))
             except IndefiniteError:
                 return Status.INDEFINITE, None
             self.solves += 1
@@ -215,8 +185,8 @@ class Equilibrium:
                 return done.status, None
             move = done.x + jump
             if not jump.any():
-                move *= self._leash(loose, move)
-            watched = free if moved and careful else free & np.repeat(self._falling(loose, contact), 3)
+                move *= loose.leash(move, play.reach)
+            watched = free if moved and careful else free & np.repeat(loose.falling(contact), 3)
             length = self._search(u, move, contact, memory, step, residual, watched, patient=careful)
             if length == 0.0:
                 return Status.INVERTED, None
@@ -228,21 +198,22 @@ class Equilibrium:
             if length == 1.0:
                 u[known] = step.prescribed.values
                 jump[:] = 0.0
-            foreseen = self._foreseen(contact, memory, move, step.allowed, patient=careful)
-            if not careful or _alike(contact.responses, foreseen):
-                memory = self._remembered(memory, contact, foreseen, move, patient=careful)
-            points = [_shifted(p, (u - held[1]).reshape(-1, 3)) for p in held[0]]
+            foreseen = play.foreseen(contact, memory, move, step.allowed, patient=careful)
+            if not careful or alike(contact.responses, foreseen):
+                memory = play.remembered(memory, contact, foreseen, move, patient=careful)
+            points = [shifted(p, (u - held[1]).reshape(-1, 3)) for p in held[0]]
             if not settled:
-                normals = self._normals(u) if iteration < _TURNING else normals
-                fresh = self._points(u, step, normals)
-                settled = iteration > _TURNING and self._mismatch(fresh, points, foreseen) <= 0.5 * self._penetration
+                normals = play.normals(u) if iteration < _TURNING else normals
+                fresh = play.points(u, step.before, step.time, normals)
+                settled = iteration > _TURNING and play.mismatch(fresh, points, foreseen) <= 0.5 * self._penetration
                 held, points = (held, points) if settled else ((fresh, u), fresh)
             careful = iteration + 1 - since >= _CARELESS
-            contact = self._answered(points, u, start, memory, keep=not careful, allowed=step.allowed)
-            falls = falls + 1 if self._falling(loose, contact).any() else 0
+            contact = play.answered(points, u, start, memory, keep=not careful, allowed=step.allowed)
+            falls = falls + 1 if loose.falling(contact).any() else 0
             if falls > _CARELESS:
                 break
-        return self._unresolved(loose, contact), None
+        status, self.trouble = loose.trouble(self.interfaces, contact)
+        return status, None
 
     def _guessed(self, first: NDArray[np.float64] | None, prescribed: Prescribed) -> NDArray[np.float64] | None:
         """A first guess that satisfies what is prescribed, unless it turns an element inside out."""
@@ -253,55 +224,11 @@ class Equilibrium:
         upright = (self.body.at(u, stiffness=False).lowest > 0).all()
         return u if upright or self._rest is not None else None
 
-    def _solve(
-        self, solver: LinearSolver | None, matrix: BlockMatrix, free: NDArray[np.bool_], right: NDArray[np.float64]
-    ) -> tuple[LinearSolver, Iteration]:
-        """With the preconditioner of the step's first matrix while it serves.
-
-        Flesh that is about to fold has a K that is not positive definite on the way to its fold. A share of each node's
-        own stiffness is then added until it is: the step is shorter, where it leads is not changed.
-        """
-        sofar = None
-        if solver is not None:
-            before = solver.of(matrix)
-            done = before.solve(right, tolerance=_INNER, iterations=_PATIENCE)
-            if done.status is Status.CONVERGED:
-                return solver, done
-            if done.status is Status.MAX_ITERATIONS and done.residual < 1.0:
-                sofar = done
-                left = right - before.masked_product(done.x)
-        for share in _STIFFENED:
-            if share:
-                matrix = self._stiffened(matrix, share)
-            try:
-                solver = LinearSolver(matrix, free, self.body.mesh, hierarchy=self._hierarchy, **self._options)
-                if sofar is not None and not share:  # go on from where the old preconditioner got to
-                    done = solver.solve(left, tolerance=_INNER / sofar.residual)
-                    done = replace(done, x=done.x + sofar.x, iterations=done.iterations + sofar.iterations)
-                else:
-                    done = solver.solve(right, tolerance=_INNER)
-            except IndefiniteError:
-                if share == _STIFFENED[-1]:
-                    raise
-                continue
-            if done.status is not Status.INDEFINITE:
-                break
-        assert solver is not None
-        self._hierarchy = solver.hierarchy
-        return solver, done
-
-    def _stiffened(self, matrix: BlockMatrix, share: float) -> BlockMatrix:
-        """A matrix with a share of the nodes' stiffness at rest added."""
-        values = matrix.values.copy()
-        row = np.repeat(np.arange(matrix.size, dtype=np.int32), np.diff(matrix.rows))
-        values[np.flatnonzero(row == matrix.columns)] += (share * self._stiff)[:, None, None] * np.eye(3)
-        return BlockMatrix(matrix.rows, matrix.columns, values)
-
     def _search(
         self,
         u: NDArray[np.float64],
         move: NDArray[np.float64],
-        contact: _Contact,
+        contact: Contact,
         memory: list[Memory],
         step: Step,
         residual: NDArray[np.float64],
@@ -335,7 +262,7 @@ class Equilibrium:
         def pull(part: float) -> float:
             """What drives on after part of the way: the bodies' forces change linearly, contact as it must."""
             pushed = np.zeros_like(body.mesh.nodes)
-            foreseen = self._foreseen(contact, memory, part * move, step.allowed, patient=patient)
+            foreseen = self._interplay.foreseen(contact, memory, part * move, step.allowed, patient=patient)
             for p, r in zip(contact.points, foreseen, strict=True):
                 pushed += p.forces(r.traction(p))
             return here + part * (ahead - here) + dot(pushed.reshape(-1), along)
@@ -356,193 +283,20 @@ class Equilibrium:
             self._rest, forces=self._rest.forces + self._rest.stiffness.product(u, threads=self.body.threads)
         )
 
-    def _normals(self, u: NDArray[np.float64]) -> list[NDArray[np.float64]]:
-        x = self.body.mesh.nodes + u.reshape(-1, 3)
-        return [interface.slave.normals(x) for interface in self.interfaces]
-
-    def _points(self, u: NDArray[np.float64], step: Step, normals: list[NDArray[np.float64]]) -> list[ContactPoints]:
-        """Every interface's points at displacement u (3N,)."""
-        x = self.body.mesh.nodes + u.reshape(-1, 3)
-        return [i.points(x, step.before, step.time, n) for i, n in zip(self.interfaces, normals, strict=True)]
-
-    def _answered(
-        self,
-        points: list[ContactPoints],
-        u: NDArray[np.float64],
-        start: NDArray[np.float64],
-        memory: list[Memory],
-        *,
-        keep: bool,
-        allowed: float,
-    ) -> _Contact:
-        """What points answer at displacement u (3N,)."""
-        since = (u - start).reshape(-1, 3)
-        slips = [p.relative(since) - p.carried for p in points]
-        responses = [
-            respond(i.pair, p, m, slip, self._stiff_penalty(k, p), allowed, keep=keep, patient=not keep)
-            for k, (i, p, m, slip) in enumerate(zip(self.interfaces, points, memory, slips, strict=True))
-        ]
-        total = np.zeros_like(self.body.mesh.nodes)
-        for p, r in zip(points, responses, strict=True):
-            total += p.forces(r.traction(p))
-        return _Contact(points, slips, responses, total.reshape(-1))
-
-    def _foreseen(
-        self, contact: _Contact, memory: list[Memory], move: NDArray[np.float64], allowed: float, *, patient: bool
-    ) -> list[Response]:
-        """What points answer after a move, by the linear model: the multipliers to go on with."""
-        out = []
-        for k, (p, m, slip) in enumerate(zip(contact.points, memory, contact.slips, strict=True)):
-            there = _shifted(p, move.reshape(-1, 3))
-            slip = slip + p.relative(move.reshape(-1, 3))
-            penalty = self._stiff_penalty(k, p)
-            out.append(respond(self.interfaces[k].pair, there, m, slip, penalty, allowed, patient=patient))
-        return out
-
-    def _remembered(
-        self,
-        memory: list[Memory],
-        contact: _Contact,
-        foreseen: list[Response],
-        move: NDArray[np.float64],
-        *,
-        patient: bool,
-    ) -> list[Memory]:
-        out = []
-        for k, (m, p, r) in enumerate(zip(memory, contact.points, foreseen, strict=True)):
-            slip = contact.slips[k] + p.relative(move.reshape(-1, 3))
-            pair, known, penalty = self.interfaces[k].pair, contact.responses[k].active, self._stiff_penalty(k, p)
-            out.append(remember(pair, m, p, r, slip, penalty, known, patient=patient))
-        return out
-
     def _reached(
         self,
         u: NDArray[np.float64],
         reactions: NDArray[np.float64],
-        contact: _Contact,
+        contact: Contact,
         memory: list[Memory],
         residual: float,
     ) -> Reached:
-        kept = self._remembered(memory, contact, contact.responses, np.zeros_like(u), patient=True)
+        kept = self._interplay.remembered(memory, contact, contact.responses, np.zeros_like(u), patient=True)
         kept = [replace(m, anchor=np.zeros_like(m.anchor)) for m in kept]
         return Reached(u, reactions, contact.points, contact.responses, contact.slips, kept, residual)
 
-    def _stiff_penalty(self, k: int, points: ContactPoints) -> NDArray[np.float64]:
-        """ε of points [Pa/m]: a multiple of the stiffness of their nodes, over the area they would have whole."""
-        edge = self.interfaces[k].edge[points.sites]
-        return np.asarray(self._penalty * self._stiff_of[k][points.sites] / edge**2)
-
-    def _begun(self, memory: list[Memory], start: NDArray[np.float64], step: Step) -> list[Memory]:
-        """Memory that knows what is apart as the step begins, where friction asks for it."""
-        x = self.body.mesh.nodes + start.reshape(-1, 3)
-        out = []
-        for interface, m in zip(self.interfaces, memory, strict=True):
-            if interface.pair.friction > 0.0:
-                points = interface.points(x, step.before, step.before)
-                apart = np.ones(len(m.apart), dtype=bool)
-                apart[points.sites] = points.gap > self._penetration * interface.edge[points.sites]
-                m = replace(m, apart=apart)
-            out.append(m)
-        return out
-
-    def _settled(self, contact: _Contact, memory: list[Memory], negligible: float) -> bool:
-        """Whether multipliers stay: overlap is gone, and forces change by little, or by what is ``negligible``."""
-        for k, (p, r, m) in enumerate(zip(contact.points, contact.responses, memory, strict=True)):
-            if not r.active.any():
-                continue
-            if (r.error / self.interfaces[k].edge[p.sites]).max() > self._penetration:
-                return False
-            change = np.abs(r.pressure - m.pressure[p.sites]) + np.linalg.norm(r.friction - m.friction[p.sites], axis=1)
-            size = np.abs(r.pressure) + np.linalg.norm(r.friction, axis=1)
-            if p.area @ change > max(_SETTLED * (p.area @ size), negligible):
-                return False
-        return True
-
-    def _mismatch(self, fresh: list[ContactPoints], points: list[ContactPoints], responses: list[Response]) -> float:
-        """How far gaps as they are differ from those believed, where surfaces press or overlap, over an edge."""
-        worst = 0.0
-        for k, (p, r, q) in enumerate(zip(points, responses, fresh, strict=True)):
-            edge = self.interfaces[k].edge
-            active = np.zeros(len(edge), dtype=bool)
-            active[p.sites] = r.active
-            believed = np.full(len(edge), np.inf)
-            believed[p.sites] = p.gap
-            off = np.abs(q.gap - believed[q.sites])
-            off = np.where(active[q.sites], off, np.minimum(off, np.maximum(-q.gap, 0.0)))
-            worst = max(worst, float((off / edge[q.sites]).max(initial=0.0)))
-        return worst
-
-    def _unheld(self, prescribed: Prescribed) -> list[NDArray[np.int64]]:
-        """Nodes of each body that the prescribed displacements do not hold."""
+    def _unheld(self, prescribed: Prescribed) -> Loose:
         key = prescribed.degrees.tobytes()
         if self._loose is None or self._loose[0] != key:
-            self._loose = (key, [nodes for nodes, _ in free_motions(self.body, prescribed)])
+            self._loose = (key, Loose(self.body, prescribed, self._stiff))
         return self._loose[1]
-
-    def _falling(self, loose: list[NDArray[np.int64]], contact: _Contact) -> NDArray[np.bool_]:
-        """Nodes of loose bodies that nothing touches, shape (N,)."""
-        out = np.zeros(len(self.body.mesh.nodes), dtype=bool)
-        if loose:
-            touched = np.zeros(len(out), dtype=bool)
-            for p, r in zip(contact.points, contact.responses, strict=True):
-                touched[p.weights[np.flatnonzero(r.active)].indices] = True
-            for nodes in loose:
-                out[nodes] = not touched[nodes].any()
-        return out
-
-    def _unresolved(self, loose: list[NDArray[np.int64]], contact: _Contact) -> Status:
-        """Why no equilibrium was found: a loose body that nothing touches, or that slides wherever it is touched."""
-        for nodes in loose:
-            mine = np.zeros(len(self.body.mesh.nodes), dtype=bool)
-            mine[nodes] = True
-            element = int(np.flatnonzero(mine[self.body.mesh.elements[:, 0]])[0])
-            what = f"'{self.body.mesh.region_names[self.body.mesh.regions[element]]}'"
-            touching = []
-            for interface, p, r in zip(self.interfaces, contact.points, contact.responses, strict=True):
-                rows = np.flatnonzero(r.active)
-                rows = rows[(p.weights[rows] @ mine.astype(float) != 0.0)] if len(rows) else rows
-                if len(rows):
-                    touching.append((interface.pair.title, bool(r.sticking[rows].any())))
-            if not touching:
-                self.trouble = f"nothing holds {what}"
-                return Status.UNHELD
-            if not any(sticks for _, sticks in touching):
-                self.trouble = f"{what} slides at {touching[0][0]}: friction is not enough to hold it"
-                return Status.SLIDING
-        return Status.MAX_ITERATIONS
-
-    def _leash(self, loose: list[NDArray[np.int64]], move: NDArray[np.float64]) -> float:
-        """Share of a move by which loose bodies go no farther than they look ahead."""
-        far = max((float(np.abs(move.reshape(-1, 3)[nodes]).max()) for nodes in loose), default=0.0)
-        reach = min(interface.reach for interface in self.interfaces)
-        return min(1.0, reach / far) if far > 0.0 else 1.0
-
-    def _steadied(
-        self, matrix: BlockMatrix, own: BlockMatrix, loose: list[NDArray[np.int64]], turn: int
-    ) -> BlockMatrix:
-        if not loose:
-            return matrix
-        nodes = np.sort(np.concatenate(loose))
-        if matrix is own:
-            matrix = BlockMatrix(own.rows, own.columns, own.values.copy())
-        row = np.repeat(np.arange(matrix.size, dtype=np.int32), np.diff(matrix.rows))
-        place = np.flatnonzero(row == matrix.columns)[nodes]
-        first, falls, least = _HELD
-        held = max(least, first * falls**turn)
-        matrix.values[place] += (held * self._stiff[nodes])[:, None, None] * np.eye(3)
-        return matrix
-
-
-def _shifted(points: ContactPoints, move: NDArray[np.float64]) -> ContactPoints:
-    """Points after a move (N, 3), by the linear model: their normals and weights stay."""
-    if not move.any():
-        return points
-    return replace(points, gap=points.gap - np.einsum("mi,mi->m", points.normal, points.relative(move)))
-
-
-def _alike(responses: list[Response], others: list[Response]) -> bool:
-    """Whether the same points touch, and stick, in both."""
-    return all(
-        np.array_equal(r.active, s.active) and np.array_equal(r.sticking, s.sticking)
-        for r, s in zip(responses, others, strict=True)
-    )

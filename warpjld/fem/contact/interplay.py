@@ -1,0 +1,187 @@
+"""What all interfaces of a problem answer together, and what they remember between linear solves."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from warpjld.fem.contact.law import Memory, Response, remember, respond
+from warpjld.fem.contact.points import ContactPoints, Interface
+
+__all__ = ["Contact", "Interplay", "alike", "shifted"]
+
+_SETTLED = 2e-3
+"""Share of the contact forces by which the multipliers may still change."""
+
+
+@dataclass(frozen=True, eq=False)
+class Contact:
+    """Every interface's points, slips [m] and responses, and their nodal forces together [N], shape (3N,)."""
+
+    points: list[ContactPoints]
+    slips: list[NDArray[np.float64]]
+    responses: list[Response]
+    forces: NDArray[np.float64]
+
+
+class Interplay:
+    """Interfaces between bodies.
+
+    Args:
+        nodes: Rest positions of the bodies' nodes [m], shape (N, 3).
+        interfaces: What may touch.
+        stiffness: Stiffness of each node [N/m], shape (N,).
+        penalty: Contact stiffness over that of a node.
+        penetration: Overlap left, as a share of an edge.
+    """
+
+    def __init__(
+        self,
+        nodes: NDArray[np.float64],
+        interfaces: list[Interface],
+        stiffness: NDArray[np.float64],
+        *,
+        penalty: float,
+        penetration: float,
+    ) -> None:
+        self.interfaces = interfaces
+        self._rest = nodes
+        self._penetration = penetration
+        self._penalties = [penalty * _meeting(interface, stiffness) / interface.edge**2 for interface in interfaces]
+
+    @property
+    def reach(self) -> float:
+        """How far ahead the least far-sighted interface looks [m]."""
+        return min(interface.reach for interface in self.interfaces)
+
+    def normals(self, u: NDArray[np.float64]) -> list[NDArray[np.float64]]:
+        """Of every interface's slave nodes at displacement u (3N,)."""
+        x = self._rest + u.reshape(-1, 3)
+        return [interface.slave.normals(x) for interface in self.interfaces]
+
+    def points(
+        self, u: NDArray[np.float64], before: float, time: float, normals: list[NDArray[np.float64]]
+    ) -> list[ContactPoints]:
+        """Every interface's points at displacement u (3N,)."""
+        x = self._rest + u.reshape(-1, 3)
+        return [i.points(x, before, time, n) for i, n in zip(self.interfaces, normals, strict=True)]
+
+    def answered(
+        self,
+        points: list[ContactPoints],
+        u: NDArray[np.float64],
+        start: NDArray[np.float64],
+        memory: list[Memory],
+        *,
+        keep: bool,
+        allowed: float,
+    ) -> Contact:
+        """What points answer at displacement u (3N,)."""
+        since = (u - start).reshape(-1, 3)
+        slips = [p.relative(since) - p.carried for p in points]
+        responses = [
+            respond(i.pair, p, m, slip, self._penalty(k, p), allowed, keep=keep, patient=not keep)
+            for k, (i, p, m, slip) in enumerate(zip(self.interfaces, points, memory, slips, strict=True))
+        ]
+        total = np.zeros_like(self._rest)
+        for p, r in zip(points, responses, strict=True):
+            total += p.forces(r.traction(p))
+        return Contact(points, slips, responses, total.reshape(-1))
+
+    def foreseen(
+        self, contact: Contact, memory: list[Memory], move: NDArray[np.float64], allowed: float, *, patient: bool
+    ) -> list[Response]:
+        """What points answer after a move, by the linear model: the multipliers to go on with."""
+        out = []
+        for k, (p, m, slip) in enumerate(zip(contact.points, memory, contact.slips, strict=True)):
+            there = shifted(p, move.reshape(-1, 3))
+            slip = slip + p.relative(move.reshape(-1, 3))
+            penalty = self._penalty(k, p)
+            out.append(respond(self.interfaces[k].pair, there, m, slip, penalty, allowed, patient=patient))
+        return out
+
+    def remembered(
+        self,
+        memory: list[Memory],
+        contact: Contact,
+        foreseen: list[Response],
+        move: NDArray[np.float64],
+        *,
+        patient: bool,
+    ) -> list[Memory]:
+        """Multipliers after a move (3N,) that was foreseen to be answered so."""
+        out = []
+        for k, (m, p, r) in enumerate(zip(memory, contact.points, foreseen, strict=True)):
+            slip = contact.slips[k] + p.relative(move.reshape(-1, 3))
+            pair, known, penalty = self.interfaces[k].pair, contact.responses[k].active, self._penalty(k, p)
+            out.append(remember(pair, m, p, r, slip, penalty, known, patient=patient))
+        return out
+
+    def _penalty(self, k: int, points: ContactPoints) -> NDArray[np.float64]:
+        """ε of points [Pa/m]: a multiple of the stiffness of their nodes, over the area they would have whole."""
+        return np.asarray(self._penalties[k][points.sites])
+
+    def begun(self, memory: list[Memory], start: NDArray[np.float64], time: float) -> list[Memory]:
+        """Memory that knows what is apart as the step begins, where friction asks for it."""
+        x = self._rest + start.reshape(-1, 3)
+        out = []
+        for interface, m in zip(self.interfaces, memory, strict=True):
+            if interface.pair.friction > 0.0:
+                points = interface.points(x, time, time)
+                apart = np.ones(len(m.apart), dtype=bool)
+                apart[points.sites] = points.gap > self._penetration * interface.edge[points.sites]
+                m = replace(m, apart=apart)
+            out.append(m)
+        return out
+
+    def settled(self, contact: Contact, memory: list[Memory], negligible: float) -> bool:
+        """Whether multipliers stay: overlap is gone, and forces change by little, or by what is ``negligible``."""
+        for k, (p, r, m) in enumerate(zip(contact.points, contact.responses, memory, strict=True)):
+            if not r.active.any():
+                continue
+            if (r.error / self.interfaces[k].edge[p.sites]).max() > self._penetration:
+                return False
+            change = np.abs(r.pressure - m.pressure[p.sites]) + np.linalg.norm(r.friction - m.friction[p.sites], axis=1)
+            size = np.abs(r.pressure) + np.linalg.norm(r.friction, axis=1)
+            if p.area @ change > max(_SETTLED * (p.area @ size), negligible):
+                return False
+        return True
+
+    def mismatch(self, fresh: list[ContactPoints], points: list[ContactPoints], responses: list[Response]) -> float:
+        """How far gaps as they are differ from those believed, where surfaces press or overlap, over an edge."""
+        worst = 0.0
+        for k, (p, r, q) in enumerate(zip(points, responses, fresh, strict=True)):
+            edge = self.interfaces[k].edge
+            active = np.zeros(len(edge), dtype=bool)
+            active[p.sites] = r.active
+            believed = np.full(len(edge), np.inf)
+            believed[p.sites] = p.gap
+            off = np.abs(q.gap - believed[q.sites])
+            off = np.where(active[q.sites], off, np.minimum(off, np.maximum(-q.gap, 0.0)))
+            worst = max(worst, float((off / edge[q.sites]).max(initial=0.0)))
+        return worst
+
+
+def _meeting(interface: Interface, stiffness: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Stiffness of sites against what they meet [N/m], shape (s,)."""
+    own = interface.share @ stiffness[interface.slave.nodes]
+    if len(interface.opposite) == 0:
+        return np.asarray(own)
+    return np.asarray(np.minimum(own, float(np.median(stiffness[interface.opposite]))))
+
+
+def shifted(points: ContactPoints, move: NDArray[np.float64]) -> ContactPoints:
+    """Points after a move (N, 3), by the linear model: their normals and weights stay."""
+    if not move.any():
+        return points
+    return replace(points, gap=points.gap - np.einsum("mi,mi->m", points.normal, points.relative(move)))
+
+
+def alike(responses: list[Response], others: list[Response]) -> bool:
+    """Whether the same points touch, and stick, in both."""
+    return all(
+        np.array_equal(r.active, s.active) and np.array_equal(r.sticking, s.sticking)
+        for r, s in zip(responses, others, strict=True)
+    )

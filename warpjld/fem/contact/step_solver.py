@@ -1,0 +1,84 @@
+"""Linear solves of one load step after another, with a preconditioner kept while it serves."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from warpjld.fem.blockmatrix import BlockMatrix
+from warpjld.fem.body import Body
+from warpjld.fem.conjugate import Iteration, Status
+from warpjld.fem.contact.loose import stiffened
+from warpjld.fem.linear import LinearSolver
+from warpjld.fem.multigrid import IndefiniteError
+
+__all__ = ["StepSolver"]
+
+_STIFFENED = (0.0, 0.02, 0.1, 0.5)
+"""Shares of each node's own stiffness that are tried where K is not positive definite."""
+_INNER = 1e-4
+_PATIENCE = 25
+"""Iterations after which a preconditioner made for an earlier matrix has served its time."""
+
+
+class StepSolver:
+    """Solves with the matrices of a contact problem, one like the other.
+
+    Args:
+        body: All bodies, merged.
+        stiffness: Stiffness of each node at rest [N/m], shape (N,).
+        precision: ``float64``, or ``float32`` refined.
+    """
+
+    def __init__(self, body: Body, stiffness: NDArray[np.float64], precision: str) -> None:
+        bulk, shear = body.constants[:, 2], 2.0 * body.constants[:, :2].sum(axis=1)
+        poisson = float(((3 * bulk - 2 * shear) / (6 * bulk + 2 * shear)).max())
+        self._options: dict[str, Any] = {"precision": precision, "threads": body.threads, "poisson": poisson}
+        self._mesh = body.mesh
+        self._stiff = stiffness
+        self._hierarchy: list[Any] | None = None
+        self._solver: LinearSolver | None = None
+
+    def begin(self) -> None:
+        """A new step: its first matrix gets a preconditioner of its own."""
+        self._solver = None
+
+    def solve(self, matrix: BlockMatrix, free: NDArray[np.bool_], right: NDArray[np.float64]) -> Iteration:
+        """K11 x = b for the free degrees of freedom, shape (3N,), with the preconditioner before while it serves.
+
+        Flesh that is about to fold has a K that is not positive definite on the way to its fold. A share of each node's
+        own stiffness is then added until it is: the step is shorter, where it leads is not changed.
+
+        Raises:
+            IndefiniteError: It is not even then.
+        """
+        sofar = None
+        if self._solver is not None:
+            before = self._solver.of(matrix)
+            done = before.solve(right, tolerance=_INNER, iterations=_PATIENCE)
+            if done.status is Status.CONVERGED:
+                return done
+            if done.status is Status.MAX_ITERATIONS and done.residual < 1.0:
+                sofar = done
+                left = right - before.masked_product(done.x)
+        for share in _STIFFENED:
+            if share:
+                matrix = stiffened(matrix, share * self._stiff)
+            try:
+                solver = LinearSolver(matrix, free, self._mesh, hierarchy=self._hierarchy, **self._options)
+                if sofar is not None and not share:  # go on from where the old preconditioner got to
+                    done = solver.solve(left, tolerance=_INNER / sofar.residual)
+                    done = replace(done, x=done.x + sofar.x, iterations=done.iterations + sofar.iterations)
+                else:
+                    done = solver.solve(right, tolerance=_INNER)
+            except IndefiniteError:
+                if share == _STIFFENED[-1]:
+                    raise
+                continue
+            if done.status is not Status.INDEFINITE:
+                break
+        self._solver, self._hierarchy = solver, solver.hierarchy
+        return done
