@@ -260,7 +260,9 @@ def _pairs(
             bonded = wishes.bond(name, other)
             bond = None if bonded is None else Bond(normal=bonded.normal, shear=bonded.shear)
             sides = [(name, faces), (other, other_faces)]
-            (slave, one), (master, two) = sides if modulus <= other_modulus else sides[::-1]
+            # the paper's loop repels objects from the skin
+            paper = wishes.pressing is not None and wishes.pressing.method == "paper"
+            (slave, one), (master, two) = sides if modulus <= other_modulus and not paper else sides[::-1]
             friction = wishes.coefficient(name, other)
             pairs.append(Pair(one, two, friction, f"{slave}–{master}", bond=bond))
             owners.append(PairOf(slave, master))

@@ -18,6 +18,7 @@ from warpjld.fem.contact.facets import Facets
 from warpjld.fem.hand.blend import Moves
 from warpjld.fem.hand.flesh_hand import FleshHand
 from warpjld.fem.hexmesh import HexMesh
+from warpjld.fem.untangle import improve
 from warpjld.skeleton import Poses
 
 __all__ = ["Part", "part_of", "posed"]
@@ -25,6 +26,8 @@ __all__ = ["Part", "part_of", "posed"]
 _LEAST = 0.05
 """Scaled Jacobian that carried elements must keep; skin nodes stay off the skin where it asks for worse."""
 
+_SKIN, _BONE = 1.0, 1e3
+"""Weights of the distances that skin and bone move where elements are turned back, in edges squared."""
 _OWN = 0.5
 """Share of its digits' bones from which on flesh belongs to a part of a hand."""
 
@@ -65,14 +68,26 @@ def posed(hand: FleshHand, poses: Poses, skin: NDArray[np.float64]) -> tuple[Fle
         if not bad.any():
             break
         share[np.unique(mesh.elements[bad])] *= 0.6
-    worst = float(moved.scaled_jacobian().min())
-    if worst <= 0.0:
+    if moved.scaled_jacobian().min() <= 0.0:
+        moved = _untangled(moved, outer, bone)
+    if moved.scaled_jacobian().min() <= 0.0:
         raise InputError(
             f"flesh: {int((moved.scaled_jacobian() <= 0).sum())} elements are turned inside out where contact begins; "
             "joints are bent too far for elements of this size"
         )
-    gap = float(np.linalg.norm((1.0 - share[outer])[:, None] * change[outer], axis=1).max())
+    gap = float(np.linalg.norm(moved.nodes[outer] - target, axis=1).max())
     return replace(hand, flesh=replace(hand.flesh, mesh=moved)), gap
+
+
+def _untangled(mesh: HexMesh, skin: NDArray[np.integer], bone: NDArray[np.integer]) -> HexMesh:
+    """Elements that a sharp bend turned inside out, turned back: nodes leave their places as little as that takes."""
+    edges = np.linalg.norm(mesh.nodes[mesh.elements[:, 1]] - mesh.nodes[mesh.elements[:, 0]], axis=1)
+    kept = np.concatenate([skin, bone])
+    at = mesh.nodes[kept]
+    pull = np.concatenate([np.full(len(skin), _SKIN), np.full(len(bone), _BONE)])
+    up = np.tile([0.0, 0.0, 1.0], (len(kept), 1))
+    nodes = improve(mesh.nodes, mesh.elements, float(np.median(edges)), kept, at, up, pull=pull, slide=1.0)
+    return replace(mesh, nodes=nodes)
 
 
 @dataclass(frozen=True, eq=False)

@@ -240,7 +240,7 @@ class ContactWishes:
         prescribed: State variables by object and points.
         bonds: Objects that stick together.
         friction: Coefficients by pair of names, in alphabetical order.
-        everywhere: Coefficient of all other pairs.
+        everywhere: Coefficient of all other pairs; None: that of skin, or none with the paper's loop, which knows none.
         gravity: [m/s²].
         pressing: What to solve, if anything.
     """
@@ -251,13 +251,15 @@ class ContactWishes:
     prescribed: dict[tuple[str, str], Prescribing] = field(default_factory=dict)
     bonds: list[Bonded] = field(default_factory=list)
     friction: dict[tuple[str, str], float] = field(default_factory=dict)
-    everywhere: float = _FRICTION
+    everywhere: float | None = None
     gravity: tuple[float, float, float] = (0.0, 0.0, 0.0)
     pressing: Pressing | None = None
 
     def coefficient(self, one: str, other: str) -> float:
         """Friction between two."""
-        return self.friction.get(pair(one, other), self.everywhere)
+        paper = self.pressing is not None and self.pressing.method == "paper"
+        usual = 0.0 if paper else _FRICTION
+        return self.friction.get(pair(one, other), usual if self.everywhere is None else self.everywhere)
 
     def bond(self, one: str, other: str) -> Bonded | None:
         """The bond between two objects, if any."""
