@@ -89,5 +89,9 @@ def test_the_border_is_found_from_either_side() -> None:
         gap = 4.0 * slope / (3.0 * modulus) * (edge * (1.0 - f)) ** 1.5
         found = beyond(*(np.array([v]) for v in (pressure, gap, edge, modulus)))
         assert found[0] == pytest.approx(f, abs=1e-3)
+        outside = slope * (edge * np.maximum(1.0 - f + s, 0.0)) ** 1.5  # around the open end
+        gap = 4.0 / (3.0 * modulus) * np.trapezoid(outside * (1.0 - np.abs(s)), s)
+        found = beyond(*(np.array([v]) for v in (pressure, gap, edge, modulus)), averaged=True)
+        assert found[0] == pytest.approx(f, abs=1e-3)
     nothing = beyond(*(np.array([v]) for v in (1.0, np.inf, edge, modulus)))
     assert nothing[0] == pytest.approx(-1.0, abs=1e-6)

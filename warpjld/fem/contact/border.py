@@ -4,8 +4,9 @@ Near the border of a smooth contact pressure goes to zero as p = P √s with the
 gap opens as g = (4 / 3) (P / E*) s^1.5 (Johnson 1985, §5.1: what Hertz's solution does, and any other). A node's
 pressure is an average over the faces around it, with the node's hat function as its weight: of a border that lies
 f edges beyond the node (within it, if negative) it is P √L φ(f), φ(f) = 4/15 ((f + 1)^2.5 − 2 f^2.5 + (f − 1)^2.5),
-negative powers left out. That, and the gap at the open end of the edge, say where the border is:
-(1 − f)^1.5 = q φ(f), q = 3 E* g / (4 p L).
+powers of what is negative left out. That, and the gap at the open end of the edge, say where the border is:
+(1 − f)^1.5 = q φ(f), q = 3 E* g / (4 p L). Where gaps are such averages too, of an end t edges outside, t^1.5 becomes
+γ(t) = 4/35 ((t + 1)^3.5 − 2 t^3.5 + (t − 1)^3.5).
 """
 
 from __future__ import annotations
@@ -35,7 +36,12 @@ def contact_modulus(body: Body, interface: Interface) -> NDArray[np.float64]:
 
 
 def beyond(
-    pressure: NDArray[np.float64], gap: NDArray[np.float64], length: NDArray[np.float64], modulus: NDArray[np.float64]
+    pressure: NDArray[np.float64],
+    gap: NDArray[np.float64],
+    length: NDArray[np.float64],
+    modulus: NDArray[np.float64],
+    *,
+    averaged: bool = False,
 ) -> NDArray[np.float64]:
     """By how many edges the border lies beyond a pressed node, towards an open one, −1 to 1.
 
@@ -44,17 +50,25 @@ def beyond(
         gap: At the open end [m]; infinite where nothing is opposite.
         length: Of the edges [m].
         modulus: E* [Pa].
+        averaged: Whether gaps are averages over the faces around a node, as pressures are.
     """
     with np.errstate(over="ignore", divide="ignore", invalid="ignore"):
         q = 0.75 * modulus * np.maximum(gap, 0.0) / (pressure * length)
     q = np.clip(np.nan_to_num(q, nan=np.inf, posinf=1e100), 0.0, 1e100)
-    low, high = np.full_like(q, -1.0), np.ones_like(q)
+    low, high = np.full_like(q, -1.0), np.full_like(q, 2.0 if averaged else 1.0)
     for _ in range(_ROUNDS):
         f = 0.5 * (low + high)
-        average = (4.0 / 15.0) * ((f + 1.0) ** 2.5 - 2.0 * np.maximum(f, 0.0) ** 2.5)
-        farther = (1.0 - f) ** 1.5 > q * average
+        average = (4.0 / 15.0) * ((f + 1.0) ** 2.5 - 2.0 * np.maximum(f, 0.0) ** 2.5 + np.maximum(f - 1.0, 0.0) ** 2.5)
+        outside = _averaged_gap(1.0 - f) if averaged else (1.0 - f) ** 1.5
+        farther = outside > q * average
         low, high = np.where(farther, f, low), np.where(farther, high, f)
     return 0.5 * (low + high)
+
+
+def _averaged_gap(t: NDArray[np.float64]) -> NDArray[np.float64]:
+    return np.asarray(
+        (4.0 / 35.0) * ((t + 1.0) ** 3.5 - 2.0 * np.maximum(t, 0.0) ** 3.5 + np.maximum(t - 1.0, 0.0) ** 3.5)
+    )
 
 
 def pressed_at_nodes(
@@ -73,7 +87,7 @@ def pressed_at_nodes(
         interface: The pair.
         near: Slave nodes with something before them, as indices into the surface's, shape (n,).
         pressure: [Pa], shape (n,).
-        gap: [m], shape (n,).
+        gap: At the nodes, or averaged around them where the interface averages [m], shape (n,).
         area: What has something opposite [m²], shape (n,).
         modulus: E* of all slave nodes [Pa], shape (m,).
         x: Positions of the body's nodes [m], shape (N, 3).
@@ -85,13 +99,15 @@ def pressed_at_nodes(
     covered[near] = np.minimum(area / np.maximum(whole[near], 1e-300), 1.0)
     load[near], distance[near] = pressure, gap
     pressed = load > 0.0
-    some = np.flatnonzero(pressed[surface.corners].any(axis=1))
+    around = np.zeros(count, dtype=bool)
+    around[surface.corners[pressed[surface.corners].any(axis=1)]] = True
+    some = np.flatnonzero(around[surface.corners].any(axis=1))
     corners = surface.corners[some]
     at = x[surface.quads[some]]
-    depth = _depth(corners, at, load, distance, modulus)
+    depth = _depth(corners, at, load, distance, modulus, averaged=interface.averages)
     faces = _positive_area(at, depth[corners])
-    mask = pressed[corners]
-    share = (faces / mask.sum(axis=1))[:, None] * mask * covered[corners]
+    mask = (pressed | (depth > 0.0))[corners]
+    share = (faces / np.maximum(mask.sum(axis=1), 1))[:, None] * mask * covered[corners]
     return np.asarray(np.bincount(corners.ravel(), share.ravel(), minlength=count)[near])
 
 
@@ -101,6 +117,8 @@ def _depth(
     load: NDArray[np.float64],
     gap: NDArray[np.float64],
     modulus: NDArray[np.float64],
+    *,
+    averaged: bool,
 ) -> NDArray[np.float64]:
     """How many edges nodes lie inside the border, negative outside, shape (m,)."""
     count = len(load)
@@ -111,7 +129,7 @@ def _depth(
     out = np.where(pressed, 1.0, -1.0)
     crossing = pressed[start] & ~pressed[end]
     i, j = start[crossing], end[crossing]
-    f = beyond(load[i], gap[j], np.maximum(length[crossing], 1e-300), modulus[i])
+    f = beyond(load[i], gap[j], np.maximum(length[crossing], 1e-300), modulus[i], averaged=averaged)
     alone = np.ones(count, dtype=bool)
     alone[start[pressed[start] & pressed[end]]] = False
     f = np.where(alone[i], np.maximum(f, 0.0), f)  # something presses there
@@ -123,7 +141,13 @@ def _depth(
     inner = pressed[start] & ~rim[start] & rim[end]
     least = np.full(count, np.inf)
     np.minimum.at(least, start[inner], out[end[inner]] + 1.0)
-    return np.where(np.isfinite(least), least, out)
+    out = np.where(np.isfinite(least), least, out)
+    edge = np.zeros(count, dtype=bool)
+    edge[j] = True
+    outer = ~pressed[start] & ~edge[start] & edge[end]
+    most = np.full(count, -np.inf)
+    np.maximum.at(most, start[outer], out[end[outer]] - 1.0)
+    return np.where(np.isfinite(most), np.minimum(most, 0.0), out)
 
 
 def _positive_area(at: NDArray[np.float64], values: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -106,6 +106,11 @@ class Interface:
         self.reach = 2.0 * float(self.slave.edge.max())
         """How far ahead a point looks [m]."""
 
+    @property
+    def averages(self) -> bool:
+        """Whether what points know of a slave node is an average over the faces around it."""
+        return self._mortar is not None or self.pair.sites == "faces"
+
     def points(
         self, x: NDArray[np.float64], before: float, time: float, normals: NDArray[np.float64] | None = None
     ) -> ContactPoints:

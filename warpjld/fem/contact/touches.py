@@ -48,7 +48,7 @@ def touch_of(
     pressure = mean @ response.pressure
     gap = np.minimum.reduceat(points.gap[mean.indices], mean.indptr[:-1]) if len(near) else np.empty(0)
     holds = mean @ bonded[points.sites].astype(float) > 0.0
-    pressed = np.where(holds, area, pressed_at_nodes(interface, near, pressure, gap, area, modulus, x))
+    pressed = np.where(holds, area, pressed_at_nodes(interface, near, pressure, mean @ points.gap, area, modulus, x))
     return Touch(
         name=interface.pair.title,
         nodes=nodes,
