@@ -10,16 +10,19 @@ import numpy as np
 from numpy.typing import NDArray
 
 from warpjld.errors import InputError
+from warpjld.fem.contact import ContactInstant
 from warpjld.fem.hand.flesh_hand import FleshHand
 from warpjld.fem.hand.labels import WEB
 from warpjld.fem.hexmesh import HexMesh
 
-__all__ = ["Tactile", "tactile_of"]
+__all__ = ["Tactile", "tactile_of", "tactile_of_pairs"]
 
 
 class _Touch(Protocol):
     """What is read of one pair at one instant (``warpjld.fem.contact.Touch``)."""
 
+    @property
+    def name(self) -> str: ...
     @property
     def nodes(self) -> NDArray[np.int32]: ...
     @property
@@ -97,9 +100,17 @@ def tactile_of(hand: FleshHand, instants: Sequence[_Instant], *, only: str | Non
     pads = tuple(name for name in hand.label_names if not name.endswith(WEB))
     place = np.array([pads.index(n) if n in pads else -1 for n in hand.label_names])
     pad_of = np.where(hand.node_labels >= 0, place[hand.node_labels], -1)
-    shape = (len(instants), len(pads))
-    out = Tactile(
-        np.array([i.time for i in instants], dtype=np.float64),
+    out = _nothing([instant.time for instant in instants], pads)
+    for frame, instant in enumerate(instants):
+        _read(hand, pad_of, instant, out, frame, only)
+    return out
+
+
+def _nothing(times: Sequence[float], pads: tuple[str, ...]) -> Tactile:
+    """Readings where nothing touches."""
+    shape = (len(times), len(pads))
+    return Tactile(
+        np.array(times, dtype=np.float64),
         pads,
         np.zeros((*shape, 3)),
         np.zeros(shape),
@@ -109,9 +120,6 @@ def tactile_of(hand: FleshHand, instants: Sequence[_Instant], *, only: str | Non
         np.full(shape, np.nan),
         np.full(shape, np.nan),
     )
-    for frame, instant in enumerate(instants):
-        _read(hand, pad_of, instant, out, frame, only)
-    return out
 
 
 def _read(
@@ -130,7 +138,7 @@ def _read(
     pushed, weighted = np.zeros(pads), np.zeros((pads, 3))
     measured, sliding, stuck = np.zeros(pads), np.zeros(pads), np.zeros(pads)
     for touch in instant.touches:
-        if only is not None and getattr(touch, "name", only) != only:
+        if only is not None and touch.name != only:
             continue
         nodal = touch.nodal[:count]
         felt = np.flatnonzero((pad_of >= 0) & nodal.any(axis=1))
@@ -171,4 +179,37 @@ def _node_areas(mesh: HexMesh, faces: NDArray[np.int32], x: NDArray[np.float64])
     out = np.zeros_like(x)
     for k in range(4):
         np.add.at(out, quads[:, k], vector)
+    return out
+
+
+def tactile_of_pairs(instants: Sequence[ContactInstant]) -> Tactile:
+    """Read every pair's slave as one pad, by the pair's name: pads that belong to no hand.
+
+    Args:
+        instants: Equilibria in contact, all of the same pairs.
+
+    Raises:
+        InputError: No instant, or pairs that change.
+    """
+    if not instants:
+        raise InputError("tactile: want at least one instant")
+    titles = tuple(touch.name for touch in instants[0].touches)
+    if any(tuple(touch.name for touch in instant.touches) != titles for instant in instants):
+        raise InputError("tactile: want the same pairs at every instant")
+    pads = tuple(title.removeprefix("contact ").strip("'") for title in titles)
+    out = _nothing([instant.time for instant in instants], pads)
+    for frame, instant in enumerate(instants):
+        for pad, touch in enumerate(instant.touches):
+            pressed = touch.pressure > 0.0
+            if not pressed.any():
+                continue
+            area, force = touch.area[pressed], touch.area[pressed] * touch.pressure[pressed]
+            x = touch.position[pressed]
+            out.force[frame, pad] = touch.area @ touch.traction
+            out.normal_force[frame, pad] = force.sum()
+            out.centre[frame, pad] = force @ x / force.sum()
+            out.area[frame, pad] = area.sum()
+            out.peak[frame, pad] = touch.pressure.max()
+            out.slip[frame, pad] = area @ np.linalg.norm(touch.slip[pressed], axis=1) / area.sum()
+            out.sticking[frame, pad] = area @ touch.sticking[pressed] / area.sum()
     return out

@@ -108,6 +108,6 @@ def draw_tactile(path: Path, tactile: Tactile, title: str = "") -> None:
 
 
 def _group(pad: str) -> str:
-    """Digit of a pad, or the palm."""
+    """Digit of a pad, or the palm; of a pad that belongs to no hand, what its name begins with."""
     parts = pad.split(".")
     return "palm" if "palm" in parts or len(parts) < 2 or parts[-1] in ("wrist", "forearm") else parts[-2]
