@@ -28,8 +28,7 @@ class Aggregation:
 
         matrix = stiffness.masked(free)
         diagonal = np.einsum("nii->ni", matrix.diagonal())
-        row = np.repeat(np.arange(matrix.size, dtype=np.int32), np.diff(matrix.rows))
-        on = np.flatnonzero(row == matrix.columns)
+        on = matrix.on_diagonal
         # prescribed degrees of freedom stay in the blocks, uncoupled
         matrix.values[on[:, None], [0, 1, 2], [0, 1, 2]] += ~free.reshape(-1, 3) * diagonal.max()
         modes = rigid_modes(nodes) * free[:, None]

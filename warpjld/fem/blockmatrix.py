@@ -57,10 +57,15 @@ class BlockMatrix:
         )
         return result
 
+    @property
+    def on_diagonal(self) -> NDArray[np.int64]:
+        """Which blocks lie on the diagonal, one for each row, shape (N,)."""
+        row = np.repeat(np.arange(self.size, dtype=np.int32), np.diff(self.rows))
+        return np.flatnonzero(row == self.columns)
+
     def diagonal(self) -> NDArray[Any]:
         """Diagonal blocks, shape (N, 3, 3)."""
-        row = np.repeat(np.arange(self.size, dtype=np.int32), np.diff(self.rows))
-        return np.asarray(self.values[row == self.columns])
+        return np.asarray(self.values[self.on_diagonal])
 
     def masked(self, free: NDArray[np.bool_], dtype: Any = np.float64) -> BlockMatrix:
         """K11 in place: rows and columns of prescribed degrees of freedom set to zero (R107).

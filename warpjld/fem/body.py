@@ -77,6 +77,12 @@ class Body:
         return bool((self.kinds >= NEO_HOOKE).any())
 
     @property
+    def poisson(self) -> float:
+        """Highest Poisson's ratio of any element at small strain."""
+        bulk, shear = self.constants[:, 2], 2.0 * self.constants[:, :2].sum(axis=1)
+        return float(((3 * bulk - 2 * shear) / (6 * bulk + 2 * shear)).max())
+
+    @property
     def degrees(self) -> int:
         """Degrees of freedom, 3N."""
         return 3 * len(self.mesh.nodes)

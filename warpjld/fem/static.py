@@ -110,9 +110,12 @@ class _Problem:
         self.loads = loads
         self.after = after
         self.start = np.zeros(body.degrees) if after is None else after.displacement.reshape(-1)
-        self.options: dict[str, Any] = {"method": method, "precision": precision, "threads": body.threads}
-        bulk, shear = body.constants[:, 2], 2.0 * body.constants[:, :2].sum(axis=1)
-        self.options["poisson"] = float(((3 * bulk - 2 * shear) / (6 * bulk + 2 * shear)).max())
+        self.options: dict[str, Any] = {
+            "method": method,
+            "precision": precision,
+            "threads": body.threads,
+            "poisson": body.poisson,
+        }
         self.tolerance = tolerance
         self.free = prescribed.free(body.degrees)
         self.hierarchy: list[Any] | None = None

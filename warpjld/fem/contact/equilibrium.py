@@ -221,8 +221,9 @@ class Equilibrium:
             return None
         u = np.array(first, dtype=np.float64).reshape(-1)
         u[prescribed.degrees] = prescribed.values
-        upright = (self.body.at(u, stiffness=False).lowest > 0).all()
-        return u if upright or self._rest is not None else None
+        if self._rest is not None:
+            return u
+        return u if (self.body.at(u, stiffness=False).lowest > 0).all() else None
 
     def _search(
         self,
@@ -261,11 +262,8 @@ class Equilibrium:
 
         def pull(part: float) -> float:
             """What drives on after part of the way: the bodies' forces change linearly, contact as it must."""
-            pushed = np.zeros_like(body.mesh.nodes)
             foreseen = self._interplay.foreseen(contact, memory, part * move, step.allowed, patient=patient)
-            for p, r in zip(contact.points, foreseen, strict=True):
-                pushed += p.forces(r.traction(p))
-            return here + part * (ahead - here) + dot(pushed.reshape(-1), along)
+            return here + part * (ahead - here) + dot(self._interplay.pushed(contact.points, foreseen), along)
 
         start, end = pull(0.0), pull(1.0)
         if not (start > 0.0 and end < -0.5 * start):

@@ -85,10 +85,14 @@ class Interplay:
             respond(i.pair, p, m, slip, self._penalty(k, p), allowed, keep=keep, patient=not keep)
             for k, (i, p, m, slip) in enumerate(zip(self.interfaces, points, memory, slips, strict=True))
         ]
+        return Contact(points, slips, responses, self.pushed(points, responses))
+
+    def pushed(self, points: list[ContactPoints], responses: list[Response]) -> NDArray[np.float64]:
+        """Nodal forces of all interfaces together [N], shape (3N,)."""
         total = np.zeros_like(self._rest)
         for p, r in zip(points, responses, strict=True):
             total += p.forces(r.traction(p))
-        return Contact(points, slips, responses, total.reshape(-1))
+        return total.reshape(-1)
 
     def foreseen(
         self, contact: Contact, memory: list[Memory], move: NDArray[np.float64], allowed: float, *, patient: bool

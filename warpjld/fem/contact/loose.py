@@ -86,8 +86,7 @@ def stiffened(
 ) -> BlockMatrix:
     """A new matrix with a stiffness [N/m], shape (N,), added at nodes, at all by default."""
     values = matrix.values.copy()
-    row = np.repeat(np.arange(matrix.size, dtype=np.int32), np.diff(matrix.rows))
-    place = np.flatnonzero(row == matrix.columns)
+    place = matrix.on_diagonal
     if nodes is not None:
         place, stiffness = place[nodes], stiffness[nodes]
     values[place] += stiffness[:, None, None] * np.eye(3)

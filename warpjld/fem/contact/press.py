@@ -94,11 +94,9 @@ def press(
         raise InputError(f"method: want {' or '.join(_METHODS)}, got '{method}'")
     if method == "paper":
         solution = _by_turns(body, prescribed, pairs, loads, wanted, after, aitken, penetration, watch, progress)
-        if check and not solution.converged and solution.status is not Status.STOPPED:
-            raise ContactError(solution)
-        return solution
-    run = _Run(body, prescribed, list(pairs), loads, wanted, after, tolerance, penetration, guess)
-    solution = run.through(watch, progress)
+    else:
+        run = _Run(body, prescribed, list(pairs), loads, wanted, after, tolerance, penetration, guess)
+        solution = run.through(watch, progress)
     if check and not solution.converged and solution.status is not Status.STOPPED:
         raise ContactError(solution)
     return solution

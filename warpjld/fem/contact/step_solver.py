@@ -34,9 +34,7 @@ class StepSolver:
     """
 
     def __init__(self, body: Body, stiffness: NDArray[np.float64], precision: str) -> None:
-        bulk, shear = body.constants[:, 2], 2.0 * body.constants[:, :2].sum(axis=1)
-        poisson = float(((3 * bulk - 2 * shear) / (6 * bulk + 2 * shear)).max())
-        self._options: dict[str, Any] = {"precision": precision, "threads": body.threads, "poisson": poisson}
+        self._options: dict[str, Any] = {"precision": precision, "threads": body.threads, "poisson": body.poisson}
         self._mesh = body.mesh
         self._stiff = stiffness
         self._hierarchy: list[Any] | None = None
