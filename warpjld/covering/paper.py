@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, fields
 from typing import Any
 
@@ -20,6 +19,7 @@ from warpjld.covering.parameters import Parameters
 from warpjld.skeleton.kinematics import Poses
 from warpjld.skeleton.tree import Skeleton
 from warpjld.surface import Surface
+from warpjld.threads import in_threads
 
 __all__ = ["Normals", "PaperCovering", "paper_normals"]
 
@@ -123,10 +123,7 @@ class PaperCovering(Covering):
                 device=device,
             )
 
-        wp.load_module(deform_paper.module, device=device)  # compiling is not safe from several threads
-        cuts = np.linspace(0, points.shape[0], min(threads, max(points.shape[0], 1)) + 1).astype(int).tolist()
-        with ThreadPoolExecutor(len(cuts) - 1) as pool:
-            list(pool.map(span, cuts[:-1], cuts[1:]))
+        in_threads(span, points.shape[0], threads, deform_paper, device)
 
     def _expressed(self, device: Any) -> list[Any]:
         """Places, parameters, and the coordinates of the vertices in their initial bases, on a device."""
