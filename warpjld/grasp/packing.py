@@ -40,6 +40,9 @@ class Chains:
     stops: NDArray[np.float64]
     starts: NDArray[np.float64]
 
+    def __getitem__(self, rows: NDArray[np.int64]) -> Chains:
+        return Chains(self.frame[rows], self.joints[rows], self.rates[rows], self.stops[rows], self.starts[rows])
+
     @property
     def reach(self) -> NDArray[np.float64]:
         """Closing at which the last joint has come to its stop, shape (R,)."""
