@@ -3,19 +3,18 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, fields
+from functools import cached_property
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.spatial.transform import Rotation
 
-from warpjld.covering.binding import Anchors, SegmentTable
+from warpjld.covering.binding import SegmentTable
 from warpjld.covering.covering import Covering
 from warpjld.covering.device import array_on, checked_device, parameters_on
 from warpjld.covering.drivers import flexion_ratio
-from warpjld.covering.operators import Fan
-from warpjld.covering.paper_places import paper_places
-from warpjld.covering.parameters import Parameters
+from warpjld.covering.paper_places import PaperPlaces, paper_places
 from warpjld.skeleton.kinematics import Poses
 from warpjld.skeleton.tree import Skeleton
 from warpjld.surface import Surface
@@ -69,17 +68,10 @@ class PaperCovering(Covering):
     same methods as :class:`~warpjld.covering.covering.Covering`.
     """
 
-    def __init__(
-        self,
-        skeleton: Skeleton,
-        surface: Surface,
-        parameters: Parameters,
-        groups: tuple[Fan, ...],
-        domains: NDArray[np.float64],
-        anchors: Anchors,
-    ) -> None:
-        super().__init__(skeleton, surface, parameters, groups, domains, anchors)
-        self.places = paper_places(surface.vertices, skeleton, groups, domains, parameters)
+    @cached_property
+    def places(self) -> PaperPlaces:
+        """Where the vertices lie on their segment or palm pair, and in which area."""
+        return paper_places(self.surface.vertices, self.skeleton, self.fans, self.domains, self.parameters)
 
     def points(self, poses: Poses, vertices: ArrayLike, *, device: str = "cpu") -> NDArray[np.float32]:
         import warp as wp
