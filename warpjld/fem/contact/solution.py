@@ -20,7 +20,7 @@ class Touch:
     """One pair at one instant; one row for each slave node that has something before it.
 
     Attributes:
-        name: The pair's.
+        name: The pair's ``label``.
         nodes: Nodes of the body, shape (m,).
         position: Where they are [m], shape (m, 3).
         normal: Unit, outward from the slave, shape (m, 3).
