@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import difflib
 from dataclasses import dataclass
 from typing import Self
 
@@ -10,6 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from warpjld.errors import InputError
+from warpjld.suggest import did_you_mean
 
 __all__ = ["ColorScale"]
 
@@ -83,8 +83,6 @@ class ColorScale:
             mixed = LinearSegmentedColormap.from_list("own", self.colormap)
             return np.asarray(np.rint(255 * mixed(np.arange(256) / 255)[:, :3]), np.uint8)
         if self.colormap not in matplotlib.colormaps:
-            near = difflib.get_close_matches(self.colormap, list(matplotlib.colormaps), n=1)
-            hint = f", did you mean '{near[0]}'?" if near else ""
-            raise InputError(f"no colour map '{self.colormap}'{hint}")
+            raise InputError(f"no colour map '{self.colormap}'{did_you_mean(self.colormap, matplotlib.colormaps)}")
         colors = matplotlib.colormaps[self.colormap](np.arange(256) / 255)[:, :3]
         return np.rint(255 * colors).astype(np.uint8)

@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any, NoReturn
 
 from warpjld.errors import InputError
-from warpjld.script.suggest import did_you_mean
+from warpjld.suggest import did_you_mean
 
 __all__ = ["TomlTable", "read_toml"]
 
