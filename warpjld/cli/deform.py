@@ -6,10 +6,12 @@ import json
 import signal
 import time
 from pathlib import Path
+from typing import Any
 
 import click
 
 from warpjld.errors import InputError
+from warpjld.io.caches import FORMATS
 
 __all__ = ["command"]
 
@@ -19,7 +21,13 @@ _BLOCK = 16  # frames deformed at once: memory does not grow with the length of 
 @click.command("deform")
 @click.argument("rig")
 @click.option("--motion", required=True, type=click.Path(path_type=Path), help="Motion: CSV, BVH, glTF/GLB, JSON.")
-@click.option("-o", "--out", required=True, type=click.Path(path_type=Path), help="Cache to write; its suffix counts.")
+@click.option(
+    "-o",
+    "--out",
+    required=True,
+    type=click.Path(path_type=Path),
+    help=f"Cache to write: {', '.join(FORMATS)}.",
+)
 @click.option("--skeleton", type=click.Path(path_type=Path), help="Skeleton file for a RIG without joints.")
 @click.option("--side", type=click.Choice(["left", "right"]), help="Which hand RIG is, if the file leaves it open.")
 @click.option("--unit", type=click.Choice(["m", "cm", "mm"]), help="RIG's unit; guessed by default.")
@@ -138,16 +146,13 @@ def _span(text: str | None, count: int) -> tuple[int, int]:
     return first, last
 
 
-def _tell(summary: dict[str, object]) -> None:
-    files = summary["files"]
-    assert isinstance(files, list)
+def _tell(summary: dict[str, Any]) -> None:
+    files, frames = summary["files"], summary["frames"]
     more = f" … {files[-1]} ({len(files)} files)" if len(files) > 1 else ""
     click.echo(f"{files[0]}{more}")
     click.echo(
-        f"{summary['frames']} frames at {summary['rate']:g} a second, {summary['vertices']} vertices, "
+        f"{frames} frame{'s' * (frames != 1)} at {summary['rate']:g} a second, {summary['vertices']} vertices, "
         f"{summary['triangles']} triangles, {summary['joints']} joints; {summary['seconds']} s"
     )
-    notes = summary["notes"]
-    assert isinstance(notes, list)
-    for note in notes:
+    for note in summary["notes"]:
         click.echo(f"note: {note}")

@@ -22,20 +22,18 @@ __all__ = ["command"]
 @click.option("--side", type=click.Choice(["left", "right"]), help="Which hand RIG is, if the file leaves it open.")
 @click.option("--unit", type=click.Choice(["m", "cm", "mm"]), help="RIG's unit; guessed by default.")
 @click.option("--up", type=click.Choice(["y", "z"]), help="RIG's up axis.")
-@click.option(
-    "-o", "--output", type=click.Path(path_type=Path), help="Picture to write; the rig's name.png by default."
-)
+@click.option("-o", "--out", type=click.Path(path_type=Path), help="Picture to write; the rig's name.png by default.")
 @click.option("--no-picture", is_flag=True, help="Write no picture.")
 @click.option("--write-skeleton", type=click.Path(path_type=Path), help="Skeleton file to write, for editing.")
-@click.option("--json", "as_json", is_flag=True, help="Print the report as JSON.")
-@click.option("-q", "--quiet", is_flag=True, help="Print only what looks suspicious.")
+@click.option("--json", "as_json", is_flag=True, help="Write the report to stdout as JSON.")
+@click.option("-q", "--quiet", is_flag=True, help="Say only what looks suspicious.")
 def command(
     rig: str,
     skeleton: Path | None,
     side: str | None,
     unit: str | None,
     up: str | None,
-    output: Path | None,
+    out: Path | None,
     no_picture: bool,
     write_skeleton: Path | None,
     as_json: bool,
@@ -56,7 +54,7 @@ def command(
         from warpjld.io.skeleton_file import write_skeleton_file
 
         write_skeleton_file(write_skeleton, opened.skeleton)
-    picture = None if no_picture else output or Path(f"{opened.name.replace(' ', '-')}.png")
+    picture = None if no_picture else out or Path(f"{opened.name.replace(' ', '-')}.png")
     if picture is not None:
         from warpjld.cli.inspect_picture import draw_rig
 
