@@ -22,7 +22,7 @@ __all__ = ["command"]
 @click.option("--no-pictures", is_flag=True, help="Write no pictures.")
 @click.option("-q", "--quiet", is_flag=True, help="Say nothing but errors.")
 def command(study: Path, out: Path | None, no_pictures: bool, quiet: bool) -> None:
-    """Solve the load steps of STUDY (a .toml file, see examples/inflate_ball.toml).
+    """Solve the load steps of STUDY (a .toml file, see examples/fem.md and examples/inflate_ball.toml).
 
     Written: NAME.pvd with one .vtu an instant (for ParaView), reactions.csv, and pictures of displacement and stress
     after each step. When a step finds no equilibrium, what was reached is written and the exit code is 1.

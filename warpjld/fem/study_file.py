@@ -1,14 +1,4 @@
-"""Studies from TOML files.
-
-| table | keys |
-|---|---|
-| (top) | ``title``; ``initial_stress``: stress at rest, xx yy zz xy yz zx [Pa] |
-| ``[mesh]`` | ``kind``: ``box``, ``ball``, ``cylinder``, ``finger`` with the arguments of the functions of these names (``warpjld.fem.box``, ``warpjld.fem.ball``); ``surface``: ``path``, ``spacing`` [m], ``scale`` to metres; ``file``: ``path``, ``scale`` |
-| ``[material.REGION]`` | ``law``: ``linear``, ``neo-hooke`` (``young`` [Pa], ``poisson``, ``density`` [kg/m³]), ``mooney-rivlin`` (``c10``, ``c01`` [Pa], ``poisson``, ``density``), ``fung`` (``young``, ``stiffening``, ``poisson``, ``density``) |
-| ``[sets.NAME]`` | nodes ``of`` a set, face set or region (the surface if left out) that lie ``above`` and ``below`` coordinates, such as ``{ z = 0.1 }`` [m] |
-| ``[[step]]`` | ``name``; ``instants``: load instants; ``free``: ``hold`` or ``refuse`` a body that could move as a whole; ``gravity`` [m/s²]; ``centrifugal``: ``axis``, ``speed`` [rad/s], ``point`` [m]; ``pressure``: faces to [Pa]; ``traction``: faces to vectors [Pa]; ``force``: sets to vectors [N]; ``prescribed``: tables with ``where``, displacements ``x``, ``y``, ``z`` [m], or planes ``onto``, such as ``{ z = 0.1 }`` |
-| ``[solver]`` | ``method``, ``precision`` |
-"""  # noqa: E501
+"""Studies from TOML files, whose tables and keys ``examples/fem.md`` lists."""
 
 from __future__ import annotations
 
