@@ -50,8 +50,8 @@ def test_an_arm_from_an_stl(tmp_path, tube):
 
 
 @pytest.mark.parametrize("suffix", ["obj", "ply", "stl", "off", "glb"])
-def test_the_built_in_hand_survives_every_surface_format(tmp_path, built, suffix):
-    rig = built["right"]
+def test_the_built_in_hand_survives_every_surface_format(tmp_path, hands, suffix):
+    rig = hands["right"]
     surface, joints = tmp_path / f"hand.{suffix}", tmp_path / "hand.json"
     trimesh.Trimesh(rig.surface.vertices, rig.surface.faces, process=False).export(surface)
     write_skeleton_file(joints, rig.skeleton)
