@@ -113,6 +113,7 @@ class SegmentTable:
 
     @staticmethod
     def build(skeleton: Skeleton, ends: NDArray[np.int32]) -> SegmentTable:
+        """Of segments between these joints, shape (S, 2)."""
         start = skeleton.rest[ends[:, 0]]
         along = skeleton.rest[ends[:, 1]] - start
         direction = along / np.linalg.norm(along, axis=1, keepdims=True)

@@ -20,7 +20,7 @@ from warpjld.skeleton.tree import Skeleton
 from warpjld.surface import Surface
 from warpjld.threads import in_threads
 
-__all__ = ["Normals", "PaperCovering", "paper_normals"]
+__all__ = ["Normals", "PaperCovering", "PaperPose", "paper_normals"]
 
 
 @dataclass(frozen=True, eq=False)
@@ -74,6 +74,7 @@ class PaperCovering(Covering):
         return paper_places(self.surface.vertices, self.skeleton, self.fans, self.domains, self.parameters)
 
     def points(self, poses: Poses, vertices: ArrayLike, *, device: str = "cpu") -> NDArray[np.float32]:
+        """Final positions of chosen vertices only [m], shape (F, n, 3) (R74)."""
         import warp as wp
 
         where = checked_device(device)

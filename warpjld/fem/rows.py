@@ -22,7 +22,11 @@ def threads_of(threads: int | None = None) -> int:
 
 
 def shared(values: NDArray[Any]) -> Any:
-    """A Warp array over the memory of a contiguous NumPy array."""
+    """A Warp array over the memory of a contiguous NumPy array.
+
+    Raises:
+        ValueError: The array is not contiguous.
+    """
     import warp as wp
 
     wp.init()

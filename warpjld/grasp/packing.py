@@ -58,7 +58,11 @@ class Chains:
 
 def skin_on(device: Any, coverings: Sequence[Covering]) -> Any:
     """``warpjld_kernels.closing_chain.Skin``: the operators of coverings of one skeleton and surface, one below the
-    other, so that vertex v of the c-th is row c · V + v."""
+    other, so that vertex v of the c-th is row c · V + v.
+
+    Raises:
+        InputError: Coverings of different surfaces, or of another method than the smooth one.
+    """
     import warp as wp
     from warpjld_kernels.anchored import pack_coefficients
     from warpjld_kernels.closing_chain import Skin

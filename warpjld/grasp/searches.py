@@ -55,9 +55,7 @@ class Searches:
 class Rows:
     """N searches, one a row: the fields of ``Searches`` with shape (N,), checked.
 
-    Attributes:
-        drive: Row of ``chains`` that each search moves, shape (N,).
-        chains: Joints that close together, each chain in each frame once.
+    ``drive`` is the row of ``chains``, joints that close together in some frame, which a search moves.
     """
 
     vertex: NDArray[np.int64]

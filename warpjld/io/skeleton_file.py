@@ -138,7 +138,11 @@ def _check_loops(names: list[str], parents: NDArray[np.int64]) -> None:
 
 
 def write_skeleton_file(path: str | Path, skeleton: Skeleton) -> None:
-    """Write a skeleton as a skeleton file that reads back as the same one."""
+    """Write a skeleton as a skeleton file that reads back as the same one.
+
+    Raises:
+        InputError: It cannot be written.
+    """
     joints = []
     for j, name in enumerate(skeleton.names):
         parent = int(skeleton.parents[j])

@@ -38,7 +38,11 @@ class ColorScale:
 
     @classmethod
     def spanning(cls, values: ArrayLike, *, title: str = "", colormap: str = "viridis", factor: float = 1.0) -> Self:
-        """A scale from the smallest to the largest of some numbers."""
+        """A scale from the smallest to the largest of some numbers.
+
+        Raises:
+            InputError: No numbers, or not all finite.
+        """
         numbers = np.asarray(values, np.float64)
         if numbers.size == 0 or not np.isfinite(numbers).all():
             raise InputError("colour scale: want at least one number, all finite")

@@ -53,6 +53,9 @@ def poses_from_angles(
         angles: Joint angles [rad], shape (F, J, 4), channels as in ``CHANNELS``.
         root_position: Displacement of the root from rest [m], shape (F, 3).
         root_rotation: Rotation of the root about its rest position, quaternions x, y, z, w, shape (F, 4).
+
+    Raises:
+        InputError: Wrong shapes, or angles that are not finite.
     """
     count = len(skeleton)
     if angles.ndim != 3 or angles.shape[1:] != (count, len(CHANNELS)):
@@ -82,6 +85,9 @@ def poses_from_rotations(
         local: Rotation of each joint relative to its parent's bone, measured from rest in the axes of the rest pose,
             quaternions x, y, z, w, shape (F, J, 4).
         root_position: Displacement of the root from rest [m], shape (F, 3).
+
+    Raises:
+        InputError: Wrong shapes.
     """
     if local.ndim != 3 or local.shape[1:] != (len(skeleton), 4):
         raise InputError(f"local: want shape (frames, {len(skeleton)}, 4), got {local.shape}")
@@ -96,6 +102,9 @@ def poses_from_world(skeleton: Skeleton, positions: NDArray[np.float64], rotatio
         positions: Joint positions [m], shape (F, J, 3).
         rotations: Rotation of each joint's bone from the rest pose, in world axes, unit quaternions x, y, z, w of
             either sign, shape (F, J, 4).
+
+    Raises:
+        InputError: Wrong shapes.
     """
     count = len(skeleton)
     for name, array, last in (("positions", positions, 3), ("rotations", rotations, 4)):

@@ -83,7 +83,11 @@ class Skeleton:
         return len(self.names)
 
     def index(self, name: str) -> int:
-        """Joint number of a canonical name; the side may be left out where only one hand or limb has it."""
+        """Joint number of a canonical name; the side may be left out where only one hand or limb has it.
+
+        Raises:
+            InputError: There is no such joint, or more than one.
+        """
         wanted = name.lower()
         matches = [
             i for i, n in enumerate(self.names) if n == wanted or (n.partition(".")[2] == wanted and n[:5] in _SIDED)
