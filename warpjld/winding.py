@@ -15,8 +15,8 @@ def winding_numbers(
 ) -> NDArray[np.float64]:
     """w = Σ Ω / 4π over all triangles, Ω by the tangent formula of van Oosterom and Strackee (1983), shape (n,).
 
-    1 inside a closed surface and 0 outside; 2 where two closed parts overlap; between where a surface is open, such as a
-    hand at its wrist.
+    1 inside a closed surface and 0 outside; 2 where two closed parts overlap; between where a surface is open, such as
+    a hand at its wrist.
 
     Args:
         vertices: Positions [m], shape (V, 3).
