@@ -28,7 +28,7 @@ def test_help_lists_every_command_and_the_units(capsys: pytest.CaptureFixture[st
 
 @pytest.mark.parametrize("name", COMMANDS)
 def test_every_command_has_help_and_one_name_for_its_output(name: str, capsys: pytest.CaptureFixture[str]) -> None:
-    assert run(name, "-h") == 0
+    assert run(name, "--help") == 0
     said = capsys.readouterr().out
     assert said.startswith(f"Usage: warpjld {name} ")
     assert "-o, --out " in said
