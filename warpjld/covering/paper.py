@@ -10,11 +10,11 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.spatial.transform import Rotation
 
-from warpjld.covering.binding import SegmentTable
 from warpjld.covering.covering import Covering
 from warpjld.covering.device import array_on, checked_device, parameters_on
 from warpjld.covering.drivers import flexion_ratio
 from warpjld.covering.paper_places import PaperPlaces, paper_places
+from warpjld.covering.segment_table import SegmentTable
 from warpjld.skeleton.kinematics import Poses
 from warpjld.skeleton.tree import Skeleton
 from warpjld.surface import Surface
