@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import importlib
+import signal
 import sys
 
 import click
@@ -58,6 +59,8 @@ def _group() -> None:
 
 def main(arguments: list[str] | None = None) -> None:
     """Run the command line. Exit codes: 0 done, 1 bad input or a failed job, 2 wrong usage, 130 interrupted."""
+    # a polite kill cleans up as Ctrl-C does, and keeps what is finished
+    signal.signal(signal.SIGTERM, signal.default_int_handler)
     try:
         code = _group.main(arguments, prog_name="warpjld", standalone_mode=False)
     except click.exceptions.Abort:

@@ -11,6 +11,7 @@ from typing import Any
 
 import click
 
+from warpjld.cli import options
 from warpjld.errors import InputError, WarpjldError
 
 __all__ = ["command"]
@@ -20,7 +21,7 @@ __all__ = ["command"]
 @click.argument("study", type=click.Path(path_type=Path))
 @click.option("-o", "--out", type=click.Path(path_type=Path), help="Output folder; the study's name by default.")
 @click.option("--no-pictures", is_flag=True, help="Write no pictures.")
-@click.option("-q", "--quiet", is_flag=True, help="Say nothing but errors.")
+@options.quiet
 def command(study: Path, out: Path | None, no_pictures: bool, quiet: bool) -> None:
     """Solve the load steps of STUDY (a .toml file, see examples/fem.md and examples/inflate_ball.toml).
 
