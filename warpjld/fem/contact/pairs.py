@@ -73,6 +73,7 @@ class Pair:
     def __post_init__(self) -> None:
         if not (self.friction >= 0.0 and np.isfinite(self.friction)):
             raise InputError(f"{self.title}: want a friction of 0 or more, got {self.friction}")
+
         if self.sites not in {"nodes", "faces"}:
             raise InputError(f"{self.title}: want sites 'nodes' or 'faces', got '{self.sites}'")
 
