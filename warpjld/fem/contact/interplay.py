@@ -32,8 +32,8 @@ class Interplay:
     Args:
         nodes: Rest positions of the bodies' nodes [m], shape (N, 3).
         interfaces: What may touch.
-        stiffness: Stiffness of each node [N/m], shape (N,).
-        penalty: Contact stiffness over that of a node.
+        moduli: E* at each interface's slave nodes [Pa].
+        penalty: Contact stiffness over E* by the edge of a face.
         penetration: Overlap left, as a share of an edge.
     """
 
@@ -41,7 +41,7 @@ class Interplay:
         self,
         nodes: NDArray[np.float64],
         interfaces: list[Interface],
-        stiffness: NDArray[np.float64],
+        moduli: list[NDArray[np.float64]],
         *,
         penalty: float,
         penetration: float,
@@ -49,7 +49,7 @@ class Interplay:
         self.interfaces = interfaces
         self._rest = nodes
         self._penetration = penetration
-        self._penalties = [penalty * _meeting(interface, stiffness) / interface.edge**2 for interface in interfaces]
+        self._penalties = [penalty * (i.share @ m) / i.edge for i, m in zip(interfaces, moduli, strict=True)]
 
     @property
     def reach(self) -> float:
@@ -166,14 +166,6 @@ class Interplay:
             off = np.where(active[q.sites], off, np.minimum(off, np.maximum(-q.gap, 0.0)))
             worst = max(worst, float((off / edge[q.sites]).max(initial=0.0)))
         return worst
-
-
-def _meeting(interface: Interface, stiffness: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Stiffness of sites against what they meet [N/m], shape (s,)."""
-    own = interface.share @ stiffness[interface.slave.nodes]
-    if len(interface.opposite) == 0:
-        return np.asarray(own)
-    return np.asarray(np.minimum(own, float(np.median(stiffness[interface.opposite]))))
 
 
 def shifted(points: ContactPoints, move: NDArray[np.float64]) -> ContactPoints:
