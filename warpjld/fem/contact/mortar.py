@@ -63,9 +63,7 @@ class Mortar:
     def points(self, x: NDArray[np.float64], reach: float, normals: NDArray[np.float64]) -> ContactPoints:
         """Points at positions x (N, 3) with slave normals (m, 3).
 
-        Of facets face to face, no farther apart than ``reach``, nor deeper. A point's direction lies midway between the
-        normals of the two sides: a side that slides along the other's slope opens or closes the gap, and the linear
-        model foresees half of that whichever slides.
+        Of facets face to face, no farther apart than ``reach``, nor deeper.
         """
         from scipy.sparse import coo_array, csr_array
 
@@ -88,16 +86,9 @@ class Mortar:
         table = table[nodes]
         table.data /= np.repeat(area[nodes], np.diff(table.indptr))
         table.sort_indices()
-        share = found[:, :16].reshape(-1, 4, 4).sum(axis=2)
-        opposite = (share[:, :, None] * self._facing(x)[pairs[:, 1], None]).reshape(-1, 3)
-        total = [np.bincount(corner.ravel(), column, minlength=len(slave.nodes)) for column in opposite.T]
-        normal = _unit(normals[nodes] + _unit(np.stack(total, axis=1)[nodes]))
+        normal = normals[nodes]
         gap = np.asarray(-np.einsum("mi,mi->m", normal, table @ x), np.float64)
         return ContactPoints(nodes, table, normal, area[nodes], gap, np.zeros((len(nodes), 3)))
-
-    def _facing(self, x: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Unit normals into the master's facets, shape (F, 3)."""
-        return _unit(-self._master.area_vectors(x))
 
     def _neighbours(self, x: NDArray[np.float64], reach: float) -> NDArray[np.int32]:
         """Slave and master facets whose boxes are within ``reach``, shape (P, 2); none is left out."""
@@ -135,8 +126,3 @@ class Mortar:
             arguments = [*(shared(t) for t in tables), _FACING, reach, reach, shared(out.reshape(-1))]
             on_rows(contact_mortar.integrate, len(pairs), arguments, threads=self._threads, least=200)
         return out
-
-
-def _unit(vectors: NDArray[Any]) -> NDArray[np.float64]:
-    size = np.linalg.norm(vectors, axis=1, keepdims=True)
-    return np.divide(vectors, size, out=np.zeros(vectors.shape), where=size > 0.0)
