@@ -13,8 +13,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from warpjld.fem.blockmatrix import BlockMatrix
 from warpjld.fem.body import Body, Tangent
-from warpjld.fem.conjugate import Status
+from warpjld.fem.conjugate import Iteration, Status
+from warpjld.fem.contact.damping import Damping
 from warpjld.fem.contact.interplay import Contact, Interplay, alike, shifted
 from warpjld.fem.contact.law import Memory, Response
 from warpjld.fem.contact.loose import Loose
@@ -41,6 +43,8 @@ looked at once forces balance. (Newton's method without their derivatives conver
 _CARELESS = 8
 """Iterations with full steps and multipliers brought up to date at once; what has not settled by then takes turns."""
 _LINE_SEARCH = 8
+_STRIDE = 0.25
+"""Farthest a node moves in an iteration, over what points look ahead (two edges)."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -115,6 +119,7 @@ class Equilibrium:
         blocks = tangent.stiffness.diagonal()
         self._stiff = np.einsum("nii->n", blocks) / 3.0
         self._solver = StepSolver(body, self._stiff, precision)
+        self._damping = Damping(body)
         self._interplay = Interplay(body.mesh.nodes, interfaces, moduli, penalty=penalty, penetration=penetration)
 
     def find(
@@ -131,6 +136,7 @@ class Equilibrium:
         loose = self._unheld(step.prescribed)
         play = self._interplay
         self._solver.begin()
+        self._damping.begin()
         memory = play.begun(memory, start, step.before)
         pressures: NDArray[np.float64] | None = None
         jump = np.zeros_like(u)
@@ -174,25 +180,25 @@ class Equilibrium:
             assert stiffness is not None
             if body.large_strain:
                 subtract_pressure_stiffness(stiffness, body, step.loads, u, step.share)
-            matrix = with_contact(
-                stiffness, contact.points, [r.blocks for r in contact.responses], threads=body.threads
+            done = self._solved(
+                stiffness, contact, free, residual, jump, lambda m: loose.steadied(m, iteration - since)
             )
-            matrix = loose.steadied(matrix, iteration - since)
-            try:
-                done = self._solver.solve(matrix, free, residual - matrix.product(jump, threads=body.threads))
-            except IndefiniteError:
-                return Status.INDEFINITE, None
-            self.solves += 1
-            self.iterations += done.iterations
             if done.status in (Status.INDEFINITE, Status.NOT_FINITE):
                 return done.status, None
             move = done.x + jump
+            stride = 1.0
             if not jump.any():
                 move *= loose.leash(move, play.reach)
+                stride = min(1.0, _STRIDE * play.reach / max(float(np.abs(move).max()), 1e-300))
+                move *= stride
             watched = free if moved and careful else free & np.repeat(loose.falling(contact), 3)
             length = self._search(u, move, contact, memory, step, residual, watched, patient=careful)
             if length == 0.0:
-                return Status.INVERTED, None
+                if not self._damping.more():
+                    return Status.INVERTED, None
+                continue
+            if moved:
+                self._damping.judge(stride * length)
             move *= length
             if body.large_strain:
                 pressures = body.at(u, stiffness=False, increment=move).pressures
@@ -217,6 +223,30 @@ class Equilibrium:
                 break
         status, self.trouble = loose.trouble(self.interfaces, contact)
         return status, None
+
+    def _solved(
+        self,
+        stiffness: BlockMatrix,
+        contact: Contact,
+        free: NDArray[np.bool_],
+        residual: NDArray[np.float64],
+        jump: NDArray[np.float64],
+        steadied: Callable[[BlockMatrix], BlockMatrix],
+    ) -> Iteration:
+        """A Newton step's free displacements; damped as far as the matrix needs it to be positive definite."""
+        blocks = [r.blocks for r in contact.responses]
+        while True:
+            matrix = with_contact(self._damping.lend(stiffness), contact.points, blocks, threads=self.body.threads)
+            matrix = steadied(matrix)
+            try:
+                right = residual - matrix.product(jump, threads=self.body.threads)
+                done = self._solver.solve(matrix, free, right)
+            except IndefiniteError:
+                done = Iteration(np.zeros_like(residual), Status.INDEFINITE, 0, 1.0, np.empty(0))
+            self.solves += 1
+            self.iterations += done.iterations
+            if done.status is not Status.INDEFINITE or not self._damping.more():
+                return done
 
     def _guessed(self, first: NDArray[np.float64] | None, prescribed: Prescribed) -> NDArray[np.float64] | None:
         """A first guess that satisfies what is prescribed, unless it turns an element inside out."""

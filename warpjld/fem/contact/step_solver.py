@@ -17,8 +17,6 @@ from warpjld.fem.multigrid import IndefiniteError
 
 __all__ = ["StepSolver"]
 
-_STIFFENED = (0.0, 0.02, 0.1, 0.5)
-"""Shares of each node's own stiffness that are tried where K is not positive definite."""
 _INNER = 1e-4
 _PATIENCE = 25
 """Iterations after which a preconditioner made for an earlier matrix has served its time."""
@@ -47,11 +45,8 @@ class StepSolver:
     def solve(self, matrix: BlockMatrix, free: NDArray[np.bool_], right: NDArray[np.float64]) -> Iteration:
         """K11 x = b for the free degrees of freedom, shape (3N,), with the preconditioner before while it serves.
 
-        Flesh that is about to fold has a K that is not positive definite on the way to its fold. A share of each node's
-        own stiffness is then added until it is: the step is shorter, where it leads is not changed.
-
         Raises:
-            IndefiniteError: It is not even then.
+            IndefiniteError: K is not positive definite.
         """
         sofar = None
         if self._solver is not None:
@@ -62,21 +57,11 @@ class StepSolver:
             if done.status is Status.MAX_ITERATIONS and done.residual < 1.0:
                 sofar = done
                 left = right - before.masked_product(done.x)
-        for share in _STIFFENED:
-            if share:
-                matrix = stiffened(matrix, share * self._stiff)
-            try:
-                solver = LinearSolver(matrix, free, self._mesh, hierarchy=self._hierarchy, **self._options)
-                if sofar is not None and not share:  # go on from where the old preconditioner got to
-                    done = solver.solve(left, tolerance=_INNER / sofar.residual)
-                    done = replace(done, x=done.x + sofar.x, iterations=done.iterations + sofar.iterations)
-                else:
-                    done = solver.solve(right, tolerance=_INNER)
-            except IndefiniteError:
-                if share == _STIFFENED[-1]:
-                    raise
-                continue
-            if done.status is not Status.INDEFINITE:
-                break
+        solver = LinearSolver(matrix, free, self._mesh, hierarchy=self._hierarchy, **self._options)
+        if sofar is not None:  # go on from where the old preconditioner got to
+            done = solver.solve(left, tolerance=_INNER / sofar.residual)
+            done = replace(done, x=done.x + sofar.x, iterations=done.iterations + sofar.iterations)
+        else:
+            done = solver.solve(right, tolerance=_INNER)
         self._solver, self._hierarchy = solver, solver.hierarchy
         return done
