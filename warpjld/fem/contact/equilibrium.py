@@ -143,7 +143,7 @@ class Equilibrium:
         normals = play.normals(u)
         held = (play.points(u, step.before, step.time, normals), u)
         settled, since, falls = False, 0, 0
-        contact = play.answered(held[0], u, start, memory, keep=True, allowed=step.allowed)
+        contact = play.sloped(play.answered(held[0], u, start, memory, keep=True, allowed=step.allowed), u)
         for iteration in range(_ITERATIONS):
             careful = iteration - since >= _CARELESS
             tangent = self._at(u, pressures)
@@ -163,7 +163,7 @@ class Equilibrium:
                 if step.allowed > 0.0 or play.mismatch(fresh, contact.points, contact.responses) <= self._penetration:
                     return Status.CONVERGED, self._reached(u, np.where(free, 0.0, balance), contact, memory, now)
                 held, settled, since = (fresh, u), False, iteration
-                contact = play.answered(fresh, u, start, memory, keep=True, allowed=step.allowed)
+                contact = play.sloped(play.answered(fresh, u, start, memory, keep=True, allowed=step.allowed), u)
                 continue
             if not np.isfinite(now):
                 return Status.NOT_FINITE, None
@@ -176,7 +176,10 @@ class Equilibrium:
             )
             matrix = loose.steadied(matrix, iteration - since)
             try:
-                done = self._solver.solve(matrix, free, residual - matrix.product(jump, threads=body.threads))
+                right = residual - matrix.product(jump, threads=body.threads)
+                if contact.beside is not None:
+                    right -= free * (contact.beside @ jump)
+                done = self._solver.solve(matrix, free, right, contact.beside)
             except IndefiniteError:
                 return Status.INDEFINITE, None
             self.solves += 1
@@ -203,12 +206,14 @@ class Equilibrium:
                 memory = play.remembered(memory, contact, foreseen, move, patient=careful)
             points = [shifted(p, (u - held[1]).reshape(-1, 3)) for p in held[0]]
             if not settled:
-                normals = play.normals(u) if iteration < _TURNING else normals
+                normals = play.turned(normals, u, iteration < _TURNING)
                 fresh = play.points(u, step.before, step.time, normals)
                 settled = iteration > _TURNING and play.mismatch(fresh, points, foreseen) <= 0.5 * self._penetration
                 held, points = (held, points) if settled else ((fresh, u), fresh)
+            else:
+                points = play.refreshed(points, u, step.before, step.time)
             careful = iteration + 1 - since >= _CARELESS
-            contact = play.answered(points, u, start, memory, keep=not careful, allowed=step.allowed)
+            contact = play.sloped(play.answered(points, u, start, memory, keep=not careful, allowed=step.allowed), u)
             falls = falls + 1 if loose.falling(contact).any() else 0
             if falls > _CARELESS:
                 break

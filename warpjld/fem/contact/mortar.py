@@ -35,7 +35,7 @@ class Mortar:
     """
 
     def __init__(self, slave: ContactSurface, master: ContactSurface, pair: Pair, count: int, threads: int) -> None:
-        self._slave, self._master = slave, master
+        self.slave, self.master = slave, master
         self._count, self._threads = count, threads
         exclusion = pair.exclusion
         if exclusion is None:
@@ -69,9 +69,9 @@ class Mortar:
 
         from warpjld.fem.contact.points import ContactPoints
 
-        slave, master = self._slave, self._master
+        slave, master = self.slave, self.master
         pairs = self._neighbours(x, reach)
-        found = self._integrals(pairs, x, reach)
+        found = self.integrals(pairs, slave.quads, master.quads, x, facing=_FACING, reach=reach)
         some = found[:, 32] > 0.0
         pairs, found = pairs[some], found[some]
         corner = slave.corners[pairs[:, 0]]
@@ -88,21 +88,21 @@ class Mortar:
         table.sort_indices()
         normal = normals[nodes]
         gap = np.asarray(-np.einsum("mi,mi->m", normal, table @ x), np.float64)
-        return ContactPoints(nodes, table, normal, area[nodes], gap, np.zeros((len(nodes), 3)))
+        return ContactPoints(nodes, table, normal, area[nodes], gap, np.zeros((len(nodes), 3)), facets=pairs)
 
     def _neighbours(self, x: NDArray[np.float64], reach: float) -> NDArray[np.int32]:
         """Slave and master facets whose boxes are within ``reach``, shape (P, 2); none is left out."""
         import warp as wp
         from warpjld_kernels import contact_mortar
 
-        origin = x[self._slave.nodes].mean(axis=0)
+        origin = x[self.slave.nodes].mean(axis=0)
         boxes = []
-        for surface, margin in ((self._slave, reach), (self._master, 0.0)):
+        for surface, margin in ((self.slave, reach), (self.master, 0.0)):
             corners = x[surface.quads] - origin
             boxes.append((corners.min(axis=1) - margin, corners.max(axis=1) + margin))
         low, high = (np.ascontiguousarray(b, dtype=np.float32) for b in boxes[1])
         bvh = wp.Bvh(*(wp.array(b, dtype=wp.vec3, device="cpu") for b in (low, high)))
-        count = len(self._slave.quads)
+        count = len(self.slave.quads)
         lower, upper = (wp.array(b.astype(np.float32), dtype=wp.vec3, device="cpu") for b in boxes[0])
         mine, other, never = (shared(a) for a in self._labels)
         starts, counts = np.zeros(count + 1, np.int32), np.zeros(count, np.int32)
@@ -117,12 +117,22 @@ class Mortar:
         facet = np.repeat(np.arange(count, dtype=np.int32), counts)
         return np.stack([facet, out[: len(facet)]], axis=1)
 
-    def _integrals(self, pairs: NDArray[np.int32], x: NDArray[np.float64], reach: float) -> NDArray[np.float64]:
+    def integrals(
+        self,
+        pairs: NDArray[np.int32],
+        slave: NDArray[np.int32],
+        master: NDArray[np.int32],
+        x: NDArray[np.float64],
+        *,
+        facing: float,
+        reach: float,
+    ) -> NDArray[np.float64]:
+        """Of pairs (P, 2) of quadrilaterals with corners at x (n, 3), see the kernel, shape (P, 33)."""
         from warpjld_kernels import contact_mortar
 
         out = np.zeros((len(pairs), 33))
         if len(pairs):
-            tables = [np.ascontiguousarray(a).reshape(-1) for a in (pairs, self._slave.quads, self._master.quads, x)]
-            arguments = [*(shared(t) for t in tables), _FACING, reach, reach, shared(out.reshape(-1))]
+            tables = [np.ascontiguousarray(a).reshape(-1) for a in (pairs, slave, master, x)]
+            arguments = [*(shared(t) for t in tables), facing, reach, reach, shared(out.reshape(-1))]
             on_rows(contact_mortar.integrate, len(pairs), arguments, threads=self._threads, least=200)
         return out

@@ -44,7 +44,9 @@ class StepSolver:
         """A new step: its first matrix gets a preconditioner of its own."""
         self._solver = None
 
-    def solve(self, matrix: BlockMatrix, free: NDArray[np.bool_], right: NDArray[np.float64]) -> Iteration:
+    def solve(
+        self, matrix: BlockMatrix, free: NDArray[np.bool_], right: NDArray[np.float64], beside: Any = None
+    ) -> Iteration:
         """K11 x = b for the free degrees of freedom, shape (3N,), with the preconditioner before while it serves.
 
         Flesh that is about to fold has a K that is not positive definite on the way to its fold. A share of each node's
@@ -56,22 +58,24 @@ class StepSolver:
         sofar = None
         if self._solver is not None:
             before = self._solver.of(matrix)
-            done = before.solve(right, tolerance=_INNER, iterations=_PATIENCE)
+            done = _solved(before, beside, right, _INNER, _PATIENCE)
             if done.status is Status.CONVERGED:
                 return done
             if done.status is Status.MAX_ITERATIONS and done.residual < 1.0:
                 sofar = done
                 left = right - before.masked_product(done.x)
+                if beside is not None:
+                    left = left - free * (beside @ done.x)
         for share in _STIFFENED:
             if share:
                 matrix = stiffened(matrix, share * self._stiff)
             try:
                 solver = LinearSolver(matrix, free, self._mesh, hierarchy=self._hierarchy, **self._options)
                 if sofar is not None and not share:  # go on from where the old preconditioner got to
-                    done = solver.solve(left, tolerance=_INNER / sofar.residual)
+                    done = _solved(solver, beside, left, _INNER / sofar.residual)
                     done = replace(done, x=done.x + sofar.x, iterations=done.iterations + sofar.iterations)
                 else:
-                    done = solver.solve(right, tolerance=_INNER)
+                    done = _solved(solver, beside, right, _INNER)
             except IndefiniteError:
                 if share == _STIFFENED[-1]:
                     raise
@@ -80,3 +84,11 @@ class StepSolver:
                 break
         self._solver, self._hierarchy = solver, solver.hierarchy
         return done
+
+
+def _solved(
+    solver: LinearSolver, beside: Any, right: NDArray[np.float64], tolerance: float, iterations: int = 400
+) -> Iteration:
+    if beside is None:
+        return solver.solve(right, tolerance=tolerance, iterations=iterations)
+    return solver.solve_beside(beside, right, tolerance=tolerance, iterations=iterations)

@@ -1,0 +1,161 @@
+"""How contact between two surfaces that both deform changes as they move: what a symmetric stiffness leaves out.
+
+The points' weights and normals change too. With pressure as high as the flesh is stiff that is no small matter: pads of
+fingers roll and slide on each other, each facet then presses on other nodes, and Newton's method without these
+derivatives goes to and fro. Those of the weights are differences, one facet pair at a time (Puso & Laursen 2004 give
+them in closed form); those of the normals are exact.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from warpjld.fem.contact.surface import ContactSurface
+
+if TYPE_CHECKING:
+    from warpjld.fem.contact.law import Response
+    from warpjld.fem.contact.mortar import Mortar
+    from warpjld.fem.contact.points import ContactPoints
+
+__all__ = ["Slopes", "slopes_of"]
+
+_STEP = 1e-6
+"""Of the differences, over an edge."""
+
+
+@dataclass(frozen=True, eq=False)
+class Slopes:
+    """Derivatives of m points by the displacement (3N,), beyond those with weights and normals that stay.
+
+    Attributes:
+        gap: Of the gaps of points that touch, ``csr_array`` (m, 3N).
+        forces: Of the nodal forces, less sign: what is to be added to the stiffness [N/m], ``csr_array`` (3N, 3N).
+    """
+
+    gap: Any
+    forces: Any
+
+
+def slopes_of(
+    mortar: Mortar, points: ContactPoints, response: Response, penalty: NDArray[np.float64], x: NDArray[np.float64]
+) -> Slopes | None:
+    """Derivatives at positions x (N, 3), at which the points were found with the normals there; None where nothing
+    touches.
+
+    How the friction of a point depends on its normal and on what its slip is measured at is left out.
+
+    Args:
+        mortar: The surfaces.
+        points: The points.
+        response: Their tractions.
+        penalty: ε [Pa/m], shape (m,).
+        x: [m]
+    """
+    from scipy.sparse import coo_array, csr_array, diags_array
+
+    rows = np.flatnonzero(response.active)
+    if not len(rows):
+        return None
+    slave, size = mortar.slave, x.size
+    row = np.full(len(slave.nodes), -1)
+    row[points.sites[rows]] = rows
+    assert points.facets is not None
+    facets = points.facets[(row[slave.corners[points.facets[:, 0]]] >= 0).any(axis=1)]
+    own, far = slave.quads[facets[:, 0]], mortar.master.quads[facets[:, 1]]
+    corner = row[slave.corners[facets[:, 0]]]  # (P, 4)
+    known = corner >= 0
+    nodes = np.concatenate([own, far], axis=1)
+    at = x[nodes]
+    change = _differences(mortar, at, _STEP * float(np.median(slave.edge)))
+    own_change, far_change = (change[:, :, k : k + 16].reshape(-1, 24, 4, 4) for k in (0, 16))
+
+    spread = np.einsum("pkab,pbi->pkai", own_change, at[:, :4]) - np.einsum("pkab,pbi->pkai", far_change, at[:, 4:])
+    area = np.where(known, points.area[corner], 1.0)[:, None]
+    wider = own_change.sum(axis=3)
+    gap = -(np.einsum("pkai,pai->pka", spread, points.normal[corner]) + points.gap[corner][:, None] * wider) / area
+    column = (3 * nodes[:, :, None] + np.arange(3)).reshape(-1, 24)
+    where = np.broadcast_to(known[:, None], gap.shape)
+    places = (np.broadcast_to(corner[:, None], gap.shape)[where], np.broadcast_to(column[:, :, None], gap.shape)[where])
+    of_gap = csr_array(coo_array((gap[where], places), shape=(len(points.sites), size)))
+
+    turning = _turning(slave, x, points.sites, rows)
+    apart = points.weights @ x
+    of_gap = of_gap - _inner(apart, rows) @ turning
+
+    traction = np.where(known[:, :, None], response.traction(points)[corner], 0.0)
+    pushed = [np.einsum("pkab,pai->pkbi", part, traction) for part in (own_change, -far_change)]
+    block = np.concatenate(pushed, axis=2).reshape(-1, 24, 24)  # by column, then row
+    places = (np.broadcast_to(column[:, None, :], block.shape).ravel(), np.repeat(column.ravel(), 24))
+    of_weights = csr_array(coo_array((block.ravel(), places), shape=(size, size)))
+
+    pressure = np.where(response.active, response.pressure, 0.0)
+    stiff = np.where(response.active, penalty, 0.0)
+    tractions = _inner(points.normal, rows).T @ (diags_array(stiff) @ of_gap) - diags_array(np.repeat(pressure, 3)) @ turning
+    spreading = _blocks(points.weights.T @ diags_array(points.area))
+    return Slopes(of_gap, -(spreading @ tractions + of_weights))
+
+
+def _differences(mortar: Mortar, at: NDArray[np.float64], step: float) -> NDArray[np.float64]:
+    """Derivatives of each facet pair's integrals by the coordinates of its corners at (P, 8, 3), shape (P, 24, 33)."""
+    count = len(at)
+    moved = np.tile(at[:, None], (1, 25, 1, 1)).reshape(count, 25, 24)
+    k = np.arange(24)
+    moved[:, 1 + k, k] += step
+    corners = np.arange(count * 25 * 8, dtype=np.int32).reshape(-1, 2, 4)
+    pairs = np.repeat(np.arange(count * 25, dtype=np.int32)[:, None], 2, axis=1)
+    found = mortar.integrals(pairs, corners[:, 0], corners[:, 1], moved, facing=1.0, reach=np.inf)
+    found = found.reshape(count, 25, 33)
+    return np.asarray((found[:, 1:] - found[:, :1]) / step)
+
+
+def _turning(surface: ContactSurface, x: NDArray[np.float64], sites: NDArray[np.int64], rows: NDArray[np.int64]) -> Any:
+    """Derivatives of the nodes' normals, ``csr_array`` (3m, 3N), zero but at ``rows``."""
+    from scipy.sparse import coo_array, csr_array
+
+    number = np.full(len(surface.nodes), -1)
+    number[sites[rows]] = rows
+    some = np.flatnonzero((number[surface.corners] >= 0).any(axis=1))
+    quads, corner = surface.quads[some], number[surface.corners[some]]
+    vector = surface.at_nodes(surface.area_vectors(x))
+    length = np.linalg.norm(vector, axis=1)[surface.corners[some]]
+    normal = np.divide(vector, np.linalg.norm(vector, axis=1, keepdims=True), where=vector.any(axis=1)[:, None], out=np.zeros_like(vector))
+    a, b, c, d = (x[quads[:, k]] for k in range(4))
+    # of (c − a) × (d − b) / 8: to each corner a quarter of the face's area vector
+    along, across = _cross(c - a), _cross(d - b)
+    each = 0.125 * np.stack([across, -along, -across, along], axis=1)  # face, node, 3, 3
+    n = normal[surface.corners[some]]
+    plane = np.eye(3) - n[:, :, :, None] * n[:, :, None, :]
+    block = np.einsum("faij,fbjk->fabik", plane, each) / length[:, :, None, None, None]
+    known = np.broadcast_to((corner >= 0)[:, :, None, None, None], block.shape)
+    row = np.broadcast_to((3 * corner[:, :, None] + np.arange(3))[:, :, None, :, None], block.shape)
+    column = np.broadcast_to((3 * quads[:, :, None] + np.arange(3))[:, None, :, None, :], block.shape)
+    shape = (3 * len(sites), x.size)
+    return csr_array(coo_array((block[known], (row[known], column[known])), shape=shape))
+
+
+def _cross(v: NDArray[np.float64]) -> NDArray[np.float64]:
+    """[v]× of vectors (n, 3), shape (n, 3, 3)."""
+    out = np.zeros((len(v), 3, 3))
+    out[:, 0, 1], out[:, 0, 2], out[:, 1, 2] = -v[:, 2], v[:, 1], -v[:, 0]
+    return out - out.transpose(0, 2, 1)
+
+
+def _inner(vectors: NDArray[np.float64], rows: NDArray[np.int64]) -> Any:
+    """Rows that take the inner product of each point's vector (m, 3) with three values of it, (m, 3m)."""
+    from scipy.sparse import csr_array
+
+    count = len(vectors)
+    values = np.zeros_like(vectors)
+    values[rows] = vectors[rows]
+    return csr_array((values.ravel(), np.arange(3 * count), 3 * np.arange(count + 1)), shape=(count, 3 * count))
+
+
+def _blocks(weights: Any) -> Any:
+    """A table of scalars (n, m) as one of 3 × 3 diagonal blocks."""
+    from scipy.sparse import csr_array, eye_array, kron
+
+    return csr_array(kron(weights, eye_array(3), format="csr"))
