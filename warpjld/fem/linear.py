@@ -101,6 +101,10 @@ class LinearSolver:
         """A solver for a matrix that differs little from this one's: the preconditioner stays, a factor does not."""
         if self.method == "direct":
             return LinearSolver(stiffness, self.free, self._mesh, method="direct", threads=self.threads)
+        return self.over(stiffness)
+
+    def over(self, stiffness: BlockMatrix) -> LinearSolver:
+        """The same preconditioner, a factor included, for another matrix."""
         out = copy(self)
         out._stiffness = stiffness
         out._product = _Product(stiffness, self.threads)

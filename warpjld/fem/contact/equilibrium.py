@@ -143,7 +143,7 @@ class Equilibrium:
         normals = play.normals(u)
         held = (play.points(u, step.before, step.time, normals), u)
         settled, since, falls = False, 0, 0
-        contact = play.sloped(play.answered(held[0], u, start, memory, keep=True, allowed=step.allowed), u)
+        contact = play.sloped(play.answered(held[0], u, start, memory, keep=True, allowed=step.allowed), memory, u)
         for iteration in range(_ITERATIONS):
             careful = iteration - since >= _CARELESS
             tangent = self._at(u, pressures)
@@ -163,7 +163,7 @@ class Equilibrium:
                 if step.allowed > 0.0 or play.mismatch(fresh, contact.points, contact.responses) <= self._penetration:
                     return Status.CONVERGED, self._reached(u, np.where(free, 0.0, balance), contact, memory, now)
                 held, settled, since = (fresh, u), False, iteration
-                contact = play.sloped(play.answered(fresh, u, start, memory, keep=True, allowed=step.allowed), u)
+                contact = play.sloped(play.answered(fresh, u, start, memory, keep=True, allowed=step.allowed), memory, u)
                 continue
             if not np.isfinite(now):
                 return Status.NOT_FINITE, None
@@ -213,7 +213,7 @@ class Equilibrium:
             else:
                 points = play.refreshed(points, u, step.before, step.time)
             careful = iteration + 1 - since >= _CARELESS
-            contact = play.sloped(play.answered(points, u, start, memory, keep=not careful, allowed=step.allowed), u)
+            contact = play.sloped(play.answered(points, u, start, memory, keep=not careful, allowed=step.allowed), memory, u)
             falls = falls + 1 if loose.falling(contact).any() else 0
             if falls > _CARELESS:
                 break

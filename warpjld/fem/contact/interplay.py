@@ -110,14 +110,14 @@ class Interplay:
         ]
         return Contact(points, slips, responses, self.pushed(points, responses))
 
-    def sloped(self, contact: Contact, u: NDArray[np.float64]) -> Contact:
+    def sloped(self, contact: Contact, memory: list[Memory], u: NDArray[np.float64]) -> Contact:
         """With what a symmetric stiffness leaves out, where points are those of displacement u (3N,)."""
         x = self._rest + u.reshape(-1, 3)
         points, beside = list(contact.points), None
         for k, (interface, p, r) in enumerate(zip(self.interfaces, points, contact.responses, strict=True)):
             if interface.mortar is None:
                 continue
-            slopes = slopes_of(interface.mortar, p, r, self._penalty(k, p), x)
+            slopes = slopes_of(interface.mortar, p, r, memory[k], self._penalty(k, p), x)
             if slopes is not None:
                 points[k] = replace(p, steep=slopes.gap)
                 beside = slopes.forces if beside is None else beside + slopes.forces

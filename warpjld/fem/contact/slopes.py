@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from warpjld.fem.contact.surface import ContactSurface
 
 if TYPE_CHECKING:
-    from warpjld.fem.contact.law import Response
+    from warpjld.fem.contact.law import Memory, Response
     from warpjld.fem.contact.mortar import Mortar
     from warpjld.fem.contact.points import ContactPoints
 
@@ -41,7 +41,7 @@ class Slopes:
 
 
 def slopes_of(
-    mortar: Mortar, points: ContactPoints, response: Response, penalty: NDArray[np.float64], x: NDArray[np.float64]
+    mortar: Mortar, points: ContactPoints, response: Response, memory: Memory, penalty: NDArray[np.float64], x: NDArray[np.float64]
 ) -> Slopes | None:
     """Derivatives at positions x (N, 3), at which the points were found with the normals there; None where nothing
     touches.
@@ -86,13 +86,14 @@ def slopes_of(
     apart = points.weights @ x
     of_gap = of_gap - _inner(apart, rows) @ turning
 
-    traction = np.where(known[:, :, None], response.traction(points)[corner], 0.0)
+    pressure = np.where(response.active, np.maximum(memory.pressure[points.sites], 0.0), 0.0)
+    carried = memory.friction[points.sites] - pressure[:, None] * points.normal
+    traction = np.where(known[:, :, None], carried[corner], 0.0)
     pushed = [np.einsum("pkab,pai->pkbi", part, traction) for part in (own_change, -far_change)]
     block = np.concatenate(pushed, axis=2).reshape(-1, 24, 24)  # by column, then row
     places = (np.broadcast_to(column[:, None, :], block.shape).ravel(), np.repeat(column.ravel(), 24))
     of_weights = csr_array(coo_array((block.ravel(), places), shape=(size, size)))
 
-    pressure = np.where(response.active, response.pressure, 0.0)
     stiff = np.where(response.active, penalty, 0.0)
     tractions = _inner(points.normal, rows).T @ (diags_array(stiff) @ of_gap) - diags_array(np.repeat(pressure, 3)) @ turning
     spreading = _blocks(points.weights.T @ diags_array(points.area))

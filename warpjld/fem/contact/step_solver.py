@@ -20,6 +20,8 @@ __all__ = ["StepSolver"]
 _STIFFENED = (0.0, 0.02, 0.1, 0.5)
 """Shares of each node's own stiffness that are tried where K is not positive definite."""
 _INNER = 1e-4
+_MOST = 150
+"""Iterations of a solve that is not symmetric."""
 _PATIENCE = 25
 """Iterations after which a preconditioner made for an earlier matrix has served its time."""
 
@@ -55,27 +57,27 @@ class StepSolver:
         Raises:
             IndefiniteError: It is not even then.
         """
+        if beside is not None:
+            return self._beside(matrix, free, right, beside)
         sofar = None
         if self._solver is not None:
             before = self._solver.of(matrix)
-            done = _solved(before, beside, right, _INNER, _PATIENCE)
+            done = before.solve(right, tolerance=_INNER, iterations=_PATIENCE)
             if done.status is Status.CONVERGED:
                 return done
             if done.status is Status.MAX_ITERATIONS and done.residual < 1.0:
                 sofar = done
                 left = right - before.masked_product(done.x)
-                if beside is not None:
-                    left = left - free * (beside @ done.x)
         for share in _STIFFENED:
             if share:
                 matrix = stiffened(matrix, share * self._stiff)
             try:
                 solver = LinearSolver(matrix, free, self._mesh, hierarchy=self._hierarchy, **self._options)
                 if sofar is not None and not share:  # go on from where the old preconditioner got to
-                    done = _solved(solver, beside, left, _INNER / sofar.residual)
+                    done = solver.solve(left, tolerance=_INNER / sofar.residual)
                     done = replace(done, x=done.x + sofar.x, iterations=done.iterations + sofar.iterations)
                 else:
-                    done = _solved(solver, beside, right, _INNER)
+                    done = solver.solve(right, tolerance=_INNER)
             except IndefiniteError:
                 if share == _STIFFENED[-1]:
                     raise
@@ -85,10 +87,26 @@ class StepSolver:
         self._solver, self._hierarchy = solver, solver.hierarchy
         return done
 
-
-def _solved(
-    solver: LinearSolver, beside: Any, right: NDArray[np.float64], tolerance: float, iterations: int = 400
-) -> Iteration:
-    if beside is None:
-        return solver.solve(right, tolerance=tolerance, iterations=iterations)
-    return solver.solve_beside(beside, right, tolerance=tolerance, iterations=iterations)
+    def _beside(
+        self, matrix: BlockMatrix, free: NDArray[np.bool_], right: NDArray[np.float64], beside: Any
+    ) -> Iteration:
+        """With a part that is not symmetric. The whole may be definite where K is not: pressure that follows the skin
+        holds flesh that would give way under pressure that does not. K is stiffened only to make a preconditioner.
+        """
+        if self._solver is not None:
+            done = self._solver.over(matrix).solve_beside(beside, right, tolerance=_INNER, iterations=_PATIENCE)
+            if done.status is Status.CONVERGED:
+                return done
+        for share in _STIFFENED:
+            near = stiffened(matrix, share * self._stiff) if share else matrix
+            try:
+                solver = LinearSolver(near, free, self._mesh, hierarchy=self._hierarchy, **self._options)
+            except IndefiniteError:
+                if share == _STIFFENED[-1]:
+                    raise
+                continue
+            done = solver.over(matrix).solve_beside(beside, right, tolerance=_INNER, iterations=_MOST)
+            if done.status is Status.CONVERGED:
+                break
+        self._solver, self._hierarchy = solver, solver.hierarchy
+        return done
