@@ -117,7 +117,7 @@ class Interplay:
         for k, (interface, p, r) in enumerate(zip(self.interfaces, points, contact.responses, strict=True)):
             if interface.mortar is None:
                 continue
-            slopes = slopes_of(interface.mortar, p, r, memory[k], self._penalty(k, p), x)
+            slopes = slopes_of(interface.mortar, p, r, memory[k], self._penalty(k, p), x, interface.reach)
             if slopes is not None:
                 points[k] = replace(p, steep=slopes.gap)
                 beside = slopes.forces if beside is None else beside + slopes.forces

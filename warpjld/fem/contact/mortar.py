@@ -19,6 +19,8 @@ __all__ = ["Mortar"]
 
 _FACING = -0.1
 """Facets may touch where the cosine of the angle between their normals is below this."""
+_TURN = 0.3
+"""They do so fully where it is less than that by this."""
 _LEAST = 1e-4
 """Share of a node's surface below which a point is left out: its average would hang on a sliver."""
 
@@ -71,7 +73,7 @@ class Mortar:
 
         slave, master = self.slave, self.master
         pairs = self._neighbours(x, reach)
-        found = self.integrals(pairs, slave.quads, master.quads, x, facing=_FACING, reach=reach)
+        found = self.integrals(pairs, slave.quads, master.quads, x, reach)
         some = found[:, 32] > 0.0
         pairs, found = pairs[some], found[some]
         corner = slave.corners[pairs[:, 0]]
@@ -123,8 +125,6 @@ class Mortar:
         slave: NDArray[np.int32],
         master: NDArray[np.int32],
         x: NDArray[np.float64],
-        *,
-        facing: float,
         reach: float,
     ) -> NDArray[np.float64]:
         """Of pairs (P, 2) of quadrilaterals with corners at x (n, 3), see the kernel, shape (P, 33)."""
@@ -133,6 +133,6 @@ class Mortar:
         out = np.zeros((len(pairs), 33))
         if len(pairs):
             tables = [np.ascontiguousarray(a).reshape(-1) for a in (pairs, slave, master, x)]
-            arguments = [*(shared(t) for t in tables), facing, reach, reach, shared(out.reshape(-1))]
+            arguments = [*(shared(t) for t in tables), _FACING, _TURN, reach, shared(out.reshape(-1))]
             on_rows(contact_mortar.integrate, len(pairs), arguments, threads=self._threads, least=200)
         return out

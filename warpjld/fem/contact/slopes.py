@@ -25,6 +25,8 @@ __all__ = ["Slopes", "slopes_of"]
 
 _STEP = 1e-6
 """Of the differences, over an edge."""
+_NEAR = 0.5
+"""Edges within which a gap may close in an iteration."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -41,7 +43,7 @@ class Slopes:
 
 
 def slopes_of(
-    mortar: Mortar, points: ContactPoints, response: Response, memory: Memory, penalty: NDArray[np.float64], x: NDArray[np.float64]
+    mortar: Mortar, points: ContactPoints, response: Response, memory: Memory, penalty: NDArray[np.float64], x: NDArray[np.float64], reach: float
 ) -> Slopes | None:
     """Derivatives at positions x (N, 3), at which the points were found with the normals there; None where nothing
     touches.
@@ -57,9 +59,9 @@ def slopes_of(
     """
     from scipy.sparse import coo_array, csr_array, diags_array
 
-    rows = np.flatnonzero(response.active)
-    if not len(rows):
+    if not response.active.any():
         return None
+    rows = np.flatnonzero(response.active | (points.gap < _NEAR * mortar.slave.edge[points.sites]))
     slave, size = mortar.slave, x.size
     row = np.full(len(slave.nodes), -1)
     row[points.sites[rows]] = rows
@@ -70,7 +72,7 @@ def slopes_of(
     known = corner >= 0
     nodes = np.concatenate([own, far], axis=1)
     at = x[nodes]
-    change = _differences(mortar, at, _STEP * float(np.median(slave.edge)))
+    change = _differences(mortar, at, reach, _STEP * float(np.median(slave.edge)))
     own_change, far_change = (change[:, :, k : k + 16].reshape(-1, 24, 4, 4) for k in (0, 16))
 
     spread = np.einsum("pkab,pbi->pkai", own_change, at[:, :4]) - np.einsum("pkab,pbi->pkai", far_change, at[:, 4:])
@@ -100,7 +102,7 @@ def slopes_of(
     return Slopes(of_gap, -(spreading @ tractions + of_weights))
 
 
-def _differences(mortar: Mortar, at: NDArray[np.float64], step: float) -> NDArray[np.float64]:
+def _differences(mortar: Mortar, at: NDArray[np.float64], reach: float, step: float) -> NDArray[np.float64]:
     """Derivatives of each facet pair's integrals by the coordinates of its corners at (P, 8, 3), shape (P, 24, 33)."""
     count = len(at)
     moved = np.tile(at[:, None], (1, 25, 1, 1)).reshape(count, 25, 24)
@@ -108,7 +110,7 @@ def _differences(mortar: Mortar, at: NDArray[np.float64], step: float) -> NDArra
     moved[:, 1 + k, k] += step
     corners = np.arange(count * 25 * 8, dtype=np.int32).reshape(-1, 2, 4)
     pairs = np.repeat(np.arange(count * 25, dtype=np.int32)[:, None], 2, axis=1)
-    found = mortar.integrals(pairs, corners[:, 0], corners[:, 1], moved, facing=1.0, reach=np.inf)
+    found = mortar.integrals(pairs, corners[:, 0], corners[:, 1], moved, reach)
     found = found.reshape(count, 25, 33)
     return np.asarray((found[:, 1:] - found[:, :1]) / step)
 
