@@ -40,6 +40,8 @@ looked at once forces balance. (Newton's method without their derivatives conver
 _CARELESS = 8
 """Iterations with full steps and multipliers brought up to date at once; what has not settled by then takes turns."""
 _LINE_SEARCH = 8
+_STRIDE = 0.25
+"""Farthest a node moves in an iteration where surfaces press on each other, over what points look ahead."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -190,6 +192,8 @@ class Equilibrium:
             if not jump.any():
                 move *= loose.leash(move, play.reach)
             watched = free if moved and careful else free & np.repeat(loose.falling(contact), 3)
+            if contact.beside is not None and not jump.any():
+                move *= min(1.0, _STRIDE * play.reach / float(np.abs(move).max()))
             length = self._search(u, move, contact, memory, step, residual, watched, patient=careful)
             if length == 0.0:
                 return Status.INVERTED, None

@@ -22,7 +22,10 @@ _FACING = -0.1
 _TURN = 0.3
 """They do so fully where it is less than that by this."""
 _LEAST = 1e-4
-"""Share of a node's surface below which a point is left out: its average would hang on a sliver."""
+"""Share of a node's surface below which a point is left out."""
+_SLIVER, _OFF = 0.1, 0.25
+"""Share of a node's surface below which its average hangs on a sliver, and by how many edges the least of slivers seem
+farther off than they are: what presses beside them is to hold them, not a pressure without bound on hardly any area."""
 
 
 class Mortar:
@@ -90,7 +93,16 @@ class Mortar:
         table.sort_indices()
         normal = normals[nodes]
         gap = np.asarray(-np.einsum("mi,mi->m", normal, table @ x), np.float64)
+        gap += self.aside(nodes, area[nodes])[0]
         return ContactPoints(nodes, table, normal, area[nodes], gap, np.zeros((len(nodes), 3)), facets=pairs)
+
+    def aside(
+        self, sites: NDArray[np.int64], area: NDArray[np.float64]
+    ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """What slivers seem farther off [m], and its derivative by their area [1/m], shape (m,) each."""
+        edge = self.slave.edge[sites]
+        t = np.minimum(area / (_SLIVER * edge**2), 1.0)
+        return _OFF * edge * (1.0 - t) ** 2, -2.0 * _OFF * (1.0 - t) / (_SLIVER * edge)
 
     def _neighbours(self, x: NDArray[np.float64], reach: float) -> NDArray[np.int32]:
         """Slave and master facets whose boxes are within ``reach``, shape (P, 2); none is left out."""

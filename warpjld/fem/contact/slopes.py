@@ -78,7 +78,10 @@ def slopes_of(
     spread = np.einsum("pkab,pbi->pkai", own_change, at[:, :4]) - np.einsum("pkab,pbi->pkai", far_change, at[:, 4:])
     area = np.where(known, points.area[corner], 1.0)[:, None]
     wider = own_change.sum(axis=3)
-    gap = -(np.einsum("pkai,pai->pka", spread, points.normal[corner]) + points.gap[corner][:, None] * wider) / area
+    off, per_area = mortar.aside(points.sites, points.area)
+    real = (points.gap - off)[corner][:, None]
+    gap = -(np.einsum("pkai,pai->pka", spread, points.normal[corner]) + real * wider) / area
+    gap += per_area[corner][:, None] * wider
     column = (3 * nodes[:, :, None] + np.arange(3)).reshape(-1, 24)
     where = np.broadcast_to(known[:, None], gap.shape)
     places = (np.broadcast_to(corner[:, None], gap.shape)[where], np.broadcast_to(column[:, :, None], gap.shape)[where])
