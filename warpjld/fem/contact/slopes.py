@@ -25,8 +25,9 @@ __all__ = ["Slopes", "slopes_of"]
 
 _STEP = 1e-6
 """Of the differences, over an edge."""
-_NEAR = 0.5
-"""Edges within which a gap may close in an iteration."""
+_NEAR, _DEEP = 0.5, 0.05
+"""Edges within which a gap may close in an iteration; and of overlap from which on how gaps change says little of where
+to go: its facets will not meet."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -67,6 +68,7 @@ def slopes_of(
     row[points.sites[rows]] = rows
     assert points.facets is not None
     facets = points.facets[(row[slave.corners[points.facets[:, 0]]] >= 0).any(axis=1)]
+    deep = points.gap < -_DEEP * slave.edge[points.sites]
     own, far = slave.quads[facets[:, 0]], mortar.master.quads[facets[:, 1]]
     corner = row[slave.corners[facets[:, 0]]]  # (P, 4)
     known = corner >= 0
@@ -83,13 +85,13 @@ def slopes_of(
     gap = -(np.einsum("pkai,pai->pka", spread, points.normal[corner]) + real * wider) / area
     gap += per_area[corner][:, None] * wider
     column = (3 * nodes[:, :, None] + np.arange(3)).reshape(-1, 24)
-    where = np.broadcast_to(known[:, None], gap.shape)
+    where = np.broadcast_to((known & ~deep[corner])[:, None], gap.shape)
     places = (np.broadcast_to(corner[:, None], gap.shape)[where], np.broadcast_to(column[:, :, None], gap.shape)[where])
     of_gap = csr_array(coo_array((gap[where], places), shape=(len(points.sites), size)))
 
     turning = _turning(slave, x, points.sites, rows)
     apart = points.weights @ x
-    of_gap = of_gap - _inner(apart, rows) @ turning
+    of_gap = of_gap - _inner(apart, rows[~deep[rows]]) @ turning
 
     pressure = np.where(response.active, np.maximum(memory.pressure[points.sites], 0.0), 0.0)
     carried = memory.friction[points.sites] - pressure[:, None] * points.normal
