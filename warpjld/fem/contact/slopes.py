@@ -68,7 +68,7 @@ def slopes_of(
     row[points.sites[rows]] = rows
     assert points.facets is not None
     facets = points.facets[(row[slave.corners[points.facets[:, 0]]] >= 0).any(axis=1)]
-    deep = points.gap < -_DEEP * slave.edge[points.sites]
+    deep = np.full(len(points.sites), bool((response.error > _DEEP * slave.edge[points.sites]).any()))
     own, far = slave.quads[facets[:, 0]], mortar.master.quads[facets[:, 1]]
     corner = row[slave.corners[facets[:, 0]]]  # (P, 4)
     known = corner >= 0
