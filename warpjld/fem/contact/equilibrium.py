@@ -213,9 +213,11 @@ class Equilibrium:
                 normals = play.turned(normals, u, iteration < _TURNING)
                 fresh = play.points(u, step.before, step.time, normals)
                 settled = iteration > _TURNING and play.mismatch(fresh, points, foreseen) <= 0.5 * self._penetration
-                held, points = (held, points) if settled else ((fresh, u), fresh)
+                if not settled:
+                    held = (fresh, u)
+                points = play.mixed(points, fresh) if settled else fresh
             else:
-                points = play.refreshed(points, u, step.before, step.time)
+                points = play.mixed(points, play.points(u, step.before, step.time, play.normals(u)))
             careful = iteration + 1 - since >= _CARELESS
             contact = play.sloped(play.answered(points, u, start, memory, keep=not careful, allowed=step.allowed), memory, u)
             falls = falls + 1 if loose.falling(contact).any() else 0

@@ -77,18 +77,15 @@ class Interplay:
         """Normals at displacement u (3N,): of surfaces that meet surfaces, or of every one; the others stay."""
         fresh = self.normals(u)
         return [
-            new if every or interface.mortar is not None else old
+            new if every or interface.slides else old
             for interface, old, new in zip(self.interfaces, normals, fresh, strict=True)
         ]
 
-    def refreshed(
-        self, points: list[ContactPoints], u: NDArray[np.float64], before: float, time: float
-    ) -> list[ContactPoints]:
-        """Points between surfaces as displacement u (3N,) has them; those at obstacles stay."""
-        x = self._rest + u.reshape(-1, 3)
+    def mixed(self, points: list[ContactPoints], fresh: list[ContactPoints]) -> list[ContactPoints]:
+        """Fresh points between surfaces, whose derivatives are known; those at obstacles stay."""
         return [
-            p if interface.mortar is None else interface.points(x, before, time)
-            for interface, p in zip(self.interfaces, points, strict=True)
+            new if interface.slides else old
+            for interface, old, new in zip(self.interfaces, points, fresh, strict=True)
         ]
 
     def answered(
@@ -115,7 +112,7 @@ class Interplay:
         x = self._rest + u.reshape(-1, 3)
         points, beside = list(contact.points), None
         for k, (interface, p, r) in enumerate(zip(self.interfaces, points, contact.responses, strict=True)):
-            if interface.mortar is None:
+            if interface.mortar is None or not interface.slides:
                 continue
             slopes = slopes_of(interface.mortar, p, r, memory[k], self._penalty(k, p), x, interface.reach)
             if slopes is not None:

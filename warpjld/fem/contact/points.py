@@ -118,6 +118,12 @@ class Interface:
         """Whether what points know of a slave node is an average over the faces around it."""
         return self.mortar is not None or self.pair.sites == "faces"
 
+    @property
+    def slides(self) -> bool:
+        """Whether its points' weights and normals change as bodies move in ways whose derivatives are known: both
+        sides deform, and are not bonded."""
+        return self.mortar is not None and self.pair.bond is None
+
     def points(
         self, x: NDArray[np.float64], before: float, time: float, normals: NDArray[np.float64] | None = None
     ) -> ContactPoints:
