@@ -39,6 +39,9 @@ _TURNING = 1
 looked at once forces balance. (Newton's method without their derivatives converges slowly, with them not symmetric.)"""
 _CARELESS = 8
 """Iterations with full steps and multipliers brought up to date at once; what has not settled by then takes turns."""
+_SURE = 3
+"""Iterations after which multipliers are good enough to take the derivatives of directions with; those of the equilibrium
+before are until then."""
 _LINE_SEARCH = 8
 _STRIDE = 0.25
 """Farthest a node moves in an iteration where surfaces press on each other, over what points look ahead."""
@@ -130,7 +133,7 @@ class Equilibrium:
         loose = self._unheld(step.prescribed)
         play = self._interplay
         self._solver.begin()
-        memory = play.begun(memory, start, step.before)
+        memory = before = play.begun(memory, start, step.before)
         pressures: NDArray[np.float64] | None = None
         jump = np.zeros_like(u)
         guessed = self._guessed(first, step.prescribed)
@@ -193,6 +196,16 @@ class Equilibrium:
                 move *= loose.leash(move, play.reach)
             watched = free if moved and careful else free & np.repeat(loose.falling(contact), 3)
             if contact.beside is not None and not jump.any():
+                far = float(np.abs(move).max())
+                if far > _STRIDE * play.reach:
+                    try:
+                        other = self._solver.solve(matrix, free, right)
+                        self.solves += 1
+                        self.iterations += other.iterations
+                        if other.status is Status.CONVERGED and np.abs(other.x).max() < far:
+                            move = other.x.copy()
+                    except IndefiniteError:
+                        pass
                 move *= min(1.0, _STRIDE * play.reach / float(np.abs(move).max()))
             length = self._search(u, move, contact, memory, step, residual, watched, patient=careful)
             if length == 0.0:
@@ -219,7 +232,8 @@ class Equilibrium:
             else:
                 points = play.mixed(points, play.points(u, step.before, step.time, play.normals(u)))
             careful = iteration + 1 - since >= _CARELESS
-            contact = play.sloped(play.answered(points, u, start, memory, keep=not careful, allowed=step.allowed), memory, u)
+            contact = play.answered(points, u, start, memory, keep=not careful, allowed=step.allowed)
+            contact = play.sloped(contact, memory if iteration + 1 >= _SURE else before, u)
             falls = falls + 1 if loose.falling(contact).any() else 0
             if falls > _CARELESS:
                 break
