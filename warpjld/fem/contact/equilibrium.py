@@ -208,6 +208,8 @@ class Equilibrium:
                         pass
                 move *= min(1.0, _STRIDE * play.reach / float(np.abs(move).max()))
             length = self._search(u, move, contact, memory, step, residual, watched, patient=careful)
+            if careful and contact.beside is not None and not jump.any():
+                length = self._descent(u, start, move, length, memory, step, residual, free)
             if length == 0.0:
                 return Status.INVERTED, None
             move *= length
@@ -296,6 +298,38 @@ class Equilibrium:
         from scipy.optimize import brentq
 
         return max(float(brentq(pull, 0.0, 1.0, xtol=1e-14, rtol=1e-6, maxiter=60, disp=False)), 1e-12)
+
+    def _descent(
+        self,
+        u: NDArray[np.float64],
+        start: NDArray[np.float64],
+        move: NDArray[np.float64],
+        most: float,
+        memory: list[Memory],
+        step: Step,
+        residual: NDArray[np.float64],
+        free: NDArray[np.bool_],
+    ) -> float:
+        """How far to go, ``most`` at most, for forces to balance better than here: where points come and go in turn, or
+        K is indefinite, the work along the way does not tell.
+        """
+        play, now = self._interplay, norm(residual)
+        length, best = most, (np.inf, most)
+        for _ in range(_LINE_SEARCH):
+            if length == 0.0:
+                break
+            there = u + length * move
+            points = play.points(there, step.before, step.time, play.normals(there))
+            contact = play.answered(points, there, start, memory, keep=False, allowed=step.allowed)
+            external = step.share * external_forces(self.body, step.loads, there if self.body.large_strain else None)
+            trial = self._at(there, None) if self._rest is not None else self.body.at(there, stiffness=False)
+            left = norm(np.where(free, external + contact.forces - trial.forces, 0.0))
+            if left < (1.0 - 1e-4 * length) * now:
+                return length
+            if left < best[0]:
+                best = (left, length)
+            length *= 0.5
+        return best[1]
 
     def _at(self, u: NDArray[np.float64], pressures: NDArray[np.float64] | None) -> Tangent:
         if self._rest is None:

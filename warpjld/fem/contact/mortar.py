@@ -17,9 +17,9 @@ if TYPE_CHECKING:
 
 __all__ = ["Mortar"]
 
-_FACING = -0.1
+_FACING = -0.2
 """Facets may touch where the cosine of the angle between their normals is below this."""
-_TURN = 0.3
+_TURN = 0.4
 """They do so fully where it is less than that by this."""
 _LEAST = 1e-4
 """Share of a node's surface below which a point is left out."""
