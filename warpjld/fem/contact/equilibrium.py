@@ -12,6 +12,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from warpjld.fem.blockmatrix import BlockMatrix
 from warpjld.fem.body import Body, Tangent
 from warpjld.fem.conjugate import Status
 from warpjld.fem.contact.interplay import Contact, Interplay, alike, shifted
@@ -39,9 +40,9 @@ _TURNING = 1
 looked at once forces balance. (Newton's method without their derivatives converges slowly, with them not symmetric.)"""
 _CARELESS = 8
 """Iterations with full steps and multipliers brought up to date at once; what has not settled by then takes turns."""
-_SURE = 3
-"""Iterations after which multipliers are good enough to take the derivatives of directions with; those of the equilibrium
-before are until then."""
+_SURE = 2
+"""Iterations after which multipliers are good enough to take the derivatives of directions with; until then those of
+the equilibrium before are."""
 _LINE_SEARCH = 8
 _STRIDE = 0.25
 """Farthest a node moves in an iteration where surfaces press on each other, over what points look ahead."""
@@ -148,7 +149,7 @@ class Equilibrium:
         normals = play.normals(u)
         held = (play.points(u, step.before, step.time, normals), u)
         settled, since, falls = False, 0, 0
-        contact = play.sloped(play.answered(held[0], u, start, memory, keep=True, allowed=step.allowed), memory, u)
+        contact = play.answered(held[0], u, start, memory, keep=True, allowed=step.allowed)
         for iteration in range(_ITERATIONS):
             careful = iteration - since >= _CARELESS
             tangent = self._at(u, pressures)
@@ -168,10 +169,13 @@ class Equilibrium:
                 if step.allowed > 0.0 or play.mismatch(fresh, contact.points, contact.responses) <= self._penetration:
                     return Status.CONVERGED, self._reached(u, np.where(free, 0.0, balance), contact, memory, now)
                 held, settled, since = (fresh, u), False, iteration
-                contact = play.sloped(play.answered(fresh, u, start, memory, keep=True, allowed=step.allowed), memory, u)
+                contact = play.sloped(
+                    play.answered(fresh, u, start, memory, keep=True, allowed=step.allowed), memory, u
+                )
                 continue
             if not np.isfinite(now):
                 return Status.NOT_FINITE, None
+            contact = play.sloped(contact, memory if iteration >= _SURE else before, u)
             stiffness = tangent.stiffness
             assert stiffness is not None
             if body.large_strain:
@@ -196,17 +200,7 @@ class Equilibrium:
                 move *= loose.leash(move, play.reach)
             watched = free if moved and careful else free & np.repeat(loose.falling(contact), 3)
             if contact.beside is not None and not jump.any():
-                far = float(np.abs(move).max())
-                if far > _STRIDE * play.reach:
-                    try:
-                        other = self._solver.solve(matrix, free, right)
-                        self.solves += 1
-                        self.iterations += other.iterations
-                        if other.status is Status.CONVERGED and np.abs(other.x).max() < far:
-                            move = other.x.copy()
-                    except IndefiniteError:
-                        pass
-                move *= min(1.0, _STRIDE * play.reach / float(np.abs(move).max()))
+                move = self._strode(move, matrix, free, right)
             length = self._search(u, move, contact, memory, step, residual, watched, patient=careful)
             if careful and contact.beside is not None and not jump.any():
                 length = self._descent(u, start, move, length, memory, step, residual, free)
@@ -228,14 +222,11 @@ class Equilibrium:
                 normals = play.turned(normals, u, iteration < _TURNING)
                 fresh = play.points(u, step.before, step.time, normals)
                 settled = iteration > _TURNING and play.mismatch(fresh, points, foreseen) <= 0.5 * self._penetration
-                if not settled:
-                    held = (fresh, u)
-                points = play.mixed(points, fresh) if settled else fresh
-            else:
-                points = play.mixed(points, play.points(u, step.before, step.time, play.normals(u)))
+                held, points = (held, points) if settled else ((fresh, u), fresh)
+            if settled:
+                points = play.refreshed(points, u, step.before, step.time)
             careful = iteration + 1 - since >= _CARELESS
             contact = play.answered(points, u, start, memory, keep=not careful, allowed=step.allowed)
-            contact = play.sloped(contact, memory if iteration + 1 >= _SURE else before, u)
             falls = falls + 1 if loose.falling(contact).any() else 0
             if falls > _CARELESS:
                 break
@@ -251,6 +242,31 @@ class Equilibrium:
         if self._rest is not None:
             return u
         return u if (self.body.at(u, stiffness=False).lowest > 0).all() else None
+
+    def _strode(
+        self,
+        move: NDArray[np.float64],
+        matrix: BlockMatrix,
+        free: NDArray[np.bool_],
+        right: NDArray[np.float64],
+    ) -> NDArray[np.float64]:
+        """A move (3N,) no longer than the derivatives of contact are good for: where it is, it is asked for again
+        without what is not symmetric of them, and the shorter is cut.
+        """
+        most = _STRIDE * self._interplay.reach
+        far = float(np.abs(move).max())
+        if far <= most:
+            return move
+        try:
+            done = self._solver.solve(matrix, free, right)
+        except IndefiniteError:
+            return move * (most / far)
+        self.solves += 1
+        self.iterations += done.iterations
+        other = float(np.abs(done.x).max())
+        if done.status is Status.CONVERGED and other < far:
+            move, far = done.x, other
+        return move * min(1.0, most / far)
 
     def _search(
         self,

@@ -20,7 +20,12 @@ _SETTLED = 2e-3
 
 @dataclass(frozen=True, eq=False)
 class Contact:
-    """Every interface's points, slips [m] and responses, and their nodal forces together [N], shape (3N,)."""
+    """Every interface's points, slips [m] and responses, and their nodal forces together [N], shape (3N,).
+
+    Attributes:
+        beside: What a symmetric stiffness leaves out [N/m], ``csr_array`` (3N, 3N); None where nothing is or it was not
+            asked for (``Interplay.sloped``).
+    """
 
     points: list[ContactPoints]
     slips: list[NDArray[np.float64]]
@@ -81,11 +86,14 @@ class Interplay:
             for interface, old, new in zip(self.interfaces, normals, fresh, strict=True)
         ]
 
-    def mixed(self, points: list[ContactPoints], fresh: list[ContactPoints]) -> list[ContactPoints]:
-        """Fresh points between surfaces, whose derivatives are known; those at obstacles stay."""
+    def refreshed(
+        self, points: list[ContactPoints], u: NDArray[np.float64], before: float, time: float
+    ) -> list[ContactPoints]:
+        """Points between surfaces as displacement u (3N,) has them, since their derivatives are known; others stay."""
+        x = self._rest + u.reshape(-1, 3)
         return [
-            new if interface.slides else old
-            for interface, old, new in zip(self.interfaces, points, fresh, strict=True)
+            interface.points(x, before, time) if interface.slides else p
+            for interface, p in zip(self.interfaces, points, strict=True)
         ]
 
     def answered(

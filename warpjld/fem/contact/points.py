@@ -42,6 +42,9 @@ class ContactPoints:
         area: Slave area the point stands for [m²], shape (m,).
         gap: Distance to the other side along ``normal``, negative where they overlap [m], shape (m,).
         carried: What the other side, if an obstacle, moved at the point since the start of the step [m], shape (m, 3).
+        facets: Slave and master facets that face each other, if the master deforms too, shape (P, 2).
+        steep: How gaps change with the displacement (3N,), beyond what they do with weights and normals that stay,
+            where that is known, ``csr_array`` (m, 3N).
     """
 
     sites: NDArray[np.int64]

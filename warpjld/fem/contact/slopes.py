@@ -44,67 +44,105 @@ class Slopes:
 
 
 def slopes_of(
-    mortar: Mortar, points: ContactPoints, response: Response, memory: Memory, penalty: NDArray[np.float64], x: NDArray[np.float64], reach: float
+    mortar: Mortar,
+    points: ContactPoints,
+    response: Response,
+    memory: Memory,
+    penalty: NDArray[np.float64],
+    x: NDArray[np.float64],
+    reach: float,
 ) -> Slopes | None:
     """Derivatives at positions x (N, 3), at which the points were found with the normals there; None where nothing
     touches.
 
-    How the friction of a point depends on its normal and on what its slip is measured at is left out.
+    Tractions turn with the multipliers, not with what the penalty adds to them: overlaps of a first guess are no
+    pressure. How the friction of a point depends on its normal, and on what its slip is measured at, is left out.
 
     Args:
         mortar: The surfaces.
         points: The points.
         response: Their tractions.
+        memory: Multipliers.
         penalty: ε [Pa/m], shape (m,).
         x: [m]
+        reach: How far the points look ahead [m].
     """
-    from scipy.sparse import coo_array, csr_array, diags_array
+    from scipy.sparse import csr_array, diags_array
 
     if not response.active.any():
         return None
-    rows = np.flatnonzero(response.active | (points.gap < _NEAR * mortar.slave.edge[points.sites]))
-    slave, size = mortar.slave, x.size
-    row = np.full(len(slave.nodes), -1)
-    row[points.sites[rows]] = rows
-    assert points.facets is not None
-    facets = points.facets[(row[slave.corners[points.facets[:, 0]]] >= 0).any(axis=1)]
-    deep = np.full(len(points.sites), bool((response.error > _DEEP * slave.edge[points.sites]).any()))
-    own, far = slave.quads[facets[:, 0]], mortar.master.quads[facets[:, 1]]
-    corner = row[slave.corners[facets[:, 0]]]  # (P, 4)
-    known = corner >= 0
-    nodes = np.concatenate([own, far], axis=1)
-    at = x[nodes]
-    change = _differences(mortar, at, reach, _STEP * float(np.median(slave.edge)))
-    own_change, far_change = (change[:, :, k : k + 16].reshape(-1, 24, 4, 4) for k in (0, 16))
-
-    spread = np.einsum("pkab,pbi->pkai", own_change, at[:, :4]) - np.einsum("pkab,pbi->pkai", far_change, at[:, 4:])
-    area = np.where(known, points.area[corner], 1.0)[:, None]
-    wider = own_change.sum(axis=3)
-    off, per_area = mortar.aside(points.sites, points.area)
-    real = (points.gap - off)[corner][:, None]
-    gap = -(np.einsum("pkai,pai->pka", spread, points.normal[corner]) + real * wider) / area
-    gap += per_area[corner][:, None] * wider
-    column = (3 * nodes[:, :, None] + np.arange(3)).reshape(-1, 24)
-    where = np.broadcast_to((known & ~deep[corner])[:, None], gap.shape)
-    places = (np.broadcast_to(corner[:, None], gap.shape)[where], np.broadcast_to(column[:, :, None], gap.shape)[where])
-    of_gap = csr_array(coo_array((gap[where], places), shape=(len(points.sites), size)))
-
-    turning = _turning(slave, x, points.sites, rows)
-    apart = points.weights @ x
-    of_gap = of_gap - _inner(apart, rows[~deep[rows]]) @ turning
-
+    edge = mortar.slave.edge[points.sites]
+    rows = np.flatnonzero(response.active | (points.gap < _NEAR * edge))
+    pairs = _Pairs(mortar, points, rows, x, reach)
+    turning = _turning(mortar.slave, x, points.sites, rows)
     pressure = np.where(response.active, np.maximum(memory.pressure[points.sites], 0.0), 0.0)
-    carried = memory.friction[points.sites] - pressure[:, None] * points.normal
-    traction = np.where(known[:, :, None], carried[corner], 0.0)
-    pushed = [np.einsum("pkab,pai->pkbi", part, traction) for part in (own_change, -far_change)]
-    block = np.concatenate(pushed, axis=2).reshape(-1, 24, 24)  # by column, then row
-    places = (np.broadcast_to(column[:, None, :], block.shape).ravel(), np.repeat(column.ravel(), 24))
-    of_weights = csr_array(coo_array((block.ravel(), places), shape=(size, size)))
-
-    stiff = np.where(response.active, penalty, 0.0)
-    tractions = _inner(points.normal, rows).T @ (diags_array(stiff) @ of_gap) - diags_array(np.repeat(pressure, 3)) @ turning
+    carried = np.where(response.active[:, None], memory.friction[points.sites], 0.0)
+    of_weights = pairs.forces(carried - pressure[:, None] * points.normal)
+    tractions = -diags_array(np.repeat(pressure, 3)) @ turning
+    of_gap = csr_array((len(edge), x.size))
+    if not (response.error > _DEEP * edge).any():
+        apart = np.zeros_like(points.normal)
+        apart[pairs.rows] = (points.weights @ x)[pairs.rows]
+        of_gap = csr_array(pairs.gaps() - _inner(apart) @ turning)
+        stiff = np.where(response.active, penalty, 0.0)
+        tractions = tractions + _inner(points.normal).T @ (diags_array(stiff) @ of_gap)
     spreading = _blocks(points.weights.T @ diags_array(points.area))
-    return Slopes(of_gap, -(spreading @ tractions + of_weights))
+    return Slopes(of_gap, csr_array(-(spreading @ tractions + of_weights)))
+
+
+class _Pairs:
+    """Facet pairs of some points, and how their integrals change.
+
+    Attributes:
+        rows: The points, among m.
+        corner: Point of each corner of the slave facets, -1 for none of these, shape (P, 4).
+        column: Degrees of freedom of the corners, slave's first, shape (P, 24).
+        own: Derivatives of ∫ N_a N_b by them, shape (P, 24, 4, 4).
+        far: Of ∫ N_a M_b.
+    """
+
+    def __init__(
+        self, mortar: Mortar, points: ContactPoints, rows: NDArray[np.int64], x: NDArray[np.float64], reach: float
+    ) -> None:
+        assert points.facets is not None
+        slave = mortar.slave
+        number = np.full(len(slave.nodes), -1)
+        number[points.sites[rows]] = rows
+        facets = points.facets[(number[slave.corners[points.facets[:, 0]]] >= 0).any(axis=1)]
+        nodes = np.concatenate([slave.quads[facets[:, 0]], mortar.master.quads[facets[:, 1]]], axis=1)
+        self.rows = rows
+        self.corner = number[slave.corners[facets[:, 0]]]
+        self.column = (3 * nodes[:, :, None] + np.arange(3)).reshape(-1, 24)
+        self._mortar, self._points, self._at, self._size = mortar, points, x[nodes], x.size
+        change = _differences(mortar, self._at, reach, _STEP * float(np.median(slave.edge)))
+        self.own, self.far = (change[:, :, k : k + 16].reshape(-1, 24, 4, 4) for k in (0, 16))
+
+    def gaps(self) -> Any:
+        """How the points' gaps change with their weights, ``csr_array`` (m, 3N)."""
+        from scipy.sparse import coo_array, csr_array
+
+        points, corner, at = self._points, self.corner, self._at
+        spread = np.einsum("pkab,pbi->pkai", self.own, at[:, :4]) - np.einsum("pkab,pbi->pkai", self.far, at[:, 4:])
+        off, per_area = self._mortar.aside(points.sites, points.area)
+        wider = self.own.sum(axis=3)
+        mean = np.einsum("pkai,pai->pka", spread, points.normal[corner]) + (points.gap - off)[corner][:, None] * wider
+        gap = per_area[corner][:, None] * wider - mean / points.area[corner][:, None]
+        where = np.broadcast_to(corner[:, None] >= 0, gap.shape)
+        row = np.broadcast_to(corner[:, None], gap.shape)[where]
+        column = np.broadcast_to(self.column[:, :, None], gap.shape)[where]
+        return csr_array(coo_array((gap[where], (row, column)), shape=(len(points.sites), self._size)))
+
+    def forces(self, traction: NDArray[np.float64]) -> Any:
+        """How nodal forces of tractions (m, 3) change with the points' weights [N/m], ``csr_array`` (3N, 3N)."""
+        from scipy.sparse import coo_array, csr_array
+
+        known = np.where(self.corner[:, :, None] >= 0, traction[self.corner], 0.0)
+        pushed = [np.einsum("pkab,pai->pkbi", part, known) for part in (self.own, -self.far)]
+        block = np.concatenate(pushed, axis=2).reshape(-1, 24, 24)  # by what moves, then by what is pushed
+        row = np.broadcast_to(self.column[:, None, :], block.shape)
+        column = np.broadcast_to(self.column[:, :, None], block.shape)
+        shape = (self._size, self._size)
+        return csr_array(coo_array((block.ravel(), (row.ravel(), column.ravel())), shape=shape))
 
 
 def _differences(mortar: Mortar, at: NDArray[np.float64], reach: float, step: float) -> NDArray[np.float64]:
@@ -128,14 +166,13 @@ def _turning(surface: ContactSurface, x: NDArray[np.float64], sites: NDArray[np.
     number[sites[rows]] = rows
     some = np.flatnonzero((number[surface.corners] >= 0).any(axis=1))
     quads, corner = surface.quads[some], number[surface.corners[some]]
-    vector = surface.at_nodes(surface.area_vectors(x))
-    length = np.linalg.norm(vector, axis=1)[surface.corners[some]]
-    normal = np.divide(vector, np.linalg.norm(vector, axis=1, keepdims=True), where=vector.any(axis=1)[:, None], out=np.zeros_like(vector))
+    length = np.linalg.norm(surface.at_nodes(surface.area_vectors(x)), axis=1)[surface.corners[some]]
+    length = np.where(length > 0.0, length, 1.0)
     a, b, c, d = (x[quads[:, k]] for k in range(4))
     # of (c − a) × (d − b) / 8: to each corner a quarter of the face's area vector
     along, across = _cross(c - a), _cross(d - b)
     each = 0.125 * np.stack([across, -along, -across, along], axis=1)  # face, node, 3, 3
-    n = normal[surface.corners[some]]
+    n = surface.normals(x)[surface.corners[some]]
     plane = np.eye(3) - n[:, :, :, None] * n[:, :, None, :]
     block = np.einsum("faij,fbjk->fabik", plane, each) / length[:, :, None, None, None]
     known = np.broadcast_to((corner >= 0)[:, :, None, None, None], block.shape)
@@ -152,14 +189,12 @@ def _cross(v: NDArray[np.float64]) -> NDArray[np.float64]:
     return out - out.transpose(0, 2, 1)
 
 
-def _inner(vectors: NDArray[np.float64], rows: NDArray[np.int64]) -> Any:
+def _inner(vectors: NDArray[np.float64]) -> Any:
     """Rows that take the inner product of each point's vector (m, 3) with three values of it, (m, 3m)."""
     from scipy.sparse import csr_array
 
     count = len(vectors)
-    values = np.zeros_like(vectors)
-    values[rows] = vectors[rows]
-    return csr_array((values.ravel(), np.arange(3 * count), 3 * np.arange(count + 1)), shape=(count, 3 * count))
+    return csr_array((vectors.ravel(), np.arange(3 * count), 3 * np.arange(count + 1)), shape=(count, 3 * count))
 
 
 def _blocks(weights: Any) -> Any:
