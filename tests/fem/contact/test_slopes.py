@@ -35,7 +35,9 @@ class Touching:
         self.interface = Interface(self.mesh, self.pair, 1)
         found = self.interface.points(self.x, 0.0, 0.0)
         pressure = np.zeros(len(self.interface.edge))
-        pressure[found.sites] = np.where(np.abs(found.gap) < 4e-3, rng.uniform(0.5, 1.0, len(found.sites)), -9.0)  # stays out
+        pressure[found.sites] = np.where(
+            np.abs(found.gap) < 4e-3, rng.uniform(0.5, 1.0, len(found.sites)), -9.0
+        )  # stays out
         self.memory: Memory = replace(start_memory(len(self.interface.edge), self.pair), pressure=pressure)
 
     def at(self, x: NDArray[np.float64]) -> tuple[ContactPoints, Response, NDArray[np.float64]]:
