@@ -103,7 +103,8 @@ def facet_pairs(
     const double other = sqrt(m[0] * m[0] + m[1] * m[1] + m[2] * m[2]);
     if (!(size > 0) || !(other > 0)) return;
     for (int k = 0; k < 3; ++k) n[k] /= size;
-    if (n[0] * m[0] + n[1] * m[1] + n[2] * m[2] > facing * other) return;
+    const double cosine = (n[0] * m[0] + n[1] * m[1] + n[2] * m[2]) / other;
+    if (!(cosine < facing)) return;
     const double along = sqrt(a[0] * a[0] + a[1] * a[1] + a[2] * a[2]);
     double e[3], f[3];
     for (int k = 0; k < 3; ++k) e[k] = a[k] / along;
@@ -186,8 +187,13 @@ def facet_pairs(
                 }
         }
     }
-    if (!(area > 0) || gap > reach * area || gap < -depth * area) return;
-    out[32] = area;
+    if (!(area > 0)) return;
+    // what turns away, or lies far off, fades: a pair that comes or goes at once would make gaps jump
+    auto fade = [](double t) { return t <= 0 ? 0.0 : t >= 1 ? 1.0 : t * t * (3 - 2 * t); };
+    gap /= area;
+    const double weight = fade((facing - cosine) / turn) * fade(2 - 2 * fabs(gap) / reach);
+    for (int i = 0; i < 32; ++i) out[i] *= weight;
+    out[32] = area * weight;
 """
 )
 def integrate_pair(
@@ -197,8 +203,8 @@ def integrate_pair(
     master: wp.array(dtype=wp.int32),
     x: wp.array(dtype=wp.float64),
     facing: wp.float64,
+    turn: wp.float64,
     reach: wp.float64,
-    depth: wp.float64,
     integrals: wp.array(dtype=wp.float64),
 ): ...
 
@@ -211,10 +217,10 @@ def integrate(
     master: wp.array(dtype=wp.int32),
     x: wp.array(dtype=wp.float64),
     facing: wp.float64,
+    turn: wp.float64,
     reach: wp.float64,
-    depth: wp.float64,
     # out
     integrals: wp.array(dtype=wp.float64),
 ):
     """∫ N_a N_b and ∫ N_a M_b of each pair, (4 × 4) each, then the area; the area is zero where they do not face."""
-    integrate_pair(first + wp.tid(), pairs, slave, master, x, facing, reach, depth, integrals)
+    integrate_pair(first + wp.tid(), pairs, slave, master, x, facing, turn, reach, integrals)

@@ -180,3 +180,32 @@ def test_a_free_ball_settles_between_what_closes_on_it() -> None:
     held = settle(at, thing.faces, np.empty((0, 3)), walls, 0.0)
     assert held.shift[0] == pytest.approx(-0.00025, rel=0.1)
     assert held.overlap == pytest.approx(0.00075, rel=0.05)
+
+
+PINCHED = """
+SPLINE 1
+FINGER1  LEFT INDEX FLEXION   AT 0 0
+FINGER23 LEFT INDEX KNUCKLES2 AT 0 0
+FINGER23 LEFT INDEX KNUCKLES3 AT 0 0
+FINGER1  LEFT THUMB FLEXION   AT 0 0
+FINGER1  LEFT THUMB PIVOT     AT 0 0
+FINGER23 LEFT THUMB KNUCKLES2 AT 0 0
+FINGER23 LEFT THUMB KNUCKLES3 AT 0 0
+FINGER1  LEFT INDEX FLEXION   AT 20 40.5
+FINGER23 LEFT INDEX KNUCKLES2 AT 20 53.1
+FINGER23 LEFT INDEX KNUCKLES3 AT 20 30.5
+FINGER1  LEFT THUMB FLEXION   AT 20 14.3
+FINGER1  LEFT THUMB PIVOT     AT 20 5.9
+FINGER23 LEFT THUMB KNUCKLES2 AT 20 30.3
+FINGER23 LEFT THUMB KNUCKLES3 AT 20 24.6
+"""
+
+
+@pytest.mark.parametrize(
+    ("flesh", "meets"), [("THUMB INDEX", True), ("THUMB INDEX ITSELF OFF", False), ("INDEX", False)]
+)
+def test_a_pinch_is_solved_from_where_skin_meets_skin(run: Callable[[str], Scene], flesh: str, meets: bool) -> None:
+    scene = run(PINCHED + f"FLESH LEFT {flesh}\nPRESS 0 20\n")
+    assert scene.contact.pressing is not None
+    start = approach(scene, scene.contact.pressing).start
+    assert start == (pytest.approx(16.0, abs=2.0) if meets else 19.0)

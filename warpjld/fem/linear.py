@@ -15,6 +15,7 @@ from warpjld.fem.conjugate import Iteration, Status, conjugate_gradients
 from warpjld.fem.dots import norm
 from warpjld.fem.hexmesh import HexMesh
 from warpjld.fem.hierarchy import hierarchy_of
+from warpjld.fem.minimal import minimal_residuals
 from warpjld.fem.multigrid import IndefiniteError, Multigrid, block_inverse
 from warpjld.fem.rows import Launch, shared, threads_of
 
@@ -100,6 +101,10 @@ class LinearSolver:
         """A solver for a matrix that differs little from this one's: the preconditioner stays, a factor does not."""
         if self.method == "direct":
             return LinearSolver(stiffness, self.free, self._mesh, method="direct", threads=self.threads)
+        return self.over(stiffness)
+
+    def over(self, stiffness: BlockMatrix) -> LinearSolver:
+        """The same preconditioner, a factor included, for another matrix."""
         out = copy(self)
         out._stiffness = stiffness
         out._product = _Product(stiffness, self.threads)
@@ -115,6 +120,27 @@ class LinearSolver:
                 self.masked_product, self._precondition, right, tolerance=tolerance, iterations=iterations
             )
         return self._refined(right, tolerance, iterations)
+
+    def solve_beside(
+        self, beside: Any, b: NDArray[np.float64], *, tolerance: float = 1e-8, iterations: int = 400
+    ) -> Iteration:
+        """(K11 + E11) x = b with an E (3N, 3N) that need not be symmetric nor definite, by minimal residuals; what
+        preconditions K preconditions the sum.
+        """
+        right = b * self._mask
+        mask = self._mask
+
+        def product(x: NDArray[np.float64]) -> NDArray[np.float64]:
+            return self.masked_product(x) + mask * (beside @ x)
+
+        def precondition(r: NDArray[np.float64]) -> NDArray[np.float64]:
+            if self.method != "direct":
+                return np.asarray(self._precondition(r))
+            x = np.zeros_like(r)
+            x[self.free] = self._factor.solve(r[self.free])
+            return x
+
+        return minimal_residuals(product, precondition, right, tolerance=tolerance, iterations=iterations)
 
     def masked_product(self, x: NDArray[Any]) -> NDArray[Any]:
         """K11 x."""

@@ -63,7 +63,7 @@ class SolvedFrame:
         np.maximum.at(out, self.touching.node, np.maximum(self.touching.pressure, 0.0))
         masters: dict[str, NDArray[np.float64]] = {}
         for pair, forces in zip(bodies.pairs, self.nodal, strict=True):
-            if isinstance(pair.master, str) and pair.master != pair.slave:
+            if isinstance(pair.master, str):
                 masters.setdefault(pair.master, np.zeros_like(mesh.nodes))
                 masters[pair.master] += forces
         for name, forces in masters.items():

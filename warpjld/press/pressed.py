@@ -17,6 +17,9 @@ from warpjld.press.run import Solved
 
 __all__ = ["Pressed"]
 
+_HARDLY = 0.02
+"""Share of the highest pressure below which nodes hardly touch: masters' pressures are spread over facets beside."""
+
 
 @dataclass(frozen=True, eq=False)
 class Pressed:
@@ -79,7 +82,7 @@ class Pressed:
     @property
     def high(self) -> float:
         """Pressure that two of a hundred touching nodes exceed, over all frames [Pa]: single nodes may be far above."""
-        touching = self._pressures[self._pressures > 0.0]
+        touching = self._pressures[self._pressures > _HARDLY * self._pressures.max()]
         return float(np.percentile(touching, 98.0)) if len(touching) else 0.0
 
     @cached_property

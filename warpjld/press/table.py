@@ -7,6 +7,7 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 
 import numpy as np
+from numpy.typing import NDArray
 
 from warpjld.fem.hand.muscles import Effort
 from warpjld.press.bodies import Bodies, HandBody
@@ -71,6 +72,7 @@ def rows_of(bodies: Bodies, hand: HandBody, solved: SolvedFrame, effort: Effort)
         skin = np.flatnonzero(flesh.node_labels >= 0)
         at = flesh.mesh.nodes[skin] + solved.displacement[span][skin]
         points[others] = digit_of[skin[cKDTree(at).query(touching.position[others])[1]]]
+    opposite = _opposite(bodies, hand, solved, digit_of, points)
     rows = []
     for digit in [*(d.digit.rpartition(".")[2] for d in effort.digits), "palm"]:
         nodes = np.flatnonzero(digit_of == digit)
@@ -83,7 +85,7 @@ def rows_of(bodies: Bodies, hand: HandBody, solved: SolvedFrame, effort: Effort)
             for owner, push in zip(bodies.owners, pushes, strict=True)
             if np.abs(push).max(initial=0.0) > 0.0
         ]
-        here = np.flatnonzero(points == digit)
+        here = np.flatnonzero((points == digit) | (opposite == digit))
         area = float(touching.area[here].sum())
         sliding = float(touching.area[here][touching.slides[here]].sum()) / area if area > 0.0 else float("nan")
         work = None if digit == "palm" else effort[digit]
@@ -107,6 +109,28 @@ def rows_of(bodies: Bodies, hand: HandBody, solved: SolvedFrame, effort: Effort)
             )
         )
     return rows
+
+
+def _opposite(
+    bodies: Bodies, hand: HandBody, solved: SolvedFrame, digit_of: NDArray[np.str_], points: NDArray[np.str_]
+) -> NDArray[np.str_]:
+    """Digit on the other side of every point where the hand touches itself, nothing for others: of the nearest skin
+    that belongs to another digit than the point's own."""
+    from scipy.spatial import cKDTree
+
+    out = np.full_like(points, "")
+    itself = np.array([o.slave == o.master == hand.name for o in bodies.owners], dtype=bool)
+    flesh = hand.part.hand
+    skin = np.flatnonzero(flesh.node_labels >= 0)
+    at = flesh.mesh.nodes[skin] + solved.displacement[bodies.spans[hand.name]][skin]
+    touching = solved.touching
+    mine = itself[touching.pair] if len(itself) else np.zeros(len(points), dtype=bool)
+    for digit in np.unique(points[mine]):
+        rows = np.flatnonzero(mine & (points == digit))
+        others = np.flatnonzero(digit_of[skin] != digit)
+        if len(others):
+            out[rows] = digit_of[skin[others[cKDTree(at[others]).query(touching.position[rows])[1]]]]
+    return out
 
 
 def write_table(path: Path, rows: Sequence[Row]) -> None:

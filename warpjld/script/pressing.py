@@ -36,6 +36,9 @@ Report = Callable[[str, int, int], None]
 _CLEAR = 2e-4
 """Skin deeper than this inside an object that cannot get out of the way presses on it [m]."""
 
+_PARTED = 0.01
+"""Skin of two digits that is nearer than this at rest belongs to where they part [m]."""
+
 _ROUNDED = 1e-3
 """Radius of the edges of boxes and cylinders as contact feels them [m]: skin has no corner to lie around."""
 
@@ -163,6 +166,8 @@ def _held(
         for name in scene.contact.flesh
         for actor in (scene.actor(name),)
     }
+    if any(_meets_itself(scene.actor(name), wish, skins[name]) for name, wish in scene.contact.flesh.items()):
+        return True, {}
     obstacles = {p.name: prop_obstacle(scene, p, frame) for p in scene.props.values() if p.name not in free}
     if any(_inside(solid, skin) for solid in obstacles.values() for skin in skins.values()):
         return True, {}
@@ -190,6 +195,22 @@ def _held(
             turn = found.turn * Rotation.from_quat(place.rotation[0])
             places[name] = type(place)(found.of(place.position), turn.as_quat()[None])
     return False, places
+
+
+def _meets_itself(actor: Actor, wish: FleshWish, skin: NDArray[np.float64]) -> bool:
+    """Whether skin of two digits, or of a digit and the palm, has passed through one another where flesh would touch
+    (R126); where digits part they lie together at rest."""
+    from warpjld.covering.intersections import crossing_faces, surface_parts
+
+    if not wish.itself:
+        return False
+    covering = cover(actor)
+    parts = surface_parts(covering)
+    pairs = crossing_faces(skin, covering.surface.faces).contact(parts).pairs
+    middle = covering.surface.vertices[covering.surface.faces].mean(axis=1)
+    far = np.linalg.norm(middle[pairs[:, 0]] - middle[pairs[:, 1]], axis=1) > _PARTED
+    mine = np.array([not wish.digits or name.rpartition(".")[2] in wish.digits for name in parts.names])
+    return bool((far & mine[parts.of_face[pairs]].all(axis=1)).any())
 
 
 def _inside(solid: Obstacle, points: NDArray[np.float64]) -> bool:

@@ -1,12 +1,16 @@
-"""A body against itself: a strip bent until its ends meet, and parts of it that never meet (R126, R127)."""
+"""A body against itself: a strip bent until its ends meet, parts of it that never meet, and the same as two bodies
+(R126, R127)."""
 
 from __future__ import annotations
+
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
+from tests.fem.contact.bodies import named, together
 from warpjld.errors import InputError
-from warpjld.fem import Body, NeoHooke, Prescribed, box, prescribe
+from warpjld.fem import Body, HexMesh, NeoHooke, Prescribed, box, prescribe
 from warpjld.fem.contact import Exclusion, Pair, press
 
 LENGTH, THICK, ALONG = 0.12, 0.004, 48
@@ -17,11 +21,14 @@ def strip() -> Body:
     return Body(box((LENGTH, 0.012, THICK), (ALONG, 3, 2)), NeoHooke(1e5, 0.4))
 
 
-def upper(body: Body, never: bool) -> tuple[np.ndarray, Exclusion]:
-    """The strip's upper side in six parts along it; a part never meets itself and its neighbours (or any other)."""
+def upper(body: Body, never: bool, *, backwards: bool = False) -> tuple[np.ndarray, Exclusion]:
+    """The strip's upper side in six parts along it; a part never meets itself and its neighbours (or any other).
+
+    Of two parts the one with the lower label is the slave: backwards it is the other."""
     faces = body.mesh.face_set("z+")
     middle = body.mesh.nodes[body.mesh.quads(faces)].mean(axis=1)[:, 0]
     label = np.minimum((6 * middle / LENGTH).astype(np.int32), 5)
+    label = 5 - label if backwards else label
     apart = np.abs(np.subtract.outer(np.arange(6), np.arange(6)))
     return faces, Exclusion(label, label, apart >= 0 if never else apart <= 1)
 
@@ -81,3 +88,59 @@ def test_self_contact_without_parts_is_refused(strip: Body) -> None:
     faces, _ = upper(strip, never=False)
     with pytest.raises(InputError, match="against itself wants an exclusion"):
         press(strip, folded(strip, 0.1), [Pair(faces, faces)])
+
+
+@pytest.mark.parametrize("friction", [0.0, 0.5])
+def test_it_does_not_matter_which_side_is_the_slave(strip: Body, friction: float) -> None:
+    forces = []
+    for backwards in (False, True):
+        faces, exclusion = upper(strip, never=False, backwards=backwards)
+        pair = Pair(faces, faces, friction=friction, exclusion=exclusion)
+        found = press(strip, lambda t: folded(strip, t), [pair], times=TIMES)
+        forces.append([float(np.linalg.norm(instant.touches[0].force)) for instant in found.instants])
+    assert forces[0][-1] > 0.0
+    np.testing.assert_allclose(forces[0], forces[1], rtol=1e-2, atol=2e-3 * forces[0][-1])
+
+
+def test_as_one_pair_with_itself_or_as_two_bodies() -> None:
+    """Two soft lumps pressed together askew, so that they slide and roll: one pair "self", or one between the two."""
+    lumps = {
+        name: named(bulging(box((0.02, 0.02, 0.01), (count, count, 3)), sign), name, at)
+        for name, count, sign, at in (("a", 6, 1.0, (0.0, 0.0, -0.01)), ("b", 5, -1.0, (0.002, 0.001, 0.004)))
+    }
+    body = together({name: (lump, NeoHooke(1e5, 0.45)) for name, lump in lumps.items()})
+    low = prescribe(body.mesh, "a.z-", x=0.0, y=0.0, z=0.0)
+
+    def held(time: float) -> Prescribed:
+        return low + prescribe(body.mesh, "b.z+", x=-0.002 * time, y=0.001 * time, z=-0.0025 * time)
+
+    one, other = body.mesh.face_set("a.z+"), body.mesh.face_set("b.z-")
+    both = np.concatenate([one, other])
+    label = np.repeat(np.array([0, 1], np.int32), [len(one), len(other)])
+    itself = Pair(both, both, 0.3, exclusion=Exclusion(label, label, np.eye(2, dtype=bool)))
+    times = np.linspace(0.1, 1.0, 10)
+    found = [press(body, held, [pair], times=times) for pair in (itself, Pair("a.z+", "b.z-", 0.3))]
+    turned = press(body, held, [Pair("b.z-", "a.z+", 0.3)], times=times)
+    forces = [[instant.touches[0].force for instant in solution.instants] for solution in found]
+    np.testing.assert_allclose(forces[0], forces[1], rtol=1e-3, atol=1e-3 * np.abs(forces[0]).max())
+    np.testing.assert_allclose(
+        -np.array([instant.touches[0].force for instant in turned.instants]),
+        forces[0],
+        rtol=0,
+        atol=2e-2 * np.abs(forces[0]).max(),
+    )
+    assert np.median(found[0].steps) <= 7
+    assert len(found[0].steps) == len(times)
+    last = found[0].last.touches[0]
+    assert last.peak > 0.2e5  # pressure as high as the flesh is stiff makes directions matter
+    np.testing.assert_allclose(last.nodal.sum(axis=0), 0.0, atol=1e-12 * last.normal_force)
+
+
+def bulging(mesh: HexMesh, sign: float) -> HexMesh:
+    """A block with a side that bulges by 3 mm, the upper one (1) or the lower one (−1)."""
+    nodes = mesh.nodes.copy()
+    middle = nodes[:, :2] - 0.01
+    share = nodes[:, 2] / 0.01 if sign > 0.0 else 1.0 - nodes[:, 2] / 0.01
+    nodes[:, 2] += sign * share * (0.003 - 15.0 * (middle**2).sum(axis=1))
+    nodes[:, :2] -= 0.01
+    return replace(mesh, nodes=nodes)

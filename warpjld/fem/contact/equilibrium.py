@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -42,9 +43,11 @@ _TURNING = 1
 looked at once forces balance. (Newton's method without their derivatives converges slowly, with them not symmetric.)"""
 _CARELESS = 8
 """Iterations with full steps and multipliers brought up to date at once; what has not settled by then takes turns."""
+_SURE = 2
+"""Iterations after which multipliers are good enough to take the derivatives of directions with; until then those of
+the equilibrium before are."""
 _LINE_SEARCH = 8
 _STRIDE = 0.25
-"""Farthest a node moves in an iteration, over what points look ahead (two edges)."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -118,7 +121,7 @@ class Equilibrium:
         assert tangent.stiffness is not None
         blocks = tangent.stiffness.diagonal()
         self._stiff = np.einsum("nii->n", blocks) / 3.0
-        self._solver = StepSolver(body, self._stiff, precision)
+        self._solver = StepSolver(body, precision)
         self._damping = Damping(body)
         self._interplay = Interplay(body.mesh.nodes, interfaces, moduli, penalty=penalty, penetration=penetration)
 
@@ -137,7 +140,7 @@ class Equilibrium:
         play = self._interplay
         self._solver.begin()
         self._damping.begin()
-        memory = play.begun(memory, start, step.before)
+        memory = before = play.begun(memory, start, step.before)
         pressures: NDArray[np.float64] | None = None
         jump = np.zeros_like(u)
         guessed = self._guessed(first, step.prescribed)
@@ -176,23 +179,25 @@ class Equilibrium:
                 continue
             if not np.isfinite(now):
                 return Status.NOT_FINITE, None
+            contact = play.sloped(contact, memory, memory if iteration >= _SURE else before, u)
             stiffness = tangent.stiffness
             assert stiffness is not None
             if body.large_strain:
                 subtract_pressure_stiffness(stiffness, body, step.loads, u, step.share)
-            done = self._solved(
-                stiffness, contact, free, residual, jump, lambda m: loose.steadied(m, iteration - since)
-            )
+            steadied = partial(loose.steadied, turn=iteration - since)
+            done = self._solved(stiffness, contact, free, residual, jump, steadied)
             if done.status in (Status.INDEFINITE, Status.NOT_FINITE):
                 return done.status, None
             move = done.x + jump
             stride = 1.0
             if not jump.any():
-                move *= loose.leash(move, play.reach)
-                stride = min(1.0, _STRIDE * play.reach / max(float(np.abs(move).max()), 1e-300))
+                far = max(float(np.abs(move).max()), 1e-300)
+                stride = min(1.0, loose.leash(move, play.reach), _STRIDE * play.reach / far)
                 move *= stride
             watched = free if moved and careful else free & np.repeat(loose.falling(contact), 3)
             length = self._search(u, move, contact, memory, step, residual, watched, patient=careful)
+            if careful and contact.beside is not None and not jump.any():
+                length = self._descent(u, start, move, length, memory, step, residual, free)
             if length == 0.0:
                 if not self._damping.more():
                     return Status.INVERTED, None
@@ -212,10 +217,12 @@ class Equilibrium:
                 memory = play.remembered(memory, contact, foreseen, move, patient=careful)
             points = [shifted(p, (u - held[1]).reshape(-1, 3)) for p in held[0]]
             if not settled:
-                normals = play.normals(u) if iteration < _TURNING else normals
+                normals = play.turned(normals, u, iteration < _TURNING)
                 fresh = play.points(u, step.before, step.time, normals)
                 settled = iteration > _TURNING and play.mismatch(fresh, points, foreseen) <= 0.5 * self._penetration
                 held, points = (held, points) if settled else ((fresh, u), fresh)
+            if settled:
+                points = play.refreshed(points, u, step.before, step.time)
             careful = iteration + 1 - since >= _CARELESS
             contact = play.answered(points, u, start, memory, keep=not careful, allowed=step.allowed)
             falls = falls + 1 if loose.falling(contact).any() else 0
@@ -238,9 +245,11 @@ class Equilibrium:
         while True:
             matrix = with_contact(self._damping.lend(stiffness), contact.points, blocks, threads=self.body.threads)
             matrix = steadied(matrix)
+            right = residual - matrix.product(jump, threads=self.body.threads)
+            if contact.beside is not None:
+                right -= free * (contact.beside @ jump)
             try:
-                right = residual - matrix.product(jump, threads=self.body.threads)
-                done = self._solver.solve(matrix, free, right)
+                done = self._solver.solve(matrix, free, right, contact.beside)
             except IndefiniteError:
                 done = Iteration(np.zeros_like(residual), Status.INDEFINITE, 0, 1.0, np.empty(0))
             self.solves += 1
@@ -305,6 +314,38 @@ class Equilibrium:
 
     def _forces(self, u: NDArray[np.float64]) -> Tangent:
         return self._at(u, None) if self._rest is not None else self.body.at(u, stiffness=False)
+
+    def _descent(
+        self,
+        u: NDArray[np.float64],
+        start: NDArray[np.float64],
+        move: NDArray[np.float64],
+        most: float,
+        memory: list[Memory],
+        step: Step,
+        residual: NDArray[np.float64],
+        free: NDArray[np.bool_],
+    ) -> float:
+        """How far to go, ``most`` at most, for forces to balance better than here: where points come and go in turn, or
+        K is indefinite, the work along the way does not tell.
+        """
+        play, now = self._interplay, norm(residual)
+        length, best = most, (np.inf, most)
+        for _ in range(_LINE_SEARCH):
+            if length == 0.0:
+                break
+            there = u + length * move
+            points = play.points(there, step.before, step.time, play.normals(there))
+            contact = play.answered(points, there, start, memory, keep=False, allowed=step.allowed)
+            external = step.share * external_forces(self.body, step.loads, there if self.body.large_strain else None)
+            trial = self._forces(there)
+            left = norm(np.where(free, external + contact.forces - trial.forces, 0.0))
+            if left < (1.0 - 1e-4 * length) * now:
+                return length
+            if left < best[0]:
+                best = (left, length)
+            length *= 0.5
+        return best[1]
 
     def _at(self, u: NDArray[np.float64], pressures: NDArray[np.float64] | None) -> Tangent:
         if self._rest is None:

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from warpjld.fem.contact.law import Memory, Response, remember, respond
 from warpjld.fem.contact.points import ContactPoints, Interface
+from warpjld.fem.contact.slopes import slopes_of
 
 __all__ = ["Contact", "Interplay", "alike", "shifted"]
 
@@ -22,12 +24,18 @@ _FIRMER, _FIRMEST = 5.0, 25.0
 
 @dataclass(frozen=True, eq=False)
 class Contact:
-    """Every interface's points, slips [m] and responses, and their nodal forces together [N], shape (3N,)."""
+    """Every interface's points, slips [m] and responses, and their nodal forces together [N], shape (3N,).
+
+    Attributes:
+        beside: What a symmetric stiffness leaves out [N/m], ``csr_array`` (3N, 3N); None where nothing is or it was not
+            asked for (``Interplay.sloped``).
+    """
 
     points: list[ContactPoints]
     slips: list[NDArray[np.float64]]
     responses: list[Response]
     forces: NDArray[np.float64]
+    beside: Any = None
 
 
 class Interplay:
@@ -72,6 +80,26 @@ class Interplay:
         x = self._rest + u.reshape(-1, 3)
         return [i.points(x, before, time, n) for i, n in zip(self.interfaces, normals, strict=True)]
 
+    def turned(
+        self, normals: list[NDArray[np.float64]], u: NDArray[np.float64], every: bool
+    ) -> list[NDArray[np.float64]]:
+        """Normals at displacement u (3N,): of surfaces that meet surfaces, or of every one; the others stay."""
+        fresh = self.normals(u)
+        return [
+            new if every or interface.slides else old
+            for interface, old, new in zip(self.interfaces, normals, fresh, strict=True)
+        ]
+
+    def refreshed(
+        self, points: list[ContactPoints], u: NDArray[np.float64], before: float, time: float
+    ) -> list[ContactPoints]:
+        """Points between surfaces as displacement u (3N,) has them, since their derivatives are known; others stay."""
+        x = self._rest + u.reshape(-1, 3)
+        return [
+            interface.points(x, before, time) if interface.slides else p
+            for interface, p in zip(self.interfaces, points, strict=True)
+        ]
+
     def answered(
         self,
         points: list[ContactPoints],
@@ -90,6 +118,23 @@ class Interplay:
             for k, (i, p, m, slip) in enumerate(zip(self.interfaces, points, memory, slips, strict=True))
         ]
         return Contact(points, slips, responses, self.pushed(points, responses))
+
+    def sloped(self, contact: Contact, memory: list[Memory], pressed: list[Memory], u: NDArray[np.float64]) -> Contact:
+        """With what a symmetric stiffness leaves out, where points are those of displacement u (3N,).
+
+        ``pressed`` knows the multipliers that directions turn with; ``memory`` is the present one.
+        """
+        x = self._rest + u.reshape(-1, 3)
+        points, beside = list(contact.points), None
+        for k, (interface, p, r) in enumerate(zip(self.interfaces, points, contact.responses, strict=True)):
+            if interface.mortar is None or not interface.slides:
+                continue
+            penalty = self._penalty(k, p, memory[k])
+            slopes = slopes_of(interface.mortar, p, r, pressed[k], penalty, x, interface.reach)
+            if slopes is not None:
+                points[k] = replace(p, steep=slopes.gap)
+                beside = slopes.forces if beside is None else beside + slopes.forces
+        return replace(contact, points=points, beside=beside)
 
     def pushed(self, points: list[ContactPoints], responses: list[Response]) -> NDArray[np.float64]:
         """Nodal forces of all interfaces together [N], shape (3N,)."""
@@ -188,7 +233,7 @@ def shifted(points: ContactPoints, move: NDArray[np.float64]) -> ContactPoints:
     """Points after a move (N, 3), by the linear model: their normals and weights stay."""
     if not move.any():
         return points
-    return replace(points, gap=points.gap - np.einsum("mi,mi->m", points.normal, points.relative(move)))
+    return replace(points, gap=points.gap + points.opened(move))
 
 
 def alike(responses: list[Response], others: list[Response]) -> bool:

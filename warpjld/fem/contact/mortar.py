@@ -17,10 +17,15 @@ if TYPE_CHECKING:
 
 __all__ = ["Mortar"]
 
-_FACING = -0.1
+_FACING = -0.2
 """Facets may touch where the cosine of the angle between their normals is below this."""
+_TURN = 0.4
+"""They do so fully where it is less than that by this."""
 _LEAST = 1e-4
-"""Share of a node's surface below which a point is left out: its average would hang on a sliver."""
+"""Share of a node's surface below which a point is left out."""
+_SLIVER, _OFF = 0.1, 0.25
+"""Share of a node's surface below which its average hangs on a sliver, and by how many edges the least of slivers seem
+farther off than they are: what presses beside them is to hold them, not a pressure without bound on hardly any area."""
 
 
 class Mortar:
@@ -35,7 +40,7 @@ class Mortar:
     """
 
     def __init__(self, slave: ContactSurface, master: ContactSurface, pair: Pair, count: int, threads: int) -> None:
-        self._slave, self._master = slave, master
+        self.slave, self.master = slave, master
         self._count, self._threads = count, threads
         exclusion = pair.exclusion
         if exclusion is None:
@@ -69,9 +74,9 @@ class Mortar:
 
         from warpjld.fem.contact.points import ContactPoints
 
-        slave, master = self._slave, self._master
+        slave, master = self.slave, self.master
         pairs = self._neighbours(x, reach)
-        found = self._integrals(pairs, x, reach)
+        found = self.integrals(pairs, slave.quads, master.quads, x, reach)
         some = found[:, 32] > 0.0
         pairs, found = pairs[some], found[some]
         corner = slave.corners[pairs[:, 0]]
@@ -88,21 +93,30 @@ class Mortar:
         table.sort_indices()
         normal = normals[nodes]
         gap = np.asarray(-np.einsum("mi,mi->m", normal, table @ x), np.float64)
-        return ContactPoints(nodes, table, normal, area[nodes], gap, np.zeros((len(nodes), 3)))
+        gap += self.aside(nodes, area[nodes])[0]
+        return ContactPoints(nodes, table, normal, area[nodes], gap, np.zeros((len(nodes), 3)), facets=pairs)
+
+    def aside(
+        self, sites: NDArray[np.int64], area: NDArray[np.float64]
+    ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """What slivers seem farther off [m], and its derivative by their area [1/m], shape (m,) each."""
+        edge = self.slave.edge[sites]
+        t = np.minimum(area / (_SLIVER * edge**2), 1.0)
+        return _OFF * edge * (1.0 - t) ** 2, -2.0 * _OFF * (1.0 - t) / (_SLIVER * edge)
 
     def _neighbours(self, x: NDArray[np.float64], reach: float) -> NDArray[np.int32]:
         """Slave and master facets whose boxes are within ``reach``, shape (P, 2); none is left out."""
         import warp as wp
         from warpjld_kernels import contact_mortar
 
-        origin = x[self._slave.nodes].mean(axis=0)
+        origin = x[self.slave.nodes].mean(axis=0)
         boxes = []
-        for surface, margin in ((self._slave, reach), (self._master, 0.0)):
+        for surface, margin in ((self.slave, reach), (self.master, 0.0)):
             corners = x[surface.quads] - origin
             boxes.append((corners.min(axis=1) - margin, corners.max(axis=1) + margin))
         low, high = (np.ascontiguousarray(b, dtype=np.float32) for b in boxes[1])
         bvh = wp.Bvh(*(wp.array(b, dtype=wp.vec3, device="cpu") for b in (low, high)))
-        count = len(self._slave.quads)
+        count = len(self.slave.quads)
         lower, upper = (wp.array(b.astype(np.float32), dtype=wp.vec3, device="cpu") for b in boxes[0])
         mine, other, never = (shared(a) for a in self._labels)
         starts, counts = np.zeros(count + 1, np.int32), np.zeros(count, np.int32)
@@ -117,12 +131,20 @@ class Mortar:
         facet = np.repeat(np.arange(count, dtype=np.int32), counts)
         return np.stack([facet, out[: len(facet)]], axis=1)
 
-    def _integrals(self, pairs: NDArray[np.int32], x: NDArray[np.float64], reach: float) -> NDArray[np.float64]:
+    def integrals(
+        self,
+        pairs: NDArray[np.int32],
+        slave: NDArray[np.int32],
+        master: NDArray[np.int32],
+        x: NDArray[np.float64],
+        reach: float,
+    ) -> NDArray[np.float64]:
+        """Of pairs (P, 2) of quadrilaterals with corners at x (n, 3), see the kernel, shape (P, 33)."""
         from warpjld_kernels import contact_mortar
 
         out = np.zeros((len(pairs), 33))
         if len(pairs):
-            tables = [np.ascontiguousarray(a).reshape(-1) for a in (pairs, self._slave.quads, self._master.quads, x)]
-            arguments = [*(shared(t) for t in tables), _FACING, reach, reach, shared(out.reshape(-1))]
+            tables = [np.ascontiguousarray(a).reshape(-1) for a in (pairs, slave, master, x)]
+            arguments = [*(shared(t) for t in tables), _FACING, _TURN, reach, shared(out.reshape(-1))]
             on_rows(contact_mortar.integrate, len(pairs), arguments, threads=self._threads, least=200)
         return out

@@ -42,6 +42,9 @@ class ContactPoints:
         area: Slave area the point stands for [m²], shape (m,).
         gap: Distance to the other side along ``normal``, negative where they overlap [m], shape (m,).
         carried: What the other side, if an obstacle, moved at the point since the start of the step [m], shape (m, 3).
+        facets: Slave and master facets that face each other, if the master deforms too, shape (P, 2).
+        steep: How gaps change with the displacement (3N,), beyond what they do with weights and normals that stay,
+            where that is known, ``csr_array`` (m, 3N).
     """
 
     sites: NDArray[np.int64]
@@ -50,6 +53,8 @@ class ContactPoints:
     area: NDArray[np.float64]
     gap: NDArray[np.float64]
     carried: NDArray[np.float64]
+    facets: NDArray[np.int32] | None = None
+    steep: Any = None
 
     def forces(self, traction: NDArray[np.float64]) -> NDArray[np.float64]:
         """Nodal forces of tractions (m, 3) that push on the slave [N], shape (N, 3); their sum is zero."""
@@ -60,6 +65,11 @@ class ContactPoints:
         """Σ c_i u_i of a displacement (N, 3), shape (m, 3)."""
         out: NDArray[np.float64] = self.weights @ displacement
         return out
+
+    def opened(self, displacement: NDArray[np.float64]) -> NDArray[np.float64]:
+        """By how much a displacement (N, 3) changes the gaps, to first order [m], shape (m,)."""
+        out: NDArray[np.float64] = -np.einsum("mi,mi->m", self.normal, self.relative(displacement))
+        return out if self.steep is None else out + self.steep @ displacement.reshape(-1)
 
 
 class Interface:
@@ -83,11 +93,11 @@ class Interface:
         self.pair = pair
         self.slave: ContactSurface = surface_of(mesh, pair.slave, f"{pair.title}: slave")
         self._count = len(mesh.nodes)
-        self._mortar: Mortar | None = None
+        self.mortar: Mortar | None = None
         self.share: Any
         if not isinstance(pair.master, Obstacle):
             master = surface_of(mesh, pair.master, f"{pair.title}: master")
-            self._mortar = Mortar(self.slave, master, pair, self._count, threads)
+            self.mortar = Mortar(self.slave, master, pair, self._count, threads)
             self.opposite = master.nodes
             self.edge = self.slave.edge
             self.share = eye_array(len(self.slave.nodes), format="csr")
@@ -109,7 +119,13 @@ class Interface:
     @property
     def averages(self) -> bool:
         """Whether what points know of a slave node is an average over the faces around it."""
-        return self._mortar is not None or self.pair.sites == "faces"
+        return self.mortar is not None or self.pair.sites == "faces"
+
+    @property
+    def slides(self) -> bool:
+        """Whether its points' weights and normals change as bodies move in ways whose derivatives are known: both
+        sides deform, and are not bonded."""
+        return self.mortar is not None and self.pair.bond is None
 
     def points(
         self, x: NDArray[np.float64], before: float, time: float, normals: NDArray[np.float64] | None = None
@@ -118,10 +134,10 @@ class Interface:
 
         ``normals`` of the slave nodes (m, 3) are taken from x unless they are given.
         """
-        if self._mortar is None:
+        if self.mortar is None:
             found = self._at_nodes(x, time) if self.pair.sites == "nodes" else self._at_faces(x, time)
             return self._against(found, before, time)
-        return self._mortar.points(x, self.reach, self.slave.normals(x) if normals is None else normals)
+        return self.mortar.points(x, self.reach, self.slave.normals(x) if normals is None else normals)
 
     def _at_nodes(self, x: NDArray[np.float64], time: float) -> _Probe:
         surface = self.slave

@@ -11,13 +11,13 @@ from numpy.typing import NDArray
 from warpjld.fem.blockmatrix import BlockMatrix
 from warpjld.fem.body import Body
 from warpjld.fem.conjugate import Iteration, Status
-from warpjld.fem.contact.loose import stiffened
 from warpjld.fem.linear import LinearSolver
-from warpjld.fem.multigrid import IndefiniteError
 
 __all__ = ["StepSolver"]
 
 _INNER = 1e-4
+_MOST = 150
+"""Iterations of a solve that is not symmetric."""
 _PATIENCE = 25
 """Iterations after which a preconditioner made for an earlier matrix has served its time."""
 
@@ -27,14 +27,12 @@ class StepSolver:
 
     Args:
         body: All bodies, merged.
-        stiffness: Stiffness of each node at rest [N/m], shape (N,).
         precision: ``float64``, or ``float32`` refined.
     """
 
-    def __init__(self, body: Body, stiffness: NDArray[np.float64], precision: str) -> None:
+    def __init__(self, body: Body, precision: str) -> None:
         self._options: dict[str, Any] = {"precision": precision, "threads": body.threads, "poisson": body.poisson}
         self._mesh = body.mesh
-        self._stiff = stiffness
         self._hierarchy: list[Any] | None = None
         self._solver: LinearSolver | None = None
 
@@ -42,12 +40,16 @@ class StepSolver:
         """A new step: its first matrix gets a preconditioner of its own."""
         self._solver = None
 
-    def solve(self, matrix: BlockMatrix, free: NDArray[np.bool_], right: NDArray[np.float64]) -> Iteration:
+    def solve(
+        self, matrix: BlockMatrix, free: NDArray[np.bool_], right: NDArray[np.float64], beside: Any = None
+    ) -> Iteration:
         """K11 x = b for the free degrees of freedom, shape (3N,), with the preconditioner before while it serves.
 
         Raises:
             IndefiniteError: K is not positive definite.
         """
+        if beside is not None:
+            return self._beside(matrix, free, right, beside)
         sofar = None
         if self._solver is not None:
             before = self._solver.of(matrix)
@@ -63,5 +65,18 @@ class StepSolver:
             done = replace(done, x=done.x + sofar.x, iterations=done.iterations + sofar.iterations)
         else:
             done = solver.solve(right, tolerance=_INNER)
+        self._solver, self._hierarchy = solver, solver.hierarchy
+        return done
+
+    def _beside(
+        self, matrix: BlockMatrix, free: NDArray[np.bool_], right: NDArray[np.float64], beside: Any
+    ) -> Iteration:
+        """With a part that is not symmetric; what is symmetric makes the preconditioner."""
+        if self._solver is not None:
+            done = self._solver.over(matrix).solve_beside(beside, right, tolerance=_INNER, iterations=_PATIENCE)
+            if done.status is Status.CONVERGED:
+                return done
+        solver = LinearSolver(matrix, free, self._mesh, hierarchy=self._hierarchy, **self._options)
+        done = solver.over(matrix).solve_beside(beside, right, tolerance=_INNER, iterations=_MOST)
         self._solver, self._hierarchy = solver, solver.hierarchy
         return done
