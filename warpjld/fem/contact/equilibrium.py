@@ -32,7 +32,7 @@ from warpjld.fem.prescribed import Prescribed
 __all__ = ["Equilibrium", "Reached", "Step"]
 
 _ITERATIONS = 40
-_PENALTY = 60.0
+_PENALTY = 200.0
 """Contact stiffness over E* by the edge of a face: more makes the linear solves slow, less makes them many."""
 _ROUNDING = 1e-13
 """Part of stiffness times displacement that is rounding, where bodies move without a force."""
