@@ -43,7 +43,7 @@ _TURNING = 1
 looked at once forces balance. (Newton's method without their derivatives converges slowly, with them not symmetric.)"""
 _CARELESS = 8
 """Iterations with full steps and multipliers brought up to date at once; what has not settled by then takes turns."""
-_SURE = 2
+_SURE = 1
 """Iterations after which multipliers are good enough to take the derivatives of directions with; until then those of
 the equilibrium before are."""
 _LINE_SEARCH = 8
