@@ -13,9 +13,14 @@ from warpjld.fem.embedding import Embedding
 from warpjld.fem.hexmesh import HexMesh
 from warpjld.grasp import Places
 from warpjld.press.bodies import Bodies
+from warpjld.press.clear import Cleared, Shown, clear
+from warpjld.press.outside import outer_triangles
 from warpjld.press.run import Solved
 
 __all__ = ["Pressed"]
+
+_SUNKEN = 0.5
+"""How deep in one another visible surfaces may come to be shown apart, in edges of elements."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -33,6 +38,7 @@ class Pressed:
     solved: Solved
     pushed: Mapping[str, tuple[NDArray[np.float64], Sequence[Places]]] = field(default_factory=dict)
     shapes: Mapping[str, NDArray[np.float64]] = field(default_factory=dict)
+    _latest: dict[float, Cleared] = field(default_factory=dict, init=False, repr=False)
 
     def moves(self, name: str) -> bool:
         """Whether an object is shown as contact has it."""
@@ -45,7 +51,7 @@ class Pressed:
         moved = self._displacement(frame)
         if hand is None or moved is None:
             return None
-        return hand.part.worn(moved[self.bodies.spans[actor]], covered)
+        return hand.part.blended(self._cleared(frame).vertices[actor], covered)
 
     def object(self, name: str, frame: float) -> NDArray[np.float64] | None:
         """An object's surface (V, 3) at a frame; None where contact was not solved."""
@@ -58,7 +64,12 @@ class Pressed:
             if not len(frames) or not frames[0] <= frame <= frames[-1]:
                 return None
             return np.asarray(places[int(np.searchsorted(frames, frame))].apply(self.shapes[name])[0])
-        return one.volume.worn(moved[self.bodies.spans[name]])
+        return self._cleared(frame).vertices[name]
+
+    def overlaps(self, frame: float) -> dict[tuple[str, str], float]:
+        """What is left of overlap between visible surfaces at a frame, by two names [m]: deeper than elements of their
+        size explain."""
+        return self._cleared(frame).left if self._displacement(frame) is not None else {}
 
     def pressure(self, name: str, frame: float) -> NDArray[np.float64] | None:
         """Contact pressure on the visible surface of an actor or object [Pa], shape (V,); None where there is none."""
@@ -75,6 +86,26 @@ class Pressed:
                 return np.where(hand.part.blend > 0.0, shown, 0.0)
         one = next(o for o in self.bodies.objects if o.name == name)
         return _shown(one.volume.mesh, one.volume.name, one.volume.visible, values)
+
+    def _cleared(self, frame: float) -> Cleared:
+        """Visible surfaces at a frame that was solved, or between two, without overlap."""
+        if frame not in self._latest:
+            moved = self._displacement(frame)
+            assert moved is not None
+            spans = self.bodies.spans
+            shown: dict[str, Shown] = {}
+            for hand in self.bodies.hands:
+                part, flesh = hand.part, hand.part.hand
+                most = _SUNKEN * _edge(flesh.mesh, flesh.name)
+                shown[hand.name] = Shown(part.carried(moved[spans[hand.name]]), part.faces, hand.softness, most)
+            for one in self.bodies.objects:
+                volume = one.volume
+                most = _SUNKEN * _edge(volume.mesh, volume.name)
+                surface = volume.worn(moved[spans[one.name]])
+                shown[one.name] = Shown(surface, volume.faces, volume.physical.young, most)
+            self._latest.clear()
+            self._latest[frame] = clear(shown, self.bodies.obstacles, frame - self.solved.start)
+        return self._latest[frame]
 
     @property
     def high(self) -> float:
@@ -116,3 +147,10 @@ def _shown(mesh: HexMesh, faces: str, surface: Embedding, values: NDArray[np.flo
     weights = np.maximum(surface.weights, 0.0) * outer[surface.corners]
     total = weights.sum(axis=1)
     return np.asarray((weights * values[surface.corners]).sum(axis=1) / np.maximum(total, 1e-12))
+
+
+def _edge(mesh: HexMesh, faces: str) -> float:
+    """Median edge of a face set at rest [m]."""
+    nodes, triangles = outer_triangles(mesh, faces)
+    x = mesh.nodes[nodes[triangles]]
+    return float(np.median(np.linalg.norm(x[:, 1] - x[:, 0], axis=1)))
