@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 
@@ -21,6 +21,8 @@ __all__ = ["Pressed"]
 
 _SUNKEN = 0.5
 """How deep in one another visible surfaces may come to be shown apart, in edges of elements."""
+_SEEN = 2e-4
+"""Overlap that is worth a note [m]."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -30,28 +32,27 @@ class Pressed:
     Attributes:
         bodies: What was pressed.
         solved: What came of it.
+        covered: An actor's surface at a frame as the covering has it [m], shape (V, 3).
         pushed: Objects that were pushed about before: frames and placements, by name.
         shapes: Their vertices in their own frame [m].
     """
 
     bodies: Bodies
     solved: Solved
+    covered: Callable[[str, float], NDArray[np.floating]]
     pushed: Mapping[str, tuple[NDArray[np.float64], Sequence[Places]]] = field(default_factory=dict)
     shapes: Mapping[str, NDArray[np.float64]] = field(default_factory=dict)
-    _latest: dict[float, Cleared] = field(default_factory=dict, init=False, repr=False)
+    _latest: dict[float, tuple[dict[str, Shown], Cleared]] = field(default_factory=dict, init=False, repr=False)
 
     def moves(self, name: str) -> bool:
         """Whether an object is shown as contact has it."""
         return any(one.name == name for one in self.bodies.objects) and len(self.solved.frames) > 0
 
-    def skin(self, actor: str, frame: float, covered: NDArray[np.floating]) -> NDArray[np.float64] | None:
-        """An actor's surface (V, 3) at a frame, of which ``covered`` is as the covering has it; None where contact was
-        not solved."""
-        hand = next((h for h in self.bodies.hands if h.name == actor), None)
-        moved = self._displacement(frame)
-        if hand is None or moved is None:
+    def skin(self, actor: str, frame: float) -> NDArray[np.float64] | None:
+        """An actor's surface (V, 3) at a frame; None where contact was not solved."""
+        if not any(hand.name == actor for hand in self.bodies.hands) or self._displacement(frame) is None:
             return None
-        return hand.part.blended(self._cleared(frame).vertices[actor], covered)
+        return self._cleared(frame)[1].vertices[actor]
 
     def object(self, name: str, frame: float) -> NDArray[np.float64] | None:
         """An object's surface (V, 3) at a frame; None where contact was not solved."""
@@ -64,12 +65,30 @@ class Pressed:
             if not len(frames) or not frames[0] <= frame <= frames[-1]:
                 return None
             return np.asarray(places[int(np.searchsorted(frames, frame))].apply(self.shapes[name])[0])
-        return self._cleared(frame).vertices[name]
+        return self._cleared(frame)[1].vertices[name]
 
-    def overlaps(self, frame: float) -> dict[tuple[str, str], float]:
-        """What is left of overlap between visible surfaces at a frame, by two names [m]: deeper than elements of their
-        size explain."""
-        return self._cleared(frame).left if self._displacement(frame) is not None else {}
+    def notes(self, frame: float) -> list[str]:
+        """What there is to say of a frame's picture: overlap deeper than elements of their size explain, which stays,
+        and skin that is pressed but has no flesh to give way with."""
+        if self._displacement(frame) is None:
+            return []
+        shown, cleared = self._cleared(frame)
+        out = [
+            f"{one} and {other} are seen to overlap by {1e3 * depth:.1f} mm at frame {frame:g}: smaller elements "
+            "follow their shapes better"
+            for (one, other), depth in cleared.left.items()
+            if depth > _SEEN
+        ]
+        for hand in self.bodies.hands:
+            bare = hand.part.blend < 0.5
+            away = cleared.vertices[hand.name][bare] - shown[hand.name].vertices[bare]
+            depth = float(np.linalg.norm(away, axis=1).max(initial=0.0))
+            if depth > _SEEN:
+                out.append(
+                    f"{hand.name}: skin that FLESH leaves out is pushed aside by {1e3 * depth:.1f} mm at frame "
+                    f"{frame:g}, without a force"
+                )
+        return out
 
     def pressure(self, name: str, frame: float) -> NDArray[np.float64] | None:
         """Contact pressure on the visible surface of an actor or object [Pa], shape (V,); None where there is none."""
@@ -87,24 +106,25 @@ class Pressed:
         one = next(o for o in self.bodies.objects if o.name == name)
         return _shown(one.volume.mesh, one.volume.name, one.volume.visible, values)
 
-    def _cleared(self, frame: float) -> Cleared:
-        """Visible surfaces at a frame that was solved, or between two, without overlap."""
+    def _cleared(self, frame: float) -> tuple[dict[str, Shown], Cleared]:
+        """Visible surfaces at a frame that was solved, or between two, as they are carried, and without overlap."""
         if frame not in self._latest:
             moved = self._displacement(frame)
             assert moved is not None
             spans = self.bodies.spans
             shown: dict[str, Shown] = {}
             for hand in self.bodies.hands:
-                part, flesh = hand.part, hand.part.hand
+                flesh = hand.part.hand
                 most = _SUNKEN * _edge(flesh.mesh, flesh.name)
-                shown[hand.name] = Shown(part.carried(moved[spans[hand.name]]), part.faces, hand.softness, most)
+                skin = hand.part.worn(moved[spans[hand.name]], self.covered(hand.name, frame))
+                shown[hand.name] = Shown(skin, flesh.surface.faces, hand.softness, most)
             for one in self.bodies.objects:
                 volume = one.volume
                 most = _SUNKEN * _edge(volume.mesh, volume.name)
                 surface = volume.worn(moved[spans[one.name]])
                 shown[one.name] = Shown(surface, volume.faces, volume.physical.young, most)
             self._latest.clear()
-            self._latest[frame] = clear(shown, self.bodies.obstacles, frame - self.solved.start)
+            self._latest[frame] = shown, clear(shown, self.bodies.obstacles, frame - self.solved.start)
         return self._latest[frame]
 
     @property

@@ -176,21 +176,15 @@ class Part:
     def worn(self, displacement: NDArray[np.float64], covered: NDArray[np.floating]) -> NDArray[np.float64]:
         """The rig's surface [m], shape (V, 3): displaced by the flesh (N, 3) where it is meshed, as the covering has it
         (V, 3) elsewhere."""
-        return self.blended(self.carried(displacement), covered)
-
-    def carried(self, displacement: NDArray[np.float64]) -> NDArray[np.float64]:
-        """The rig's surface [m], shape (V, 3), as the flesh displaced so (N, 3) carries it where it is meshed; as it
-        was at time 0 elsewhere."""
         inside = self.blend > 0.0
-        out = self.skin.copy()
+        out = np.array(covered, dtype=np.float64)
         embedding = self.hand.flesh.skin
-        out[inside] += np.einsum("pa,pai->pi", embedding.weights[inside], displacement[embedding.corners[inside]])
+        carried = self.skin[inside] + np.einsum(
+            "pa,pai->pi", embedding.weights[inside], displacement[embedding.corners[inside]]
+        )
+        share = self.blend[inside, None]
+        out[inside] = share * carried + (1.0 - share) * out[inside]
         return out
-
-    def blended(self, carried: NDArray[np.float64], covered: NDArray[np.floating]) -> NDArray[np.float64]:
-        """The carried surface where the flesh is meshed, the covering's elsewhere [m], all of shape (V, 3)."""
-        share = self.blend[:, None]
-        return np.asarray(share * carried + (1.0 - share) * covered)
 
     @property
     def faces(self) -> NDArray[np.int32]:
