@@ -16,6 +16,7 @@ from warpjld.press.bodies import Bodies
 from warpjld.press.clear import Cleared, Shown, clear
 from warpjld.press.outside import outer_triangles
 from warpjld.press.run import Solved
+from warpjld.press.smooth import Smoother
 
 __all__ = ["Pressed"]
 
@@ -102,9 +103,9 @@ class Pressed:
             if hand.name == name:
                 flesh = hand.part.hand
                 shown = _shown(flesh.mesh, flesh.name, flesh.flesh.skin, values)
-                return np.where(hand.part.blend > 0.0, shown, 0.0)
+                return self._smoothers[name].of(np.where(hand.part.blend > 0.0, shown, 0.0))
         one = next(o for o in self.bodies.objects if o.name == name)
-        return _shown(one.volume.mesh, one.volume.name, one.volume.visible, values)
+        return self._smoothers[name].of(_shown(one.volume.mesh, one.volume.name, one.volume.visible, values))
 
     def _cleared(self, frame: float) -> tuple[dict[str, Shown], Cleared]:
         """Visible surfaces at a frame that was solved, or between two, as they are carried, and without overlap."""
@@ -116,7 +117,9 @@ class Pressed:
             for hand in self.bodies.hands:
                 flesh = hand.part.hand
                 most = _SUNKEN * _edge(flesh.mesh, flesh.name)
-                skin = hand.part.worn(moved[spans[hand.name]], self.covered(hand.name, frame))
+                covered = np.asarray(self.covered(hand.name, frame), dtype=np.float64)
+                skin = hand.part.worn(moved[spans[hand.name]], covered)
+                skin = covered + self._smoothers[hand.name].of(skin - covered)
                 shown[hand.name] = Shown(skin, flesh.surface.faces, hand.softness, most)
             for one in self.bodies.objects:
                 volume = one.volume
@@ -129,9 +132,22 @@ class Pressed:
 
     @property
     def high(self) -> float:
-        """Pressure that two of a hundred touching nodes exceed, over all frames [Pa]: single nodes may be far above."""
-        touching = self._pressures[self._pressures > 0.0]
-        return float(np.percentile(touching, 98.0)) if len(touching) else 0.0
+        """Pressure that one of ten touching nodes exceeds at the frame where that is highest [Pa]: single nodes may be
+        far above."""
+        touching = (frame[frame > 0.0] for frame in self._pressures)
+        return max((float(np.percentile(one, 90.0)) for one in touching if len(one)), default=0.0)
+
+    @cached_property
+    def _smoothers(self) -> dict[str, Smoother]:
+        """Of the visible surfaces, by name."""
+        out = {}
+        for hand in self.bodies.hands:
+            flesh = hand.part.hand
+            out[hand.name] = Smoother(hand.part.skin, flesh.surface.faces, _edge(flesh.mesh, flesh.name))
+        for one in self.bodies.objects:
+            volume = one.volume
+            out[one.name] = Smoother(volume.surface, volume.faces, _edge(volume.mesh, volume.name))
+        return out
 
     @cached_property
     def _frames(self) -> NDArray[np.float64]:
