@@ -130,12 +130,11 @@ class Pressed:
             self._latest[frame] = shown, clear(shown, self.bodies.obstacles, frame - self.solved.start)
         return self._latest[frame]
 
-    @property
+    @cached_property
     def high(self) -> float:
-        """Pressure that one of ten touching nodes exceeds at the frame where that is highest [Pa]: single nodes may be
-        far above."""
-        touching = (frame[frame > 0.0] for frame in self._pressures)
-        return max((float(np.percentile(one, 90.0)) for one in touching if len(one)), default=0.0)
+        """Highest pressure that any surface shows at a frame that was solved [Pa]: less than single nodes bear."""
+        shown = (self.pressure(name, frame) for name in self.bodies.spans for frame in self._frames)
+        return max((float(one.max(initial=0.0)) for one in shown if one is not None), default=0.0)
 
     @cached_property
     def _smoothers(self) -> dict[str, Smoother]:
