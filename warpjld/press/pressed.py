@@ -22,6 +22,8 @@ __all__ = ["Pressed"]
 
 _SUNKEN = 0.5
 """How deep in one another visible surfaces may come to be shown apart, in edges of elements."""
+_KEPT = 64
+"""Frames whose surfaces are kept: exports, films and objects ask for the same ones in turn."""
 _SEEN = 2e-4
 """Overlap that is worth a note [m]."""
 
@@ -126,7 +128,8 @@ class Pressed:
                 most = _SUNKEN * _edge(volume.mesh, volume.name)
                 surface = volume.worn(moved[spans[one.name]])
                 shown[one.name] = Shown(surface, volume.faces, volume.physical.young, most)
-            self._latest.clear()
+            if len(self._latest) >= _KEPT:
+                self._latest.pop(next(iter(self._latest)))
             self._latest[frame] = shown, clear(shown, self.bodies.obstacles, frame - self.solved.start)
         return self._latest[frame]
 
