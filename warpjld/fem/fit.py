@@ -19,15 +19,12 @@ __all__ = ["Fit", "fit_mesh", "mesh_surface_file"]
 
 _REPAIRS = 5
 """Further rounds in which the pull is relaxed where elements suffer."""
-
-
 _RETURNS = 6
 """And rounds after those, in which what was relaxed goes on being pulled."""
-
 _CLOSE = 0.05
 """Distance of all boundary nodes from the surface, in spacings, that ends this."""
-
 _NEARER = 0.9
+"""So does a greatest distance that does not fall below this share of the best so far."""
 _LED = 0.3
 """Pull of nodes that go where their neighbours go, over that of others."""
 
