@@ -3,12 +3,14 @@
 import csv
 import runpy
 from dataclasses import replace
+from itertools import permutations
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 from warpjld.cli import main
+from warpjld.fem.contact.facets import Facets
 from warpjld.script import Interpreter, Scene, all_commands
 from warpjld.script.plugin import load_commands
 from warpjld.script.runner import run_scene
@@ -55,11 +57,13 @@ def test_pressing(name: str, tmp_path) -> None:
     last = {"press_ball.jld": 34, "press_ball_on_table.jld": 14, "press_plate.jld": 18, "press_pinch.jld": 32}[name]
     scene.first, scene.last = last - 2, last
     scene.contact.pressing = replace(scene.contact.pressing, last=last)
+    Interpreter(scene).run_text("EXPORT 'seen.npz'")
     summary = run_scene(scene, tmp_path)
+    assert overlap(tmp_path) < 2e-4
     assert summary["press"]["status"] == "CONVERGED"
     assert summary["press"]["verdict"].startswith("realistic")
     assert summary["press"]["digits"]
-    assert summary["notes"] == []
+    assert all("skin that FLESH leaves out" in note for note in summary["notes"])  # the ball of the thumb
     rows = list(csv.DictReader((tmp_path / "contact.csv").open(encoding="utf-8")))
     total = [
         sum(float(r["force_n"]) for r in rows if r["frame"] == frame)
@@ -67,6 +71,17 @@ def test_pressing(name: str, tmp_path) -> None:
     ]
     assert total[-1] > total[0]
     assert 0.05 < total[-1] < 100.0
+
+
+def overlap(folder: Path) -> float:
+    """How deep the visible surfaces are in one another at the last frame [m]."""
+    surfaces = []
+    for path in sorted(folder.glob("seen*.npz")):
+        with np.load(path) as file:
+            surfaces.append(Facets(file["vertices"][-1].astype(float), file["faces"]))
+    assert len(surfaces) > 1
+    depths = [-one.project(other.vertices).distance.min() for one, other in permutations(surfaces, 2)]
+    return float(max(depths))
 
 
 def test_the_fist_closes_thumb_last_and_opens_again() -> None:

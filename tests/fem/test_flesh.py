@@ -56,7 +56,21 @@ def test_spacing_too_coarse_for_the_fingers() -> None:
     from warpjld.hand import build_hand
 
     with pytest.raises(InputError, match="too coarse, thin parts are not meshed"):
-        flesh_of(build_hand("left"), 0.004)
+        flesh_of(build_hand("left"), 0.009)
+
+
+@pytest.mark.parametrize("spacing", [0.004, 0.005])
+def test_coarse_elements_fill_every_finger(spacing: float) -> None:
+    from warpjld.hand import build_hand
+
+    rig = build_hand("left")
+    flesh = flesh_of(rig, spacing)
+    assert flesh.fit.least >= 0.1
+    assert flesh.fit.volume > 0.94
+    assert flesh.fit.gap < 0.6 * spacing
+    assert len(flesh.names) == len({*flesh.names})
+    assert {"thumb", "index", "middle", "ring", "pinky"} <= {part for name in flesh.names for part in name.split(".")}
+    assert (flesh.skin.outside < 1.5).all()  # fingertips too
 
 
 def _volume(mesh):  # type: ignore[no-untyped-def]

@@ -34,3 +34,18 @@ def test_refuses() -> None:
         ColorScale(1, 1)
     with pytest.raises(InputError, match="did you mean viridis"):
         ColorScale(0, 1, colormap="viridix").colors(np.zeros(1))
+
+
+@pytest.mark.parametrize(
+    ("low", "high", "factor", "texts"),
+    [
+        (0.0, 25_200.0, 1e-3, ["0", "5", "10", "15", "20", "25"]),
+        (0.0, 1.0, 1.0, ["0", "0.2", "0.4", "0.6", "0.8", "1"]),
+        (-0.003, 0.0071, 1e3, ["-2", "0", "2", "4", "6"]),
+    ],
+)
+def test_ticks_are_round_as_written(low: float, high: float, factor: float, texts: list[str]) -> None:
+    ticks = ColorScale(low, high, factor=factor).ticks()
+    assert [f"{tick * factor:.3g}" for tick in ticks] == texts
+    assert low <= ticks[0]
+    assert ticks[-1] <= high

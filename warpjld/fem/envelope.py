@@ -20,7 +20,7 @@ class _Answer:
 
 
 class Envelope:
-    """Triangles that enclose a volume; holes are bridged by the winding number and reported.
+    """Triangles that enclose a volume; holes are closed by fans, or bridged by the winding number, and reported.
 
     Args:
         vertices: [m], shape (V, 3).
@@ -41,25 +41,24 @@ class Envelope:
             raise InputError(f"surface: want triangles of shape (n, 3) with n > 0, got {triangles.shape}")
         if triangles.min() < 0 or triangles.max() >= len(points):
             raise InputError(f"surface: triangle indices must lie in 0…{len(points) - 1}")
-        corners = points[triangles]
-        volume = float(np.einsum("ti,ti->", corners[:, 0], np.cross(corners[:, 1], corners[:, 2]))) / 6.0
-        if volume < 0:
-            triangles = np.ascontiguousarray(triangles[:, ::-1])
-            volume = -volume
-        self.size = float(np.linalg.norm(np.ptp(points, axis=0)))
-        if not volume > 1e-9 * self.size**3:
-            raise InputError("surface: encloses no volume")
         edges = np.sort(triangles[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2), axis=1)
         _, uses = np.unique(edges, axis=0, return_counts=True)
         self.open_edges = int((uses == 1).sum())
         self.crowded_edges = int((uses > 2).sum())
-        self.volume = volume
+        points, triangles = _capped(points, triangles)
+        corners = points[triangles]
+        away = corners - points.mean(axis=0)
+        volume = float(np.einsum("ti,ti->", away[:, 0], np.cross(away[:, 1], away[:, 2]))) / 6.0
+        if volume < 0:
+            triangles, corners = np.ascontiguousarray(triangles[:, ::-1]), corners[:, ::-1]
+        self.size = float(np.linalg.norm(np.ptp(points, axis=0)))
+        if not abs(volume) > 1e-9 * self.size**3:
+            raise InputError("surface: encloses no volume")
+        self.volume = abs(volume)
         self.vertices = points
         self.faces = triangles
         cross = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-        sign = 1.0 if np.array_equal(triangles, np.ascontiguousarray(faces, dtype=np.int32)) else -1.0
-        length = np.linalg.norm(cross, axis=1)
-        self.normals = sign * cross / np.maximum(length, 1e-300)[:, None]
+        self.normals = cross / np.maximum(np.linalg.norm(cross, axis=1), 1e-300)[:, None]
         wp.init()
         self._origin = points.mean(axis=0)
         local = ((points - self._origin) / self.size).astype(np.float32)
@@ -96,3 +95,28 @@ class Envelope:
             closest.astype(np.float64) * self.size + self._origin,
             self.normals[np.maximum(face, 0)],
         )
+
+
+def _capped(points: NDArray[np.float64], triangles: NDArray[np.int32]) -> tuple[NDArray[np.float64], NDArray[np.int32]]:
+    """Vertices and triangles with a fan over every hole whose border is a single loop: a wrist that was cut off."""
+    edges = triangles[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2)
+    count = np.int64(len(points))
+    open_ = edges[~np.isin(edges[:, 0] * count + edges[:, 1], edges[:, 1] * count + edges[:, 0])]
+    start, uses = np.unique(open_[:, 0], return_counts=True)
+    if not len(open_) or (uses > 1).any() or not np.array_equal(start, np.unique(open_[:, 1])):
+        return points, triangles
+    onwards = dict(open_.tolist())
+    centres: list[NDArray[np.float64]] = []
+    fans: list[NDArray[np.int64]] = []
+    while onwards:
+        first, loop = next(iter(onwards)), []
+        here = first
+        while here in onwards:
+            loop.append(here)
+            here = onwards.pop(here)
+        ring = np.array(loop)
+        centre = np.full(len(ring), len(points) + len(centres))
+        centres.append(points[ring].mean(axis=0))
+        fans.append(np.stack([np.roll(ring, -1), ring, centre], axis=1))
+    closed = np.concatenate([triangles, *fans]).astype(np.int32)
+    return np.concatenate([points, centres]), np.ascontiguousarray(closed)

@@ -4,24 +4,29 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import ndimage
 
 from warpjld.errors import InputError
+from warpjld.fem.core import core_of
 from warpjld.fem.envelope import Envelope
 from warpjld.fem.hexmesh import HexMesh, elements_of
 from warpjld.fem.untangle import improve
-from warpjld.fem.voxels import core_cells, make_manifold
 
 __all__ = ["Fit", "fit_mesh", "mesh_surface_file"]
 
 _REPAIRS = 5
 """Further rounds in which the pull is relaxed where elements suffer."""
-
-_MARGIN = 0.4
-"""Distance of the grid's outermost nodes from the surface, in spacings: room for the layer."""
+_RETURNS = 6
+"""And rounds after those, in which what was relaxed goes on being pulled."""
+_CLOSE = 0.05
+"""Distance of all boundary nodes from the surface, in spacings, that ends this."""
+_NEARER = 0.9
+"""So does a greatest distance that does not fall below this share of the best so far."""
+_LED = 0.3
+"""Pull of nodes that go where their neighbours go, over that of others."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -60,13 +65,13 @@ def fit_mesh(envelope: Envelope, spacing: float, *, least: float = 0.1, name: st
     """
     if not spacing > 0:
         raise InputError(f"spacing: want a length above 0 m, got {spacing}")
-    notes = []
+    notes: list[str] = []
     if not envelope.watertight:
         notes.append(
             f"the surface is not watertight ({envelope.open_edges} open edges, {envelope.crowded_edges} edges with "
-            "more than two faces): inside and outside were told apart by winding number"
+            "more than two faces): holes were closed, inside and outside told apart by winding number"
         )
-    cells, origin = _cells(envelope, spacing, notes)
+    cells, origin = core_of(envelope, spacing, notes)
     mesh, boundary = _grown(cells, origin, spacing, name)
     fitted, backed = _settled(mesh, boundary, envelope, spacing, least, rounds)
     quality = fitted.scaled_jacobian()
@@ -98,28 +103,6 @@ def mesh_surface_file(path: Path, *, spacing: float, scale: float = 1.0) -> Fit:
     except Exception as error:
         raise InputError(f"not a surface that can be read: {error}", path=path) from error
     return fit_mesh(Envelope(scale * np.asarray(loaded.vertices), np.asarray(loaded.faces)), spacing)
-
-
-def _cells(envelope: Envelope, spacing: float, notes: list[str]) -> tuple[NDArray[np.bool_], NDArray[np.float64]]:
-    low = envelope.vertices.min(axis=0) - 2.0 * spacing
-    counts = np.ceil((envelope.vertices.max(axis=0) + 2.0 * spacing - low) / spacing).astype(int) + 1
-    if int(counts.prod()) > 60_000_000:
-        raise InputError(f"spacing: {spacing:g} m would make a grid of {int(counts.prod()):,} nodes")
-    lines = [low[k] + spacing * np.arange(counts[k]) for k in range(3)]
-    grid = np.stack(np.meshgrid(*lines, indexing="ij"), axis=-1).reshape(-1, 3)
-    distance = envelope.ask(grid).distance.reshape(counts)
-    cells = make_manifold(core_cells(distance < -_MARGIN * spacing))
-    label, pieces = ndimage.label(cells)
-    if pieces == 0:
-        raise InputError(f"spacing: {spacing:g} m is too coarse, no element fits inside the surface")
-    if pieces > 1:
-        sizes = np.bincount(label.ravel())[1:]
-        kept = 1 + int(sizes.argmax())
-        notes.append(
-            f"{pieces - 1} thin pieces ({int(sizes.sum() - sizes.max())} cells) joined by less than a cell are left out"
-        )
-        cells = make_manifold(label == kept)
-    return cells, low
 
 
 def _grown(
@@ -165,43 +148,90 @@ def _settled(
     """Boundary nodes on the surface and well-shaped elements, as far as both go together.
 
     Boundary nodes are pulled to their closest points ever harder; where elements suffer the pull is relaxed, and where
-    the closest point looks the other way (the far side of a fold, a neighbouring finger) there is none.
+    the closest point looks the other way (the far side of a fold, a neighbouring finger) nodes go where neighbours
+    go. Once all elements are good, what is still off the surface is pulled on, as long as that brings it nearer.
     """
     quads = mesh.quads(mesh.face_set("surface"))
+    links = _links(quads, boundary)
     nodes = mesh.nodes
     relaxed = np.ones(len(boundary))
     best: tuple[HexMesh, int] | None = None
-    for number in range(rounds + _REPAIRS):
+    nearest = np.inf
+    for number in range(rounds + _REPAIRS + _RETURNS):
         answer = envelope.ask(nodes[boundary])
         x = nodes[quads]
         outwards = np.zeros_like(nodes)
         np.add.at(outwards, quads, np.cross(x[:, 2] - x[:, 0], x[:, 3] - x[:, 1])[:, None, :].repeat(4, axis=1))
         agrees = np.einsum("bi,bi->b", outwards[boundary], answer.normal) > 0.0
-        strength = (2.0, 10.0, 30.0)[min(number, 2)] * relaxed * agrees
+        target, normal = _led(nodes[boundary], answer.closest, answer.normal, agrees, links)
+        strength = (2.0, 10.0, 30.0)[min(number, 2)] * relaxed * np.where(agrees, 1.0, _LED)
         nodes = improve(
             nodes,
             mesh.elements,
             spacing,
             boundary,
-            answer.closest,
-            answer.normal,
+            target,
+            normal,
             pull=strength,
             softness=0.3 if number == 0 else 0.03,
         )
         if number + 1 < rounds:
             continue
         moved = replace(mesh, nodes=nodes)
-        best = _snapped(moved, boundary, agrees & (relaxed > 0.01), envelope, least)
-        quality = moved.scaled_jacobian()
-        if best[0].scaled_jacobian().min() >= least:
+        snapped = _snapped(moved, boundary, agrees & (relaxed > 0.01), envelope, least)
+        if snapped[0].scaled_jacobian().min() >= least:
+            away = float(np.abs(envelope.ask(snapped[0].nodes[boundary]).distance).max())
+            if best is None or away < _NEARER * nearest:
+                best, nearest = snapped, away
+            elif number + 1 >= rounds + _REPAIRS:
+                return best
+            if nearest < _CLOSE * spacing or number + 1 == rounds + _REPAIRS + _RETURNS:
+                return best
+            nodes = snapped[0].nodes
+            relaxed = np.minimum(1.0, 8.0 * relaxed)
+            continue
+        if best is not None and number + 1 >= rounds + _REPAIRS:
             return best
+        quality = moved.scaled_jacobian()
         suffering = np.zeros(len(nodes), dtype=bool)
         suffering[mesh.elements[quality < 2.0 * least]] = True
         for _ in range(2):
             suffering[mesh.elements[suffering[mesh.elements].any(axis=1)]] = True
         relaxed[suffering[boundary]] *= 0.03
-    assert best is not None
-    return best
+    return snapped if best is None else best
+
+
+def _links(quads: NDArray[np.int32], boundary: NDArray[np.int64]) -> Any:
+    """Which boundary nodes share an edge, symmetric ``csr_array`` (B, B)."""
+    from scipy.sparse import csr_array
+
+    row = np.searchsorted(boundary, quads)
+    one, other = row.ravel(), np.roll(row, -1, axis=1).ravel()
+    table = csr_array((np.ones(len(one)), (one, other)), shape=(len(boundary), len(boundary)))
+    return table + table.T
+
+
+def _led(
+    nodes: NDArray[np.float64],
+    closest: NDArray[np.float64],
+    normal: NDArray[np.float64],
+    agrees: NDArray[np.bool_],
+    links: Any,
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Targets and normals; nodes whose own closest point is none for them move as their neighbours do."""
+    move = np.where(agrees[:, None], closest - nodes, 0.0)
+    facing = np.where(agrees[:, None], normal, 0.0)
+    known = agrees.copy()
+    while not known.all():
+        count = links @ known.astype(float)
+        next_ = ~known & (count > 0.0)
+        if not next_.any():
+            break
+        move[next_] = (links @ np.where(known[:, None], move, 0.0))[next_] / count[next_, None]
+        facing[next_] = (links @ np.where(known[:, None], facing, 0.0))[next_]
+        known |= next_
+    size = np.linalg.norm(facing, axis=1, keepdims=True)
+    return nodes + move, np.where(size > 1e-6, facing / np.maximum(size, 1e-6), normal)
 
 
 def _snapped(

@@ -20,29 +20,43 @@ def core_cells(inside: NDArray[np.bool_]) -> NDArray[np.bool_]:
     return out
 
 
-def make_manifold(cells: NDArray[np.bool_]) -> NDArray[np.bool_]:
-    """Remove cells until no two meet at an edge or a corner only, and neither do two empty ones.
+def make_manifold(cells: NDArray[np.bool_], spare: NDArray[np.bool_] | None = None) -> NDArray[np.bool_]:
+    """Change as few cells as it takes until no two meet at an edge or a corner only, and neither do two empty ones.
 
     Args:
         cells: Chosen cells, an empty rim around them.
+        spare: Cells that may be added; others are only removed.
     """
     cells = cells.copy()
+    left = np.zeros_like(cells) if spare is None else spare & ~cells
     while True:
         around = np.stack([_shifted(cells, corner) for corner in np.ndindex(2, 2, 2)], axis=-1)
-        wrong = _BROKEN[(around * (1 << np.arange(8))).sum(axis=-1)]
+        wrong = _BROKEN[around @ _BITS]
         if not wrong.any():
             return cells
-        # at each broken node, remove the cells that have fewest neighbours
         count = ndimage.convolve(
             cells.astype(int), ndimage.generate_binary_structure(3, 1).astype(int), mode="constant"
         )
         for i, j, k in np.argwhere(wrong):
             block = tuple(slice(n - 1, n + 1) for n in (i, j, k))
-            present = cells[block]
-            if not present.any():
-                continue
-            weight = np.where(present, count[block], 99)
-            cells[block] = present & (weight > weight.min())
+            cells[block], left[block] = _mended(cells[block], left[block], count[block])
+
+
+def _mended(
+    present: NDArray[np.bool_], spare: NDArray[np.bool_], count: NDArray[np.int64]
+) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
+    """Eight cells around a node and what is still spare of them, changed least: cells that have few neighbours are
+    removed, or spare ones added."""
+    price = np.where(present, 6.0 + count, np.where(spare, 8.0, np.inf)).ravel()
+    pattern = present.ravel()
+    if not _BROKEN[int(pattern @ _BITS)]:
+        return present, spare
+    best, mended = np.inf, present
+    for flips, number in zip(_FLIPS, _FLIPS @ _BITS, strict=True):
+        cost = price[flips].sum()
+        if cost < best and not _BROKEN[int(pattern @ _BITS) ^ int(number)]:
+            best, mended = cost, (pattern ^ flips).reshape(2, 2, 2)
+    return mended, spare & ~mended & ~present
 
 
 def _shifted(cells: NDArray[np.bool_], corner: tuple[int, int, int]) -> NDArray[np.bool_]:
@@ -67,3 +81,5 @@ def _broken_patterns() -> NDArray[np.bool_]:
 
 
 _BROKEN = _broken_patterns()
+_BITS = 1 << np.arange(8)
+_FLIPS = np.array([[bool(n >> bit & 1) for bit in range(8)] for n in range(1, 256)])

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,6 +14,7 @@ from warpjld.fem import Body, Loads, Material, Prescribed, merge
 from warpjld.fem.contact import Bond, Exclusion, Obstacle, Pair
 from warpjld.fem.hand.blend import Moves
 from warpjld.grasp import Places
+from warpjld.press.outside import outside
 from warpjld.press.rest import Part
 from warpjld.press.settle import settle
 from warpjld.press.volumes import ObjectVolume
@@ -240,10 +241,22 @@ def assemble(
     mesh = merge(*meshes)
     body = Body(mesh, {name: laws[name] for name in mesh.region_names}, initial_stress=stress)
     pressure = {o.volume.inside: o.volume.physical.pressure for o in objects if o.volume.physical.pressure}
+    paper = wishes.pressing is not None and wishes.pressing.method == "paper"  # knows nodes only
+    offset = None if paper else np.concatenate([*map(_outside, hands), *map(_outside, objects)])
     pairs, owners = _pairs(hands, objects, obstacles, wishes)
+    pairs = [replace(pair, offset=offset) for pair in pairs]
     loads = Loads(gravity=wishes.gravity, pressure=pressure)
     start = objects[0].start if objects else 0.0
     return Bodies(tuple(hands), tuple(objects), obstacles, body, spans, tuple(pairs), tuple(owners), loads, start)
+
+
+def _outside(one: HandBody | ObjectBody) -> NDArray[np.float64]:
+    """How far what is seen lies outside a body's nodes [m], shape (N,)."""
+    if isinstance(one, ObjectBody):
+        volume = one.volume
+        return outside(volume.mesh, volume.name, volume.surface, volume.faces)
+    flesh = one.part.hand
+    return outside(flesh.mesh, flesh.name, one.part.skin, one.part.faces)
 
 
 def _pairs(

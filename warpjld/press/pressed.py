@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 
@@ -13,12 +13,19 @@ from warpjld.fem.embedding import Embedding
 from warpjld.fem.hexmesh import HexMesh
 from warpjld.grasp import Places
 from warpjld.press.bodies import Bodies
+from warpjld.press.clear import Cleared, Shown, clear
+from warpjld.press.outside import outer_triangles
 from warpjld.press.run import Solved
+from warpjld.press.smooth import Smoother
 
 __all__ = ["Pressed"]
 
-_HARDLY = 0.02
-"""Share of the highest pressure below which nodes hardly touch: masters' pressures are spread over facets beside."""
+_SUNKEN = 0.5
+"""How deep in one another visible surfaces may come to be shown apart, in edges of elements."""
+_KEPT = 64
+"""Frames whose surfaces are kept: exports, films and objects ask for the same ones in turn."""
+_SEEN = 2e-4
+"""Overlap that is worth a note [m]."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -28,27 +35,27 @@ class Pressed:
     Attributes:
         bodies: What was pressed.
         solved: What came of it.
+        covered: An actor's surface at a frame as the covering has it [m], shape (V, 3).
         pushed: Objects that were pushed about before: frames and placements, by name.
         shapes: Their vertices in their own frame [m].
     """
 
     bodies: Bodies
     solved: Solved
+    covered: Callable[[str, float], NDArray[np.floating]]
     pushed: Mapping[str, tuple[NDArray[np.float64], Sequence[Places]]] = field(default_factory=dict)
     shapes: Mapping[str, NDArray[np.float64]] = field(default_factory=dict)
+    _latest: dict[float, tuple[dict[str, Shown], Cleared]] = field(default_factory=dict, init=False, repr=False)
 
     def moves(self, name: str) -> bool:
         """Whether an object is shown as contact has it."""
         return any(one.name == name for one in self.bodies.objects) and len(self.solved.frames) > 0
 
-    def skin(self, actor: str, frame: float, covered: NDArray[np.floating]) -> NDArray[np.float64] | None:
-        """An actor's surface (V, 3) at a frame, of which ``covered`` is as the covering has it; None where contact was
-        not solved."""
-        hand = next((h for h in self.bodies.hands if h.name == actor), None)
-        moved = self._displacement(frame)
-        if hand is None or moved is None:
+    def skin(self, actor: str, frame: float) -> NDArray[np.float64] | None:
+        """An actor's surface (V, 3) at a frame; None where contact was not solved."""
+        if not any(hand.name == actor for hand in self.bodies.hands) or self._displacement(frame) is None:
             return None
-        return hand.part.worn(moved[self.bodies.spans[actor]], covered)
+        return self._cleared(frame)[1].vertices[actor]
 
     def object(self, name: str, frame: float) -> NDArray[np.float64] | None:
         """An object's surface (V, 3) at a frame; None where contact was not solved."""
@@ -61,7 +68,30 @@ class Pressed:
             if not len(frames) or not frames[0] <= frame <= frames[-1]:
                 return None
             return np.asarray(places[int(np.searchsorted(frames, frame))].apply(self.shapes[name])[0])
-        return one.volume.worn(moved[self.bodies.spans[name]])
+        return self._cleared(frame)[1].vertices[name]
+
+    def notes(self, frame: float) -> list[str]:
+        """What there is to say of a frame's picture: overlap deeper than elements of their size explain, which stays,
+        and skin that is pressed but has no flesh to give way with."""
+        if self._displacement(frame) is None:
+            return []
+        shown, cleared = self._cleared(frame)
+        out = [
+            f"{one} and {other} are seen to overlap by {1e3 * depth:.1f} mm at frame {frame:g}: smaller elements "
+            "follow their shapes better"
+            for (one, other), depth in cleared.left.items()
+            if depth > _SEEN
+        ]
+        for hand in self.bodies.hands:
+            bare = hand.part.blend < 0.5
+            away = cleared.vertices[hand.name][bare] - shown[hand.name].vertices[bare]
+            depth = float(np.linalg.norm(away, axis=1).max(initial=0.0))
+            if depth > _SEEN:
+                out.append(
+                    f"{hand.name}: skin that FLESH leaves out is pushed aside by {1e3 * depth:.1f} mm at frame "
+                    f"{frame:g}, without a force"
+                )
+        return out
 
     def pressure(self, name: str, frame: float) -> NDArray[np.float64] | None:
         """Contact pressure on the visible surface of an actor or object [Pa], shape (V,); None where there is none."""
@@ -75,15 +105,51 @@ class Pressed:
             if hand.name == name:
                 flesh = hand.part.hand
                 shown = _shown(flesh.mesh, flesh.name, flesh.flesh.skin, values)
-                return np.where(hand.part.blend > 0.0, shown, 0.0)
+                return self._smoothers[name].of(np.where(hand.part.blend > 0.0, shown, 0.0))
         one = next(o for o in self.bodies.objects if o.name == name)
-        return _shown(one.volume.mesh, one.volume.name, one.volume.visible, values)
+        return self._smoothers[name].of(_shown(one.volume.mesh, one.volume.name, one.volume.visible, values))
 
-    @property
+    def _cleared(self, frame: float) -> tuple[dict[str, Shown], Cleared]:
+        """Visible surfaces at a frame that was solved, or between two, as they are carried, and without overlap."""
+        if frame not in self._latest:
+            moved = self._displacement(frame)
+            assert moved is not None
+            spans = self.bodies.spans
+            shown: dict[str, Shown] = {}
+            for hand in self.bodies.hands:
+                flesh = hand.part.hand
+                most = _SUNKEN * _edge(flesh.mesh, flesh.name)
+                covered = np.asarray(self.covered(hand.name, frame), dtype=np.float64)
+                skin = hand.part.worn(moved[spans[hand.name]], covered)
+                skin = covered + self._smoothers[hand.name].of(skin - covered)
+                shown[hand.name] = Shown(skin, flesh.surface.faces, hand.softness, most)
+            for one in self.bodies.objects:
+                volume = one.volume
+                most = _SUNKEN * _edge(volume.mesh, volume.name)
+                surface = volume.worn(moved[spans[one.name]])
+                shown[one.name] = Shown(surface, volume.faces, volume.physical.young, most)
+            if len(self._latest) >= _KEPT:
+                self._latest.pop(next(iter(self._latest)))
+            self._latest[frame] = shown, clear(shown, self.bodies.obstacles, frame - self.solved.start)
+        return self._latest[frame]
+
+    @cached_property
     def high(self) -> float:
-        """Pressure that two of a hundred touching nodes exceed, over all frames [Pa]: single nodes may be far above."""
-        touching = self._pressures[self._pressures > _HARDLY * self._pressures.max()]
-        return float(np.percentile(touching, 98.0)) if len(touching) else 0.0
+        """Highest pressure that any surface shows at a frame that was solved [Pa]: less than single nodes bear."""
+        shown = (self.pressure(name, frame) for name in self.bodies.spans for frame in self._frames)
+        return max((float(one.max(initial=0.0)) for one in shown if one is not None), default=0.0)
+
+    @cached_property
+    def _smoothers(self) -> dict[str, Smoother]:
+        """Of the visible surfaces, by name."""
+        out = {}
+        for hand in self.bodies.hands:
+            flesh = hand.part.hand
+            out[hand.name] = Smoother(hand.part.skin, flesh.surface.faces, _edge(flesh.mesh, flesh.name))
+        for one in self.bodies.objects:
+            volume = one.volume
+            out[one.name] = Smoother(volume.surface, volume.faces, _edge(volume.mesh, volume.name))
+        return out
 
     @cached_property
     def _frames(self) -> NDArray[np.float64]:
@@ -119,3 +185,10 @@ def _shown(mesh: HexMesh, faces: str, surface: Embedding, values: NDArray[np.flo
     weights = np.maximum(surface.weights, 0.0) * outer[surface.corners]
     total = weights.sum(axis=1)
     return np.asarray((weights * values[surface.corners]).sum(axis=1) / np.maximum(total, 1e-12))
+
+
+def _edge(mesh: HexMesh, faces: str) -> float:
+    """Median edge of a face set at rest [m]."""
+    nodes, triangles = outer_triangles(mesh, faces)
+    x = mesh.nodes[nodes[triangles]]
+    return float(np.median(np.linalg.norm(x[:, 1] - x[:, 0], axis=1)))

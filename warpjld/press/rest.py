@@ -26,8 +26,15 @@ __all__ = ["Part", "part_of", "posed"]
 _LEAST = 0.05
 """Scaled Jacobian that carried elements must keep; skin nodes stay off the skin where it asks for worse."""
 
-_SKIN, _BONE = 1.0, 1e3
-"""Weights of the distances that skin and bone move where elements are turned back, in edges squared."""
+_GOOD = 0.15
+"""Scaled Jacobian below which elements around are put in order."""
+_NEAR = 0.03
+"""Distance of a skin node from the skin, in edges, from which on they are, too."""
+_RINGS = 4
+_PULLS = (3.0, 10.0, 30.0, 30.0)
+"""Weights of the distances of skin nodes from the skin, in edges squared, one after the other."""
+_SLIDE = 0.05
+_FIXED = 1e4
 _OWN = 0.5
 """Share of its digits' bones from which on flesh belongs to a part of a hand."""
 
@@ -60,34 +67,92 @@ def posed(hand: FleshHand, poses: Poses, skin: NDArray[np.float64]) -> tuple[Fle
     offset = np.einsum("nij,nj->ni", surface.frames(place, surface.vertices), mesh.nodes[outer] - found.closest)
     target = surface.at(place, skin) + np.einsum("nij,ni->nj", surface.frames(place, skin), offset)
     change = _harmonic(mesh, outer, target - nodes[outer], bone)
-    share = np.ones(len(nodes))
+    moved = replace(mesh, nodes=nodes + change)
     least = min(_LEAST, 0.5 * float(mesh.scaled_jacobian().min()))
-    for _ in range(16):
-        moved = replace(mesh, nodes=nodes + share[:, None] * change)
-        bad = moved.scaled_jacobian() < least
-        if not bad.any():
-            break
-        share[np.unique(mesh.elements[bad])] *= 0.6
-    if moved.scaled_jacobian().min() <= 0.0:
-        moved = _untangled(moved, outer, bone)
+    if moved.scaled_jacobian().min() < least:
+        shape = Facets(skin, hand.surface.faces)
+        moved = _mended(replace(mesh, nodes=nodes), change, outer, bone, shape, least)
     if moved.scaled_jacobian().min() <= 0.0:
         raise InputError(
             f"flesh: {int((moved.scaled_jacobian() <= 0).sum())} elements are turned inside out where contact begins; "
             "joints are bent too far for elements of this size"
         )
-    gap = float(np.linalg.norm(moved.nodes[outer] - target, axis=1).max())
+    gap = float(np.abs(Facets(skin, hand.surface.faces).project(moved.nodes[outer]).distance).max())
     return replace(hand, flesh=replace(hand.flesh, mesh=moved)), gap
 
 
-def _untangled(mesh: HexMesh, skin: NDArray[np.integer], bone: NDArray[np.integer]) -> HexMesh:
-    """Elements that a sharp bend turned inside out, turned back: nodes leave their places as little as that takes."""
-    edges = np.linalg.norm(mesh.nodes[mesh.elements[:, 1]] - mesh.nodes[mesh.elements[:, 0]], axis=1)
-    kept = np.concatenate([skin, bone])
-    at = mesh.nodes[kept]
-    pull = np.concatenate([np.full(len(skin), _SKIN), np.full(len(bone), _BONE)])
-    up = np.tile([0.0, 0.0, 1.0], (len(kept), 1))
-    nodes = improve(mesh.nodes, mesh.elements, float(np.median(edges)), kept, at, up, pull=pull, slide=1.0)
-    return replace(mesh, nodes=nodes)
+def _mended(
+    mesh: HexMesh,
+    change: NDArray[np.float64],
+    outer: NDArray[np.integer],
+    bone: NDArray[np.integer],
+    skin: Facets,
+    least: float,
+) -> HexMesh:
+    """The nodes moved by ``change`` (N, 3), where a fold asks for it by less; then put in order around the folds.
+
+    There skin nodes slide along the skin, and those inside go where elements are well shaped; all others stay.
+    """
+    moved = _as_far(mesh, mesh.nodes, mesh.nodes + change, least)
+    edge = float(np.median(np.linalg.norm(np.diff(mesh.nodes[mesh.elements[:, :2]], axis=1), axis=2)))
+    boundary, held = np.zeros(len(mesh.nodes), dtype=bool), np.zeros(len(mesh.nodes), dtype=bool)
+    boundary[outer], held[bone] = True, True
+    wanted = mesh.nodes + change
+    for pull in _PULLS:
+        there = moved.nodes
+        away = np.zeros(len(there))
+        away[outer] = np.abs(skin.project(there[outer]).distance)
+        trouble = away > _NEAR * edge
+        trouble[np.unique(mesh.elements[moved.scaled_jacobian() < _GOOD])] = True
+        if not trouble.any():
+            break
+        near = trouble.copy()
+        for _ in range(_RINGS):
+            near[np.unique(mesh.elements[near[mesh.elements].any(axis=1)])] = True
+        elements = mesh.elements[near[mesh.elements].all(axis=1)]
+        inside = np.zeros(len(there), dtype=bool)
+        inside[elements] = True
+        rim = np.zeros(len(there), dtype=bool)
+        rim[mesh.elements[~near[mesh.elements].all(axis=1)]] = True
+        number = np.flatnonzero(inside)
+        fixed = number[(held | rim)[number]]
+        free = number[(boundary & ~held & ~rim)[number]]
+        found = skin.project(wanted[free])
+        local = np.full(len(there), -1)
+        local[number] = np.arange(len(number))
+        kept = np.concatenate([free, fixed])
+        nodes = there.copy()
+        nodes[number] = improve(
+            there[number],
+            local[elements].astype(np.int32),
+            edge,
+            local[kept],
+            np.concatenate([found.closest, there[fixed]]),
+            np.concatenate([found.normal, np.tile([0.0, 0.0, 1.0], (len(fixed), 1))]),
+            pull=np.concatenate([np.full(len(free), pull), np.full(len(fixed), _FIXED)]),
+            slide=_SLIDE,
+            softness=0.03,
+        )
+        nodes[fixed] = there[fixed]
+        tidied = replace(mesh, nodes=nodes)
+        if tidied.scaled_jacobian().min() < min(least, float(moved.scaled_jacobian().min())):
+            continue
+        goal = nodes.copy()
+        goal[free] = skin.project(nodes[free]).closest
+        moved = _as_far(mesh, nodes, goal, least)
+    return moved
+
+
+def _as_far(mesh: HexMesh, start: NDArray[np.float64], goal: NDArray[np.float64], least: float) -> HexMesh:
+    """Nodes from a start towards a goal, less far where an element would become worse than ``least``."""
+    share = np.ones((len(start), 1))
+    for _ in range(16):
+        moved = replace(mesh, nodes=start + share * (goal - start))
+        bad = moved.scaled_jacobian() < least
+        if not bad.any():
+            break
+        share[np.unique(mesh.elements[bad])] *= 0.6
+    return moved
 
 
 @dataclass(frozen=True, eq=False)
@@ -120,6 +185,12 @@ class Part:
         share = self.blend[inside, None]
         out[inside] = share * carried + (1.0 - share) * out[inside]
         return out
+
+    @property
+    def faces(self) -> NDArray[np.int32]:
+        """Triangles of the surface whose flesh is meshed, shape (T, 3)."""
+        faces = self.hand.surface.faces
+        return np.asarray(faces[(self.blend[faces] > 0.0).all(axis=1)])
 
 
 def part_of(hand: FleshHand, poses: Poses, skin: NDArray[np.float64], digits: Sequence[str] = ()) -> Part:

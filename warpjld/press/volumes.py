@@ -36,6 +36,7 @@ class ObjectVolume:
         physical: Law, wall and pressure.
         visible: Its surface, carried by the mesh.
         surface: Its surface at time 0 [m], shape (V, 3).
+        faces: Triangles of its surface, shape (T, 3).
         stress: Stress that holds the pressure inside in its shape at time 0 [Pa], shape (E, 6) (R98).
     """
 
@@ -45,6 +46,7 @@ class ObjectVolume:
     physical: Physical
     visible: Embedding
     surface: NDArray[np.float64]
+    faces: NDArray[np.int32]
     stress: NDArray[np.float64]
 
     @property
@@ -98,7 +100,14 @@ def object_volume(name: str, thing: GraspObject, physical: Physical, place: Plac
     turn = place.apply(np.eye(3))[0] - place.apply(np.zeros((1, 3)))[0]
     moved = replace(mesh, nodes=place.apply(mesh.nodes)[0])
     return ObjectVolume(
-        name, moved, mesh.nodes, physical, visible, place.apply(thing.vertices)[0], _turned(stress, turn.T)
+        name,
+        moved,
+        mesh.nodes,
+        physical,
+        visible,
+        place.apply(thing.vertices)[0],
+        thing.faces,
+        _turned(stress, turn.T),
     )
 
 

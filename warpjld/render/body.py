@@ -34,15 +34,20 @@ class Body:
         self._mesh.point_data["Normals"] = normals
         self._mesh.point_data.active_normals_name = "Normals"
 
-    def show(self, plotter: Any, color: str | None, **look: Any) -> None:
-        """Add it in one colour, or (None) in those given by `paint`."""
-        if color is None:
-            self.paint(np.full((int(self._shading.origin.max()) + 1, 3), 200, np.uint8))
-        colored = {"scalars": "color", "rgb": True} if color is None else {"color": color}
+    def show(self, plotter: Any, color: str | NDArray[np.uint8], **look: Any) -> None:
+        """Add it in one colour; or in a table of colours, shape (n, 3), that shares given by `paint` go through."""
+        colored: dict[str, Any] = {"color": color}
+        if not isinstance(color, str):
+            from matplotlib.colors import ListedColormap
+
+            self.paint(np.zeros(int(self._shading.origin.max()) + 1))
+            # shares are interpolated, not colours: between grey and red comes orange
+            colored = {"scalars": "share", "clim": (0.0, 1.0), "cmap": ListedColormap(color / 255.0)}
+            colored |= {"n_colors": len(color), "interpolate_before_map": True, "show_scalar_bar": False}
         # pyvista's own smooth shading would compute other normals
         actor = plotter.add_mesh(self._mesh, smooth_shading=False, **colored, **look)
         actor.prop.interpolation = "Phong"
-        if color is not None:
+        if isinstance(color, str):
             red, green, blue = actor.prop.color.float_rgb
             # light that has gone through skin is warmer
             actor.prop.ambient_color = (red, 0.84 * green, 0.78 * blue)
@@ -57,6 +62,6 @@ class Body:
         bounds = np.reshape(self._mesh.bounds, (3, 2))
         return np.stack(np.meshgrid(*bounds), axis=-1).reshape(-1, 3)
 
-    def paint(self, colors: NDArray[np.uint8]) -> None:
-        """Colour the vertices, shape (n, 3)."""
-        self._mesh.point_data["color"] = colors[self._shading.origin]
+    def paint(self, shares: NDArray[np.floating]) -> None:
+        """Colour the vertices, shape (n,): 0 is the table's first colour, 1 its last."""
+        self._mesh.point_data["share"] = shares[self._shading.origin]

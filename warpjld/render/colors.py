@@ -53,12 +53,14 @@ class ColorScale:
 
     def colors(self, values: NDArray[np.floating]) -> NDArray[np.uint8]:
         """Colours, shape (n, 3), of numbers (n,)."""
-        table = self._table()
-        share = np.clip((values - self.low) / (self.high - self.low), 0, 1)
-        return table[np.rint(share * 255).astype(int)]
+        return self.table()[np.rint(np.clip(self.shares(values), 0, 1) * 255).astype(int)]
+
+    def shares(self, values: NDArray[np.floating]) -> NDArray[np.float64]:
+        """How far numbers (n,) are from ``low`` to ``high``."""
+        return np.asarray((values - self.low) / (self.high - self.low), np.float64)
 
     def drawn_on(self, picture: NDArray[np.uint8], ink: str) -> NDArray[np.uint8]:
-        """The picture with a bar, five numbers and the title at its right border."""
+        """The picture with a bar, round numbers and the title at its right border."""
         from PIL import Image
 
         from warpjld.render.text import write
@@ -70,7 +72,7 @@ class ColorScale:
         canvas = Image.fromarray(picture.copy())
         ramp = self.colors(np.linspace(self.high, self.low, bar_height))
         canvas.paste(Image.fromarray(np.repeat(ramp[:, None], bar_width, axis=1)), (left, top))
-        for number in np.linspace(self.low, self.high, 5):
+        for number in self.ticks():
             y = top + bar_height * (1 - (number - self.low) / (self.high - self.low))
             text = f"{number * self.factor:.3g}"  # with a hyphen: the built-in font has no minus sign
             write(canvas, (left + bar_width + 0.5 * size, y), text, size=size, color=ink, anchor="lm")
@@ -78,7 +80,17 @@ class ColorScale:
             write(canvas, (width - 0.8 * size, top - 1.4 * size), self.title, size=size, color=ink, anchor="rm")
         return np.asarray(canvas)
 
-    def _table(self) -> NDArray[np.uint8]:
+    def ticks(self) -> NDArray[np.float64]:
+        """Numbers to write beside the bar: four to eight, round as they are written."""
+        low, high = sorted((self.low * self.factor, self.high * self.factor))
+        rough = (high - low) / 7.0
+        power = 10.0 ** np.floor(np.log10(rough))
+        step = power * next(n for n in (1.0, 2.0, 2.5, 5.0, 10.0) if n * power >= rough * (1.0 - 1e-9))
+        first, last = np.ceil(low / step - 1e-9), np.floor(high / step + 1e-9)
+        return np.asarray((step * np.arange(first, last + 1) + 0.0) / self.factor)
+
+    def table(self) -> NDArray[np.uint8]:
+        """The colours from ``low`` to ``high``, shape (256, 3)."""
         import matplotlib
 
         if isinstance(self.colormap, tuple):

@@ -123,12 +123,12 @@ class Scene:
         if len(points) <= self._faces.max():
             raise InputError(f"vertices: faces want {self._faces.max() + 1} of them, got {len(points)}")
         bones = self._bones_from(joints)
-        colors = self._colors_from(values, len(points))
+        shares = self._shares_from(values, len(points))
         if self._plotter is None:
             self._build(points, bones)
         self._skin.place(points)
-        if colors is not None:
-            self._skin.paint(colors)
+        if shares is not None:
+            self._skin.paint(shares)
         if self._wire:
             self._wires.place(points, self._camera.position)
         if bones is not None:
@@ -165,12 +165,12 @@ class Scene:
             raise InputError(f"segments: joints are 0…{len(bones) - 1}, got {low}…{high}")
         return bones
 
-    def _colors_from(self, values: ArrayLike | None, count: int) -> NDArray[np.uint8] | None:
+    def _shares_from(self, values: ArrayLike | None, count: int) -> NDArray[np.float64] | None:
         if (values is None) != (self._scale is None):
             raise InputError("values: wanted with each frame where a scale is given, and only there")
         if values is None or self._scale is None:
             return None
-        return self._scale.colors(_finite("values", values, (count,)))
+        return self._scale.shares(_finite("values", values, (count,)))
 
     def _build(self, points: NDArray[np.float64], joints: NDArray[np.float64] | None) -> None:
         from warpjld.render.window import open_window
@@ -186,7 +186,7 @@ class Scene:
         if opacity > 0:
             # of translucent skin only the front layer is drawn: then nothing needs sorting by depth
             culling = "back" if opacity < 1 else False
-            color = None if self._scale else style.skin
+            color = self._scale.table() if self._scale else style.skin
             self._skin.show(
                 self._plotter,
                 color,

@@ -140,7 +140,7 @@ class Crowd:
             return vertices
         out = vertices
         for k in range(len(vertices)):
-            found = self.pressed.skin(role.actor.name, float(self.frames[start + k]), vertices[k])
+            found = self.pressed.skin(role.actor.name, float(self.frames[start + k]))
             if found is not None:
                 out = out.copy() if out is vertices else out
                 out[k] = found

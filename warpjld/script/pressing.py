@@ -111,7 +111,15 @@ def _run(scene: Scene, pressing: Pressing, folder: Path, progress: Report) -> Pr
     verdict = verdict_of(solved, table.rows, table.suggestions())
     pushed = {name: (np.array(frames), places) for name, (frames, places) in before.moved.items()}
     shapes = {name: scene.prop(name).thing.vertices for name in pushed}
-    return PressReport(Pressed(bodies, solved, pushed, shapes), table.rows, verdict, notes)
+
+    def covered(actor: str, frame: float) -> NDArray[np.floating]:
+        one = scene.actor(actor)
+        return np.asarray(cover(one).deform(stage(one, np.array([frame]), scene.rate))[0])
+
+    pressed = Pressed(bodies, solved, covered, pushed, shapes)
+    if solved.frames:
+        notes += pressed.notes(solved.frames[-1].frame)
+    return PressReport(pressed, table.rows, verdict, notes)
 
 
 @dataclass(frozen=True, eq=False)

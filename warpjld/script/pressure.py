@@ -14,7 +14,7 @@ if TYPE_CHECKING:
 
 __all__ = ["PressureView"]
 
-_COLORS = ("#b9b3aa", "#e8b04a", "#d4452b", "#7a1030", "#3a0520")
+_COLORS = ("#b9b3aa", "#ebb54d", "#e2762f", "#c9302c", "#7a1030", "#3a0520")
 _NOTHING = 1.0  # Pa: the scale's top where nothing touches
 
 

@@ -41,6 +41,7 @@ class Mortar:
 
     def __init__(self, slave: ContactSurface, master: ContactSurface, pair: Pair, count: int, threads: int) -> None:
         self.slave, self.master = slave, master
+        self.offset = pair.offset
         self._count, self._threads = count, threads
         exclusion = pair.exclusion
         if exclusion is None:

@@ -60,6 +60,8 @@ class Pair:
         bond: Surfaces that are tied from the start.
         sites: Where an obstacle is looked for: at the slave's ``nodes``; or at the integration points of its ``faces``,
             which takes more iterations, and meets obstacles with edges or tips smaller than a face.
+        offset: How far what touches lies outside the mesh at every node of the body [m], shape (N,): a glove, or a
+            skin finer than the elements. Gaps are measured from there.
     """
 
     slave: str | NDArray[np.int32]
@@ -69,11 +71,14 @@ class Pair:
     exclusion: Exclusion | None = None
     bond: Bond | None = None
     sites: str = "nodes"
+    offset: NDArray[np.float64] | None = None
 
     def __post_init__(self) -> None:
         if not (self.friction >= 0.0 and np.isfinite(self.friction)):
             raise InputError(f"{self.title}: want a friction of 0 or more, got {self.friction}")
 
+        if self.offset is not None and not (np.ndim(self.offset) == 1 and np.isfinite(self.offset).all()):
+            raise InputError(f"{self.title}: offset: want a finite length for each node")
         if self.sites not in {"nodes", "faces"}:
             raise InputError(f"{self.title}: want sites 'nodes' or 'faces', got '{self.sites}'")
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -93,6 +93,8 @@ class Interface:
         self.pair = pair
         self.slave: ContactSurface = surface_of(mesh, pair.slave, f"{pair.title}: slave")
         self._count = len(mesh.nodes)
+        if pair.offset is not None and len(pair.offset) != self._count:
+            raise InputError(f"{pair.title}: offset: want {self._count} lengths, one a node, got {len(pair.offset)}")
         self.mortar: Mortar | None = None
         self.share: Any
         if not isinstance(pair.master, Obstacle):
@@ -113,7 +115,8 @@ class Interface:
             table = (np.tile(_GAUSS, (faces, 1)).ravel(), np.repeat(self.slave.corners, 4, axis=0).ravel())
             rows = 4 * np.arange(4 * faces + 1)
             self.share = csr_array((*table, rows), shape=(4 * faces, len(self.slave.nodes)))
-        self.reach = 2.0 * float(self.slave.edge.max())
+        farthest = 0.0 if pair.offset is None else 2.0 * float(np.abs(pair.offset).max(initial=0.0))
+        self.reach = 2.0 * float(self.slave.edge.max()) + farthest
         """How far ahead a point looks [m]."""
 
     @property
@@ -135,9 +138,13 @@ class Interface:
         ``normals`` of the slave nodes (m, 3) are taken from x unless they are given.
         """
         if self.mortar is None:
-            found = self._at_nodes(x, time) if self.pair.sites == "nodes" else self._at_faces(x, time)
-            return self._against(found, before, time)
-        return self.mortar.points(x, self.reach, self.slave.normals(x) if normals is None else normals)
+            probe = self._at_nodes(x, time) if self.pair.sites == "nodes" else self._at_faces(x, time)
+            found = self._against(probe, before, time)
+        else:
+            found = self.mortar.points(x, self.reach, self.slave.normals(x) if normals is None else normals)
+        if self.pair.offset is None:
+            return found
+        return replace(found, gap=found.gap - abs(found.weights) @ self.pair.offset)
 
     def _at_nodes(self, x: NDArray[np.float64], time: float) -> _Probe:
         surface = self.slave

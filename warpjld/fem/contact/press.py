@@ -121,6 +121,9 @@ def _by_turns(
     if any(pair.friction > 0.0 or pair.bond is not None for pair in pairs):
         raise InputError("pairs: the paper's loop knows neither friction nor bonds; use method='augmented'")
 
+    if any(pair.offset is not None for pair in pairs):
+        raise InputError("pairs: the paper's loop knows no offsets; use method='augmented'")
+
     def known(time: float) -> Prescribed:
         return prescribed(time) if callable(prescribed) else prescribed.scaled(time / times[-1])
 

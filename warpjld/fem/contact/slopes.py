@@ -126,6 +126,10 @@ class _Pairs:
         off, per_area = self._mortar.aside(points.sites, points.area)
         wider = self.own.sum(axis=3)
         mean = np.einsum("pkai,pai->pka", spread, points.normal[corner]) + (points.gap - off)[corner][:, None] * wider
+        if self._mortar.offset is not None:
+            offset = self._mortar.offset[self.column[:, ::3] // 3]
+            mean += np.einsum("pkab,pb->pka", self.own, offset[:, :4])
+            mean += np.einsum("pkab,pb->pka", self.far, offset[:, 4:])
         gap = per_area[corner][:, None] * wider - mean / points.area[corner][:, None]
         where = np.broadcast_to(corner[:, None] >= 0, gap.shape)
         row = np.broadcast_to(corner[:, None], gap.shape)[where]

@@ -177,7 +177,8 @@ def build_flesh_hand(
 
     Args:
         rig: Surface and skeleton.
-        spacing: Edge length of the elements [m]; 3 mm is as coarse as fingers allow.
+        spacing: Edge length of the elements [m]; above 3 mm fingers are but three elements thick, and
+            stiffer than they should be: for a first look.
         name: Begins the names of regions, and names the face set of the skin.
         bone: Radius of a bone over the depth of its segment under the skin.
         flush: Shift of the bone towards the back over that depth.
