@@ -173,7 +173,8 @@ def _meeting(interface: Interface, stiffness: NDArray[np.float64]) -> NDArray[np
     own = interface.share @ stiffness[interface.slave.nodes]
     if len(interface.opposite) == 0:
         return np.asarray(own)
-    return np.asarray(np.minimum(own, float(np.median(stiffness[interface.opposite]))))
+    opposite = float(np.median(stiffness[interface.opposite]))
+    return np.asarray(2.0 * own * opposite / (own + opposite))
 
 
 def shifted(points: ContactPoints, move: NDArray[np.float64]) -> ContactPoints:

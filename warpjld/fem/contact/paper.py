@@ -258,6 +258,7 @@ def _touch(side: _Side, meeting: _Meeting, forces: NDArray[np.float64], x: NDArr
         meeting.distance,
         area,
         np.where(pressure > 0.0, area, 0.0),
+        np.where(pressure > 0.0, area, 0.0),
         np.zeros((len(nodes), 3)),
         pressure > 0.0,
         np.zeros(len(nodes), dtype=bool),

@@ -29,6 +29,7 @@ class Touch:
         gap: Distance, negative where the surfaces overlap [m], shape (m,).
         area: Slave area of each row [m²], shape (m,).
         pressed: The part of it inside the border of contact, which runs between nodes [m²], shape (m,).
+        held: The part of that which friction or a bond holds; its border runs between nodes as well [m²], shape (m,).
         slip: Tangential displacement relative to the other side since the instant before [m], shape (m, 3).
         sticking: Whether friction or a bond holds, shape (m,).
         bonded: Whether the bond still holds, shape (m,).
@@ -44,6 +45,7 @@ class Touch:
     gap: NDArray[np.float64]
     area: NDArray[np.float64]
     pressed: NDArray[np.float64]
+    held: NDArray[np.float64]
     slip: NDArray[np.float64]
     sticking: NDArray[np.bool_]
     bonded: NDArray[np.bool_]
@@ -90,7 +92,7 @@ class Touch:
     def sliding(self) -> float:
         """Share of the area under pressure that slides; NaN where nothing presses."""
         total = self.contact_area
-        return float(self.pressed[~self.sticking].sum()) / total if total > 0.0 else float("nan")
+        return 1.0 - float(self.held.sum()) / total if total > 0.0 else float("nan")
 
     @property
     def penetration(self) -> float:
