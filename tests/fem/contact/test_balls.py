@@ -50,20 +50,18 @@ def check(body: Body, found: ContactSolution) -> None:
     assert np.abs(gaps).max() < 0.15 * SAG  # distances along the polyhedra's normals, not the solver's smooth ones
 
 
-@pytest.mark.parametrize("poisson", [0.3, 0.49])
+@pytest.mark.parametrize("poisson", [0.3, 0.45, 0.49])
 def test_stiffness_ratios(poisson: float) -> None:
-    """Steps of a quarter of an edge: five coupled solves a step in the median, Newton's for large strain included."""
-    solves: list[int] = []
+    """Steps of a quarter of an edge: five coupled solves a step in the median of every pair of balls."""
     forces = []
-    for ratio in (0.1, 1.0, 10.0):
+    for ratio in (0.1, 0.3, 1.0, 3.0, 10.0):
         body, found = solved(ratio, poisson)
         check(body, found)
         assert len(found.steps) == len(STEPS)  # none was halved
-        solves += found.steps
+        assert np.median(found.steps) <= 5
+        assert max(found.steps) <= 8
         forces.append(float(np.linalg.norm(found.last.touches[0].force)))
-    assert np.median(solves) <= 5
-    assert max(solves) <= 10
-    assert forces[0] < forces[1] < forces[2]
+    assert (np.diff(forces) > 0.0).all()
 
 
 def test_friction() -> None:

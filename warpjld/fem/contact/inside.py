@@ -67,7 +67,8 @@ class Inside:
         still = pressed[j]  # where pressure ends, what sticks ends with it
         i, j = i[still], j[still]
         held = faces.depth(stuck, i, j, held_beyond(left[i], faces.inwards(left, stuck, i, j)))
-        return whole, np.minimum(self._at_nodes(faces, np.minimum(depth, held), pressed), whole)
+        held = np.where(pressed, np.minimum(depth, held), depth)
+        return whole, np.minimum(self._at_nodes(faces, held, pressed), whole)
 
     def _at_nodes(self, faces: _Faces, depth: NDArray[np.float64], pressed: NDArray[np.bool_]) -> NDArray[np.float64]:
         corners = faces.corners

@@ -14,6 +14,9 @@ from warpjld.fem.contact.solution import Touch
 
 __all__ = ["touch_of"]
 
+_LEAST = 1e-6
+"""Share of Coulomb's limit that a node which sticks has left at least."""
+
 
 def touch_of(
     interface: Interface,
@@ -54,7 +57,8 @@ def touch_of(
     active = mean @ response.active.astype(float)
     sticking = mean @ (response.sticking & response.active).astype(float) > 0.5 * active
     friction = np.linalg.norm(pushed - np.einsum("mi,mi->m", pushed, normal)[:, None] * normal, axis=1)
-    spare = np.where(sticking, np.maximum(interface.pair.friction * pressure - friction, 0.0), 0.0)
+    limit = interface.pair.friction * pressure
+    spare = np.where(sticking, np.maximum(limit - friction, _LEAST * limit), 0.0)
     inside = Inside(interface, near, area, x)
     pressed, held = inside.areas(pressure, mean @ points.gap if interface.averages else apart, modulus, spare)
     return Touch(
