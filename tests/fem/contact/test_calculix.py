@@ -9,7 +9,7 @@ meshes with a penalty of 200 E, writes areas of radius 0.312, 0.466, 0.327, 0.47
 the border's radius, and grows as faces shrink (linear at 0.1: 0.312 on 2048, 0.326 on 6912 elements).
 
 ``touching`` takes our radius by the same definition: on the same meshes 0.302, 0.461, 0.323, 0.471, within 2.5 % of
-what is noted. ``Touch.contact_area``, whose border runs inside faces, gives 0.332 and 0.479, 0.335 and 0.492: within 3 % of
+what is noted. ``Touch.contact_area``, its border inside faces, gives 0.332 and 0.479, 0.335 and 0.492: within 3 % of
 Hertz's radius for the force (a³ = 3 F R / 4 E*), linear within 1 % of what it goes to as the mesh is refined.
 
 The hollow ball (inner radius 0.8, ν 0.45; CalculiX with neo-Hooke 0.0093 and 0.0206 at 0.1 and 0.2): with full
