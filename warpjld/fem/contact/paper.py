@@ -21,13 +21,14 @@ from numpy.typing import NDArray
 from warpjld.fem.body import Body
 from warpjld.fem.conjugate import Status
 from warpjld.fem.contact.facets import Facets, Place
+from warpjld.fem.contact.law import Memory, start_memory
 from warpjld.fem.contact.obstacles import Obstacle
 from warpjld.fem.contact.pairs import Pair
 from warpjld.fem.contact.solution import ContactInstant, ContactSolution, Touch
 from warpjld.fem.contact.surface import ContactSurface, surface_of
 from warpjld.fem.loads import Loads
 from warpjld.fem.prescribed import Prescribed
-from warpjld.fem.solution import Solution
+from warpjld.fem.solution import Instant, Solution
 from warpjld.fem.static import solve
 
 __all__ = ["by_turns"]
@@ -37,8 +38,15 @@ _CAUTION = 0.25
 """First relaxation; it then changes by no more than a factor of two a turn."""
 _DEEPEST = 5.0
 """Overlap, over an edge, beyond which a node is taken to have another side of the master behind it."""
+_REPEL = 0.25
+"""Overlap, over an edge, that nodes are repelled by at once; where there is more, the step in time is halved."""
+_HALVINGS = 5
 _RUNAWAY = 1e3
 """Growth of the move from its least that is called divergence."""
+_ADVICE = {
+    False: "it settles where the skin is the stiffer body; else relax it after Aitken, or use the default method",
+    True: "take shorter steps in time, or use the default method",
+}
 
 
 @dataclass(frozen=True, eq=False)
@@ -67,6 +75,10 @@ class _Side:
             corners = master.corners
             self._facets = Facets(body.mesh.nodes[self.nodes], np.concatenate([corners[:, :3], corners[:, [0, 2, 3]]]))
             self.triangles = self._facets.faces
+
+    def memory(self) -> Memory:
+        """Who was pushed, for a later run: nodes with a pressure."""
+        return replace(start_memory(len(self.slave.nodes), self.pair), pressure=self.touching.astype(np.float64))
 
     def meet(self, x: NDArray[np.float64], skin: NDArray[np.float64], time: float) -> _Meeting:
         """Nodes that overlap or were pushed, at positions x (N, 3), and the polygons of ``skin`` (N, 3) under them."""
@@ -107,8 +119,10 @@ def by_turns(
     loads: Callable[[float], Loads],
     times: Sequence[float],
     *,
+    after: ContactSolution | None = None,
     aitken: bool = False,
     threshold: float = 1e-3,
+    guess: Callable[[float, float, NDArray[np.float64]], NDArray[np.float64]] | None = None,
     watch: Callable[[ContactInstant], str | None] | None = None,
     progress: Callable[[str], None] | None = None,
 ) -> ContactSolution:
@@ -120,8 +134,10 @@ def by_turns(
         pairs: Slave nodes are repelled by master facets.
         loads: Loads as a function of time.
         times: Rising times.
+        after: Displacements and forces to go on from.
         aitken: Relax the master's surface after Aitken (Küttler & Wall 2008).
         threshold: Move of any point, over an edge, below which it has settled.
+        guess: Where step 1 begins to look for the bodies; see ``press``.
         watch: See ``press``.
         progress: See ``press``.
     """
@@ -129,89 +145,177 @@ def by_turns(
     edge = min(float(side.slave.edge.min()) for side in sides)
     reached: list[ContactInstant] = []
     steps: list[int] = []
-    last: Solution | None = None
+    now, last = 0.0, _start(body)
+    if after is not None:
+        now, last = after.last.time, _start(body, after.last.displacement, after.last.reactions)
+        for side, known in zip(sides, after.memory, strict=True):
+            side.touching = known.pressure > 0.0
+    begun = last.last
     status, message = Status.CONVERGED, Status.CONVERGED.value
-    for time in times:
-        status, last, instant = _instant(
-            body, prescribed(time), sides, loads(time), time, last, aitken, threshold * edge
-        )
-        steps.append(instant.solves)
-        reached.append(instant)
+    todo, halvings = [float(time) for time in times], 0
+    while todo:
+        time = todo[0]
+        first = None if guess is None else guess(now, time, last.displacement)
+        touched = [side.touching.copy() for side in sides]
+        deepest = _REPEL * edge if halvings < _HALVINGS else np.inf
+        turns = _Turns(body, prescribed(time), sides, loads(time), time, aitken, threshold * edge)
+        status = turns.through(last, first, deepest)
         if progress:
-            progress(f"time {time:.3g}: {instant.solves // 2} turns, {status.value}")
+            progress(f"time {time:.3g}: {turns.report}")
         if status is not Status.CONVERGED:
-            message = (
-                f"at time {time:.4g}: repelling and releasing did not settle ({status.value}); it does where the "
-                "master is the stiffer body, or with Aitken's relaxation, or use the default method"
-            )
-            break
-        reason = watch(instant) if watch else None
+            halvings += 1
+            if halvings > _HALVINGS:
+                message = f"at time {time:.4g} (from {now:.4g}): {turns.report}; {_ADVICE[aitken]}"
+                break
+            for side, touching in zip(sides, touched, strict=True):
+                side.touching = touching
+            todo.insert(0, 0.5 * (now + time))
+            continue
+        steps.append(turns.solves)
+        last, now = turns.last, time
+        todo.pop(0)
+        halvings = max(0, halvings - 1)
+        if time not in times:
+            continue
+        reached.append(turns.instant())
+        reason = watch(reached[-1]) if watch else None
         if reason:
             status, message = Status.STOPPED, reason
             break
-    return ContactSolution(status, tuple(reached), message, (), tuple(steps), loads(reached[-1].time))
+    if not reached:
+        reached = [ContactInstant(now, begun.displacement, begun.reactions, (), 0, 0, 0.0)]
+    memory = tuple(side.memory() for side in sides)
+    return ContactSolution(status, tuple(reached), message, memory, tuple(steps), loads(reached[-1].time))
 
 
-def _instant(
-    body: Body,
-    known: Prescribed,
-    sides: list[_Side],
-    loads: Loads,
-    time: float,
-    last: Solution | None,
-    aitken: bool,
-    threshold: float,
-) -> tuple[Status, Solution, ContactInstant]:
-    rest = body.mesh.nodes
-    base = np.zeros_like(rest) if loads.nodal is None else loads.nodal
-    if last is None:
-        last = solve(body, known, loads, free="hold", check=False)
-    else:
-        last = solve(body, known, last.loads, after=last, free="hold", check=False)
-    u = last.displacement
-    surface = np.unique(np.concatenate([side.nodes for side in sides])).astype(np.int64)
-    skin = u[surface]
-    omega, before = _CAUTION if aitken else 1.0, np.zeros(0)
-    least, iterations, solves = np.inf, last.last.iterations, 0
-    status = Status.MAX_ITERATIONS
-    touches: list[Touch] = []
-    for _ in range(_TURNS):
-        held = rest.copy()
-        held[surface] += skin
-        meetings = [side.meet(rest + u, held, time) for side in sides]
-        repelled = _without(_repelled(rest, surface, skin, sides, meetings), known)
-        fixed = solve(body, known + repelled, loads, after=last, free="hold", check=False)
+def _start(
+    body: Body, displacement: NDArray[np.float64] | None = None, reactions: NDArray[np.float64] | None = None
+) -> Solution:
+    """Bodies at rest, or at a displacement (N, 3) with reactions (N, 3): the forces that are missing there to balance,
+    contact's and all others, are its loads.
+    """
+    nothing = np.zeros_like(body.mesh.nodes)
+    u = nothing if displacement is None else displacement
+    held = nothing if reactions is None else reactions
+    missing = body.at(u, stiffness=False).forces.reshape(-1, 3) - held if displacement is not None else nothing
+    instant = Instant(1.0, u, held, 0, 0, 0.0)
+    return Solution(Status.CONVERGED, (instant,), "", np.empty(0, np.int64), Loads(nodal=missing))
+
+
+class _Turns:
+    """Repelling and releasing at one time, in turns.
+
+    Attributes:
+        last: The last equilibrium of released bodies.
+        solves: Static solves, two a turn.
+        moves: Farthest move of any point in each turn [m].
+        report: How it ended, in words.
+    """
+
+    def __init__(
+        self,
+        body: Body,
+        known: Prescribed,
+        sides: list[_Side],
+        loads: Loads,
+        time: float,
+        aitken: bool,
+        threshold: float,
+    ) -> None:
+        self._body, self._known, self._sides, self._loads, self._time = body, known, sides, loads, time
+        self._aitken, self._threshold = aitken, threshold
+        self._touches: list[Touch] = []
+        self._iterations = 0
+        self.solves = 0
+        self.moves: list[float] = []
+        self.report = ""
+
+    def through(self, last: Solution, first: NDArray[np.float64] | None, deepest: float) -> Status:
+        """Turn until no point moves any more. Overlap beyond ``deepest`` [m] at the start is left to shorter steps."""
+        rest, surface = self._body.mesh.nodes, _surface(self._sides)
+        self.last = self._solve(self._known, last.loads, last, first)
+        if not self.last.converged:
+            return self._ended(self.last.status, f"the bodies do not follow what is prescribed: {self.last.message}")
+        skin = self.last.displacement[surface]
+        omega, before = _CAUTION if self._aitken else 1.0, np.zeros(0)
+        for turn in range(_TURNS):
+            u = self.last.displacement
+            held = rest.copy()
+            held[surface] += skin
+            meetings = [side.meet(rest + u, held, self._time) for side in self._sides]
+            overlap = max(float(np.maximum(-m.distance, 0.0).max(initial=0.0)) for m in meetings)
+            if turn == 0 and overlap > deepest:
+                return self._ended(Status.STAGNATED, f"bodies overlap by {1e3 * overlap:.3g} mm at once")
+            ended = self._turn(skin, surface, meetings)
+            if ended is not None:
+                return ended
+            off = (self.last.displacement[surface] - skin).ravel()
+            self.moves.append(max(float(np.abs(self.last.displacement - u).max()), float(np.abs(off).max(initial=0.0))))
+            if self.moves[-1] < self._threshold:
+                return self._ended(Status.CONVERGED, f"{turn + 1} turns")
+            if self.moves[-1] > _RUNAWAY * min(self.moves):
+                break
+            if self._aitken and len(before) and (off != before).any():
+                change = off - before
+                wanted = -omega * float(before @ change) / float(change @ change)
+                omega = float(np.clip(wanted, 0.5 * omega, min(2.0 * omega, 1.5)))
+            before = off
+            skin = skin + omega * off.reshape(-1, 3)
+        grows = self.growth
+        how = f"each turn moves {grows:.2f} times as far as the one before"
+        status = Status.STAGNATED if grows >= 1.0 else Status.MAX_ITERATIONS
+        return self._ended(status, f"repelling and releasing did not settle in {len(self.moves)} turns: {how}")
+
+    @property
+    def growth(self) -> float:
+        """Of the moves from turn to turn, as their geometric mean over the last ten; below 1 it settles."""
+        moves = self.moves[-11:]
+        return float((moves[-1] / moves[0]) ** (1.0 / (len(moves) - 1))) if len(moves) > 1 else np.nan
+
+    def instant(self) -> ContactInstant:
+        """What was reached."""
+        found = self.last.last
+        touches = tuple(self._touches)
+        return ContactInstant(
+            self._time, found.displacement, found.reactions, touches, self.solves, self._iterations, found.residual
+        )
+
+    def _turn(self, skin: NDArray[np.float64], surface: NDArray[np.int64], meetings: list[_Meeting]) -> Status | None:
+        """Steps 2 to 5 once, with the skin held; how that ended if it went wrong."""
+        rest, loads = self._body.mesh.nodes, self._loads
+        repelled = _without(_repelled(rest, surface, skin, self._sides, meetings), self._known)
+        fixed = self._solve(self._known + repelled, loads, self.last)
+        if not fixed.converged:
+            return self._ended(fixed.status, f"repelled bodies found no equilibrium: {fixed.message}")
         forces = np.zeros_like(rest)
-        touches = []
-        for side, meeting in zip(sides, meetings, strict=True):
+        self._touches = []
+        for side, meeting in zip(self._sides, meetings, strict=True):
             own = side.share(meeting, fixed.reactions[side.slave.nodes[meeting.rows]], forces)
-            touches.append(_touch(side, meeting, own, rest + fixed.displacement, len(rest)))
-        freed = solve(body, known, replace(loads, nodal=base + forces), after=last, free="hold", check=False)
-        solves += 2
-        iterations += fixed.last.iterations + freed.last.iterations
-        if not (fixed.converged and freed.converged):
-            status = (freed if fixed.converged else fixed).status
-            break
-        moved = float(np.abs(freed.displacement - u).max())
-        u, last = freed.displacement, freed
-        off = (u[surface] - skin).ravel()
-        gone = float(np.abs(off).max(initial=0.0))
-        if max(moved, gone) < threshold:
-            status = Status.CONVERGED
-            break
-        least = min(least, max(moved, gone))
-        if max(moved, gone) > _RUNAWAY * least:
-            status = Status.STAGNATED
-            break
-        if aitken and len(before) and (off != before).any():
-            change = off - before
-            wanted = -omega * float(before @ change) / float(change @ change)
-            omega = float(np.clip(wanted, 0.5 * omega, min(2.0 * omega, 1.5)))
-        before = off
-        skin = skin + omega * off.reshape(-1, 3)
-    residual = last.last.residual
-    instant = ContactInstant(time, u, last.reactions, tuple(touches), solves, iterations, residual)
-    return status, last, instant
+            self._touches.append(_touch(side, meeting, own, rest + fixed.displacement, len(rest)))
+        base = np.zeros_like(rest) if loads.nodal is None else loads.nodal
+        # from where they were repelled to: where contact has settled that is in equilibrium already
+        freed = self._solve(self._known, replace(loads, nodal=base + forces), fixed)
+        if not freed.converged:
+            return self._ended(freed.status, f"released bodies give way under the forces found: {freed.message}")
+        self.last = freed
+        self.solves += 2
+        return None
+
+    def _solve(
+        self, known: Prescribed, loads: Loads, after: Solution, guess: NDArray[np.float64] | None = None
+    ) -> Solution:
+        found = solve(self._body, known, loads, after=after, guess=guess, free="hold", check=False)
+        self._iterations += found.last.iterations
+        return found
+
+    def _ended(self, status: Status, report: str) -> Status:
+        self.report = report
+        return status
+
+
+def _surface(sides: list[_Side]) -> NDArray[np.int64]:
+    """Nodes of all masters."""
+    return np.unique(np.concatenate([side.nodes for side in sides])).astype(np.int64)
 
 
 def _repelled(

@@ -95,7 +95,7 @@ def press(
     if method not in _METHODS:
         raise InputError(f"method: want {' or '.join(_METHODS)}, got '{method}'")
     if method == "paper":
-        solution = _by_turns(body, prescribed, pairs, loads, wanted, after, aitken, penetration, watch, progress)
+        solution = _by_turns(body, prescribed, pairs, loads, wanted, after, aitken, penetration, guess, watch, progress)
     else:
         run = _Run(body, prescribed, list(pairs), loads, wanted, after, tolerance, penetration, guess)
         solution = run.through(watch, progress)
@@ -113,13 +113,14 @@ def _by_turns(
     after: ContactSolution | None,
     aitken: bool,
     threshold: float,
+    guess: Guess | None,
     watch: Callable[[ContactInstant], str | None] | None,
     progress: Callable[[str], None] | None,
 ) -> ContactSolution:
     from warpjld.fem.contact.paper import by_turns
 
-    if after is not None:
-        raise InputError("after: the paper's loop begins at rest")
+    if any(pair.exclusion is not None for pair in pairs):
+        raise InputError("pairs: the paper's loop does not know a surface that meets itself; use method='augmented'")
     if any(pair.friction > 0.0 or pair.bond is not None for pair in pairs):
         raise InputError("pairs: the paper's loop knows neither friction nor bonds; use method='augmented'")
 
@@ -129,7 +130,19 @@ def _by_turns(
     def load(time: float) -> Loads:
         return loads(time) if callable(loads) else (loads or Loads()).scaled(time / times[-1])
 
-    return by_turns(body, known, pairs, load, times, aitken=aitken, threshold=threshold, watch=watch, progress=progress)
+    return by_turns(
+        body,
+        known,
+        pairs,
+        load,
+        times,
+        after=after,
+        aitken=aitken,
+        threshold=threshold,
+        guess=guess,
+        watch=watch,
+        progress=progress,
+    )
 
 
 class _Run:
