@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from warpjld.errors import InputError
 from warpjld.fem.body import Body
 from warpjld.fem.conjugate import Status
+from warpjld.fem.contact.blocked import blocked
 from warpjld.fem.contact.border import contact_modulus
 from warpjld.fem.contact.equilibrium import Equilibrium, Reached, Step
 from warpjld.fem.contact.law import Memory, start_memory
@@ -163,6 +164,7 @@ class _Run:
         self.prescribed = prescribed
         self.loads = loads or Loads()
         self.guess = guess
+        self.penetration = penetration
         self.interfaces = interfaces_of(body.mesh, pairs, body.threads)
         self.moduli = [contact_modulus(body, interface) for interface in self.interfaces]
         self.equilibrium = Equilibrium(body, self.interfaces, tolerance=tolerance, penetration=penetration)
@@ -216,6 +218,9 @@ class _Run:
             status, found = self._find(step)
             solves += self.equilibrium.solves
             iterations += self.equilibrium.iterations
+            if overlap := self._blocked(step, found):
+                message = f"no equilibrium at time {target:.4g}: {overlap}; no force can part them"
+                return self._end(Status.BLOCKED, reached, message, step)
             if found is None:
                 halvings += 1
                 unheld = status in (Status.SLIDING, Status.UNHELD)
@@ -243,6 +248,24 @@ class _Run:
             if wish:
                 return self._end(Status.STOPPED, reached, wish, step)
         return self._end(Status.CONVERGED, reached, Status.CONVERGED.value, step)
+
+    def _blocked(self, step: Step, found: Reached | None) -> str:
+        """Overlap that nothing can part, in words; looked for where a step failed, or ended with an overlap."""
+        if found is None:
+            u = self.u.copy()
+            u[step.prescribed.degrees] = step.prescribed.values
+            x = self.body.mesh.nodes + u.reshape(-1, 3)
+            points = [interface.points(x, step.before, step.time) for interface in self.interfaces]
+        else:
+            points = found.points
+        return blocked(
+            self.interfaces,
+            points,
+            self.memory,
+            step.prescribed.free(self.body.degrees),
+            allowed=step.allowed,
+            penetration=self.penetration,
+        )
 
     def _find(self, step: Step) -> tuple[Status, Reached | None]:
         """Equilibrium of a step; again after every bond that did not hold."""
