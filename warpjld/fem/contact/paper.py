@@ -26,7 +26,7 @@ from warpjld.fem.contact.obstacles import Obstacle
 from warpjld.fem.contact.pairs import Pair
 from warpjld.fem.contact.solution import ContactInstant, ContactSolution, Touch
 from warpjld.fem.contact.surface import ContactSurface, surface_of
-from warpjld.fem.loads import Loads
+from warpjld.fem.loads import Loads, external_forces
 from warpjld.fem.prescribed import Prescribed
 from warpjld.fem.solution import Instant, Solution
 from warpjld.fem.static import solve
@@ -35,7 +35,9 @@ __all__ = ["by_turns"]
 
 _TURNS = 60
 _CAUTION = 0.25
-"""First relaxation; it then changes by no more than a factor of two a turn."""
+"""First relaxation where the two sides are as stiff as one another."""
+_LEAST, _MOST = 0.1, 2.0
+"""Factors by which it may change in a turn."""
 _DEEPEST = 5.0
 """Overlap, over an edge, beyond which a node is taken to have another side of the master behind it."""
 _REPEL = 0.25
@@ -145,9 +147,12 @@ def by_turns(
     edge = min(float(side.slave.edge.min()) for side in sides)
     reached: list[ContactInstant] = []
     steps: list[int] = []
-    now, last = 0.0, _start(body)
+    now, last = 0.0, Solution(Status.CONVERGED, (_at_rest(body),), "", np.empty(0, np.int64), loads(0.0))
+    forces, omega = np.zeros_like(body.mesh.nodes), _first_omega(body, sides) if aitken else 1.0
     if after is not None:
-        now, last = after.last.time, _start(body, after.last.displacement, after.last.reactions)
+        now = after.last.time
+        last = replace(last, instants=(replace(_at_rest(body), displacement=after.last.displacement),))
+        forces = _missing(body, loads(now), after.last)
         for side, known in zip(sides, after.memory, strict=True):
             side.touching = known.pressure > 0.0
     begun = last.last
@@ -158,13 +163,15 @@ def by_turns(
         first = None if guess is None else guess(now, time, last.displacement)
         touched = [side.touching.copy() for side in sides]
         deepest = _REPEL * edge if halvings < _HALVINGS else np.inf
-        turns = _Turns(body, prescribed(time), sides, loads(time), time, aitken, threshold * edge)
+        turns = _Turns(
+            body, prescribed(time), sides, loads(time), time, forces, omega if aitken else None, edge * threshold
+        )
         status = turns.through(last, first, deepest)
         if progress:
             progress(f"time {time:.3g}: {turns.report}")
         if status is not Status.CONVERGED:
             halvings += 1
-            if halvings > _HALVINGS:
+            if halvings > _HALVINGS or turns.diverged:  # that, shorter steps do not change
                 message = f"at time {time:.4g} (from {now:.4g}): {turns.report}; {_ADVICE[aitken]}"
                 break
             for side, touching in zip(sides, touched, strict=True):
@@ -172,7 +179,7 @@ def by_turns(
             todo.insert(0, 0.5 * (now + time))
             continue
         steps.append(turns.solves)
-        last, now = turns.last, time
+        last, now, forces, omega = turns.last, time, turns.forces, turns.omega
         todo.pop(0)
         halvings = max(0, halvings - 1)
         if time not in times:
@@ -188,18 +195,31 @@ def by_turns(
     return ContactSolution(status, tuple(reached), message, memory, tuple(steps), loads(reached[-1].time))
 
 
-def _start(
-    body: Body, displacement: NDArray[np.float64] | None = None, reactions: NDArray[np.float64] | None = None
-) -> Solution:
-    """Bodies at rest, or at a displacement (N, 3) with reactions (N, 3): the forces that are missing there to balance,
-    contact's and all others, are its loads.
-    """
+def _at_rest(body: Body) -> Instant:
     nothing = np.zeros_like(body.mesh.nodes)
-    u = nothing if displacement is None else displacement
-    held = nothing if reactions is None else reactions
-    missing = body.at(u, stiffness=False).forces.reshape(-1, 3) - held if displacement is not None else nothing
-    instant = Instant(1.0, u, held, 0, 0, 0.0)
-    return Solution(Status.CONVERGED, (instant,), "", np.empty(0, np.int64), Loads(nodal=missing))
+    return Instant(1.0, nothing, nothing, 0, 0, 0.0)
+
+
+def _missing(body: Body, loads: Loads, at: ContactInstant) -> NDArray[np.float64]:
+    """Contact forces of an instant [N], shape (N, 3): what loads and reactions leave to balance."""
+    internal = body.at(at.displacement, stiffness=False).forces.reshape(-1, 3)
+    return np.asarray(
+        internal - at.reactions - external_forces(body, loads, at.displacement.reshape(-1)).reshape(-1, 3)
+    )
+
+
+def _first_omega(body: Body, sides: list[_Side]) -> float:
+    """A cautious relaxation to begin with: the stiffer what is repelled, the more the skin overshoots; no obstacle."""
+    stiffness = body.at().stiffness
+    assert stiffness is not None
+    stiff = np.einsum("nii->n", stiffness.diagonal())
+    out = 1.0
+    for side in sides:
+        if len(side.nodes):
+            out = min(
+                out, _CAUTION * min(1.0, float(np.median(stiff[side.nodes]) / np.median(stiff[side.slave.nodes])))
+            )
+    return out
 
 
 class _Turns:
@@ -207,9 +227,12 @@ class _Turns:
 
     Attributes:
         last: The last equilibrium of released bodies.
+        forces: Contact forces on all nodes under which it is one [N], shape (N, 3).
+        omega: Share of the forces found that bodies are released under, over those of the turn before; plainly all.
         solves: Static solves, two a turn.
-        moves: Farthest move of any point in each turn [m].
+        moves: Farthest move or overlap of any point in each turn [m].
         report: How it ended, in words.
+        diverged: Whether turns did not settle, though each found its equilibria.
     """
 
     def __init__(
@@ -219,52 +242,71 @@ class _Turns:
         sides: list[_Side],
         loads: Loads,
         time: float,
-        aitken: bool,
+        forces: NDArray[np.float64],
+        omega: float | None,
         threshold: float,
     ) -> None:
         self._body, self._known, self._sides, self._loads, self._time = body, known, sides, loads, time
-        self._aitken, self._threshold = aitken, threshold
+        self._aitken, self._threshold = omega is not None, threshold
         self._touches: list[Touch] = []
         self._iterations = 0
+        self.forces, self.omega = forces, 1.0 if omega is None else omega
         self.solves = 0
         self.moves: list[float] = []
         self.report = ""
+        self.diverged = False
 
     def through(self, last: Solution, first: NDArray[np.float64] | None, deepest: float) -> Status:
         """Turn until no point moves any more. Overlap beyond ``deepest`` [m] at the start is left to shorter steps."""
         rest, surface = self._body.mesh.nodes, _surface(self._sides)
-        self.last = self._solve(self._known, last.loads, last, first)
+        self.last = self._solve(self._known, self._loaded(self.forces), last, first)
         if not self.last.converged:
             return self._ended(self.last.status, f"the bodies do not follow what is prescribed: {self.last.message}")
-        skin = self.last.displacement[surface]
-        omega, before = _CAUTION if self._aitken else 1.0, np.zeros(0)
+        before = np.zeros(0)
         for turn in range(_TURNS):
             u = self.last.displacement
-            held = rest.copy()
-            held[surface] += skin
-            meetings = [side.meet(rest + u, held, self._time) for side in self._sides]
+            meetings = [side.meet(rest + u, rest + u, self._time) for side in self._sides]
             overlap = max(float(np.maximum(-m.distance, 0.0).max(initial=0.0)) for m in meetings)
             if turn == 0 and overlap > deepest:
                 return self._ended(Status.STAGNATED, f"bodies overlap by {1e3 * overlap:.3g} mm at once")
-            ended = self._turn(skin, surface, meetings)
-            if ended is not None:
-                return ended
-            off = (self.last.displacement[surface] - skin).ravel()
-            self.moves.append(max(float(np.abs(self.last.displacement - u).max()), float(np.abs(off).max(initial=0.0))))
+            fixed, found = self._repelled(surface, meetings)
+            if not fixed.converged:
+                return self._ended(fixed.status, f"repelled bodies found no equilibrium: {fixed.message}")
+            off = (found - self.forces).ravel()
+            if self._aitken and len(before) and (off != before).any():
+                change = off - before
+                wanted = -self.omega * float(before @ change) / float(change @ change)
+                self.omega = float(np.clip(wanted, _LEAST * self.omega, min(_MOST * self.omega, 1.0)))
+            before = off
+            forces = self.forces + self.omega * off.reshape(-1, 3)
+            # from where they were repelled to, if under nearly those forces: that is in equilibrium already
+            start = fixed if self.omega > 0.5 else self.last
+            freed = self._solve(self._known, self._loaded(forces), start)
+            if not freed.converged:
+                return self._ended(freed.status, f"released bodies give way under the forces found: {freed.message}")
+            self.last, self.forces = freed, forces
+            self.solves += 2
+            moved = float(np.abs(freed.displacement - u).max())
+            # what is relaxed moves less than it has yet to go
+            self.moves.append(max(moved, self._way(fixed, u)))
             if self.moves[-1] < self._threshold:
                 return self._ended(Status.CONVERGED, f"{turn + 1} turns")
             if self.moves[-1] > _RUNAWAY * min(self.moves):
                 break
-            if self._aitken and len(before) and (off != before).any():
-                change = off - before
-                wanted = -omega * float(before @ change) / float(change @ change)
-                omega = float(np.clip(wanted, 0.5 * omega, min(2.0 * omega, 1.5)))
-            before = off
-            skin = skin + omega * off.reshape(-1, 3)
+        self.diverged = True
         grows = self.growth
         how = f"each turn moves {grows:.2f} times as far as the one before"
         status = Status.STAGNATED if grows >= 1.0 else Status.MAX_ITERATIONS
         return self._ended(status, f"repelling and releasing did not settle in {len(self.moves)} turns: {how}")
+
+    def _way(self, fixed: Solution, u: NDArray[np.float64]) -> float:
+        """How far nodes that stay pushed were repelled [m]."""
+        pushed = np.concatenate([side.slave.nodes[side.touching] for side in self._sides])
+        return float(np.abs(fixed.displacement[pushed] - u[pushed]).max(initial=0.0))
+
+    def _loaded(self, forces: NDArray[np.float64]) -> Loads:
+        nodal = forces if self._loads.nodal is None else self._loads.nodal + forces
+        return replace(self._loads, nodal=nodal)
 
     @property
     def growth(self) -> float:
@@ -280,26 +322,17 @@ class _Turns:
             self._time, found.displacement, found.reactions, touches, self.solves, self._iterations, found.residual
         )
 
-    def _turn(self, skin: NDArray[np.float64], surface: NDArray[np.int64], meetings: list[_Meeting]) -> Status | None:
-        """Steps 2 to 5 once, with the skin held; how that ended if it went wrong."""
-        rest, loads = self._body.mesh.nodes, self._loads
-        repelled = _without(_repelled(rest, surface, skin, self._sides, meetings), self._known)
-        fixed = self._solve(self._known + repelled, loads, self.last)
-        if not fixed.converged:
-            return self._ended(fixed.status, f"repelled bodies found no equilibrium: {fixed.message}")
+    def _repelled(self, surface: NDArray[np.int64], meetings: list[_Meeting]) -> tuple[Solution, NDArray[np.float64]]:
+        """Steps 2 to 4: bodies with the skin held and slave nodes on it, and the forces of that on all nodes [N]."""
+        rest, u = self._body.mesh.nodes, self.last.displacement
+        repelled = _without(_repelled(rest, surface, u[surface], self._sides, meetings), self._known)
+        fixed = self._solve(self._known + repelled, self._loads, self.last)
         forces = np.zeros_like(rest)
         self._touches = []
         for side, meeting in zip(self._sides, meetings, strict=True):
             own = side.share(meeting, fixed.reactions[side.slave.nodes[meeting.rows]], forces)
             self._touches.append(_touch(side, meeting, own, rest + fixed.displacement, len(rest)))
-        base = np.zeros_like(rest) if loads.nodal is None else loads.nodal
-        # from where they were repelled to: where contact has settled that is in equilibrium already
-        freed = self._solve(self._known, replace(loads, nodal=base + forces), fixed)
-        if not freed.converged:
-            return self._ended(freed.status, f"released bodies give way under the forces found: {freed.message}")
-        self.last = freed
-        self.solves += 2
-        return None
+        return fixed, forces
 
     def _solve(
         self, known: Prescribed, loads: Loads, after: Solution, guess: NDArray[np.float64] | None = None
