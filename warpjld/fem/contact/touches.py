@@ -62,7 +62,7 @@ def touch_of(
     inside = Inside(interface, near, area, x)
     pressed, held = inside.areas(pressure, mean @ points.gap if interface.averages else apart, modulus, spare)
     return Touch(
-        name=interface.pair.title,
+        name=interface.pair.label,
         nodes=nodes,
         position=x[nodes],
         normal=normal,
