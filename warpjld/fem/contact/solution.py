@@ -96,7 +96,11 @@ class Touch:
 
     @property
     def penetration(self) -> float:
-        """Deepest overlap [m], ≥ 0."""
+        """Deepest overlap [m], ≥ 0.
+
+        Between two meshes of averages over the nodes' surroundings, as they are held apart: single nodes of balls whose
+        faces do not match stand up to a tenth of an edge inside the other side's polygons, most at contact's border.
+        """
         return float(np.maximum(-self.gap, 0.0).max(initial=0.0))
 
 
