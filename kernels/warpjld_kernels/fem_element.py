@@ -14,6 +14,7 @@ per element (mean dilatation), whose small-strain limit is the B-bar element:
 
 The p of K_ab's second sum is an argument: with p itself K is the exact tangent; with the pressure that the last Newton
 step predicted, κ (θ − 1 + Σ G_a·Δu_a / V), it is the tangent of the mixed method, whose steps stay large where κ ≫ μ.
+Laws with full integration have p in their τ and c, at every point.
 """
 
 import warp as wp
@@ -86,6 +87,7 @@ class Sums:
         const int* ids = batches.elements.data + place;
         const int kind = batches.kinds.data[batch], count = left < N ? left : N;
         const bool large = kind >= NEO_HOOKE;
+        const bool full = kind == LINEAR_FULL || kind == NEO_HOOKE_FULL;
 
         Doubles rest[8][3], now[8][3], moved[8][3], c10, c01, kappa, beta, s0[6];
         for (int l = 0; l < N; ++l) {
@@ -118,15 +120,15 @@ class Sums:
                 const double* step = state.increment.data + 3 * model.elements.data[8 * ids[l] + a];
                 for (int i = 0; i < 3; ++i) PICK(swelling, l) += PICK(G[a][i], l) * step[i];
             }
-        for (int l = 0; l < N; ++l) PICK(held, l) = state.pressures.data[ids[l]];
+        for (int l = 0; l < N; ++l) PICK(held, l) = full ? 0.0 : state.pressures.data[ids[l]];
         const Doubles following = pressure + kappa * swelling / volume;
         for (int l = 0; l < count; ++l) out.pressures.data[ids[l]] = PICK(following, l);
-        const Doubles bulk = kind == LINEAR_FULL ? Doubles(0) : kappa / volume;
+        const Doubles bulk = full ? Doubles(0) : kappa / volume;
         Doubles K[36][9], f[8][3];
         for (int n = 0; n < 36; ++n)
             for (int i = 0; i < 9; ++i) K[n][i] = 0;
         for (int a = 0; a < 8; ++a)
-            for (int i = 0; i < 3; ++i) f[a][i] = large ? pressure * G[a][i] : Doubles(0);
+            for (int i = 0; i < 3; ++i) f[a][i] = large && !full ? pressure * G[a][i] : Doubles(0);
 
         for (int q = 0; q < 8; ++q) {
 """

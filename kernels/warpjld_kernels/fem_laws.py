@@ -1,7 +1,7 @@
 """C++ for the laws of materials: stress and tangent at a point, put together in ``fem_element``.
 
 A law gives an isochoric Kirchhoff stress τ and its spatial tangent c; the volumetric part is one pressure an element,
-but for ``LINEAR_FULL``. Numbers are ``Doubles``, one lane an element (see ``lanes``).
+but for ``LINEAR_FULL`` and ``NEO_HOOKE_FULL``. Numbers are ``Doubles``, one lane an element (see ``lanes``).
 """
 
 LINEAR = 0
@@ -12,9 +12,12 @@ NEO_HOOKE = 2
 MOONEY_RIVLIN = 3
 FUNG = 4
 """Neo-Hookean with a shear modulus that grows as exp(β (Ī₁ − 3))."""
+NEO_HOOKE_FULL = 5
+"""Neo-Hookean with U(J) at every point: locks as ``LINEAR_FULL`` does."""
 
 VOIGT = f"""
     constexpr int LINEAR_FULL = {LINEAR_FULL}, NEO_HOOKE = {NEO_HOOKE}, MOONEY_RIVLIN = {MOONEY_RIVLIN}, FUNG = {FUNG};
+    constexpr int NEO_HOOKE_FULL = {NEO_HOOKE_FULL};
     const int voigt[6][2] = {{{{0, 0}}, {{1, 1}}, {{2, 2}}, {{0, 1}}, {{1, 2}}, {{2, 0}}}};
     const int at[3][3] = {{{{0, 3, 5}}, {{3, 1, 4}}, {{5, 4, 2}}}};
 """
@@ -84,6 +87,13 @@ STRESS = """
                             if (I < 3 && J < 3) D[I][J] += mm / 9.0;
                         }
                 }
+                if (kind == NEO_HOOKE_FULL)
+                    for (int I = 0; I < 6; ++I) {
+                        const Doubles p = kappa * jacobian * (jacobian - 1.0);
+                        if (I < 3) tau[I] += p;
+                        D[I][I] -= (I < 3 ? 2.0 : 1.0) * p;
+                        for (int J = 0; J < 3 && I < 3; ++J) D[I][J] += p + kappa * jacobian * jacobian;
+                    }
                 Doubles FS[3][3];
                 for (int i = 0; i < 3; ++i)
                     for (int j = 0; j < 3; ++j)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -26,7 +28,14 @@ pytestmark = pytest.mark.filterwarnings("ignore::warpjld.fem.MaterialWarning")
 
 
 @pytest.mark.parametrize(
-    "law", [NeoHooke(1.0, 0.4), MooneyRivlin(0.3, 0.2, 0.45), Fung(1.0, 3.0, 0.4), LinearElastic(1.0, 0.3)]
+    "law",
+    [
+        NeoHooke(1.0, 0.4),
+        NeoHooke(1.0, 0.4, mean_dilatation=False),
+        MooneyRivlin(0.3, 0.2, 0.45),
+        Fung(1.0, 3.0, 0.4),
+        LinearElastic(1.0, 0.3),
+    ],
 )
 def test_tangent_against_finite_differences(law: Material) -> None:
     mesh = box((1.0, 1.0, 1.0), (2, 2, 2))
@@ -115,13 +124,53 @@ def test_shell_under_following_pressure(stretch: float, pressure: float) -> None
     assert radius / 0.8 == pytest.approx(stretch, rel=2e-3)
 
 
-@pytest.mark.parametrize("law", [NeoHooke(1.0, 0.3), MooneyRivlin(0.1, 0.09, 0.3), Fung(1.0, 5.0, 0.3)])
+@pytest.mark.parametrize(
+    "law",
+    [NeoHooke(1.0, 0.3), NeoHooke(1.0, 0.3, mean_dilatation=False), MooneyRivlin(0.1, 0.09, 0.3), Fung(1.0, 5.0, 0.3)],
+)
 def test_turning_as_a_whole_costs_nothing(law: Material) -> None:
     mesh = box((1.0, 1.0, 1.0), (2, 2, 2))
     angle = 2.0
     turn = np.array([[np.cos(angle), -np.sin(angle), 0], [np.sin(angle), np.cos(angle), 0], [0, 0, 1.0]])
     u = mesh.nodes @ turn.T - mesh.nodes
     assert np.abs(Body(mesh, law).at(u, stiffness=False).forces).max() < 1e-14
+
+
+@pytest.mark.parametrize("strain", [(0, 0), (1, 1), (2, 2), (0, 1), (1, 2), (2, 0)])
+def test_patch_with_full_integration(strain: tuple[int, int]) -> None:
+    """A uniform deformation of a fifth on a distorted mesh, and its stress, μ dev b̄ / J + κ (J − 1)."""
+    mesh = box((1.0, 1.0, 1.0), (3, 3, 3))
+    inside = np.setdiff1d(np.arange(len(mesh.nodes)), mesh.node_set("surface"))
+    nodes = mesh.nodes.copy()
+    nodes[inside] += np.random.default_rng(1).uniform(-0.05, 0.05, (len(inside), 3))
+    mesh = replace(mesh, nodes=nodes)
+    gradient = np.zeros((3, 3))
+    gradient[strain] = 0.2
+    exact = nodes @ gradient.T
+    surface = mesh.node_set("surface")
+    body = Body(mesh, NeoHooke(1.0, 0.3, mean_dilatation=False))
+    found = solve(body, prescribe(mesh, surface, displacement=exact[surface]), tolerance=1e-12)
+    np.testing.assert_allclose(found.displacement, exact, rtol=0, atol=1e-11)
+    f = np.eye(3) + gradient
+    volume = np.linalg.det(f)
+    b = f @ f.T * volume ** (-2.0 / 3.0)
+    stress = (b - np.trace(b) / 3.0 * np.eye(3)) / 2.6 / volume + (volume - 1.0) / 1.2 * np.eye(3)
+    expected = [stress[i, j] for i, j in ((0, 0), (1, 1), (2, 2), (0, 1), (1, 2), (2, 0))]
+    np.testing.assert_allclose(cauchy(body, found.displacement), np.tile(expected, (27, 1)), atol=1e-10)
+
+
+def test_full_integration_locks() -> None:
+    """A shell of nearly incompressible rubber that its own mean-dilatation element swells to 1.1."""
+    mesh = ball(1.0, inner=0.8, n=4, layers=2, octant=True)
+    held = prescribe(mesh, "x0", x=0) + prescribe(mesh, "y0", y=0) + prescribe(mesh, "z0", z=0)
+    wall = mesh.node_set("inner")
+    swollen = []
+    for mean_dilatation in (True, False):
+        body = Body(mesh, NeoHooke(2.9998, 0.4999, mean_dilatation=mean_dilatation))
+        found = solve(body, held, Loads(pressure={"inner": 0.144424}), instants=4)
+        swollen.append(np.linalg.norm((mesh.nodes + found.displacement)[wall], axis=1).mean() / 0.8 - 1.0)
+    assert swollen[0] == pytest.approx(0.1, rel=0.05)
+    assert swollen[1] < 0.5 * swollen[0]
 
 
 def test_uniform_stretch_of_mooney_rivlin() -> None:

@@ -28,6 +28,7 @@ class Status(Enum):
     INVERTED = "elements were turned inside out, however small the step"
     SLIDING = "slides: friction is not enough to hold it"
     UNHELD = "nothing holds it"
+    BLOCKED = "bodies overlap where all that meets is prescribed"
     STOPPED = "stopped as asked"
 
 

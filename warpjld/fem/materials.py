@@ -15,7 +15,7 @@ from warpjld.fem.hexmesh import HexMesh
 __all__ = ["Fung", "LinearElastic", "Material", "MaterialWarning", "MooneyRivlin", "NeoHooke", "laws_of"]
 
 _USUAL_POISSON = 0.49
-LINEAR, LINEAR_FULL, NEO_HOOKE, MOONEY_RIVLIN, FUNG = range(5)
+LINEAR, LINEAR_FULL, NEO_HOOKE, MOONEY_RIVLIN, FUNG, NEO_HOOKE_FULL = range(6)
 
 
 class MaterialWarning(UserWarning):
@@ -79,19 +79,22 @@ def LinearElastic(young: float, poisson: float, density: float = 1000.0, *, mean
     return Material(LINEAR if mean_dilatation else LINEAR_FULL, 0.5 * shear, 0.0, bulk, density)
 
 
-def NeoHooke(young: float, poisson: float, density: float = 1000.0) -> Material:
+def NeoHooke(young: float, poisson: float, density: float = 1000.0, *, mean_dilatation: bool = True) -> Material:
     """W = μ/2 (Ī₁ − 3) + κ/2 (θ − 1)², θ the element's mean volume ratio: rubber and flesh at large strain.
+
+    Without ``mean_dilatation`` θ is each point's own, as in programs with plain 8-node elements: it locks near ν = ½.
 
     Args:
         young: Young's modulus at small strain [Pa].
         poisson: Poisson's ratio at small strain, −1 < ν < ½; above .49 with a warning.
         density: [kg/m³].
+        mean_dilatation: One volume ratio, and so one pressure, per element.
 
     Raises:
         InputError: A modulus, ratio or density that no material has.
     """
     shear, bulk = _moduli(young, poisson, density)
-    return Material(NEO_HOOKE, 0.5 * shear, 0.0, bulk, density)
+    return Material(NEO_HOOKE if mean_dilatation else NEO_HOOKE_FULL, 0.5 * shear, 0.0, bulk, density)
 
 
 def MooneyRivlin(c10: float, c01: float, poisson: float = 0.49, density: float = 1000.0) -> Material:

@@ -26,6 +26,8 @@ _HALVINGS = 8
 _NEWTON = 16
 _CAUTIOUS = 25
 _LINE_SEARCH = 8
+_ROUNDING, _PLACES = 1e-13, 0.03
+"""As in ``contact.equilibrium``."""
 _DIRECT = 40_000
 """Degrees of freedom up to which a step with an indefinite stiffness is solved directly."""
 
@@ -246,7 +248,10 @@ class _Problem:
             start = max(start, now) if step == 0 and guessed is None else start
             scale = max(start, norm(external), norm(np.where(free, 0.0, tangent.forces - external)), 1e-300)
             moved = not jump.any()
-            if moved and now <= self.tolerance * scale:
+            # a body that is carried along as a whole ends without a force: of stiffness times place, this much is noise
+            stiff = np.einsum("nii->n", stiffness.diagonal()) / 3.0
+            noise = _ROUNDING * (norm(np.repeat(stiff, 3) * u) + _PLACES * norm(stiff) * body.mesh.size)
+            if moved and now <= max(self.tolerance * scale, noise):
                 reactions = np.where(free, 0.0, tangent.forces - external).reshape(-1, 3)
                 return Status.CONVERGED, Instant(target, u.reshape(-1, 3), reactions, step, iterations, now / scale)
             right = residual - stiffness.product(jump, threads=body.threads)

@@ -267,14 +267,14 @@ def _pairs(
 ) -> tuple[list[Pair], list[PairOf]]:
     soft = [(h.name, h.part.hand.name, h.softness) for h in hands]
     soft += [(o.name, o.volume.name, o.volume.physical.young) for o in objects]
+    # the paper's loop repels objects from the skin, and does not know skin that meets itself
+    paper = wishes.pressing is not None and wishes.pressing.method == "paper"
     pairs, owners = [], []
     for k, (name, faces, modulus) in enumerate(soft):
         for other, other_faces, other_modulus in soft[k + 1 :]:
             bonded = wishes.bond(name, other)
             bond = None if bonded is None else Bond(normal=bonded.normal, shear=bonded.shear)
             sides = [(name, faces), (other, other_faces)]
-            # the paper's loop repels objects from the skin
-            paper = wishes.pressing is not None and wishes.pressing.method == "paper"
             (slave, one), (master, two) = sides if modulus <= other_modulus and not paper else sides[::-1]
             friction = wishes.coefficient(name, other)
             pairs.append(Pair(one, two, friction, f"{slave}–{master}", bond=bond))
@@ -283,7 +283,7 @@ def _pairs(
             pairs.append(Pair(faces, obstacle, wishes.coefficient(name, other), f"{name}–{other}"))
             owners.append(PairOf(name, other))
     for hand in hands:
-        if hand.itself:
+        if hand.itself and not paper:
             flesh = hand.part.hand
             exclusion = Exclusion(flesh.skin_labels, flesh.skin_labels, flesh.excluded)
             friction = wishes.coefficient(hand.name, hand.name)

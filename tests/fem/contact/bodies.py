@@ -42,7 +42,7 @@ def lid(travel: float, height: float = 1.0) -> Plane:
 
 
 def mean_gaps(body: Body, instant: ContactInstant, slave: str, master: str, samples: int = 8) -> np.ndarray:
-    """Gap of two deformed surfaces averaged over the surroundings of each pressed slave node [m], shape (n,).
+    """Gap of two deformed surfaces averaged over the surroundings of each slave node where they meet [m], shape (n,).
 
     Found without the solver's own points: signed distances, negative inside, of a fine lattice on every slave face,
     weighted with the node's shape function. Between two polyhedra the distance itself swings about this mean by their
@@ -58,7 +58,7 @@ def mean_gaps(body: Body, instant: ContactInstant, slave: str, master: str, samp
     shape = np.stack([(1 - s) * (1 - t), s * (1 - t), s * t, (1 - s) * t], axis=1)
     faces = mesh.quads(mesh.face_set(slave))
     touch = instant.touches[0]
-    pressed = set(touch.nodes[touch.pressure > 0.0].tolist())
+    pressed = set(touch.nodes[(touch.pressure > 0.0) & (touch.gap < 1e-3 * np.sqrt(touch.area))].tolist())
     faces = faces[np.isin(faces, list(pressed)).any(axis=1)]
     points = np.einsum("qk,fki->fqi", shape, mesh.nodes[faces]).reshape(-1, 3)
     closest, _, triangle = trimesh.proximity.closest_point(surface, points)

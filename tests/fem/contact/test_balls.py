@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import numpy as np
-import pytest
 
 from tests.fem.contact.bodies import mean_gaps, named, together
 from warpjld.fem import Body, NeoHooke, Prescribed, ball, prescribe
@@ -50,20 +49,21 @@ def check(body: Body, found: ContactSolution) -> None:
     assert np.abs(gaps).max() < 0.15 * SAG  # distances along the polyhedra's normals, not the solver's smooth ones
 
 
-@pytest.mark.parametrize("poisson", [0.3, 0.49])
-def test_stiffness_ratios(poisson: float) -> None:
-    """Steps of a quarter of an edge: five coupled solves a step in the median, Newton's for large strain included."""
+def test_stiffness_ratios() -> None:
+    """Steps of a quarter of an edge: five coupled solves in the median of all, six at most in that of any pair."""
     solves: list[int] = []
-    forces = []
-    for ratio in (0.1, 1.0, 10.0):
-        body, found = solved(ratio, poisson)
-        check(body, found)
-        assert len(found.steps) == len(STEPS)  # none was halved
-        solves += found.steps
-        forces.append(float(np.linalg.norm(found.last.touches[0].force)))
+    for poisson in (0.3, 0.45, 0.49):
+        forces = []
+        for ratio in (0.1, 0.3, 1.0, 3.0, 10.0):
+            body, found = solved(ratio, poisson)
+            check(body, found)
+            assert len(found.steps) == len(STEPS)  # none was halved
+            assert np.median(found.steps) <= 6
+            assert max(found.steps) <= 8
+            solves += found.steps
+            forces.append(float(np.linalg.norm(found.last.touches[0].force)))
+        assert (np.diff(forces) > 0.0).all()
     assert np.median(solves) <= 5
-    assert max(solves) <= 10
-    assert forces[0] < forces[1] < forces[2]
 
 
 def test_friction() -> None:

@@ -7,8 +7,12 @@ import pytest
 
 from tests.fem.contact.bodies import FREE, lid, named, symmetric, together
 from warpjld.errors import InputError
-from warpjld.fem import Body, LinearElastic, NeoHooke, Status, ball, box, prescribe
+from warpjld.fem import Body, LinearElastic, Loads, NeoHooke, Status, ball, box, cylinder, prescribe
 from warpjld.fem.contact import Bond, ContactError, Exclusion, Pair, press
+from warpjld.fem.contact.loose import stiffened
+from warpjld.fem.contact.solids import Plane, Sphere
+from warpjld.fem.contact.step_solver import StepSolver
+from warpjld.fem.multigrid import IndefiniteError
 
 
 @pytest.fixture(scope="module")
@@ -88,11 +92,15 @@ def test_going_on_from_something_else(body: Body) -> None:
         press(body, held, [pair], times=(1.0,), after=found)
 
 
-def test_a_body_squeezed_to_nothing_says_so() -> None:
-    """Two plates that close entirely: the last equilibrium, and why there is no other."""
+@pytest.mark.parametrize(
+    ("travel", "message"),
+    [(0.97, "no equilibrium found after time"), (1.05, "no equilibrium at time 1: .* both sides are prescribed")],
+)
+def test_a_body_squeezed_to_nothing_says_so(travel: float, message: str) -> None:
+    """Two plates that close almost, or entirely: the last equilibrium, and why there is no other."""
     mesh = ball(1.0, n=3, octant=True)
-    with pytest.raises(ContactError, match="no equilibrium found after time") as caught:
-        press(Body(mesh, NeoHooke(1.0, 0.3)), symmetric(mesh), [Pair("outer", lid(1.05))], times=(0.2, 1.0))
+    with pytest.raises(ContactError, match=message) as caught:
+        press(Body(mesh, NeoHooke(1.0, 0.3)), symmetric(mesh), [Pair("outer", lid(travel))], times=(0.2, 1.0))
     solution = caught.value.solution
     assert solution.status is not Status.CONVERGED
     assert solution.last.time == 0.2
@@ -110,3 +118,98 @@ def test_stops_as_asked(body: Body) -> None:
 def test_a_free_body_without_loads_stays(body: Body) -> None:
     found = press(body, FREE, [Pair("outer", lid(0.1, height=3.0))])
     assert np.abs(found.last.displacement).max() == 0.0
+
+
+@pytest.mark.parametrize("young", [0.0, -1.0, float("nan"), float("inf")])
+def test_a_stiffness_that_nothing_has(young: float) -> None:
+    for law in (LinearElastic, NeoHooke):
+        with pytest.raises(InputError, match="young: want a modulus above 0 Pa"):
+            law(young, 0.3)
+
+
+def test_a_bond_to_nothing() -> None:
+    law = LinearElastic(1.0, 0.3)
+    body = together({name: (named(box(), name, (0, 0, z)), law) for name, z in (("a", 0.0), ("b", 3.0))})
+    held = prescribe(body.mesh, "a.z-", x=0.0, y=0.0, z=0.0) + prescribe(body.mesh, "b.z+", x=0.0, y=0.0, z=0.0)
+    with pytest.raises(InputError, match="a bond to nothing: its two sides do not meet"):
+        press(body, held, [Pair("a.z+", "b.z-", bond=Bond())])
+
+
+@pytest.mark.parametrize("beside", [0.3, 2.0], ids=["some of it", "all of it"])
+def test_overlap_of_sides_that_are_both_prescribed(beside: float) -> None:
+    """No force can part what may not move: named at once, without halving."""
+    mesh = box((1.0, 1.0, 0.5), (4, 4, 2))
+    above = np.flatnonzero((mesh.nodes[:, 2] == 0.5) & (mesh.nodes[:, 0] < beside))
+    held = prescribe(mesh, "z-", x=0.0, y=0.0, z=0.0) + prescribe(mesh, above, x=0.0, y=0.0, z=0.0)
+    pair = Pair("z+", lid(0.1, height=0.5), name="lid")
+    found = press(Body(mesh, NeoHooke(1.0, 0.3)), held, [pair], check=False)
+    assert found.status is Status.BLOCKED
+    assert "contact 'lid': both sides are prescribed and overlap by 0.1 m" in found.message
+    assert len(found.steps) == 0
+
+
+def test_what_starts_inside_an_object_that_does_not_give_way() -> None:
+    """A palm around a ball: a ring whose outside is held, and a ball in it that is larger than its hole. What there is
+    to be parted is parted, or its overlap is named; a bone inside the ball is the second."""
+    mesh = cylinder(1.0, 0.5, inner=0.5, n=8, layers=3, along=2)
+    body = Body(mesh, NeoHooke(1.0, 0.45))
+    outside = prescribe(mesh, "outer", x=0.0, y=0.0, z=0.0)
+    parted = press(body, outside, [Pair("inner", Sphere((0, 0, 0.25), 0.6))], times=(1.0,))
+    assert parted.last.touches[0].penetration < 1e-3 * 0.4
+    assert parted.last.touches[0].normal_force > 0.0
+    bone = outside + prescribe(mesh, "inner", x=0.0, y=0.0, z=0.0)
+    found = press(body, bone, [Pair("inner", Sphere((0, 0, 0.25), 0.6))], check=False)
+    assert found.status is Status.BLOCKED
+    assert "both sides are prescribed" in found.message
+
+
+def test_a_load_that_makes_a_block_give_way_is_named() -> None:
+    """A cube on the ground under a pressure that does not turn with it sways at about π² E / 48 (Euler): below that it
+    stands, above it there is no equilibrium to be found, and the last one is returned."""
+    mesh = box(counts=(4, 4, 4))
+    pair = Pair("z-", Plane((0, 0, 0), (0, 0, 1)), friction=0.4)
+    found = press(
+        Body(mesh, NeoHooke(1.0, 0.3)),
+        FREE,
+        [pair],
+        Loads(traction={"z+": (0.0, 0.0, -0.4)}),
+        times=(0.4, 1.0),
+        check=False,
+    )
+    assert found.status is Status.INDEFINITE
+    assert "unstable" in found.message
+    assert found.last.time == 0.4
+    assert found.last.touches[0].force[2] == pytest.approx(0.16, rel=1e-3)
+
+
+def test_a_stiffness_that_is_not_positive_definite_is_stiffened_for_a_step() -> None:
+    """A share of the nodes' own stiffness is added until conjugate gradients have something to go down on; where even
+    the largest share is not enough, it is said so."""
+    mesh = box(counts=(4, 4, 4))
+    body = Body(mesh, LinearElastic(1.0, 0.3))
+    free = prescribe(mesh, "z-", x=0.0, y=0.0, z=0.0).free(body.degrees)
+    stiffness = body.at().stiffness
+    assert stiffness is not None
+    stiff = np.einsum("nii->n", stiffness.diagonal()) / 3.0
+    right = np.where(free, 1.0, 0.0)
+    for less, solvable in ((0.0, True), (0.05, True), (3.0, False)):
+        matrix = stiffened(stiffness, -less * stiff)
+        solver = StepSolver(body, stiff, "float64")
+        if solvable:
+            done = solver.solve(matrix, free, right)
+            assert done.status is Status.CONVERGED
+            assert done.x @ right > 0.0
+        else:
+            with pytest.raises(IndefiniteError):
+                solver.solve(matrix, free, right)
+
+
+def test_a_guess_that_squeezes_elements_leads_to_the_same_equilibrium() -> None:
+    """Its false pressures are not believed: those of the equilibrium before are."""
+    mesh = ball(1.0, n=4, octant=True)
+    body, held, pairs = Body(mesh, NeoHooke(1.0, 0.49)), symmetric(mesh), [Pair("outer", lid(0.1))]
+    plain = press(body, held, pairs)
+    noise = np.random.default_rng(2).uniform(-0.02, 0.02, mesh.nodes.shape)
+    guessed = press(body, held, pairs, guess=lambda before, time, u: u + noise)
+    assert len(guessed.steps) == 1
+    np.testing.assert_allclose(guessed.last.displacement, plain.last.displacement, atol=2e-5)

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from warpjld.errors import InputError
 from warpjld.fem.body import Body
 from warpjld.fem.conjugate import Status
+from warpjld.fem.contact.blocked import blocked
 from warpjld.fem.contact.border import contact_modulus
 from warpjld.fem.contact.equilibrium import Equilibrium, Reached, Step
 from warpjld.fem.contact.law import Memory, start_memory
@@ -27,6 +28,8 @@ _HALVINGS = 7
 _HALVINGS_UNHELD = 3
 """A body that slides away, or falls, seldom does so because the step is long."""
 _BREAKS = 100
+_PART = 0.85
+"""How far along the course of the step before a first guess goes: contact stiffens what it meets."""
 _METHODS = ("augmented", "paper")
 
 Guess = Callable[[float, float, NDArray[np.float64]], NDArray[np.float64]]
@@ -93,7 +96,7 @@ def press(
     if method not in _METHODS:
         raise InputError(f"method: want {' or '.join(_METHODS)}, got '{method}'")
     if method == "paper":
-        solution = _by_turns(body, prescribed, pairs, loads, wanted, after, aitken, penetration, watch, progress)
+        solution = _by_turns(body, prescribed, pairs, loads, wanted, after, aitken, penetration, guess, watch, progress)
     else:
         run = _Run(body, prescribed, list(pairs), loads, wanted, after, tolerance, penetration, guess)
         solution = run.through(watch, progress)
@@ -111,13 +114,14 @@ def _by_turns(
     after: ContactSolution | None,
     aitken: bool,
     threshold: float,
+    guess: Guess | None,
     watch: Callable[[ContactInstant], str | None] | None,
     progress: Callable[[str], None] | None,
 ) -> ContactSolution:
     from warpjld.fem.contact.paper import by_turns
 
-    if after is not None:
-        raise InputError("after: the paper's loop begins at rest")
+    if any(pair.exclusion is not None for pair in pairs):
+        raise InputError("pairs: the paper's loop does not know a surface that meets itself; use method='augmented'")
     if any(pair.friction > 0.0 or pair.bond is not None for pair in pairs):
         raise InputError("pairs: the paper's loop knows neither friction nor bonds; use method='augmented'")
 
@@ -130,7 +134,19 @@ def _by_turns(
     def load(time: float) -> Loads:
         return loads(time) if callable(loads) else (loads or Loads()).scaled(time / times[-1])
 
-    return by_turns(body, known, pairs, load, times, aitken=aitken, threshold=threshold, watch=watch, progress=progress)
+    return by_turns(
+        body,
+        known,
+        pairs,
+        load,
+        times,
+        after=after,
+        aitken=aitken,
+        threshold=threshold,
+        guess=guess,
+        watch=watch,
+        progress=progress,
+    )
 
 
 class _Run:
@@ -151,6 +167,7 @@ class _Run:
         self.prescribed = prescribed
         self.loads = loads or Loads()
         self.guess = guess
+        self.penetration = penetration
         self.interfaces = interfaces_of(body.mesh, pairs, body.threads)
         self.moduli = [contact_modulus(body, interface) for interface in self.interfaces]
         self.equilibrium = Equilibrium(body, self.interfaces, self.moduli, tolerance=tolerance, penetration=penetration)
@@ -204,6 +221,9 @@ class _Run:
             status, found = self._find(step)
             solves += self.equilibrium.solves
             iterations += self.equilibrium.iterations
+            if overlap := self._blocked(step, found):
+                message = f"no equilibrium at time {target:.4g}: {overlap}; no force can part them"
+                return self._end(Status.BLOCKED, reached, message, step)
             if found is None:
                 halvings += 1
                 unheld = status in (Status.SLIDING, Status.UNHELD)
@@ -231,6 +251,24 @@ class _Run:
             if wish:
                 return self._end(Status.STOPPED, reached, wish, step)
         return self._end(Status.CONVERGED, reached, Status.CONVERGED.value, step)
+
+    def _blocked(self, step: Step, found: Reached | None) -> str:
+        """Overlap that nothing can part, in words; looked for where a step failed, or ended with an overlap."""
+        if found is None:
+            u = self.u.copy()
+            u[step.prescribed.degrees] = step.prescribed.values
+            x = self.body.mesh.nodes + u.reshape(-1, 3)
+            points = [interface.points(x, step.before, step.time) for interface in self.interfaces]
+        else:
+            points = found.points
+        return blocked(
+            self.interfaces,
+            points,
+            self.memory,
+            step.prescribed.free(self.body.degrees),
+            allowed=step.allowed,
+            penetration=self.penetration,
+        )
 
     def _find(self, step: Step) -> tuple[Status, Reached | None]:
         """Equilibrium of a step; again after every bond that did not hold."""
@@ -261,7 +299,7 @@ class _Run:
         if self.course is None:
             return None if self.guess is None else self._carried(step.before, step.time)
         carried = self._carried(step.before, step.time)
-        first: NDArray[np.float64] = carried + (step.time - step.before) * self.course.reshape(-1)
+        first: NDArray[np.float64] = carried + _PART * (step.time - step.before) * self.course.reshape(-1)
         if not self.body.large_strain or bool((self.body.at(first, stiffness=False).lowest > 0.0).all()):
             return first
         return None if self.guess is None else carried

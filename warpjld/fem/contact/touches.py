@@ -2,15 +2,20 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 from numpy.typing import NDArray
 
-from warpjld.fem.contact.border import pressed_at_nodes
+from warpjld.fem.contact.inside import Inside
 from warpjld.fem.contact.law import Response
 from warpjld.fem.contact.points import ContactPoints, Interface
 from warpjld.fem.contact.solution import Touch
 
 __all__ = ["touch_of"]
+
+_LEAST = 1e-6
+"""Share of Coulomb's limit that a node which sticks has left at least."""
 
 
 def touch_of(
@@ -22,7 +27,8 @@ def touch_of(
     modulus: NDArray[np.float64],
     x: NDArray[np.float64],
 ) -> Touch:
-    """A pair at an instant, from its points (m) to its slave nodes (n): averages by area; of gaps the least.
+    """A pair at an instant, from its points (m) to its slave nodes (n): what presses on a node, over its share of the
+    surface (between two meshes the multipliers themselves swing from node to node).
 
     Args:
         interface: The pair.
@@ -33,35 +39,53 @@ def touch_of(
         modulus: E* at all slave nodes [Pa], for the border of contact (see ``border``).
         x: Positions of the body's nodes [m], shape (N, 3).
     """
-    share = interface.share[points.sites]
+    share = points.weights[:, interface.slave.nodes].maximum(0.0)  # of what a point stands for, the slave's side
     weight = share.T.multiply(points.area).tocsr()
     area = np.asarray(weight.sum(axis=1)).ravel()
     near = np.flatnonzero(area > 0.0)
     area = area[near]
-    mean = weight[near] / area[:, None]
-    mean = mean.tocsr()
+    mean = (weight[near] / area[:, None]).tocsr()
     traction = response.traction(points)
     across = slip - np.einsum("mi,mi->m", slip, points.normal)[:, None] * points.normal
     normal = mean @ points.normal
     size = np.linalg.norm(normal, axis=1, keepdims=True)
+    normal = np.divide(normal, size, out=np.zeros_like(normal), where=size > 0.0)
     nodes = interface.slave.nodes[near]
-    pressure = mean @ response.pressure
-    gap = np.minimum.reduceat(points.gap[mean.indices], mean.indptr[:-1]) if len(near) else np.empty(0)
+    pressure, pushed = mean @ response.pressure, mean @ traction
+    apart = _gaps(interface, points, near, mean)
     holds = mean @ bonded[points.sites].astype(float) > 0.0
-    pressed = np.where(holds, area, pressed_at_nodes(interface, near, pressure, mean @ points.gap, area, modulus, x))
+    active = mean @ response.active.astype(float)
+    sticking = mean @ (response.sticking & response.active).astype(float) > 0.5 * active
+    friction = np.linalg.norm(pushed - np.einsum("mi,mi->m", pushed, normal)[:, None] * normal, axis=1)
+    limit = interface.pair.friction * pressure
+    spare = np.where(sticking, np.maximum(limit - friction, _LEAST * limit), 0.0)
+    inside = Inside(interface, near, area, x)
+    pressed, held = inside.areas(pressure, mean @ points.gap if interface.averages else apart, modulus, spare)
     return Touch(
         name=interface.pair.label,
         nodes=nodes,
         position=x[nodes],
-        normal=np.divide(normal, size, out=np.zeros_like(normal), where=size > 0.0),
+        normal=normal,
         pressure=pressure,
-        traction=mean @ traction,
-        gap=gap,
+        traction=pushed,
+        gap=apart,
         area=area,
-        pressed=pressed,
+        pressed=np.where(holds, area, pressed),
+        held=np.where(holds, area, held),
         slip=mean @ across,
-        sticking=mean @ (response.sticking & response.active).astype(float)
-        > 0.5 * (mean @ response.active.astype(float)),
+        sticking=sticking,
         bonded=holds,
         nodal=points.forces(traction),
     )
+
+
+def _gaps(interface: Interface, points: ContactPoints, near: NDArray[np.int64], mean: Any) -> NDArray[np.float64]:
+    """Gaps of slave nodes: their own between meshes, else the least of their points [m], shape (n,)."""
+    if len(near) == 0:
+        return np.empty(0)
+    least = np.minimum.reduceat(points.gap[mean.indices], mean.indptr[:-1])
+    if len(interface.opposite):
+        own = np.full(len(interface.slave.nodes), np.nan)
+        own[points.sites] = points.gap
+        least = np.where(np.isnan(own[near]), least, own[near])
+    return np.asarray(least, np.float64)
