@@ -22,7 +22,7 @@ EXACT = 1e-5
 class Touching:
     """Two wavy blocks on each other, of different meshes, one turned, with pressures on some of what they share."""
 
-    def __init__(self, seed: int) -> None:
+    def __init__(self, seed: int, offset: float = 0.0) -> None:
         rng = np.random.default_rng(seed)
         low = named(box((1.0, 1.0, 0.4), (5, 5, 2)), "a", (-0.5, -0.5, -0.4))
         high = named(box((1.0, 1.0, 0.4), (4, 4, 2)), "b", (-0.45, -0.52, 0.0))
@@ -31,7 +31,9 @@ class Touching:
         self.mesh = merge(low, high)
         self.x = self.mesh.nodes + 5e-4 * rng.normal(size=self.mesh.nodes.shape)
         self.x[:, 2] += 0.04 * np.sin(3.0 * self.x[:, 0] + 1.0) * np.cos(2.0 * self.x[:, 1])
-        self.pair = Pair("a.z+", "b.z-")
+        seen = offset * rng.uniform(size=len(self.x)) if offset else None
+        self.pair = Pair("a.z+", "b.z-", offset=seen)
+        self.x[:, 2] -= np.where(self.mesh.nodes[:, 2] < 0.0, offset, 0.0)  # what is seen lies outside
         self.interface = Interface(self.mesh, self.pair, 1)
         found = self.interface.points(self.x, 0.0, 0.0)
         pressure = np.zeros(len(self.interface.edge))
@@ -59,9 +61,9 @@ class Touching:
         return points, response, found
 
 
-@pytest.mark.parametrize("seed", [0, 1, 2])
-def test_against_differences(seed: int) -> None:
-    touching = Touching(seed)
+@pytest.mark.parametrize(("seed", "offset"), [(0, 0.0), (1, 0.0), (2, 0.0), (3, 0.005)])
+def test_against_differences(seed: int, offset: float) -> None:
+    touching = Touching(seed, offset)
     points, response, slopes = touching.slopes()
     active = response.active
     assert 3 < active.sum() < len(active)

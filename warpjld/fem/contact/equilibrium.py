@@ -229,6 +229,8 @@ class Equilibrium:
             if falls > _CARELESS:
                 break
         status, self.trouble = loose.trouble(self.interfaces, contact)
+        if status is Status.MAX_ITERATIONS and self._damping.share > 0.0:
+            status = Status.INDEFINITE
         return status, None
 
     def _solved(
