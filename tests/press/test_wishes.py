@@ -13,7 +13,7 @@ from warpjld.fem.contact.barr import Barr
 from warpjld.fem.contact.meshes import Keyframed
 from warpjld.fem.contact.solids import Box, Sphere
 from warpjld.press.wishes import Points
-from warpjld.script.pressing import prop_obstacle
+from warpjld.script.press_bodies import prop_obstacle
 from warpjld.script.props import prop_places
 from warpjld.script.staging import frame_numbers
 
