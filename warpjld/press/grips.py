@@ -25,7 +25,7 @@ __all__ = ["FoundGrip", "find_grip", "write_grips"]
 
 _START = math.radians(0.5)
 """First step of a search [rad]."""
-_NEAR = 0.05
+_NEAR = 0.08
 """How near to the gentlest grip, as a share of its angle."""
 
 _HELD = (GripStatus.HELD, GripStatus.HELD_AT_ONCE)

@@ -26,7 +26,7 @@ _LOWERINGS = 14
 _FAR = 0.25
 """An object that sinks by this share of its height slides."""
 
-_LEFT = 0.02
+_LEFT = 0.01
 """Share of the weight that may be left on the handle before it lets go."""
 
 _HOPELESS = 0.95

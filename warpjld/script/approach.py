@@ -56,7 +56,9 @@ def approach(scene: Scene, pressing: Pressing) -> Approach:
     # what stands on its points gives way to its weight by so little that it may do so in the first step
     if keyed or (any(wishes.gravity) and (free or not wishes.grips)):
         return Approach(float(pressing.first), moved)
-    for frame in range(pressing.first, pressing.last + 1):
+    # a grip is searched for from digits that touch, and may do so without pressing: that has to be solved
+    latest = min([pressing.last - 1.0, *(np.ceil(wish.first) - 1.0 for wish in wishes.grips)])
+    for frame in range(pressing.first, int(latest) + 1):
         held, places = _held(scene, float(frame), free, moved)
         if held:
             return Approach(float(max(pressing.first, frame - 1)), moved)
@@ -64,7 +66,7 @@ def approach(scene: Scene, pressing: Pressing) -> Approach:
             frames, sequence = moved.setdefault(name, ([], []))
             frames.append(float(frame))
             sequence.append(place)
-    return Approach(float(pressing.last - 1), moved)
+    return Approach(latest, moved)
 
 
 def _held(

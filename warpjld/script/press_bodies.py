@@ -127,15 +127,9 @@ def _lifted(scene: Scene, wish: GripWish, volume: ObjectVolume) -> tuple[ObjectV
 
     pull = np.array(scene.contact.pull)
     axis = int(np.argmax(np.abs(pull)))
-    if np.count_nonzero(pull) != 1:
-        raise InputError("LIFT wants a GRAVITY along one axis of the stage")
-    if any(state.tracks for (name, _), state in scene.contact.prescribed.items() if name == wish.object):
-        raise InputError("LIFT wants an object that nothing but HOLD keeps in its place: no VECTOR and no PARTIAL")
     if wish.weight is not None:
         density = wish.weight / (float(np.abs(pull).max()) * float(volumes(volume.mesh).sum()))
         volume = replace(volume, physical=replace(volume.physical, density=density))
-    if not volume.physical.density > 0.0:
-        raise InputError("it weighs nothing: give it a DENSITY, or say how much to LIFT with WEIGHT")
     return volume, Support(handle_of(volume.mesh.nodes), axis)
 
 

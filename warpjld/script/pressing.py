@@ -14,6 +14,7 @@ from warpjld.errors import InputError
 from warpjld.press.wishes import ContactWishes, GripWish, Pressing, placed
 from warpjld.script.approach import approach
 from warpjld.script.press_bodies import hand_body, object_body, prop_obstacle
+from warpjld.script.press_checks import check_wishes
 from warpjld.script.press_keys import corrected_keys, gripped_keys
 from warpjld.script.press_rows import PressRows
 
@@ -89,7 +90,7 @@ def _run(scene: Scene, pressing: Pressing, folder: Path, progress: Report) -> Pr
     from warpjld.press.verdict import verdict_of
 
     wishes = scene.contact
-    _check_wishes(scene, wishes, pressing)
+    check_wishes(scene, pressing)
     progress("looking for the first touch", 0, 1)
     before = approach(scene, pressing)
     start = before.start
@@ -129,32 +130,6 @@ def _run(scene: Scene, pressing: Pressing, folder: Path, progress: Report) -> Pr
     return PressReport(Pressed(bodies, solved, pushed, shapes), table.rows, verdict, grips, notes)
 
 
-def _check_wishes(scene: Scene, wishes: ContactWishes, pressing: Pressing) -> None:
-    """Refuse grips and corrections that cannot be."""
-    for wish in wishes.grips:
-        try:
-            if wish.actor not in wishes.flesh:
-                raise InputError(f"{wish.actor} has no flesh that deforms: FLESH {wish.actor} makes it so")
-            if wish.lift and wish.object not in wishes.physical:
-                raise InputError(
-                    f"{wish.object} is not physical and weighs nothing: PHYSICAL {wish.object} makes it so"
-                )
-            if wish.first < pressing.first or wish.last > pressing.last:
-                span = f"{pressing.first} to {pressing.last}"
-                raise InputError(f"its frames must lie in those of PRESS, {span}, got {wish.first:g} to {wish.last:g}")
-            if pressing.method == "paper":
-                raise InputError("a grip cannot be searched for by the paper's method, which knows no friction")
-        except InputError as error:
-            raise placed(error, wish.where) from None
-    if pressing.state is not None and (wishes.grips or pressing.correct):
-        raise InputError("STATE keeps no grips and no corrections: leave it out")
-    if pressing.correct and pressing.method == "paper":
-        raise InputError("CORRECT goes on from the frame before: the paper's method cannot")
-    recorded = [name for name in wishes.flesh if scene.actor(name).recorded is not None]
-    if pressing.correct and recorded:
-        raise InputError(f"actor {recorded[0]} is driven by a MOTION file: no angle can be corrected")
-
-
 def _frames(pressing: Pressing, wishes: ContactWishes, start: float) -> list[float]:
     """Frames to solve: every so many, the last, and those at which a grip begins or ends."""
     frames = {float(f) for f in range(pressing.first, pressing.last + 1, pressing.every)} | {float(pressing.last)}
@@ -180,9 +155,5 @@ def _pauses(scene: Scene, bodies: Bodies, found: list[FoundGrip]) -> dict[float,
 
     pauses: dict[float, Callable[[ContactSolution], None]] = {}
     for wish in scene.contact.grips:
-        if wish.first in pauses:
-            raise placed(InputError(f"two grips begin at frame {wish.first:g}"), wish.where)
-        if wish.first <= bodies.start:
-            raise placed(InputError(f"at frame {wish.first:g} nothing touches yet: GRASP comes first"), wish.where)
         pauses[wish.first] = partial(search, wish)
     return pauses
