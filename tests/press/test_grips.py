@@ -33,21 +33,21 @@ FINGER23 LEFT INDEX KNUCKLES2  AT 0 40
 FINGER23 LEFT INDEX KNUCKLES3  AT 0 20
 FINGER1  LEFT THUMB ABDUCTION  AT 0 8
 FINGER1  LEFT THUMB FLEXION    AT 0 -15
-PHYSICAL BALL YOUNG 200000 POISSON 0.45 ELEMENT 0.006
+PHYSICAL BALL YOUNG 200000 POISSON 0.45 ELEMENT 0.004
 FLESH LEFT THUMB INDEX ELEMENT 0.003 ITSELF OFF
 SPLINE 1
 GRASP 0 10 LEFT BALL THUMB COUPLING 1 0.6
-SQUEEZE 10 12 LEFT 1
+SQUEEZE 10 12 LEFT 2
 """
 
 
 @pytest.fixture(scope="module")
 def pressed(rig, tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, dict, Scene]:
-    """A finger presses a plate with 1.5 N: the script made once."""
+    """A finger presses a plate with 0.6 N: the script made once."""
     scene = Scene(say=lambda text: None)
     scene.add("left", rig)
     Interpreter(scene).run_text(
-        PLATE + "SQUEEZE 5 8 LEFT FORCE 1.5\nPRESS 2 8\nSIZE 160 120\nPICTURE 8 'a.png'\n"
+        PLATE + "SQUEEZE 5 8 LEFT FORCE 0.6\nPRESS 2 8\nSIZE 160 120\nPICTURE 8 'a.png'\n"
         "TACTILE 'touch.csv'\nTACTILE 'touch.png' LEFT\nTACTILE 'touch.parquet'"
     )
     out = tmp_path_factory.mktemp("force")
@@ -58,11 +58,11 @@ def test_a_finger_presses_with_the_force_asked_for(pressed: tuple[Path, dict, Sc
     out, summary, scene = pressed
     (found,) = summary["press"]["searches"]
     assert found["status"] == "REACHED"
-    assert found["force_n"] == pytest.approx(1.5, rel=0.02)
+    assert found["force_n"] == pytest.approx(0.6, rel=0.02)
     assert list(found["digits"]) == ["left.index"]
-    assert "1.5 N asked for" in summary["press"]["grips"][0]
+    assert "0.6 N asked for" in summary["press"]["grips"][0]
     rows = [row for row in csv.DictReader((out / "contact.csv").open(encoding="utf-8")) if row["digit"] == "index"]
-    assert float(rows[-1]["force_n"]) == pytest.approx(1.5, rel=0.05)  # on another way: friction remembers
+    assert float(rows[-1]["force_n"]) == pytest.approx(0.6, rel=0.05)  # on another way: friction remembers
     tried = list(csv.DictReader((out / "grips.csv").open(encoding="utf-8")))
     assert sum(int(row["chosen"]) for row in tried) == 1
     # the angle that was found is a key now
@@ -76,10 +76,10 @@ def test_the_pad_feels_what_the_plate_bears(pressed: tuple[Path, dict, Scene]) -
     out, _, _ = pressed
     rows = [r for r in csv.DictReader((out / "touch.csv").open(encoding="utf-8")) if r["pad"] == "left.index.distal"]
     force = np.array([float(row["normal_force"]) for row in rows])
-    assert len(rows) >= 5
+    assert len(rows) >= 4
     assert (np.diff(force) >= 0.0).all()
-    assert force[-1] == pytest.approx(1.5, rel=0.1)
-    assert float(rows[-1]["force_y"]) == pytest.approx(1.5, rel=0.1)
+    assert force[-1] == pytest.approx(0.6, rel=0.1)
+    assert float(rows[-1]["force_y"]) == pytest.approx(0.6, rel=0.1)
     centre = [float(rows[-1][f"centre_{axis}"]) for axis in "xyz"]
     np.testing.assert_allclose(centre, [0.034, -0.0245, -0.168], atol=6e-3)
     assert float(rows[-1]["slip"]) >= 0.0
@@ -95,6 +95,7 @@ def solved(scene: Scene, out: Path) -> PressReport:
     return report
 
 
+@pytest.mark.slow
 def test_a_force_beyond_the_muscles_is_unreachable(run: Callable[[str], Scene], tmp_path: Path) -> None:
     scene = run(PLATE + "STRENGTH LEFT INDEX 0.5\nSQUEEZE 5 8 LEFT FORCE 4 INDEX MOST 6\nPRESS 2 8 EVERY 3")
     report = solved(scene, tmp_path)
@@ -113,6 +114,7 @@ def test_a_force_beyond_the_range_of_motion_is_unreachable(run: Callable[[str], 
     assert math.degrees(found.grip) == pytest.approx(0.5)
 
 
+@pytest.mark.slow
 def test_digits_that_bear_too_much_are_opened(run: Callable[[str], Scene], tmp_path: Path) -> None:
     scene = run(PLATE + "STRENGTH LEFT INDEX 1\nSQUEEZE 5 8 LEFT 2.5\nPRESS 2 8 CORRECT")
     wanted = float(scene.actor("left").motion.value("left.index.base.flexion", 8.0))
@@ -130,7 +132,7 @@ def test_digits_that_bear_too_much_are_opened(run: Callable[[str], Scene], tmp_p
 @pytest.mark.parametrize(
     ("lines", "status", "text"),
     [
-        ("LIFT 12 16 LEFT BALL WEIGHT 30 MOST 1", "LIMIT", "30 N of BALL: does not hold at the firmest grip"),
+        ("LIFT 12 16 LEFT BALL WEIGHT 30 MOST 0.5", "LIMIT", "30 N of BALL: does not hold at the firmest grip"),
         ("STRENGTH LEFT THUMB 0.2\nLIFT 12 16 LEFT BALL WEIGHT 30", "TOO_WEAK", "than the muscles have"),
     ],
 )

@@ -28,6 +28,9 @@ _START = math.radians(0.5)
 _NEAR = 0.08
 """How near to the gentlest grip, as a share of its angle."""
 
+_PRESSES = 0.01
+"""A digit presses with more than this share of the strongest: flesh between two digits hands a little on to both."""
+
 _HELD = (GripStatus.HELD, GripStatus.HELD_AT_ONCE)
 _COLUMNS = ("actor", "object", "frame", "grip_deg", "held", "force_n", "sliding", "share", "digit", "chosen", "status")
 
@@ -158,7 +161,8 @@ def _digits(effort: Effort | None, wish: GripWish) -> dict[str, tuple[float, flo
     """Digits that press."""
     if effort is None:
         return {}
-    return {d.digit: (d.force, d.limit, d.share) for d in effort.digits if d.force > 1e-9}
+    least = _PRESSES * max(d.force for d in effort.digits)
+    return {d.digit: (d.force, d.limit, d.share) for d in effort.digits if d.force > least}
 
 
 def _row(
