@@ -5,10 +5,14 @@ from __future__ import annotations
 import os
 from functools import cache
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import pytest
 
 from warpjld.rig import Rig
+
+if TYPE_CHECKING:
+    from warpjld.covering import Covering
 
 _DATA = Path(__file__).resolve().parents[2] / "shared" / "data"
 
@@ -24,6 +28,20 @@ def data() -> Path:
     if not _DATA.is_dir():
         pytest.skip("third-party assets (../shared/data) are not here")
     return _DATA
+
+
+@pytest.fixture(scope="session")
+def hands() -> dict[str, Rig]:
+    """Built-in hands by side, coarse."""
+    return {side: _built(side, resolution=1500) for side in ("left", "right")}
+
+
+@pytest.fixture(scope="session")
+def bound(hands: dict[str, Rig]) -> Covering:
+    """The coarse left hand, bound."""
+    from warpjld.covering import bind
+
+    return bind(hands["left"].skeleton, hands["left"].surface)
 
 
 @pytest.fixture

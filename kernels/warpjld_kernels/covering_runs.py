@@ -7,12 +7,9 @@ a GPU the same loops have one lane and neighbouring threads take neighbouring ve
 
 import warp as wp
 
-wp.set_module_options(
-    {
-        "enable_backward": False,
-        "cpu_compiler_flags": "-march=native -ffp-contract=fast -mprefer-vector-width=512",
-    }
-)
+from warpjld_kernels.lanes import VECTORISED
+
+wp.set_module_options(VECTORISED)
 
 CPU_LANES = 64
 """Vertices one CPU thread index computes together; a run has at least as many. On a GPU it is 1."""

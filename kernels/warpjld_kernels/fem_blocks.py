@@ -9,12 +9,9 @@ from typing import Any
 
 import warp as wp
 
-wp.set_module_options(
-    {
-        "enable_backward": False,
-        "cpu_compiler_flags": "-march=native -ffp-contract=fast -mprefer-vector-width=512",
-    }
-)
+from warpjld_kernels.lanes import VECTORISED
+
+wp.set_module_options(VECTORISED)
 
 _ROW = """
     const int begin = rows.data[row], end = rows.data[row + 1];
@@ -64,6 +61,26 @@ def row_product(  # noqa: F811
 ) -> wp.vec3d: ...
 
 
+@wp.func
+def values_at(node: int, x: wp.array(dtype=Any)):
+    """The three values of a node."""
+    return wp.vector(x[3 * node], x[3 * node + 1], x[3 * node + 2])
+
+
+@wp.func
+def set_values(node: int, s: Any, x_out: wp.array(dtype=Any)):
+    x_out[3 * node] = s[0]
+    x_out[3 * node + 1] = s[1]
+    x_out[3 * node + 2] = s[2]
+
+
+@wp.func
+def scaled(node: int, i: int, inverse: wp.array(dtype=Any), r: Any):
+    """One value of D⁻¹ r at a node; D⁻¹ holds inverted diagonal blocks."""
+    at = 9 * node + 3 * i
+    return inverse[at] * r[0] + inverse[at + 1] * r[1] + inverse[at + 2] * r[2]
+
+
 @wp.kernel
 def product(
     # matrix
@@ -78,10 +95,7 @@ def product(
 ):
     """y = A x over rows from ``first`` on."""
     row = first + wp.tid()
-    s = row_product(row, rows, columns, values, x)
-    y_out[3 * row] = s[0]
-    y_out[3 * row + 1] = s[1]
-    y_out[3 * row + 2] = s[2]
+    set_values(row, row_product(row, rows, columns, values, x), y_out)
 
 
 @wp.kernel
@@ -99,10 +113,7 @@ def residual(
 ):
     """r = b − A x over rows from ``first`` on."""
     row = first + wp.tid()
-    s = row_product(row, rows, columns, values, x)
-    r_out[3 * row] = b[3 * row] - s[0]
-    r_out[3 * row + 1] = b[3 * row + 1] - s[1]
-    r_out[3 * row + 2] = b[3 * row + 2] - s[2]
+    set_values(row, values_at(row, b) - row_product(row, rows, columns, values, x), r_out)
 
 
 @wp.kernel
@@ -119,12 +130,11 @@ def first_step(
 ):
     """The smoother's first step from x = 0: x = step = scale · D⁻¹ b."""
     row = first + wp.tid()
+    r = values_at(row, b)
     for i in range(3):
-        d = inverse[9 * row + 3 * i] * b[3 * row]
-        d += inverse[9 * row + 3 * i + 1] * b[3 * row + 1]
-        d += inverse[9 * row + 3 * i + 2] * b[3 * row + 2]
-        step_out[3 * row + i] = scale * d
-        x_out[3 * row + i] = scale * d
+        moved = scale * scaled(row, i, inverse, r)
+        step_out[3 * row + i] = moved
+        x_out[3 * row + i] = moved
 
 
 @wp.kernel
@@ -146,15 +156,11 @@ def chebyshev_step(
     # out
     x_out: wp.array(dtype=Any),
 ):
-    """step = momentum · step + scale · D⁻¹ (b − A x), x' = x + step; D⁻¹ holds inverted diagonal blocks."""
+    """step = momentum · step + scale · D⁻¹ (b − A x), x' = x + step."""
     row = first + wp.tid()
-    s = row_product(row, rows, columns, values, x)
-    r0 = b[3 * row] - s[0]
-    r1 = b[3 * row + 1] - s[1]
-    r2 = b[3 * row + 2] - s[2]
+    r = values_at(row, b) - row_product(row, rows, columns, values, x)
     for i in range(3):
-        d = inverse[9 * row + 3 * i] * r0 + inverse[9 * row + 3 * i + 1] * r1 + inverse[9 * row + 3 * i + 2] * r2
-        moved = momentum * step[3 * row + i] + scale * d
+        moved = momentum * step[3 * row + i] + scale * scaled(row, i, inverse, r)
         step[3 * row + i] = moved
         x_out[3 * row + i] = x[3 * row + i] + moved
 
@@ -175,22 +181,12 @@ def interpolate(
     """y = W x or y + W x, one scalar weight for the three values of a node: prolongation, or restriction with Wᵀ."""
     row = first + wp.tid()
     zero = weights.dtype(0.0)
-    s0 = zero
-    s1 = zero
-    s2 = zero
+    s = wp.vector(zero, zero, zero)
     for k in range(rows[row], rows[row + 1]):
-        w = weights[k]
-        column = 3 * columns[k]
-        s0 += w * x[column]
-        s1 += w * x[column + 1]
-        s2 += w * x[column + 2]
+        s += weights[k] * values_at(columns[k], x)
     if add:
-        s0 += y_out[3 * row]
-        s1 += y_out[3 * row + 1]
-        s2 += y_out[3 * row + 2]
-    y_out[3 * row] = s0
-    y_out[3 * row + 1] = s1
-    y_out[3 * row + 2] = s2
+        s += values_at(row, y_out)
+    set_values(row, s, y_out)
 
 
 # both precisions at once: one module to compile, whichever is asked for first

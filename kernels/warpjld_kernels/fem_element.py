@@ -20,14 +20,9 @@ import warp as wp
 
 from warpjld_kernels.fem_hexahedron import CORNERS, GRADIENTS
 from warpjld_kernels.fem_laws import STRESS, VOIGT
-from warpjld_kernels.lanes import prelude
+from warpjld_kernels.lanes import VECTORISED, prelude
 
-wp.set_module_options(
-    {
-        "enable_backward": False,
-        "cpu_compiler_flags": "-march=native -ffp-contract=fast -mprefer-vector-width=512",
-    }
-)
+wp.set_module_options(VECTORISED)
 
 LANES = 8
 """Elements computed together."""

@@ -6,12 +6,9 @@ of rows has its own marker, so ranges may run side by side; sums are in the same
 
 import warp as wp
 
-wp.set_module_options(
-    {
-        "enable_backward": False,
-        "cpu_compiler_flags": "-march=native -ffp-contract=fast -mprefer-vector-width=512",
-    }
-)
+from warpjld_kernels.lanes import VECTORISED
+
+wp.set_module_options(VECTORISED)
 
 
 @wp.struct

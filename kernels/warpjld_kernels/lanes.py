@@ -14,6 +14,12 @@ either.
 | ``FIRST_OF(bits)`` | number of the lowest bit set |
 """
 
+VECTORISED = {
+    "enable_backward": False,
+    "cpu_compiler_flags": "-march=native -ffp-contract=fast -mprefer-vector-width=512",
+}
+"""Options of a module whose loops are to fill the CPU's vector registers."""
+
 
 def prelude(lanes: int) -> str:
     """What a native function's body begins with."""

@@ -2,15 +2,10 @@
 
 import warp as wp
 
+from warpjld_kernels.lanes import VECTORISED
 from warpjld_kernels.triangle_tree import SLIVER, Tree, nearest_triangle
 
-wp.set_module_options(
-    {
-        "max_unroll": 1,
-        "enable_backward": False,
-        "cpu_compiler_flags": "-march=native -ffp-contract=fast -mprefer-vector-width=512",
-    }
-)
+wp.set_module_options({**VECTORISED, "max_unroll": 1})
 
 FAR = wp.constant(1.0e10)
 # half-width of the band round 1/2 in which a winding number by far-field expansion is not trusted

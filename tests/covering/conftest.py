@@ -6,21 +6,14 @@ from pathlib import Path
 
 import pytest
 
-from warpjld.covering import Covering, bind
-from warpjld.hand import build_hand
 from warpjld.io import load_rig
 from warpjld.rig import Rig
 
 
 @pytest.fixture(scope="session")
-def built() -> Rig:
-    """The built-in left hand, small."""
-    return build_hand("left", resolution=1500)
-
-
-@pytest.fixture(scope="session")
-def bound(built: Rig) -> Covering:
-    return bind(built.skeleton, built.surface)
+def built(hands: dict[str, Rig]) -> Rig:
+    """The built-in left hand, coarse."""
+    return hands["left"]
 
 
 @pytest.fixture(scope="session")

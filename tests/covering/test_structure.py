@@ -13,7 +13,6 @@ from tests.covering.poses import random_angles, random_poses
 from warpjld.covering import Covering, bind
 from warpjld.covering.paper import PaperCovering
 from warpjld.errors import InputError
-from warpjld.hand import build_hand
 from warpjld.io import load_rig
 from warpjld.rig import Rig
 from warpjld.skeleton import poses_from_angles, rest_poses
@@ -106,8 +105,8 @@ def test_poses_that_are_not_finite_are_refused(bound: Covering, field: str) -> N
 
 
 @pytest.mark.parametrize("method", ["smooth", "paper"])
-def test_hands_mirror_each_other(built: Rig, method: Method) -> None:
-    right = build_hand("right", resolution=1500)
+def test_hands_mirror_each_other(hands: dict[str, Rig], built: Rig, method: Method) -> None:
+    right = hands["right"]
     mirror = np.array([-1.0, 1.0, 1.0])
     np.testing.assert_allclose(right.surface.vertices * mirror, built.surface.vertices, atol=1e-12)
     moved = []

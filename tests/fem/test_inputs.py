@@ -52,7 +52,7 @@ def test_poisson_near_a_half_warns() -> None:
 
 
 def test_unknown_region_suggests() -> None:
-    with pytest.raises(InputError, match="did you mean 'body'"):
+    with pytest.raises(InputError, match="did you mean body"):
         Body(box(counts=(1, 1, 1)), {"bodi": LAW})
 
 

@@ -12,7 +12,7 @@ import trimesh
 
 from warpjld.cli import main
 from warpjld.errors import InputError
-from warpjld.fem.study import load_study
+from warpjld.fem.study_file import load_study
 
 EXAMPLE = Path(__file__).resolve().parents[2] / "examples" / "inflate_ball.toml"
 SMALL = """
@@ -69,24 +69,37 @@ def test_study_writes_a_series_and_reactions(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("old", "new", "message"),
     [
-        ('kind = "box"', 'kind = "boxx"', "unknown 'boxx', did you mean 'box'"),
-        ("young = 1e5", "young = 0", r"\[material.body\] young: want a modulus above 0"),
-        ("poisson = 0.45", "poisson = 0.5", r"\[material.body\] poisson: want"),
-        ("poisson = 0.45", "poison = 0.45", "did you mean 'poisson'"),
-        ("[material.body]", "[material.bodi]", "no region 'bodi', did you mean 'body'"),
-        ('law = "neo-hooke"', 'law = "neohooke"', "did you mean 'neo-hooke'"),
+        ('kind = "box"', 'kind = "boxx"', r":3: mesh.kind: want one of box, .*'boxx'; did you mean box\?"),
+        ("young = 1e5", "young = 0", ":8: material.body.young: want a modulus above 0"),
+        ("poisson = 0.45", "poisson = 0.5", ":9: material.body.poisson: want −1 < ν < 0.5"),
+        ("poisson = 0.45", "poison = 0.45", r":9: material.body.poison: unknown key; did you mean poisson\?"),
+        ("[material.body]", "[material.bodi]", "no region 'bodi'; did you mean body"),
+        ('law = "neo-hooke"', 'law = "neohooke"', "did you mean neo-hooke"),
         ("above = { x = 0.9 }", "above = { x = 9.0 }", r"\[sets.rim\] holds no node"),
         ('where = "z+"', 'where = "top"', "no node set 'top'"),
         ("counts = [2, 2, 4]", "counts = [2, 2, 0]", "counts: want three positive"),
         ("[[step]]", "[step]", "not TOML"),
-        ("counts = [2, 2, 4]", 'counts = "many"', r"\[mesh\] counts: want an array of numbers, got 'many'"),
-        ("young = 1e5", 'young = "soft"', r"\[material.body\] young: want a number, got 'soft'"),
-        ("instants = 2", "centrifugal = { axle = [0, 0, 1] }", "pull' centrifugal: unknown 'axle'"),
-        ("instants = 2", 'gravity = "down"', "gravity: want an array of numbers, got 'down'"),
-        ("instants = 2", "gravity = [0, 9.81]", "gravity: want three numbers"),
-        ("instants = 2", "instants = 0", "'pull' instants: want a whole number from 1 on, got 0"),
+        ("counts = [2, 2, 4]", 'counts = "many"', ":5: mesh.counts: want a finite number, got 'many'"),
+        ("young = 1e5", 'young = "soft"', ":8: material.body.young: want a finite number, got 'soft'"),
+        (
+            "instants = 2",
+            "centrifugal = { axle = [0, 0, 1] }",
+            "centrifugal.axis: is missing",
+        ),
+        ("instants = 2", 'gravity = "down"', r":15: step\[0\].gravity: want 3 numbers, got 'down'"),
+        ("instants = 2", "gravity = [0, 9.81]", r":15: step\[0\].gravity: want 3 numbers, got \[0, 9.81\]"),
+        ("instants = 2", "instants = 0", r":15: step\[0\].instants: want a whole number from 1 on, got 0"),
         ("instants = 2", 'free = "held"', "free: want one of refuse, hold, got 'held'"),
-        ("[material.body]", '[solver]\nmethod = "multigrd"\n[material.body]', r"\[solver\] method: want one of auto, "),
+        (
+            "[material.body]",
+            '[solver]\nmethod = "multigrd"\n[material.body]',
+            "solver.method: .* did you mean multigrid",
+        ),
+        ('of = "z+"', 'off = "z+"', r":11: sets.rim.off: unknown key; did you mean of\?"),
+        ("above = { x = 0.9 }", "above = { w = 0.9 }", "sets.rim.above.w: unknown key"),
+        ("instants = 2", "force = { top = 3 }", "force.top: want 3 numbers, got 3"),
+        ('{ where = "z+", onto = { z = 2.4 } }', '{ where = "z+" }', "is given no displacement"),
+        ('name = "pull"', 'nam = "pull"', r":14: step\[0\].nam: unknown key; did you mean name\?"),
         ("instants = 2", "traction = { lid = [0, 0, 1] }", "traction on a missing face set"),
     ],
 )
@@ -96,6 +109,15 @@ def test_wrong_study(tmp_path: Path, old: str, new: str, message: str) -> None:
     with pytest.raises(InputError, match=message) as caught:
         load_study(path)
     assert caught.value.path == path
+
+
+def test_a_set_named_twice_keeps_all_it_is_held_by(tmp_path: Path) -> None:
+    twice = '{ where = "z+", x = 0.0 }, { where = "z+", onto = { z = 2.4 } }'
+    (tmp_path / "twice.toml").write_text(SMALL.replace('{ where = "z+", onto = { z = 2.4 } }', twice))
+    study = load_study(tmp_path / "twice.toml")
+    held = next(study.run()).held["z+"]
+    top = study.body.mesh.node_set("z+")
+    np.testing.assert_array_equal(held, np.sort(np.concatenate([3 * top, 3 * top + 2])))
 
 
 def test_missing_face_and_free_body_are_one_line(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -6,13 +6,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from warpjld.grasp.objects import GraspObject
-from warpjld.grasp.winding import winding_numbers
+from warpjld.winding import winding_numbers
 
 
 def signed_distance(points: NDArray, thing: GraspObject) -> NDArray[np.float64]:
     """Distances [m] in the object's frame, negative where the surface winds more than half round."""
     unsigned = np.array([_to_triangles(p, thing.vertices[thing.faces]).min() for p in points])
-    return np.where(winding_numbers(points, thing.vertices, thing.faces) > 0.5, -unsigned, unsigned)
+    return np.where(winding_numbers(thing.vertices, thing.faces, points) > 0.5, -unsigned, unsigned)
 
 
 def _to_triangles(p: NDArray, corner: NDArray) -> NDArray[np.float64]:

@@ -148,7 +148,7 @@ def test_parts_by_name(covering) -> None:
     assert set(last) < set(part_vertices(covering, "left.index")) == set(part_vertices(covering, "INDEX"))
     assert pad_vertex(covering, "index") in last
     assert len(part_vertices(covering, None)) == len(covering.surface.vertices)
-    with pytest.raises(InputError, match="did you mean 'index'"):
+    with pytest.raises(InputError, match="did you mean index"):
         part_vertices(covering, "indx")
     with pytest.raises(InputError, match="no digit 'toe'"):
         digit_chains(covering.skeleton, ["toe"])

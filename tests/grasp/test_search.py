@@ -126,9 +126,7 @@ def test_beside_the_facet_is_told(stiff) -> None:
     vertex, floor = top(stiff, 0.6), PLANE.placed((0.0, -0.02, 0))
     beside = int(np.flatnonzero(floor.normals[:, 1] > 0.9)[0])
     search = FlexionSearch(stiff, ObjectSet([floor, floor.placed((5.0, -0.02, 0))]))
-    found = search.run(
-        *straight(stiff), Searches(vertex=vertex, joint=1, facet=[beside, beside + 1], thing=[[0], [1]][0])
-    )
+    found = search.run(*straight(stiff), Searches(vertex=vertex, joint=1, facet=[beside, beside + 1]))
     assert found.inside.sum() == 1  # one of the two triangles of the top lies under the vertex
     found = search.run(*straight(stiff), Searches(vertex=vertex, joint=1, facet=beside, thing=1))
     assert not found.inside[0]
@@ -214,7 +212,7 @@ def test_a_batch_is_bit_for_bit_what_its_searches_are_alone(covering, bench) -> 
             ),
             places=places[searches.place[k]],
         )
-        for field in ("status", "closing", "distance", "facet", "evaluations", "angles"):
+        for field in ("status", "closing", "angles", "distance", "facet", "inside", "point", "evaluations"):
             np.testing.assert_array_equal(getattr(alone, field)[0], getattr(together, field)[k])
 
 
@@ -253,6 +251,8 @@ def test_joints_may_bend_together(covering) -> None:
         ({"distance": np.nan}, "distance is not finite"),
         ({"rate": np.inf}, "rate and stop must be finite"),
         ({"vertex": [1, 2], "facet": [1, 2, 3]}, "one value or one for each"),
+        ({"joint": []}, r"joint wants shape .* got \(0, 1\)"),
+        ({"vertex": []}, "want at least one"),
     ],
 )
 def test_wrong_searches(stiff, change, says: str) -> None:

@@ -232,7 +232,7 @@ def mesh_of(rig: Rig) -> tuple[np.ndarray, np.ndarray]:
         ({"length": float("nan")}, "length: want metres"),
         ({"breadth": 0.03}, "breadth: want metres, 0.061…0.118"),
         ({"resolution": 10}, "resolution: want a number of vertices"),
-        ({"proportions": {"indx": 1.1}}, "did you mean 'index'"),
+        ({"proportions": {"indx": 1.1}}, "did you mean index"),
         ({"proportions": {"index": 4.0}}, "proportions of 'index': want a length"),
     ],
 )

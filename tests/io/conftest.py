@@ -11,7 +11,6 @@ import pygltflib as gl
 import pytest
 from scipy.spatial.transform import Rotation
 
-from warpjld.hand import build_hand
 from warpjld.rig import Rig
 
 
@@ -153,17 +152,11 @@ def write_glb() -> Callable[[Glb, Path], Path]:
 
 
 @pytest.fixture(scope="session")
-def built() -> dict[str, Rig]:
-    """The built-in hands, coarse."""
-    return {side: build_hand(side, resolution=1500) for side in ("left", "right")}
-
-
-@pytest.fixture(scope="session")
-def hand_glb(built: dict[str, Rig]) -> Callable[..., Glb]:
+def hand_glb(hands: dict[str, Rig]) -> Callable[..., Glb]:
     """A built-in hand as file content: bones on any local axis, rigid weights, names of one's choice."""
 
     def make(side: str = "left", axis: tuple[float, float, float] = (0, 1, 0), names: object = None) -> Glb:
-        rig = built[side]
+        rig = hands[side]
         keep = [j for j, name in enumerate(rig.skeleton.names) if not name.endswith(".forearm")]
         skeleton = rig.skeleton
         parents = [keep.index(int(p)) if (p := skeleton.parents[j]) in keep else -1 for j in keep]

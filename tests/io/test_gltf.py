@@ -29,23 +29,23 @@ def same_rest(rig, built, atol=CLOSE):
 
 @pytest.mark.parametrize("axis", [(0, 1, 0), (1, 0, 0), (0, 0, -1), (-1, 0, 0)])
 @pytest.mark.parametrize("flat", [False, True])
-def test_bone_axis_conventions_and_flat_files_give_the_same_rig(write_glb, hand_glb, built, tmp_path, axis, flat):
+def test_bone_axis_conventions_and_flat_files_give_the_same_rig(write_glb, hand_glb, hands, tmp_path, axis, flat):
     named = load_rig(write_glb(replace(hand_glb(axis=axis), flat=flat), tmp_path / "named.glb"))
-    same_rest(named, built["left"])
+    same_rest(named, hands["left"])
     number = iter(range(100))
     glb = replace(hand_glb(axis=axis, names=lambda name: f"bone_{next(number):03d}"), flat=flat)
     unnamed = load_rig(write_glb(glb, tmp_path / "unnamed.glb"))
-    same_rest(unnamed, built["left"])
+    same_rest(unnamed, hands["left"])
     np.testing.assert_allclose(unnamed.skeleton.axes, named.skeleton.axes, atol=1e-9)
 
 
-def test_axes_agree_with_those_the_built_in_hand_was_made_with(write_glb, hand_glb, built, tmp_path):
+def test_axes_agree_with_those_the_built_in_hand_was_made_with(write_glb, hand_glb, hands, tmp_path):
     for side in ("left", "right"):
         rig = load_rig(write_glb(hand_glb(side), tmp_path / f"{side}.glb"))
         for name in hand_joint_names(side):
             cosine = (
                 rig.skeleton.axes[rig.skeleton.index(name)]
-                @ built[side].skeleton.axes[built[side].skeleton.index(name)]
+                @ hands[side].skeleton.axes[hands[side].skeleton.index(name)]
             )
             assert cosine > np.cos(np.radians(12)), name
 
@@ -61,24 +61,24 @@ def test_six_influences_survive(write_glb, hand_glb, tmp_path):
     np.testing.assert_allclose(got, dense, atol=1e-6)
 
 
-def test_the_mesh_nodes_transform_does_not_count(write_glb, hand_glb, built, tmp_path):
+def test_the_mesh_nodes_transform_does_not_count(write_glb, hand_glb, hands, tmp_path):
     moved = np.eye(4)
     moved[:3, :3], moved[:3, 3] = Rotation.from_euler("xyz", [1, 2, 3]).as_matrix() * 7, [5, 6, 7]
-    same_rest(load_rig(write_glb(replace(hand_glb(), mesh_node=moved), tmp_path / "a.glb")), built["left"])
+    same_rest(load_rig(write_glb(replace(hand_glb(), mesh_node=moved), tmp_path / "a.glb")), hands["left"])
 
 
-def test_an_armature_that_scales_and_turns_places_joints_and_vertices_alike(write_glb, hand_glb, built, tmp_path):
+def test_an_armature_that_scales_and_turns_places_joints_and_vertices_alike(write_glb, hand_glb, hands, tmp_path):
     armature = np.eye(4)
     armature[:3, :3], armature[:3, 3] = Rotation.from_euler("xyz", [0.3, 1, 2]).as_matrix() * 1.1, [0.1, 0.2, 0.3]
     glb = hand_glb()
     placed = glb.vertices @ armature[:3, :3].T + armature[:3, 3]
     rig = load_rig(write_glb(replace(glb, armature=armature, vertices=placed), tmp_path / "a.glb"))
-    rest = built["left"].skeleton.rest[[built["left"].skeleton.index(n) for n in rig.skeleton.names]]
+    rest = hands["left"].skeleton.rest[[hands["left"].skeleton.index(n) for n in rig.skeleton.names]]
     np.testing.assert_allclose(rig.skeleton.rest, rest @ armature[:3, :3].T + armature[:3, 3], atol=CLOSE)
     np.testing.assert_allclose(rig.surface.vertices, placed, atol=CLOSE)
 
 
-def test_a_bind_pose_that_differs_from_the_shown_pose(write_glb, hand_glb, built, tmp_path):
+def test_a_bind_pose_that_differs_from_the_shown_pose(write_glb, hand_glb, hands, tmp_path):
     glb = hand_glb()
     turn = np.eye(4)
     turn[:3, :3] = Rotation.from_euler("x", 0.4).as_matrix()
@@ -106,16 +106,16 @@ def test_a_bind_pose_that_differs_from_the_shown_pose(write_glb, hand_glb, built
     ],
     ids=lambda liberty: next(iter(liberty)),
 )
-def test_liberties_of_the_format(write_glb, hand_glb, built, tmp_path, liberty):
+def test_liberties_of_the_format(write_glb, hand_glb, hands, tmp_path, liberty):
     rig = load_rig(write_glb(replace(hand_glb(), **liberty), tmp_path / "a.glb"))
     if "split" in liberty:
         assert [part.name for part in rig.surface.parts] == ["mesh0", "mesh1"]
-        assert len(rig.surface.faces) == len(built["left"].surface.faces)
+        assert len(rig.surface.faces) == len(hands["left"].surface.faces)
         used = rig.surface.vertices[rig.surface.faces]
-        want = built["left"].surface.vertices[built["left"].surface.faces]
+        want = hands["left"].surface.vertices[hands["left"].surface.faces]
         np.testing.assert_allclose(used, want, atol=CLOSE)
     else:
-        same_rest(rig, built["left"])
+        same_rest(rig, hands["left"])
 
 
 @pytest.mark.parametrize("kind", [np.uint8, np.uint16])
@@ -151,28 +151,28 @@ def test_uv_seams_are_welded_for_geometry_and_kept_for_export(write_glb, hand_gl
 
 
 @pytest.mark.parametrize("unit", ["cm", "mm"])
-def test_units_are_guessed_from_the_hands_size(write_glb, hand_glb, built, tmp_path, unit):
+def test_units_are_guessed_from_the_hands_size(write_glb, hand_glb, hands, tmp_path, unit):
     factor = {"cm": 100.0, "mm": 1000.0}[unit]
     glb = hand_glb()
     frames = glb.frames.copy()
     frames[:, :3, 3] *= factor
     path = write_glb(replace(glb, frames=frames, vertices=glb.vertices * factor), tmp_path / "big.glb")
     rig = load_rig(path)
-    same_rest(rig, built["left"])
+    same_rest(rig, hands["left"])
     assert any(f"taken to be in {unit}" in note for note in rig.notes)
-    same_rest(load_rig(path, unit=unit), built["left"])
+    same_rest(load_rig(path, unit=unit), hands["left"])
     # frames are placed in metres and do not scale
     np.testing.assert_allclose(np.linalg.det(rig.source_frames[:, :3, :3]), 1.0, atol=1e-5)
     np.testing.assert_allclose(rig.source_frames[:, :3, 3], rig.skeleton.rest, atol=CLOSE)
 
 
-def test_z_up(write_glb, hand_glb, built, tmp_path):
+def test_z_up(write_glb, hand_glb, hands, tmp_path):
     turn = np.array([[1.0, 0, 0], [0, 0, -1], [0, 1, 0]])  # y up to z up
     glb = hand_glb()
     frames = glb.frames.copy()
     frames[:, :3, :3], frames[:, :3, 3] = turn @ frames[:, :3, :3], frames[:, :3, 3] @ turn.T
     path = write_glb(replace(glb, frames=frames, vertices=glb.vertices @ turn.T), tmp_path / "z.glb")
-    same_rest(load_rig(path, up="z"), built["left"])
+    same_rest(load_rig(path, up="z"), hands["left"])
 
 
 def test_truncated_file(write_glb, hand_glb, tmp_path):

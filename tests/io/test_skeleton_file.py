@@ -50,8 +50,8 @@ def test_an_arm_from_an_stl(tmp_path, tube):
 
 
 @pytest.mark.parametrize("suffix", ["obj", "ply", "stl", "off", "glb"])
-def test_the_built_in_hand_survives_every_surface_format(tmp_path, built, suffix):
-    rig = built["right"]
+def test_the_built_in_hand_survives_every_surface_format(tmp_path, hands, suffix):
+    rig = hands["right"]
     surface, joints = tmp_path / f"hand.{suffix}", tmp_path / "hand.json"
     trimesh.Trimesh(rig.surface.vertices, rig.surface.faces, process=False).export(surface)
     write_skeleton_file(joints, rig.skeleton)
@@ -86,11 +86,11 @@ def test_a_real_rigs_skeleton_survives_its_file(data, tmp_path, name):
         ({"joints": [{"parent": None}]}, "joint 0 has no name"),
         ({"joints": [{"name": "a", "position": [0, 0]}]}, "joint 'a': position wants three finite numbers"),
         ({"joints": [{"name": "a", "position": [0, 0, float("nan")]}]}, "joint 'a': position wants three finite"),
-        ({"joints": [{"name": "a", "positon": [0, 0, 0]}]}, "no key 'positon'; did you mean 'position'"),
+        ({"joints": [{"name": "a", "positon": [0, 0, 0]}]}, "no key 'positon'; did you mean position"),
         ({"joints": [{"name": "a", "position": [0, 0, 0], "parent": "b"}]}, "no joint 'b' to be its parent"),
         ({"joints": [{"name": "a", "position": [0, 0, 0], "parent": "a"}]}, "'a' is its own ancestor"),
         ({"joints": [{"name": "a", "position": [0, 0, 0], "axis": [0, 0, 0]}]}, "axis has no length"),
-        ({"joints": [{"name": "a", "position": [0, 0, 0], "limits": {"flex": [0, 1]}}]}, "did you mean 'flexion'"),
+        ({"joints": [{"name": "a", "position": [0, 0, 0], "limits": {"flex": [0, 1]}}]}, "did you mean flexion"),
         ({"joints": [{"name": "a", "position": [0, 0, 0], "limits": {"flexion": [2, 1]}}]}, "want .smallest, largest"),
         ({"joints": [{"name": "a", "position": [0, 0, 0]}] * 2}, "two joints are called 'a'"),
     ],

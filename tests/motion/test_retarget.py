@@ -14,7 +14,7 @@ from warpjld.io import load_rig
 from warpjld.motion.bvh import read_bvh
 from warpjld.motion.clip import Clip
 from warpjld.motion.retarget import correspondence, retarget
-from warpjld.motion.rotations import multiply, rotate, unit
+from warpjld.rotations import multiply, rotate, unit
 from warpjld.skeleton import Poses, Skeleton
 
 DIRECTIONS = 1e-6

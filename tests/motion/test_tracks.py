@@ -108,7 +108,7 @@ def test_no_report_where_nothing_was_held() -> None:
 @pytest.mark.parametrize(
     ("channel", "message"),
     [
-        ("index.base.flexon", "no angle 'flexon'.*did you mean 'flexion'"),
+        ("index.base.flexon", "no angle 'flexon'.*did you mean flexion"),
         ("flexion", "want 'joint.channel'"),
         ("joint 18.flexion", "numbered 0 to 17"),
         ("metacarpus.pivot", "flexion only"),
@@ -123,7 +123,7 @@ def test_bad_channels_are_explained(channel: str, message: str) -> None:
 def test_unknown_joint_is_suggested_when_it_meets_a_skeleton() -> None:
     motion = Motion()
     motion.set_key("indx.base.flexion", 0, 0.1)
-    with pytest.raises(InputError, match=r"did you mean 'index.base'"):
+    with pytest.raises(InputError, match=r"did you mean index.base"):
         motion.poses(hand())
 
 

@@ -32,5 +32,5 @@ def test_bar_leaves_the_left_of_the_picture_alone() -> None:
 def test_refuses() -> None:
     with pytest.raises(InputError, match="low < high"):
         ColorScale(1, 1)
-    with pytest.raises(InputError, match="did you mean 'viridis'"):
+    with pytest.raises(InputError, match="did you mean viridis"):
         ColorScale(0, 1, colormap="viridix").colors(np.zeros(1))

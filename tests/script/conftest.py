@@ -1,4 +1,4 @@
-"""A coarse hand, and a way to run a script on it."""
+"""A way to run a script on a coarse hand."""
 
 from __future__ import annotations
 
@@ -6,15 +6,8 @@ from collections.abc import Callable
 
 import pytest
 
-from warpjld.hand import build_hand
 from warpjld.rig import Rig
 from warpjld.script import Interpreter, Scene
-
-
-@pytest.fixture(scope="session")
-def hands() -> dict[str, Rig]:
-    """Coarse built-in hands by side."""
-    return {side: build_hand(side, resolution=1500) for side in ("left", "right")}
 
 
 @pytest.fixture

@@ -84,7 +84,7 @@ def test_bad_angles_are_named() -> None:
 
 def test_joint_names_may_leave_the_side_out_and_are_suggested() -> None:
     assert chain().index("INDEX.base") == 0
-    with pytest.raises(InputError, match=r"did you mean 'index.knuckle2'"):
+    with pytest.raises(InputError, match=r"did you mean index.knuckle2"):
         chain().index("index.knukle2")
 
 

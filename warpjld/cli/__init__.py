@@ -3,24 +3,28 @@
 from __future__ import annotations
 
 import importlib
+import signal
 import sys
 
 import click
 
 from warpjld import __version__
 from warpjld.errors import WarpjldError
+from warpjld.suggest import one_of
 
 __all__ = ["main"]
 
 _COMMANDS = {
-    "run": "Run a command script: animation, pictures, film, exports.",
+    "run": "Run a script: animation, grasping, contact; pictures, films, exports.",
+    "shell": "Type a script's commands one by one and look at the result.",
+    "inspect": "Report what was recognised in a rig.",
+    "calibrate": "Fit the covering's parameters to a rig.",
     "deform": "Deform a rig by a motion file.",
     "study": "Run many grasps and bring them into one table.",
-    "inspect": "Report what was recognised in a rig.",
     "fem": "Load a deformable body and solve for its shape, stresses and reactions.",
-    "calibrate": "Fit the covering's parameters to a rig.",
-    "shell": "Type commands of the language and look at the result.",
 }
+_HELP = """Metres, degrees, newtons and pascals everywhere. HELP in the shell, or `echo HELP | warpjld shell`, lists
+what scripts understand."""
 
 
 class _Lazy(click.Group):
@@ -35,12 +39,19 @@ class _Lazy(click.Group):
         command: click.Command = importlib.import_module(f"warpjld.cli.{name}").command
         return command
 
+    def resolve_command(
+        self, ctx: click.Context, args: list[str]
+    ) -> tuple[str | None, click.Command | None, list[str]]:
+        if args and args[0] not in _COMMANDS and not args[0].startswith("-"):
+            ctx.fail(f"there is no command '{args[0]}'{one_of(args[0], _COMMANDS)}")
+        return super().resolve_command(ctx, args)
+
     def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
         with formatter.section("Commands"):
             formatter.write_dl(list(_COMMANDS.items()))
 
 
-@click.group(cls=_Lazy, context_settings={"help_option_names": ["-h", "--help"]})
+@click.group(cls=_Lazy, context_settings={"help_option_names": ["-h", "--help"]}, epilog=_HELP)
 @click.version_option(__version__, prog_name="warpjld")
 def _group() -> None:
     """Hands and bodies deformed by Joint-dependent Local Deformations, without painted weights."""
@@ -48,6 +59,8 @@ def _group() -> None:
 
 def main(arguments: list[str] | None = None) -> None:
     """Run the command line. Exit codes: 0 done, 1 bad input or a failed job, 2 wrong usage, 130 interrupted."""
+    # a polite kill cleans up as Ctrl-C does, and keeps what is finished
+    signal.signal(signal.SIGTERM, signal.default_int_handler)
     try:
         code = _group.main(arguments, prog_name="warpjld", standalone_mode=False)
     except click.exceptions.Abort:
@@ -61,5 +74,8 @@ def main(arguments: list[str] | None = None) -> None:
         sys.exit(130)
     except WarpjldError as error:
         click.echo(f"error: {error}", err=True)
+        sys.exit(1)
+    except OSError as error:  # a full disk, a folder that went away: nothing a traceback would tell more of
+        click.echo(f"error: {error.filename or 'a file'}: {error.strerror or error}", err=True)
         sys.exit(1)
     sys.exit(code if isinstance(code, int) else 0)

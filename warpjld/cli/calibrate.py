@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import json
-import signal
 from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
 import click
+
+from warpjld.cli import options
 
 if TYPE_CHECKING:
     from warpjld.covering.calibrate import Calibration, PoseQuality
@@ -26,26 +27,17 @@ __all__ = ["command"]
     show_default=True,
     help="Parameter file to write.",
 )
-@click.option("--skeleton", type=click.Path(path_type=Path), help="Skeleton file for a RIG without joints.")
-@click.option("--side", type=click.Choice(["left", "right"]), help="Which hand RIG is, if the file leaves it open.")
-@click.option("--unit", type=click.Choice(["m", "cm", "mm"]), help="RIG's unit; guessed by default.")
-@click.option("--up", type=click.Choice(["y", "z"]), help="RIG's up axis.")
+@options.rig
 @click.option(
     "--start", type=click.Path(path_type=Path, dir_okay=False), help="Parameter file to begin with; else the defaults."
 )
-@click.option(
-    "--domains",
-    type=click.Choice(["geometry", "skin"]),
-    default="geometry",
-    show_default=True,
-    help="Found from the surface, or the rig's painted weights.",
-)
+@options.domains
 @click.option("--poses", type=click.IntRange(min=1), help="How many poses to fit to; all of the set by default.")
 @click.option(
     "--iterations", type=click.IntRange(min=1), default=120, show_default=True, help="Most iterations of the minimiser."
 )
-@click.option("--json", "as_json", is_flag=True, help="Write the result to stdout as JSON.")
-@click.option("-q", "--quiet", is_flag=True, help="Say nothing but errors.")
+@options.json
+@options.quiet
 def command(
     rig: str,
     out: Path,
@@ -73,8 +65,6 @@ def command(
     from warpjld.errors import InputError
 
     silence_warp()
-    # a polite kill cleans up as Ctrl-C does
-    signal.signal(signal.SIGTERM, signal.default_int_handler)
     if not out.absolute().parent.is_dir():
         raise InputError("cannot write the parameter file: no such folder", path=out.parent)
     opened = open_rig(rig, skeleton=skeleton, side=side, unit=unit, up=up)

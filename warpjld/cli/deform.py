@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 import json
-import signal
 import time
 from pathlib import Path
+from typing import Any
 
 import click
 
+from warpjld.cli import options
 from warpjld.errors import InputError
+from warpjld.io.caches import FORMATS
 
 __all__ = ["command"]
 
@@ -19,11 +21,14 @@ _BLOCK = 16  # frames deformed at once: memory does not grow with the length of 
 @click.command("deform")
 @click.argument("rig")
 @click.option("--motion", required=True, type=click.Path(path_type=Path), help="Motion: CSV, BVH, glTF/GLB, JSON.")
-@click.option("-o", "--out", required=True, type=click.Path(path_type=Path), help="Cache to write; its suffix counts.")
-@click.option("--skeleton", type=click.Path(path_type=Path), help="Skeleton file for a RIG without joints.")
-@click.option("--side", type=click.Choice(["left", "right"]), help="Which hand RIG is, if the file leaves it open.")
-@click.option("--unit", type=click.Choice(["m", "cm", "mm"]), help="RIG's unit; guessed by default.")
-@click.option("--up", type=click.Choice(["y", "z"]), help="RIG's up axis.")
+@click.option(
+    "-o",
+    "--out",
+    required=True,
+    type=click.Path(path_type=Path),
+    help=f"Cache to write: {', '.join(FORMATS)}.",
+)
+@options.rig
 @click.option("--frames", "span", metavar="A:B", help="Only frames A to B, both included, the motion's first being 0.")
 @click.option("--rate", type=float, help="Frames a second; the motion's own by default, 30 for CSV.")
 @click.option(
@@ -34,13 +39,7 @@ _BLOCK = 16  # frames deformed at once: memory does not grow with the length of 
     help="CSV angles beyond a joint's limit.",
 )
 @click.option("--parameters", type=click.Path(path_type=Path), help="Covering parameters, as calibrate writes them.")
-@click.option(
-    "--domains",
-    type=click.Choice(["geometry", "skin"]),
-    default="geometry",
-    show_default=True,
-    help="Where a vertex's domain comes from: the surface alone, or painted weights.",
-)
+@options.domains
 @click.option(
     "--method",
     type=click.Choice(["smooth", "paper"]),
@@ -48,10 +47,10 @@ _BLOCK = 16  # frames deformed at once: memory does not grow with the length of 
     show_default=True,
     help="Soft domain borders, or one segment a vertex as published.",
 )
-@click.option("--device", default="cpu", show_default=True, help="Where to compute: cpu, cuda:0, …")
-@click.option("--threads", type=click.IntRange(min=1), help="CPU threads; as many as pay by default.")
-@click.option("--json", "as_json", is_flag=True, help="Write the summary to stdout as JSON.")
-@click.option("-q", "--quiet", is_flag=True, help="Say nothing but errors.")
+@options.device
+@options.threads
+@options.json
+@options.quiet
 def command(
     rig: str,
     motion: Path,
@@ -82,8 +81,6 @@ def command(
     from warpjld.motion import open_motion
 
     silence_warp()
-    # a polite kill cleans up as Ctrl-C does
-    signal.signal(signal.SIGTERM, signal.default_int_handler)
     began = time.perf_counter()
     driven = open_rig(rig, skeleton=skeleton, side=side, unit=unit, up=up)
     moved = open_motion(motion, driven, rate=rate, limits=limits)  # type: ignore[arg-type]
@@ -138,16 +135,13 @@ def _span(text: str | None, count: int) -> tuple[int, int]:
     return first, last
 
 
-def _tell(summary: dict[str, object]) -> None:
-    files = summary["files"]
-    assert isinstance(files, list)
+def _tell(summary: dict[str, Any]) -> None:
+    files, frames = summary["files"], summary["frames"]
     more = f" … {files[-1]} ({len(files)} files)" if len(files) > 1 else ""
     click.echo(f"{files[0]}{more}")
     click.echo(
-        f"{summary['frames']} frames at {summary['rate']:g} a second, {summary['vertices']} vertices, "
+        f"{frames} frame{'s' * (frames != 1)} at {summary['rate']:g} a second, {summary['vertices']} vertices, "
         f"{summary['triangles']} triangles, {summary['joints']} joints; {summary['seconds']} s"
     )
-    notes = summary["notes"]
-    assert isinstance(notes, list)
-    for note in notes:
+    for note in summary["notes"]:
         click.echo(f"note: {note}")

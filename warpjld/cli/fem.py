@@ -11,20 +11,19 @@ from typing import Any
 
 import click
 
-from warpjld.errors import WarpjldError
+from warpjld.cli import options
+from warpjld.errors import InputError, WarpjldError
 
 __all__ = ["command"]
 
 
 @click.command("fem")
 @click.argument("study", type=click.Path(path_type=Path))
-@click.option(
-    "-o", "--output", type=click.Path(path_type=Path), help="Folder for results; the study's name by default."
-)
+@click.option("-o", "--out", type=click.Path(path_type=Path), help="Output folder; the study's name by default.")
 @click.option("--no-pictures", is_flag=True, help="Write no pictures.")
-@click.option("-q", "--quiet", is_flag=True, help="Print nothing but errors.")
-def command(study: Path, output: Path | None, no_pictures: bool, quiet: bool) -> None:
-    """Solve the load steps of STUDY (a .toml file, see examples/inflate_ball.toml).
+@options.quiet
+def command(study: Path, out: Path | None, no_pictures: bool, quiet: bool) -> None:
+    """Solve the load steps of STUDY (a .toml file, see examples/fem.md and examples/inflate_ball.toml).
 
     Written: NAME.pvd with one .vtu an instant (for ParaView), reactions.csv, and pictures of displacement and stress
     after each step. When a step finds no equilibrium, what was reached is written and the exit code is 1.
@@ -33,7 +32,7 @@ def command(study: Path, output: Path | None, no_pictures: bool, quiet: bool) ->
     from rich.table import Table
 
     from warpjld.cli.progress import silence_warp
-    from warpjld.fem.study import load_study
+    from warpjld.fem.study_file import load_study
     from warpjld.fem.vtk import Series
 
     silence_warp()
@@ -43,8 +42,11 @@ def command(study: Path, output: Path | None, no_pictures: bool, quiet: bool) ->
         loaded = load_study(study)
     for note in (*loaded.notes, *(str(warning.message) for warning in caught)):
         console.print(f"note: {note}", markup=False)
-    folder = output or Path(study.stem)
-    folder.mkdir(parents=True, exist_ok=True)
+    folder = out or Path(study.stem)
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise InputError(f"cannot write into this folder: {error.strerror}", path=folder) from error
     mesh = loaded.body.mesh
     console.print(
         f"{loaded.title}: {len(mesh.elements)} elements, {loaded.body.degrees} degrees of freedom, "

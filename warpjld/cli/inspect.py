@@ -10,6 +10,7 @@ import click
 import numpy as np
 from numpy.typing import NDArray
 
+from warpjld.cli import options
 from warpjld.rig import Rig
 from warpjld.skeleton.tree import CHANNELS
 
@@ -18,30 +19,25 @@ __all__ = ["command"]
 
 @click.command("inspect")
 @click.argument("rig")
-@click.option("--skeleton", type=click.Path(path_type=Path), help="Skeleton file for a RIG without joints.")
-@click.option("--side", type=click.Choice(["left", "right"]), help="Which hand RIG is, if the file leaves it open.")
-@click.option("--unit", type=click.Choice(["m", "cm", "mm"]), help="RIG's unit; guessed by default.")
-@click.option("--up", type=click.Choice(["y", "z"]), help="RIG's up axis.")
-@click.option(
-    "-o", "--output", type=click.Path(path_type=Path), help="Picture to write; the rig's name.png by default."
-)
+@options.rig
+@click.option("-o", "--out", type=click.Path(path_type=Path), help="Picture to write; the rig's name.png by default.")
 @click.option("--no-picture", is_flag=True, help="Write no picture.")
 @click.option("--write-skeleton", type=click.Path(path_type=Path), help="Skeleton file to write, for editing.")
-@click.option("--json", "as_json", is_flag=True, help="Print the report as JSON.")
-@click.option("-q", "--quiet", is_flag=True, help="Print only what looks suspicious.")
+@options.json
+@click.option("-q", "--quiet", is_flag=True, help="Say only what looks suspicious.")
 def command(
     rig: str,
     skeleton: Path | None,
     side: str | None,
     unit: str | None,
     up: str | None,
-    output: Path | None,
+    out: Path | None,
     no_picture: bool,
     write_skeleton: Path | None,
     as_json: bool,
     quiet: bool,
 ) -> None:
-    """Report what was recognised in RIG: joints, domains, limits, and joints that look misplaced (R14).
+    """Report what was recognised in RIG: joints, domains, limits, and joints that look misplaced.
 
     RIG is a rig file (.glb, .gltf), a surface with --skeleton, or builtin:left, builtin:right. A picture of the
     surface's wire-frame with the named skeleton in it is written beside, unless --no-picture.
@@ -56,7 +52,7 @@ def command(
         from warpjld.io.skeleton_file import write_skeleton_file
 
         write_skeleton_file(write_skeleton, opened.skeleton)
-    picture = None if no_picture else output or Path(f"{opened.name.replace(' ', '-')}.png")
+    picture = None if no_picture else out or Path(f"{opened.name.replace(' ', '-')}.png")
     if picture is not None:
         from warpjld.cli.inspect_picture import draw_rig
 

@@ -24,6 +24,9 @@ def draw_rig(rig: Rig, path: Path, *, suspicious: Set[str] = frozenset()) -> Non
         rig: What to draw.
         path: PNG file.
         suspicious: Joints to mark.
+
+    Raises:
+        InputError: It cannot be written there.
     """
     import pyvista
 

@@ -3,25 +3,24 @@
 from __future__ import annotations
 
 import json
-import signal
 from pathlib import Path
 
 import click
+
+from warpjld.cli import options
 
 __all__ = ["command"]
 
 
 @click.command("run")
 @click.argument("script", type=click.Path(path_type=Path))
-@click.option("-o", "--out", type=click.Path(path_type=Path), default="out", show_default=True, help="Output folder.")
-@click.option("--device", default="cpu", show_default=True, help="Where to compute: cpu, cuda:0, …")
-@click.option("--threads", type=click.IntRange(min=1), help="CPU threads; all by default.")
-@click.option(
-    "--commands", multiple=True, type=click.Path(path_type=Path), help="Python file that adds commands; repeatable."
-)
+@options.out_folder
+@options.device
+@options.threads
+@options.commands
 @click.option("--check", is_flag=True, help="Read the script and say what it would make; compute nothing.")
-@click.option("--json", "as_json", is_flag=True, help="Write the summary to stdout as JSON.")
-@click.option("-q", "--quiet", is_flag=True, help="Say nothing but errors.")
+@options.json
+@options.quiet
 def command(
     script: Path,
     out: Path,
@@ -41,8 +40,6 @@ def command(
     from warpjld.script.summary import table
 
     silence_warp()
-    # a polite kill cleans up as Ctrl-C does
-    signal.signal(signal.SIGTERM, signal.default_int_handler)
 
     def say(text: str) -> None:
         if not quiet:

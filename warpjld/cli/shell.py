@@ -8,6 +8,7 @@ from pathlib import Path
 
 import click
 
+from warpjld.cli import options
 from warpjld.errors import WarpjldError
 
 __all__ = ["command"]
@@ -19,12 +20,10 @@ _WELCOME = "HELP lists the commands, RUN makes the files, SAVE keeps what was ty
 
 @click.command("shell")
 @click.argument("script", required=False, type=click.Path(path_type=Path))
-@click.option("-o", "--out", type=click.Path(path_type=Path), default="out", show_default=True, help="Output folder.")
-@click.option("--device", default="cpu", show_default=True, help="Where to compute: cpu, cuda:0, …")
-@click.option("--threads", type=click.IntRange(min=1), help="CPU threads; all by default.")
-@click.option(
-    "--commands", multiple=True, type=click.Path(path_type=Path), help="Python file that adds commands; repeatable."
-)
+@options.out_folder
+@options.device
+@options.threads
+@options.commands
 def command(script: Path | None, out: Path, device: str, threads: int | None, commands: tuple[Path, ...]) -> None:
     """Type commands of the language, after running SCRIPT if one is given. Commands may also be piped in; then the
     first error ends the shell."""

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import json
-import signal
 from pathlib import Path
 from typing import TYPE_CHECKING, Literal
 
 import click
+
+from warpjld.cli import options
 
 if TYPE_CHECKING:
     from warpjld.study import Rerun, StudyResult
@@ -17,7 +18,7 @@ __all__ = ["command"]
 
 @click.command("study")
 @click.argument("plan", type=click.Path(path_type=Path))
-@click.option("-o", "--out", type=click.Path(path_type=Path), default="out", show_default=True, help="Output folder.")
+@options.out_folder
 @click.option("--processes", type=click.IntRange(min=1), help="Worker processes; one a core by default.")
 @click.option(
     "--table",
@@ -29,8 +30,8 @@ __all__ = ["command"]
 @click.option("--fresh", is_flag=True, help="Start again, forgetting the trials in the output folder.")
 @click.option("--rerun", "row", type=click.IntRange(min=0), metavar="ROW", help="Repeat one trial, with pictures.")
 @click.option("--check", is_flag=True, help="Read the plan and load its hands and objects; run nothing.")
-@click.option("--json", "as_json", is_flag=True, help="Write the summary to stdout as JSON.")
-@click.option("-q", "--quiet", is_flag=True, help="Say nothing but errors.")
+@options.json
+@options.quiet
 def command(
     plan: Path,
     out: Path,
@@ -52,8 +53,6 @@ def command(
     from warpjld.study.grasping import GraspExperiment, load_plan
 
     silence_warp()
-    # a polite kill stops as Ctrl-C does: what is finished is kept
-    signal.signal(signal.SIGTERM, signal.default_int_handler)
     settings = load_plan(plan)
     experiment = GraspExperiment(settings)
     if row is not None:

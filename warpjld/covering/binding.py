@@ -12,9 +12,10 @@ from numpy.typing import NDArray
 
 from warpjld.covering.operators import Fan, segment_ends
 from warpjld.covering.parameters import Parameters
+from warpjld.covering.segment_table import SegmentTable
 from warpjld.skeleton.tree import Skeleton
 
-__all__ = ["FLOOR", "OPERATORS", "SIDE_BAND", "STATIONS", "Anchors", "SegmentTable", "anchor"]
+__all__ = ["FLOOR", "OPERATORS", "SIDE_BAND", "STATIONS", "Anchors", "anchor"]
 
 OPERATORS = 4
 """Segment operators a vertex may hold (the paper has one; the rest make borders soft)."""
@@ -98,40 +99,6 @@ def anchor(
     segment, weight, ratio, side, lift, pair, between, station = joined
     muscle = np.array([fan.muscle for fan in groups for _ in fan.segments])
     return Anchors(ends, muscle, vertices, segment, weight, ratio, side, lift, pairs, pair, between, station)
-
-
-@dataclass(frozen=True, eq=False)
-class SegmentTable:
-    """What projecting on S segments at rest needs."""
-
-    ends: NDArray[np.int32]
-    start: NDArray[np.float64]  # (S, 3)
-    along: NDArray[np.float64]  # (S, 3)
-    normals: NDArray[np.float64]  # (S, 2, 3): y axes at the proximal and distal joint (R20)
-    open_end: NDArray[np.bool_]  # extremity: the ratio may exceed 1
-    open_start: NDArray[np.bool_]  # root: the ratio may fall below 0
-
-    @staticmethod
-    def build(skeleton: Skeleton, ends: NDArray[np.int32]) -> SegmentTable:
-        start = skeleton.rest[ends[:, 0]]
-        along = skeleton.rest[ends[:, 1]] - start
-        direction = along / np.linalg.norm(along, axis=1, keepdims=True)
-        normals = np.stack([np.cross(direction, skeleton.axes[ends[:, k]]) for k in (0, 1)], axis=1)
-        lengths = np.linalg.norm(normals, axis=2, keepdims=True)
-        # an axis along the segment says nothing of its sides: take the other end's, or any normal
-        normals = np.where(lengths > 1e-3, normals / np.maximum(lengths, 1e-30), normals[:, ::-1])
-        fallback = np.cross(direction, np.eye(3)[np.abs(direction).argmin(axis=1)])
-        lengths = np.linalg.norm(normals, axis=2, keepdims=True)
-        normals = np.where(lengths > 1e-3, normals / np.maximum(lengths, 1e-30), fallback[:, None, :])
-        leaf = np.array([not skeleton.children[d] for d in ends[:, 1]])
-        root = np.array([skeleton.parents[p] < 0 for p in ends[:, 0]])
-        return SegmentTable(ends, start, along, normals, leaf, root)
-
-    def project(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Ratio of every point on every segment, shape (V, S), clamped except beyond extremities (R37, C1)."""
-        t = (points @ self.along.T - (self.start * self.along).sum(axis=1)) / (self.along**2).sum(axis=1)
-        t = np.where((t < 0.0) & ~self.open_start, 0.0, t)
-        return np.where((t > 1.0) & ~self.open_end, 1.0, t)
 
 
 def _neighbour_pairs(groups: tuple[Fan, ...]) -> tuple[NDArray[np.int32], dict[int, int]]:

@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Iterator
-from concurrent.futures import ThreadPoolExecutor
-from functools import cache, cached_property
+from functools import cached_property
 from typing import Any, Literal
 
 import numpy as np
@@ -23,16 +21,11 @@ from warpjld.rig import Skin
 from warpjld.skeleton.kinematics import Poses
 from warpjld.skeleton.tree import Skeleton
 from warpjld.surface import Surface
+from warpjld.threads import in_threads, threads_for
 
 __all__ = ["Covering", "bind"]
 
 _SPLIT_BELOW = 200_000  # vertex-frames a thread must have before splitting pays
-
-
-@cache
-def _pool(threads: int) -> ThreadPoolExecutor:
-    """Kept for the next call: starting threads can cost as much as deforming."""
-    return ThreadPoolExecutor(threads, thread_name_prefix="warpjld")
 
 
 class Covering:
@@ -128,7 +121,7 @@ class Covering:
             raise InputError(f"out: want contiguous float32 of shape {shape}, got {out.dtype} {out.shape}")
         if where.is_cpu:
             if threads is None:
-                threads = min(os.cpu_count() or 1, max(1, shape[0] * shape[1] // _SPLIT_BELOW))
+                threads = threads_for(shape[0] * shape[1], _SPLIT_BELOW)
             self._launch(rows, wp.array(out, dtype=wp.vec3, device=where, copy=False), where, threads, order)
         else:
             points = wp.empty(shape[:2], dtype=wp.vec3, device=where)
@@ -211,12 +204,7 @@ class Covering:
                 device=device,
             )
 
-        cuts = np.unique(np.linspace(0, len(rows), threads + 1).astype(int))
-        if len(cuts) <= 2:
-            span(0, len(rows))
-            return
-        wp.load_module(deform_runs.module, device=device)  # compiling is not safe from several threads
-        list(_pool(len(cuts) - 1).map(span, cuts[:-1].tolist(), cuts[1:].tolist()))
+        in_threads(span, len(rows), threads, deform_runs, device)
 
     def _on(self, device: Any, name: str, make: Any) -> list[Any]:
         """Arguments that stay on a device between calls."""

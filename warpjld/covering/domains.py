@@ -56,6 +56,9 @@ def domains_from_skin(
     """Painted weights as domains, shape (V, fans): the weight of a joint goes to the segments its bone carries.
 
     Where a bone carries segments of several fans the nearer ones get more, by inverse fourth power of the distance.
+
+    Raises:
+        InputError: Painted weights of another surface.
     """
     if skin.joints.shape != skin.weights.shape or len(skin.joints) != len(vertices):
         raise InputError(f"skin: want joints and weights of shape ({len(vertices)}, K), got {skin.weights.shape}")

@@ -11,7 +11,7 @@ from warpjld.covering.binding import STATIONS, Anchors
 from warpjld.skeleton.kinematics import Poses
 from warpjld.skeleton.tree import CHANNELS, Skeleton
 
-__all__ = ["Drivers", "closing_logarithm", "drive", "flexion_ratio", "halfway_rotations"]
+__all__ = ["Drivers", "closing_logarithm", "drive", "flexion_ratio", "halfway_rotations", "virtual_lengths"]
 
 
 @dataclass(frozen=True, eq=False)
@@ -67,14 +67,24 @@ def closing_logarithm(
     """log of λ = final / initial length of the virtual segment where it is below 1, else 0 (A §4, C3, R44)."""
     if not len(anchors.pairs):
         return np.zeros((len(positions), 1, STATIONS))
-    return np.minimum(np.log(_virtual_lengths(anchors, positions) / _virtual_lengths(anchors, rest[None])), 0.0)
+    now, before = (virtual_lengths(anchors.ends, anchors.pairs, joints) for joints in (positions, rest[None]))
+    return np.minimum(np.log(now / before), 0.0)
 
 
-def _virtual_lengths(anchors: Anchors, positions: NDArray[np.float64]) -> NDArray[np.float64]:
+def virtual_lengths(
+    ends: NDArray[np.int32], pairs: NDArray[np.int32], positions: NDArray[np.float64]
+) -> NDArray[np.float64]:
+    """Lengths of the virtual segments that join neighbours [m], at ``STATIONS`` places, shape (F, N, STATIONS) (R42).
+
+    Args:
+        ends: Proximal and distal joint of every segment, shape (S, 2).
+        pairs: Neighbouring segments, shape (N, 2).
+        positions: Joint positions [m], shape (F, J, 3).
+    """
     place = np.linspace(0.0, 1.0, STATIONS)[:, None]
-    first, second = (anchors.ends[anchors.pairs[:, k]] for k in (0, 1))
+    first, second = (ends[pairs[:, k]] for k in (0, 1))
     starts = positions[:, second[:, 0]] - positions[:, first[:, 0]]
-    ends = positions[:, second[:, 1]] - positions[:, first[:, 1]]
-    across = (1.0 - place) * starts[:, :, None] + place * ends[:, :, None]
+    stops = positions[:, second[:, 1]] - positions[:, first[:, 1]]
+    across = (1.0 - place) * starts[:, :, None] + place * stops[:, :, None]
     lengths: NDArray[np.float64] = np.maximum(np.linalg.norm(across, axis=-1), 1e-9)
     return lengths

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from warpjld.skeleton.tree import Segment, Skeleton
 
-__all__ = ["Fan", "fans"]
+__all__ = ["Fan", "fans", "segment_ends"]
 
 
 @dataclass(frozen=True)

@@ -2,26 +2,25 @@
 
 from __future__ import annotations
 
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, fields
+from functools import cached_property
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.spatial.transform import Rotation
 
-from warpjld.covering.binding import Anchors, SegmentTable
 from warpjld.covering.covering import Covering
 from warpjld.covering.device import array_on, checked_device, parameters_on
 from warpjld.covering.drivers import flexion_ratio
-from warpjld.covering.operators import Fan
-from warpjld.covering.paper_places import paper_places
-from warpjld.covering.parameters import Parameters
+from warpjld.covering.paper_places import PaperPlaces, paper_places
+from warpjld.covering.segment_table import SegmentTable
 from warpjld.skeleton.kinematics import Poses
 from warpjld.skeleton.tree import Skeleton
 from warpjld.surface import Surface
+from warpjld.threads import in_threads
 
-__all__ = ["Normals", "PaperCovering", "paper_normals"]
+__all__ = ["Normals", "PaperCovering", "PaperPose", "paper_normals"]
 
 
 @dataclass(frozen=True, eq=False)
@@ -69,19 +68,13 @@ class PaperCovering(Covering):
     same methods as :class:`~warpjld.covering.covering.Covering`.
     """
 
-    def __init__(
-        self,
-        skeleton: Skeleton,
-        surface: Surface,
-        parameters: Parameters,
-        groups: tuple[Fan, ...],
-        domains: NDArray[np.float64],
-        anchors: Anchors,
-    ) -> None:
-        super().__init__(skeleton, surface, parameters, groups, domains, anchors)
-        self.places = paper_places(surface.vertices, skeleton, groups, domains, parameters)
+    @cached_property
+    def places(self) -> PaperPlaces:
+        """Where the vertices lie on their segment or palm pair, and in which area."""
+        return paper_places(self.surface.vertices, self.skeleton, self.fans, self.domains, self.parameters)
 
     def points(self, poses: Poses, vertices: ArrayLike, *, device: str = "cpu") -> NDArray[np.float32]:
+        """Final positions of chosen vertices only [m], shape (F, n, 3) (R74)."""
         import warp as wp
 
         where = checked_device(device)
@@ -123,10 +116,7 @@ class PaperCovering(Covering):
                 device=device,
             )
 
-        wp.load_module(deform_paper.module, device=device)  # compiling is not safe from several threads
-        cuts = np.linspace(0, points.shape[0], min(threads, max(points.shape[0], 1)) + 1).astype(int).tolist()
-        with ThreadPoolExecutor(len(cuts) - 1) as pool:
-            list(pool.map(span, cuts[:-1], cuts[1:]))
+        in_threads(span, points.shape[0], threads, deform_paper, device)
 
     def _expressed(self, device: Any) -> list[Any]:
         """Places, parameters, and the coordinates of the vertices in their initial bases, on a device."""

@@ -7,9 +7,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from warpjld.covering.binding import SegmentTable
 from warpjld.covering.operators import Fan, segment_ends
 from warpjld.covering.parameters import Parameters
+from warpjld.covering.segment_table import SegmentTable
 from warpjld.skeleton.tree import Skeleton
 
 __all__ = ["PaperPlaces", "paper_places"]

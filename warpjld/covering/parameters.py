@@ -102,15 +102,23 @@ def _volume_loss(angle: NDArray[np.float64]) -> NDArray[np.float64]:
 
 
 def save_parameters(path: str | Path, skeleton: Skeleton, parameters: Parameters) -> None:
-    """Write a parameter file (JSON: joint → values)."""
+    """Write a parameter file (JSON: joint → values).
+
+    Raises:
+        InputError: It cannot be written.
+    """
     joints = {
         name: {f.name: np.round(getattr(parameters, f.name)[j], 6).tolist() for f in fields(parameters)}
         for j, name in enumerate(skeleton.names)
     }
     target = Path(path)
     beside = target.with_name(target.name + ".part")
-    beside.write_text(json.dumps({"warpjld": "parameters", "version": 1, "joints": joints}, indent=1) + "\n")
-    beside.replace(target)
+    content = json.dumps({"warpjld": "parameters", "version": 1, "joints": joints}, indent=1)
+    try:
+        beside.write_text(content + "\n", encoding="utf-8")
+        beside.replace(target)
+    except OSError as error:
+        raise InputError(f"cannot write parameters: {error.strerror}", path=path) from error
 
 
 def load_parameters(path: str | Path, skeleton: Skeleton) -> Parameters:

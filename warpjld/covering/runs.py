@@ -19,7 +19,13 @@ __all__ = ["Columns", "Runs", "pack_runs", "palette"]
 
 @dataclass(frozen=True)
 class Columns:
-    """Where each input begins in a row of the palette."""
+    """Where each input begins in a row of the palette; places of the joints come first.
+
+    Attributes:
+        joints: J of the skeleton.
+        segments: Of the operators.
+        pairs: Neighbours in palms.
+    """
 
     joints: int
     segments: int
@@ -27,32 +33,48 @@ class Columns:
 
     @property
     def halfway(self) -> int:
+        """Rotations halfway between the two bones at a joint."""
         return 3 * self.joints
 
     @property
     def rotations(self) -> int:
+        """Rotations of the bones."""
         return 7 * self.joints
 
     @property
     def flexion_ratio(self) -> int:
+        """Flexion ratios of the joints (R59)."""
         return 11 * self.joints
 
     @property
     def palm(self) -> int:
+        """Thickening of the palm at the stations of every pair (C3)."""
         return 12 * self.joints
 
     @property
     def muscles(self) -> int:
+        """Flexion ratios that inflate the segments' muscles."""
         return self.palm + STATIONS * self.pairs
 
     @property
     def width(self) -> int:
+        """Numbers in a row."""
         return self.muscles + self.segments
 
 
 @dataclass(frozen=True, eq=False)
 class Runs:
-    """Arguments of ``warpjld_kernels.covering_runs.deform_runs`` that do not depend on the pose."""
+    """Arguments of ``warpjld_kernels.covering_runs.deform_runs`` that do not depend on the pose.
+
+    Attributes:
+        columns: Of the palette.
+        tiles: Run and first lane in it of every tile, shape (tiles, 2).
+        runs: Of every run its first lane, its vertices, its first coefficient, its first slot, and how many slots are
+            joints, rotations, scales and muscles, shape (runs, 8).
+        slots: Palette columns that the runs read, run by run.
+        coefficients: Rows of a run's slots one after another, a muscle's three, then offsets; a column a vertex.
+        order: Vertex at every lane, those of the runs one after another.
+    """
 
     columns: Columns
     tiles: NDArray[np.int32]

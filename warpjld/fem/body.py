@@ -104,6 +104,9 @@ class Body:
             pressures: Pressure of each element that K is to take for its own, shape (E,); by default the present one.
             increment: Displacement that is about to be added [m], shape (3N,): ``pressures`` of the result foresee it.
             reuse: A result that is not needed any more: its matrix is written over.
+
+        Raises:
+            InputError: Wrong shapes.
         """
         from warpjld_kernels import fem_element
 

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from warpjld.errors import InputError
+from warpjld.suggest import one_of
 
 __all__ = ["FACES", "HexMesh", "elements_of", "merge"]
 
@@ -204,8 +205,4 @@ def merge(*meshes: HexMesh) -> HexMesh:
 
 
 def _unknown(kind: str, name: str, known: list[str]) -> str:
-    from difflib import get_close_matches
-
-    close = get_close_matches(name, known, n=1)
-    hint = f", did you mean '{close[0]}'?" if close else ""
-    return f"no {kind} '{name}'{hint} There are: {', '.join(known)}"
+    return f"no {kind} '{name}'{one_of(name, known)}"

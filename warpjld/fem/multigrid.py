@@ -14,47 +14,15 @@ from numpy.typing import NDArray
 
 from warpjld.errors import WarpjldError
 from warpjld.fem.blockmatrix import BlockMatrix, padded
-from warpjld.fem.dots import dot
-from warpjld.fem.rows import Launch, grouped, on_rows, shared, threads_of
+from warpjld.fem.chebyshev import chebyshev_steps, highest_eigenvalue
+from warpjld.fem.galerkin import coarse_matrix, restriction
+from warpjld.fem.rows import Launch, shared, threads_of
 
-__all__ = ["IndefiniteError", "Multigrid", "block_inverse", "coarse_matrix"]
+__all__ = ["IndefiniteError", "Multigrid", "block_inverse"]
 
 
 class IndefiniteError(WarpjldError):
     """A matrix that should be positive definite is not."""
-
-
-def coarse_matrix(
-    fine: BlockMatrix, free: NDArray[np.bool_], weights: Any, transposed: Any, *, threads: int
-) -> BlockMatrix:
-    """Pᵀ K11 P, float64; prescribed degrees of freedom (not ``free``, shape (3N,)) do not take part."""
-    from warpjld_kernels import fem_galerkin
-
-    count = weights.shape[1]
-    work = np.concatenate([[0], np.cumsum(np.diff(transposed.indptr))])
-    parts = threads if count >= 64 else 1
-    edges = np.searchsorted(work, np.linspace(0, work[-1], parts + 1)).astype(np.int32)
-    edges[0], edges[-1] = 0, count
-    rows = np.zeros(count + 1, np.int32)
-    ranges, mask = shared(edges), shared(free.astype(np.float64))
-    model = grouped(fem_galerkin.Blocks, rows=fine.rows, columns=fine.columns, values=fine.values.reshape(-1))
-    up, down = (
-        grouped(fem_galerkin.Weights, rows=w.indptr, columns=w.indices, weights=w.data) for w in (weights, transposed)
-    )
-    marker = np.full((parts, count), -1, np.int32)
-    table = shared(marker)
-    coarse = grouped(fem_galerkin.Blocks, rows=rows, columns=np.zeros(1, np.int32), values=np.zeros(1))
-    arguments = [ranges, False, model, up, down, table, coarse]
-    on_rows(fem_galerkin.coarse_pattern, parts, arguments, threads=threads, least=2)
-    np.cumsum(rows, out=rows)
-    columns, values = np.empty(rows[-1], np.int32), np.zeros((rows[-1], 3, 3))
-    coarse = grouped(fem_galerkin.Blocks, rows=rows, columns=columns, values=values.reshape(-1))
-    marker.fill(-1)
-    arguments = [ranges, True, model, up, down, table, coarse]
-    on_rows(fem_galerkin.coarse_pattern, parts, arguments, threads=threads, least=2)
-    arguments = [ranges, model, mask, up, down, table, coarse]
-    on_rows(fem_galerkin.coarse_values, parts, arguments, threads=threads, least=2)
-    return BlockMatrix(rows, columns, values)
 
 
 def block_inverse(matrix: BlockMatrix, free: NDArray[np.bool_] | None = None) -> NDArray[np.float64]:
@@ -120,7 +88,7 @@ class Multigrid:
         self._type = np.dtype(precision)
         self._free = free.astype(self._type)
         matrices = [(stiffness, free)]
-        transposes = [_transpose(weights) for weights in hierarchy]
+        transposes = [restriction(weights) for weights in hierarchy]
         for weights, transposed in zip(hierarchy, transposes, strict=True):
             coarse = coarse_matrix(*matrices[-1], weights, transposed, threads=self.threads)
             matrices.append((coarse, np.ones(3 * coarse.size, dtype=bool)))
@@ -154,7 +122,7 @@ class Multigrid:
         kind, count = self._type, matrix.size
         inverse = block_inverse(matrix, free).astype(kind)
         plain = matrix.masked(free, kind)
-        highest = 1.1 * _highest(plain, inverse, self.threads)
+        highest = 1.1 * highest_eigenvalue(plain, inverse, self.threads)
         table = plain.arguments
         inverted = shared(inverse.reshape(-1))
         step, *pair = (shared(padded(3 * count, kind)) for _ in range(3))
@@ -166,7 +134,7 @@ class Multigrid:
         scalar = table[2].dtype
         before, after = [], []
         current = 0
-        for k, (momentum, scale) in enumerate(_chebyshev(degree, highest / spread, highest)):
+        for k, (momentum, scale) in enumerate(chebyshev_steps(degree, highest / spread, highest)):
             values = scalar(momentum), scalar(scale)
             if k == 0:
                 before.append(launch(fem_blocks.first_step, count, inverted, values[1], right, step, pair[0]))
@@ -179,7 +147,7 @@ class Multigrid:
         before.append(launch(fem_blocks.interpolate, weights.shape[1], *down, False, step, shared(below)))
         up = [shared(weights.indptr), shared(weights.indices), shared(weights.data.astype(kind))]
         after.append(launch(fem_blocks.interpolate, count, *up, True, shared(correction), pair[current]))
-        for momentum, scale in _chebyshev(degree, highest / spread, highest):
+        for momentum, scale in chebyshev_steps(degree, highest / spread, highest):
             values = scalar(momentum), scalar(scale)
             arguments = [*table, inverted, *values, right, pair[current], step, pair[1 - current]]
             after.append(launch(fem_blocks.chebyshev_step, count, *arguments))
@@ -204,19 +172,6 @@ class Multigrid:
             for launch in level.after:
                 launch()
         return (self._levels[0].x * self._free).astype(r.dtype)
-
-
-def _chebyshev(degree: int, low: float, high: float) -> list[tuple[float, float]]:
-    """Momentum and scale of each step of the Chebyshev polynomial over [low, high]."""
-    centre, half = 0.5 * (high + low), 0.5 * (high - low)
-    sigma = centre / half
-    rho = 1.0 / sigma
-    steps = [(0.0, 1.0 / centre)]
-    for _ in range(degree - 1):
-        following = 1.0 / (2.0 * sigma - rho)
-        steps.append((following * rho, 2.0 * following / half))
-        rho = following
-    return steps
 
 
 class _Coarsest:
@@ -251,47 +206,3 @@ class _Coarsest:
         out = np.empty(len(self._order))
         out[self._order] = cho_solve_banded((self._factor, True), b[self._order].astype(np.float64), check_finite=False)
         return out
-
-
-def _highest(matrix: BlockMatrix, inverse: NDArray[Any], threads: int, rounds: int = 16) -> float:
-    """Highest eigenvalue of D⁻¹A, from a fixed start: Lanczos, by way of conjugate gradients' coefficients.
-
-    A few badly shaped elements make a few high eigenvalues far apart from the rest; the power method finds them too
-    late, and a smoother that does not know them amplifies them.
-    """
-    kind = matrix.values.dtype
-    rng = np.random.default_rng(0)
-
-    def scaled(v: NDArray[Any]) -> NDArray[Any]:
-        return np.einsum("nij,nj->ni", inverse, v.reshape(-1, 3)).ravel()
-
-    r = rng.uniform(-1.0, 1.0, 3 * matrix.size).astype(kind)
-    z = scaled(r)
-    p, rz = z, dot(r, z)
-    diagonal, beside = [], []
-    ratio, before = 0.0, 1.0
-    for _ in range(rounds):
-        q = matrix.product(p, threads=threads)
-        curvature = dot(p, q)
-        if not (curvature > 0.0 and rz > 0.0):
-            break
-        alpha = rz / curvature
-        diagonal.append(1.0 / alpha + ratio / before)
-        r = r - kind.type(alpha) * q
-        z = scaled(r)
-        ratio, rz = dot(r, z) / rz, dot(r, z)
-        beside.append(np.sqrt(max(ratio, 0.0)) / alpha)
-        p = z + kind.type(ratio) * p
-        before = alpha
-    if not diagonal:
-        return 1.0
-    from scipy.linalg import eigh_tridiagonal
-
-    return float(eigh_tridiagonal(np.array(diagonal), np.array(beside[:-1]), eigvals_only=True)[-1])
-
-
-def _transpose(weights: Any) -> Any:
-    out = weights.T.tocsr()
-    out.indices = out.indices.astype(np.int32)
-    out.indptr = out.indptr.astype(np.int32)
-    return out

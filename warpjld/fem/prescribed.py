@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -12,7 +11,16 @@ from warpjld.errors import InputError
 from warpjld.fem.body import Body
 from warpjld.fem.hexmesh import HexMesh
 
-__all__ = ["FreeBodyError", "Prescribed", "free_motions", "held_in_place", "prescribe"]
+__all__ = [
+    "FreeBodyError",
+    "Prescribed",
+    "components",
+    "free_motions",
+    "held_in_place",
+    "prescribe",
+    "refuse_free",
+    "rigid_modes",
+]
 
 _MOTIONS = (
     "moving along x",
@@ -197,11 +205,3 @@ def held_in_place(body: Body, prescribed: Prescribed) -> Prescribed:
         degrees = 3 * nodes[chosen // 3] + chosen % 3
         prescribed = prescribed + Prescribed(degrees, np.zeros(len(degrees)))
     return prescribed
-
-
-def by_name(mesh: HexMesh, given: Mapping[str, Mapping[str, float]]) -> Prescribed:
-    """Prescribed displacements from a table ``{set: {axis: metres}}``."""
-    out = Prescribed(np.empty(0, np.int64), np.empty(0))
-    for name, components_ in given.items():
-        out = out + prescribe(mesh, name, **components_)
-    return out

@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import os
-from concurrent.futures import ThreadPoolExecutor
-from functools import cache
 from itertools import pairwise
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+
+from warpjld.threads import cores, helpers
 
 __all__ = ["Launch", "grouped", "on_rows", "shared", "threads_of"]
 
@@ -19,13 +18,15 @@ _LEAST_ROWS = 3000
 
 def threads_of(threads: int | None = None) -> int:
     """As many threads as asked for, by default as this process may use."""
-    if threads is not None:
-        return max(1, threads)
-    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+    return cores() if threads is None else max(1, threads)
 
 
 def shared(values: NDArray[Any]) -> Any:
-    """A Warp array over the memory of a contiguous NumPy array."""
+    """A Warp array over the memory of a contiguous NumPy array.
+
+    Raises:
+        ValueError: The array is not contiguous.
+    """
     import warp as wp
 
     wp.init()
@@ -70,7 +71,7 @@ class Launch:
 
     def __call__(self) -> None:
         """Run it, and return when all rows are done."""
-        others = [_pool(self._threads).submit(command.launch) for command in self._commands[1:]]
+        others = [helpers(self._threads).submit(command.launch) for command in self._commands[1:]]
         for command in self._commands[:1]:
             command.launch()
         for other in others:
@@ -80,8 +81,3 @@ class Launch:
 def on_rows(kernel: Any, count: int, inputs: list[Any], *, threads: int = 1, least: int = _LEAST_ROWS) -> None:
     """Launch ``kernel(first, *inputs)`` over ``count`` rows once (see ``Launch``)."""
     Launch(kernel, count, inputs, threads=threads, least=least)()
-
-
-@cache
-def _pool(threads: int) -> ThreadPoolExecutor:
-    return ThreadPoolExecutor(max_workers=threads - 1, thread_name_prefix="warpjld-fem")

@@ -1,9 +1,12 @@
 """Grasping: objects, distances and intersections, flexion search, closing a hand (A §7, R69–R78, R90)."""
 
-from warpjld.grasp.distance import Distances, FacetDistances, ObjectSet, facet_distance
+from warpjld.grasp.distance import Distances, ObjectSet
+from warpjld.grasp.facet import FacetDistances, facet_distance
+from warpjld.grasp.found import Found, Status
 from warpjld.grasp.object_file import load_object
 from warpjld.grasp.objects import GraspObject, Places, make_object
-from warpjld.grasp.search import NEAREST, FlexionSearch, Found, Searches, Status
+from warpjld.grasp.search import FlexionSearch
+from warpjld.grasp.searches import NEAREST, Searches
 from warpjld.grasp.validation import MeshReport
 
 __all__ = [

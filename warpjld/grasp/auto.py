@@ -41,7 +41,7 @@ class AutoGrasp:
     Attributes:
         posture: Name of the posture it began with.
         position: Displacement of the skeleton's root [m], shape (3,).
-        rotation: Rotation of the root about its rest place, shape (4,).
+        rotation: Rotation of the root about its rest place, x y z w, shape (4,).
         approach: Direction in which the hand came, shape (3,).
         start: Angles of the open hand [rad], shape (J, 4).
         angles: Angles of the closed hand [rad], shape (J, 4).

@@ -106,8 +106,8 @@ def give_way(
     Args:
         gaps: Of one hand with joint angles (J, 4), by part [m], see ``BothWays.gaps``.
         parts: Names of these parts.
-        start: Angles of the open hand, shape (J, 4).
-        closed: Angles of the closed hand, shape (J, 4).
+        start: Angles of the open hand [rad], shape (J, 4).
+        closed: Angles of the closed hand [rad], shape (J, 4).
         chains: Joints of the digits, see ``digit_chains``.
         allowed: Depth that stays at the end [m].
         on_the_way: Depth above which a digit passes through the object [m].

@@ -1,13 +1,9 @@
-"""How far points are from objects: to a chosen facet's plane (R73), or to the nearest point of the surface (C19)."""
+"""How far points are from objects: the nearest points of their surfaces, inside or outside (C19)."""
 
 from __future__ import annotations
 
-import os
 from collections.abc import Sequence
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
-from functools import cache
-from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -15,31 +11,14 @@ from numpy.typing import ArrayLike, NDArray
 
 from warpjld.covering.device import checked_device
 from warpjld.errors import InputError
+from warpjld.grasp.feature_normals import face_normals, feature_normals
 from warpjld.grasp.objects import GraspObject, Places
 from warpjld.grasp.triangle_tree import build_tree, join_trees
+from warpjld.threads import in_threads, threads_for
 
-__all__ = ["Distances", "FacetDistances", "ObjectSet", "facet_basis", "facet_distance", "feature_normals"]
+__all__ = ["Distances", "ObjectSet", "finite_points"]
 
 _SPLIT_BELOW = 2_000  # points a thread must have before splitting pays
-
-
-@dataclass(frozen=True, eq=False)
-class FacetDistances:
-    """Points in a facet's basis (A §7, R73).
-
-    Attributes:
-        coordinates: x along the facet's first edge, y along its normal, z = x × y [m], shape (…, 3). y is the
-            distance: negative behind the facet; x and z are the lateral place.
-        inside: Whether the foot of the perpendicular lies in the facet, borders included, shape (…) (C19).
-    """
-
-    coordinates: NDArray[np.float64]
-    inside: NDArray[np.bool_]
-
-    @property
-    def distance(self) -> NDArray[np.float64]:
-        """Signed distance to the facet's plane [m]."""
-        return np.asarray(self.coordinates[..., 1])
 
 
 @dataclass(frozen=True, eq=False)
@@ -57,45 +36,6 @@ class Distances:
     point: NDArray[np.float32] | None
 
 
-def facet_basis(thing: GraspObject, facet: int) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Origin (a corner) and rows x, y, z of a facet's basis in the object's frame (A §7, R73).
-
-    Raises:
-        InputError: There is no such facet.
-    """
-    corner = thing.vertices[thing.faces[thing.check_facet(facet)]]
-    x = corner[1] - corner[0]
-    x = x / np.linalg.norm(x)
-    y = thing.normals[facet]
-    return corner[0], np.stack([x, y, np.cross(x, y)])
-
-
-def facet_distance(points: ArrayLike, thing: GraspObject, facet: int, place: Places | None = None) -> FacetDistances:
-    """Distance process (A §7.1): points represented in a facet's basis.
-
-    Args:
-        points: On the stage [m], shape (n, 3).
-        thing: The object.
-        facet: Row of its faces.
-        place: One placement; the object's own if left out.
-
-    Raises:
-        InputError: No such facet, wrong shapes, or points that are not finite.
-    """
-    stage = _finite_points(points)
-    where = thing.place if place is None else place
-    origin, axes = facet_basis(thing, facet)
-    local = where.to_local(stage.reshape(-1, 3))[0] - origin
-    coordinates = local @ axes.T
-    corners = (thing.vertices[thing.faces[facet]] - origin) @ axes.T
-    flat, inside = coordinates[:, [0, 2]], np.ones(len(local), dtype=bool)
-    area = -_cross(corners[1, [0, 2]] - corners[0, [0, 2]], corners[2, [0, 2]] - corners[0, [0, 2]])
-    for k in range(3):
-        start, end = corners[k, [0, 2]], corners[(k + 1) % 3, [0, 2]]
-        inside &= -_cross(end - start, flat - start) >= -1e-12 * abs(area)
-    return FacetDistances(coordinates.reshape(stage.shape), inside.reshape(stage.shape[:-1]))
-
-
 class ObjectSet:
     """Search structures of some objects on a device; built once, used by distances and searches.
 
@@ -110,7 +50,6 @@ class ObjectSet:
     def __init__(self, objects: Sequence[GraspObject] | GraspObject, *, device: str = "cpu") -> None:
         import warp as wp
         from warpjld_kernels.surface_distance import Solids
-        from warpjld_kernels.triangle_tree import Tree
 
         self.objects = (objects,) if isinstance(objects, GraspObject) else tuple(objects)
         if not self.objects:
@@ -132,16 +71,7 @@ class ObjectSet:
         solids.solid = wp.array(flags, dtype=wp.int32, device=self.device)
         features = np.concatenate([_features(thing) for thing in self.objects])
         solids.features = wp.array(features.astype(np.float32), dtype=wp.vec3, device=self.device)
-        tree, built = Tree(), join_trees([build_tree(thing.vertices, thing.faces) for thing in self.objects])
-        for name, kind in (
-            ("root", wp.int32),
-            ("child", wp.int32),
-            ("boxes", float),
-            ("corners", float),
-            ("face", wp.int32),
-        ):
-            setattr(tree, name, wp.array(getattr(built, name).ravel(), dtype=kind, device=self.device))
-        solids.tree = tree
+        solids.tree = _tree_on(self.device, self.objects)
         self.solids: Any = solids
         """``warpjld_kernels.surface_distance.Solids`` on the device."""
 
@@ -154,6 +84,11 @@ class ObjectSet:
         if numbers.size and (numbers.min() < 0 or numbers.max() >= len(self)):
             raise InputError(f"objects: numbers go from 0 to {len(self) - 1}")
         return numbers
+
+    def places(self, which: ArrayLike) -> Places:
+        """Where objects stand at first, one place for each number."""
+        own = [self.objects[k].place for k in self.check(which)]
+        return Places(np.concatenate([p.position for p in own]), np.concatenate([p.rotation for p in own]))
 
     def distances(
         self,
@@ -185,7 +120,7 @@ class ObjectSet:
         import warp as wp
         from warpjld_kernels.surface_distance import measure
 
-        cloud = np.ascontiguousarray(_finite_points(points), dtype=np.float32)
+        cloud = np.ascontiguousarray(finite_points(points), dtype=np.float32)
         cloud = cloud[None] if cloud.ndim == 2 else cloud
         if not limit > 0.0:
             raise InputError(f"limit: want metres above 0, got {limit:g}")
@@ -215,7 +150,7 @@ class ObjectSet:
             )
 
         if threads is None:
-            threads = min(os.cpu_count() or 1, max(1, distance.size // _SPLIT_BELOW))
+            threads = threads_for(distance.size, _SPLIT_BELOW)
         in_threads(span, size, threads if self.device.is_cpu else 1, measure, self.device)
         if not self.device.is_cpu:
             distance, face, point = (out.numpy() for out in outs)
@@ -230,8 +165,7 @@ class ObjectSet:
         if chosen.size and (chosen.min() < 0 or chosen.max() >= count):
             raise InputError(f"sets: numbers go from 0 to {count - 1}")
         if places is None:
-            own = [self.objects[k].place for k in numbers]
-            places = Places(np.concatenate([p.position for p in own]), np.concatenate([p.rotation for p in own]))
+            places = self.places(numbers)
         lengths = {len(numbers), len(places), len(chosen)}
         rows = max(lengths)
         if lengths - {1, rows}:
@@ -247,50 +181,16 @@ class ObjectSet:
         )
 
 
-def in_threads(span: Any, count: int, threads: int, kernel: Any, device: Any) -> None:
-    """``span(begin, end)`` over 0 … count cut into pieces, in threads of their own (launches release the GIL)."""
+def _tree_on(device: Any, things: Sequence[GraspObject]) -> Any:
+    """``warpjld_kernels.triangle_tree.Tree`` of all objects on a device."""
     import warp as wp
+    from warpjld_kernels.triangle_tree import Tree
 
-    cuts = np.unique(np.linspace(0, count, max(1, min(threads, count)) + 1).astype(int)).tolist()
-    if len(cuts) <= 2:
-        span(0, count)
-        return
-    wp.load_module(kernel.module, device=device)  # compiling is not safe from several threads
-    others = [_pool(threads).submit(span, begin, end) for begin, end in pairwise(cuts[1:])]
-    span(cuts[0], cuts[1])
-    for other in others:
-        other.result()
-
-
-@cache
-def _pool(threads: int) -> ThreadPoolExecutor:
-    """Kept for the next call."""
-    return ThreadPoolExecutor(threads - 1, thread_name_prefix="warpjld-grasp")
-
-
-def feature_normals(vertices: NDArray[np.float64], faces: NDArray[np.int32]) -> NDArray[np.float64]:
-    """Normals of a triangle, of its edges opposite to corner 0, 1, 2, and of its corners, shape (t, 7, 3).
-
-    An edge has the sum of the normals at it, a corner their sum weighted by angle (Bærentzen and Aanæs 2005).
-    Triangles without area have none and add none.
-    """
-    corner = vertices[faces]
-    normal = _face_normals(corner)
-    out = np.empty((len(faces), 7, 3))
-    out[:, 0] = normal
-    edges = np.sort(faces[:, [[1, 2], [2, 0], [0, 1]]].reshape(-1, 2), axis=1)
-    _, place = np.unique(edges, axis=0, return_inverse=True)
-    total = np.zeros((int(place.max()) + 1, 3))
-    np.add.at(total, place.ravel(), np.repeat(normal, 3, axis=0))
-    out[:, 1:4] = total[place.reshape(-1, 3)]
-    at_corner = np.zeros((len(vertices), 3))
-    for k in range(3):
-        to_next, to_last = corner[:, (k + 1) % 3] - corner[:, k], corner[:, (k + 2) % 3] - corner[:, k]
-        sine = np.linalg.norm(np.cross(to_next, to_last), axis=1)
-        angle = np.arctan2(sine, (to_next * to_last).sum(axis=1))
-        np.add.at(at_corner, faces[:, k], angle[:, None] * normal)
-    out[:, 4:] = at_corner[faces]
-    return out
+    tree, built = Tree(), join_trees([build_tree(thing.vertices, thing.faces) for thing in things])
+    kinds = {"root": wp.int32, "child": wp.int32, "boxes": float, "corners": float, "face": wp.int32}
+    for name, kind in kinds.items():
+        setattr(tree, name, wp.array(getattr(built, name).ravel(), dtype=kind, device=device))
+    return tree
 
 
 def _features(thing: GraspObject) -> NDArray[np.float64]:
@@ -298,23 +198,15 @@ def _features(thing: GraspObject) -> NDArray[np.float64]:
     if thing.report.solid:
         return feature_normals(thing.vertices, thing.faces)
     out = np.zeros((len(thing.faces), 7, 3))
-    out[:, 0] = _face_normals(thing.vertices[thing.faces])
+    out[:, 0] = face_normals(thing.vertices[thing.faces])
     return out
 
 
-def _face_normals(corner: NDArray[np.float64]) -> NDArray[np.float64]:
-    normal = np.cross(corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0])
-    return np.asarray(normal / np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), 1e-300))
-
-
-def _finite_points(points: ArrayLike) -> NDArray[np.float64]:
+def finite_points(points: ArrayLike) -> NDArray[np.float64]:
+    """Points (n, 3) or sets of points (S, n, 3) as an array, or an InputError that says what is wrong with them."""
     array = np.asarray(points)
     if array.ndim not in (2, 3) or array.shape[-1] != 3:
         raise InputError(f"points: want shape (n, 3) or (sets, n, 3), got {array.shape}")
     if not np.isfinite(array).all():
         raise InputError(f"points: entry {np.argwhere(~np.isfinite(array))[0].tolist()} is not finite")
     return array
-
-
-def _cross(a: NDArray[np.float64], b: NDArray[np.float64]) -> NDArray[np.float64]:
-    return np.asarray(a[..., 0] * b[..., 1] - a[..., 1] * b[..., 0])

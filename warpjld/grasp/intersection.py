@@ -12,6 +12,7 @@ from warpjld.errors import InputError
 from warpjld.grasp.distance import ObjectSet
 from warpjld.grasp.objects import GraspObject, Places
 from warpjld.grasp.validation import MeshReport
+from warpjld.suggest import did_you_mean
 
 __all__ = ["Contact", "Intersection", "contacts", "intersection", "part_vertices"]
 
@@ -86,11 +87,8 @@ def part_vertices(covering: Covering, part: str | None) -> NDArray[np.int32]:
         if wanted in (fan.name, short[k]) or fan.name.startswith(f"{wanted}.") or short[k].startswith(f"{wanted}.")
     ]
     if not chosen:
-        from difflib import get_close_matches
-
         known = {*(fan.name for fan in covering.fans), *short, *(name.partition(".")[0] for name in short)}
-        close = get_close_matches(wanted, sorted(known), n=1)
-        raise InputError(f"no part '{part}' in this surface" + (f"; did you mean '{close[0]}'?" if close else ""))
+        raise InputError(f"no part '{part}' in this surface{did_you_mean(wanted, sorted(known))}")
     return np.flatnonzero(np.isin(owner, chosen)).astype(np.int32)
 
 

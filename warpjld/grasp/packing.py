@@ -11,9 +11,8 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from warpjld.covering import Covering
-from warpjld.covering.binding import STATIONS
 from warpjld.covering.device import anchors_on, array_on, parameters_on
-from warpjld.covering.drivers import flexion_ratio
+from warpjld.covering.drivers import flexion_ratio, virtual_lengths
 from warpjld.errors import InputError
 from warpjld.skeleton import CHANNELS, Poses, Skeleton
 
@@ -40,6 +39,9 @@ class Chains:
     stops: NDArray[np.float64]
     starts: NDArray[np.float64]
 
+    def __getitem__(self, rows: NDArray[np.int64]) -> Chains:
+        return Chains(self.frame[rows], self.joints[rows], self.rates[rows], self.stops[rows], self.starts[rows])
+
     @property
     def reach(self) -> NDArray[np.float64]:
         """Closing at which the last joint has come to its stop, shape (R,)."""
@@ -55,7 +57,11 @@ class Chains:
 
 def skin_on(device: Any, coverings: Sequence[Covering]) -> Any:
     """``warpjld_kernels.closing_chain.Skin``: the operators of coverings of one skeleton and surface, one below the
-    other, so that vertex v of the c-th is row c · V + v."""
+    other, so that vertex v of the c-th is row c · V + v.
+
+    Raises:
+        InputError: Coverings of different surfaces, or of another method than the smooth one.
+    """
     import warp as wp
     from warpjld_kernels.anchored import pack_coefficients
     from warpjld_kernels.closing_chain import Skin
@@ -93,7 +99,7 @@ def skin_on(device: Any, coverings: Sequence[Covering]) -> Any:
     skin.parents = array_on(device, first.skeleton.parents, wp.int32)
     pairs = anchors[0].pairs if len(anchors[0].pairs) else np.zeros((1, 2), np.int32)
     skin.pairs = array_on(device, pairs, wp.int32)
-    skin.across = array_on(device, _rest_lengths(first, pairs), float)
+    skin.across = array_on(device, virtual_lengths(anchors[0].ends, pairs, first.skeleton.rest[None])[0], float)
     proximal = anchors[0].ends[pairs, 0]
     skin.palm = array_on(device, np.stack([c.parameters.palm[proximal].mean(axis=1) for c in coverings]), float)
     skin.vertices = len(anchors[0])
@@ -172,15 +178,6 @@ def _depths(skeleton: Skeleton, joints: NDArray[np.int32]) -> NDArray[np.int32]:
             names = ", ".join(skeleton.names[m] for m in movers)
             raise InputError(f"joints that close together must lie one beyond the other, got {names}")
     return out[place.ravel()]
-
-
-def _rest_lengths(covering: Covering, pairs: NDArray[np.int32]) -> NDArray[np.float64]:
-    ends, rest = covering.anchors.ends, covering.skeleton.rest
-    place = np.linspace(0.0, 1.0, STATIONS)[:, None]
-    starts = rest[ends[pairs[:, 1], 0]] - rest[ends[pairs[:, 0], 0]]
-    stops = rest[ends[pairs[:, 1], 1]] - rest[ends[pairs[:, 0], 1]]
-    across = (1.0 - place) * starts[:, None] + place * stops[:, None]
-    return np.asarray(np.maximum(np.linalg.norm(across, axis=-1), 1e-9))
 
 
 def _about(axis: NDArray[np.float64], angle: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -24,6 +24,9 @@ def ball(diameter: float = 0.065, *, subdivisions: int = 4, name: str = "ball") 
         diameter: In metres.
         subdivisions: 0 … 7.
         name: For messages.
+
+    Raises:
+        InputError: A size or a number out of range.
     """
     _check(diameter=diameter)
     if not 0 <= subdivisions <= 7:
@@ -79,7 +82,11 @@ def cylinder(
 def plate(
     diameter: float = 0.20, height: float = 0.02, *, thickness: float = 0.004, name: str = "plate"
 ) -> GraspObject:
-    """A plate: a flat bottom, a rising rim with a round edge."""
+    """A plate: a flat bottom, a rising rim with a round edge.
+
+    Raises:
+        InputError: A size out of range, or too thick.
+    """
     _check(diameter=diameter, height=height, thickness=thickness)
     if thickness > 0.5 * height or thickness > 0.1 * diameter:
         raise InputError(f"thickness: too thick for a plate of {diameter:g} m by {height:g} m, got {thickness:g}")
@@ -95,7 +102,11 @@ def plate(
 def glass(
     diameter: float = 0.07, height: float = 0.12, *, thickness: float = 0.003, name: str = "glass"
 ) -> GraspObject:
-    """A tumbler: open above, a thick bottom, narrower below, with a round rim."""
+    """A tumbler: open above, a thick bottom, narrower below, with a round rim.
+
+    Raises:
+        InputError: A size out of range, or too thick.
+    """
     _check(diameter=diameter, height=height, thickness=thickness)
     if thickness > 0.2 * diameter or 3.0 * thickness > 0.5 * height:
         raise InputError(f"thickness: too thick for a glass of {diameter:g} m by {height:g} m, got {thickness:g}")

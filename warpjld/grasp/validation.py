@@ -12,7 +12,7 @@ from scipy.sparse.csgraph import connected_components
 from warpjld.covering.intersections import crossing_faces
 from warpjld.covering.quality import enclosed_volume
 from warpjld.errors import InputError
-from warpjld.grasp.winding import winding_numbers
+from warpjld.winding import winding_numbers
 
 __all__ = ["MeshReport", "mend"]
 
@@ -169,7 +169,7 @@ def _look_inwards(vertices: NDArray[np.float64], faces: NDArray[np.int32], piece
     for k in range(len(pieces)):
         if inwards[k] != inwards[largest]:
             # a cavity looks the other way from the piece around it, whichever way that one looked
-            within = winding_numbers(vertices[pieces[k][:1, 0]], vertices, outer)[0] > 0.5
+            within = winding_numbers(vertices, outer, vertices[pieces[k][:1, 0]])[0] > 0.5
             inwards[k] = inwards[largest] if within else inwards[k]
     return inwards
 
@@ -178,7 +178,7 @@ def _nested_properly(vertices: NDArray[np.float64], faces: NDArray[np.int32], pi
     """Whether outward pieces lie outside all others, and cavities inside exactly one."""
     for k in range(int(piece.max()) + 1) if piece.max() else ():
         own = faces[piece == k]
-        others = winding_numbers(vertices[own[:1, 0]], vertices, faces[piece != k])[0]
+        others = winding_numbers(vertices, faces[piece != k], vertices[own[:1, 0]])[0]
         wanted = 0.0 if float(enclosed_volume(vertices, own)) > 0.0 else 1.0
         if abs(others - wanted) > 0.1:
             return False

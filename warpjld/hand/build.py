@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from difflib import get_close_matches
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,6 +15,7 @@ from warpjld.hand.triangulate import triangulate
 from warpjld.rig import Rig
 from warpjld.skeleton import DIGITS, PALM_SEGMENTS, Skeleton, default_limits, hand_joint_names
 from warpjld.skeleton.hand import FINGER_JOINTS, HAND_PARENTS
+from warpjld.suggest import one_of
 from warpjld.surface import Part, Surface
 
 __all__ = ["build_hand"]
@@ -82,9 +82,7 @@ def _scales(proportions: Mapping[str, float | tuple[float, float]] | None) -> di
     out = {}
     for digit, scale in (proportions or {}).items():
         if digit not in DIGITS:
-            close = get_close_matches(digit, DIGITS, n=1)
-            hint = f"; did you mean '{close[0]}'?" if close else f"; want one of {', '.join(DIGITS)}"
-            raise InputError(f"proportions: no digit '{digit}'{hint}")
+            raise InputError(f"proportions: no digit '{digit}'{one_of(digit, DIGITS)}")
         long, thick = scale if isinstance(scale, tuple) else (scale, 1.0)
         if not (0.5 <= long <= 1.5 and 0.7 <= thick <= 1.3):
             raise InputError(

@@ -60,6 +60,7 @@ class Sweep:
         """Sweep whose sections have their centroids on a spline.
 
         Args:
+            origin: As of the class; likewise ``frame``, ``ends``, ``caps``, ``squareness`` and ``nail``.
             centres: (axial coordinate, lateral, dorsal) of centroids to pass through.
             profile: (axial coordinate, half-width, dorsal half-height, palmar half-height).
         """

@@ -18,7 +18,11 @@ _FURTHEST = 1e12
 
 
 def assemble_rig(source: SourceRig, *, side: str | None = None, unit: str | None = None, up: str | None = None) -> Rig:
-    """Recognise what ``source`` holds and bring it to the canonical form; arguments as in ``load_rig``."""
+    """Recognise what ``source`` holds and bring it to the canonical form; arguments as in ``load_rig``.
+
+    Raises:
+        InputError: What it holds cannot be used; the file is named.
+    """
     try:
         return _assemble(source, side, unit, up)
     except InputError as error:

@@ -18,7 +18,6 @@ from __future__ import annotations
 
 import json
 from collections.abc import Mapping
-from difflib import get_close_matches
 from pathlib import Path
 from typing import Any
 
@@ -30,6 +29,7 @@ from warpjld.io.mesh_file import MeshFile
 from warpjld.io.source import SourceRig
 from warpjld.skeleton.recognise.tree import SourceTree
 from warpjld.skeleton.tree import CHANNELS, Skeleton
+from warpjld.suggest import did_you_mean
 
 __all__ = ["read_skeleton_file", "write_skeleton_file"]
 
@@ -67,7 +67,7 @@ def _rig(path: Path, content: Any, mesh: MeshFile) -> SourceRig:
             raise InputError(f"joint {i} has no name")
         unknown = next((key for key in entry if key not in _KEYS), None)
         if unknown is not None:
-            raise InputError(f"joint '{entry['name']}': no key '{unknown}'{_hint(unknown, _KEYS)}")
+            raise InputError(f"joint '{entry['name']}': no key '{unknown}'{did_you_mean(unknown, _KEYS)}")
         if entry["name"] in names:
             raise InputError(f"two joints are called '{entry['name']}'")
         names.append(entry["name"])
@@ -80,7 +80,9 @@ def _rig(path: Path, content: Any, mesh: MeshFile) -> SourceRig:
         above = entry.get("parent")
         if above is not None:
             if above not in names:
-                raise InputError(f"joint '{names[j]}': no joint '{above}' to be its parent{_hint(str(above), names)}")
+                raise InputError(
+                    f"joint '{names[j]}': no joint '{above}' to be its parent{did_you_mean(str(above), names)}"
+                )
             parents[j] = names.index(above)
         if entry.get("axis") is not None:
             axes[j] = _vector(entry["axis"], names[j], "axis")
@@ -116,7 +118,7 @@ def _limits(value: Any, name: str) -> dict[str, tuple[float, float]]:
     out = {}
     for channel, pair in value.items():
         if channel not in CHANNELS:
-            raise InputError(f"joint '{name}': no channel '{channel}'{_hint(channel, CHANNELS)}")
+            raise InputError(f"joint '{name}': no channel '{channel}'{did_you_mean(channel, CHANNELS)}")
         good = isinstance(pair, list) and len(pair) == 2 and all(isinstance(x, int | float) for x in pair)
         if not good or not pair[0] <= pair[1]:
             raise InputError(f"joint '{name}': limits of {channel} want [smallest, largest] in degrees, got {pair!r}")
@@ -135,13 +137,12 @@ def _check_loops(names: list[str], parents: NDArray[np.int64]) -> None:
             raise InputError(f"joint '{names[j]}' is its own ancestor")
 
 
-def _hint(word: str, pool: Any) -> str:
-    close = get_close_matches(word, list(pool), n=1)
-    return f"; did you mean '{close[0]}'?" if close else ""
-
-
 def write_skeleton_file(path: str | Path, skeleton: Skeleton) -> None:
-    """Write a skeleton as a skeleton file that reads back as the same one."""
+    """Write a skeleton as a skeleton file that reads back as the same one.
+
+    Raises:
+        InputError: It cannot be written.
+    """
     joints = []
     for j, name in enumerate(skeleton.names):
         parent = int(skeleton.parents[j])

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from warpjld.errors import InputError
 from warpjld.motion.clip import Clip
-from warpjld.motion.rotations import multiply, rotate
+from warpjld.rotations import multiply, rotate
 
 __all__ = ["read_bvh"]
 

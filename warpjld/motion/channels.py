@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import re
-from difflib import get_close_matches
 
 from warpjld.errors import InputError
 from warpjld.skeleton import CHANNELS, PAPER_NUMBERS, Skeleton
+from warpjld.suggest import one_of
 
 __all__ = ["ROOT_CHANNELS", "canonical_channels", "resolve_channel"]
 
@@ -35,9 +35,7 @@ def canonical_channels(channel: str) -> tuple[str, ...]:
     if joint == "root" and len(kind) == 1:
         raise InputError(f"channel '{channel}': the root moves along x, y or z")
     if kind not in CHANNELS:
-        close = get_close_matches(kind, CHANNELS, n=1)
-        hint = f"; did you mean '{close[0]}'?" if close else ""
-        raise InputError(f"channel '{channel}': no angle '{kind}'; known: {', '.join(CHANNELS)}{hint}")
+        raise InputError(f"channel '{channel}': no angle '{kind}'{one_of(kind, CHANNELS)}")
     side, dot, rest = joint.partition(".")
     prefix, bare = (f"{side}.", rest) if dot and side in ("left", "right") else ("", joint)
     if bare == "metacarpus":

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from warpjld.motion.frame_times import frame_times
-from warpjld.motion.rotations import slerp
+from warpjld.rotations import slerp
 
 __all__ = ["Clip"]
 

@@ -13,8 +13,8 @@ from warpjld.errors import InputError
 from warpjld.motion.clip import Clip
 from warpjld.motion.frame_times import frame_times
 from warpjld.motion.retarget import retarget
-from warpjld.motion.rotations import slerp, unit
 from warpjld.rig import Rig
+from warpjld.rotations import slerp, unit
 from warpjld.skeleton import Poses, poses_from_world
 
 if TYPE_CHECKING:

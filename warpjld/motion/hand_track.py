@@ -11,7 +11,7 @@ from scipy.spatial.transform import Rotation
 
 from warpjld.errors import InputError
 from warpjld.motion.frame_times import frame_times
-from warpjld.motion.rotations import conjugate, minimal_rotation, multiply, rotate, slerp
+from warpjld.rotations import conjugate, minimal_rotation, multiply, rotate, slerp
 from warpjld.skeleton import DIGITS, Poses, Skeleton, poses_from_rotations
 from warpjld.skeleton.hand import FINGER_JOINTS
 

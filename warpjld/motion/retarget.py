@@ -26,7 +26,7 @@ from scipy.spatial.transform import Rotation
 from warpjld.errors import InputError
 from warpjld.motion.clip import Clip
 from warpjld.motion.landmarks import Landmarks, landmarks_of_clip, landmarks_of_skeleton
-from warpjld.motion.rotations import conjugate, minimal_rotation, multiply, rotate, slerp, unit
+from warpjld.rotations import conjugate, minimal_rotation, multiply, rotate, slerp, unit
 from warpjld.skeleton import DIGITS, Poses, Skeleton, poses_from_rotations
 
 __all__ = ["correspondence", "retarget"]

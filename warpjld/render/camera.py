@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import difflib
 import math
 from dataclasses import dataclass, replace
 from typing import Literal, Self
@@ -11,6 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from warpjld.errors import InputError
+from warpjld.suggest import one_of
 
 __all__ = ["VIEWS", "Camera"]
 
@@ -98,9 +98,7 @@ class Camera:
             InputError: Unknown name, no points, or axes that are parallel.
         """
         if name not in VIEWS:
-            near = difflib.get_close_matches(name, VIEWS, n=1)
-            hint = f", did you mean '{near[0]}'?" if near else f": want one of {', '.join(VIEWS)}"
-            raise InputError(f"no view '{name}'{hint}")
+            raise InputError(f"no view '{name}'{one_of(name, VIEWS)}")
         cloud = np.asarray(points, np.float64).reshape(-1, 3)
         if len(cloud) == 0 or not np.isfinite(cloud).all():
             raise InputError("camera points: want at least one point, all finite")

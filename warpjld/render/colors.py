@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import difflib
 from dataclasses import dataclass
 from typing import Self
 
@@ -10,6 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from warpjld.errors import InputError
+from warpjld.suggest import did_you_mean
 
 __all__ = ["ColorScale"]
 
@@ -38,7 +38,11 @@ class ColorScale:
 
     @classmethod
     def spanning(cls, values: ArrayLike, *, title: str = "", colormap: str = "viridis", factor: float = 1.0) -> Self:
-        """A scale from the smallest to the largest of some numbers."""
+        """A scale from the smallest to the largest of some numbers.
+
+        Raises:
+            InputError: No numbers, or not all finite.
+        """
         numbers = np.asarray(values, np.float64)
         if numbers.size == 0 or not np.isfinite(numbers).all():
             raise InputError("colour scale: want at least one number, all finite")
@@ -83,8 +87,6 @@ class ColorScale:
             mixed = LinearSegmentedColormap.from_list("own", self.colormap)
             return np.asarray(np.rint(255 * mixed(np.arange(256) / 255)[:, :3]), np.uint8)
         if self.colormap not in matplotlib.colormaps:
-            near = difflib.get_close_matches(self.colormap, list(matplotlib.colormaps), n=1)
-            hint = f", did you mean '{near[0]}'?" if near else ""
-            raise InputError(f"no colour map '{self.colormap}'{hint}")
+            raise InputError(f"no colour map '{self.colormap}'{did_you_mean(self.colormap, matplotlib.colormaps)}")
         colors = matplotlib.colormaps[self.colormap](np.arange(256) / 255)[:, :3]
         return np.rint(255 * colors).astype(np.uint8)

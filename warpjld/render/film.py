@@ -62,6 +62,7 @@ class Film:
 
         Raises:
             InputError: Another size or type, or the disk refuses.
+            WarpjldError: Outside of the film's ``with`` statement.
         """
         if not self._open:
             raise WarpjldError("a film is written inside its with statement: with Film(...) as film: ...")

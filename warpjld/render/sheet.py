@@ -37,6 +37,9 @@ def grid(
 
     Returns:
         Picture, uint8 (height, width, 3), of even height and width.
+
+    Raises:
+        InputError: No picture, or pictures of different sizes.
     """
     from PIL import Image as Pictures
 
@@ -108,6 +111,9 @@ def contact_sheet(
 
     Returns:
         Picture, uint8 (height, width, 3).
+
+    Raises:
+        InputError: Arrays whose numbers of frames differ, or no column.
     """
     frames = np.asarray(vertices, np.float64)
     if frames.ndim != 3 or len(frames) == 0:

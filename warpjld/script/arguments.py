@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 from warpjld.errors import InputError
 from warpjld.script.statements import Number, Position, Text, Value, Word
-from warpjld.script.suggest import did_you_mean
+from warpjld.suggest import did_you_mean
 
 if TYPE_CHECKING:
     from warpjld.script.interpreter import Interpreter

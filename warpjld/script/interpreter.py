@@ -25,7 +25,7 @@ from warpjld.script.statements import (
     Value,
     Word,
 )
-from warpjld.script.suggest import did_you_mean
+from warpjld.suggest import did_you_mean
 
 if TYPE_CHECKING:
     from warpjld.script.scene import Scene

@@ -10,8 +10,8 @@ import numpy as np
 from warpjld.errors import InputError
 from warpjld.script.arguments import Arguments
 from warpjld.script.scene import Actor, Scene, SplineConstants
-from warpjld.script.suggest import did_you_mean
 from warpjld.skeleton import CHANNELS, PAPER_NUMBERS, Skeleton
+from warpjld.suggest import did_you_mean
 
 __all__ = ["joint_numbers", "read_joint", "set_keys"]
 

@@ -19,7 +19,7 @@ from importlib.metadata import entry_points
 from typing import TYPE_CHECKING, TypeVar
 
 from warpjld.errors import InputError
-from warpjld.script.suggest import did_you_mean
+from warpjld.suggest import did_you_mean
 
 if TYPE_CHECKING:
     from warpjld.script.arguments import Arguments

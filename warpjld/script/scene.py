@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from warpjld.errors import InputError
 from warpjld.press.wishes import ContactWishes
 from warpjld.script.placement import Placement
-from warpjld.script.suggest import did_you_mean
+from warpjld.suggest import did_you_mean
 
 if TYPE_CHECKING:
     from warpjld.covering import Covering, Parameters

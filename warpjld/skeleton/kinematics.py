@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from warpjld.errors import InputError
+from warpjld.rotations import about, conjugate, multiply, rotate
 from warpjld.skeleton.tree import CHANNELS, Skeleton
 
 __all__ = ["Poses", "poses_from_angles", "poses_from_rotations", "poses_from_world", "rest_poses", "vertical_flexion"]
@@ -53,6 +54,9 @@ def poses_from_angles(
         angles: Joint angles [rad], shape (F, J, 4), channels as in ``CHANNELS``.
         root_position: Displacement of the root from rest [m], shape (F, 3).
         root_rotation: Rotation of the root about its rest position, quaternions x, y, z, w, shape (F, 4).
+
+    Raises:
+        InputError: Wrong shapes, or angles that are not finite.
     """
     count = len(skeleton)
     if angles.ndim != 3 or angles.shape[1:] != (count, len(CHANNELS)):
@@ -63,9 +67,9 @@ def poses_from_angles(
     axes, directions, mirror = skeleton.axes, skeleton.directions, skeleton.mirror[:, None]
     normals = np.cross(directions, axes)
     flexion, pivot, twisting, abduction = (angles[..., k, None] for k in range(len(CHANNELS)))
-    pivoted = _turned(_about(mirror * pivot * directions), axes)
-    local = _multiply(_about(mirror * abduction * normals), _about(flexion * pivoted))
-    local = _multiply(local, _about(-mirror * twisting * directions))
+    pivoted = rotate(about(mirror * pivot * directions), axes)
+    local = multiply(about(mirror * abduction * normals), about(flexion * pivoted))
+    local = multiply(local, about(-mirror * twisting * directions))
     return _compose(skeleton, local, root_position, root_rotation)
 
 
@@ -82,6 +86,9 @@ def poses_from_rotations(
         local: Rotation of each joint relative to its parent's bone, measured from rest in the axes of the rest pose,
             quaternions x, y, z, w, shape (F, J, 4).
         root_position: Displacement of the root from rest [m], shape (F, 3).
+
+    Raises:
+        InputError: Wrong shapes.
     """
     if local.ndim != 3 or local.shape[1:] != (len(skeleton), 4):
         raise InputError(f"local: want shape (frames, {len(skeleton)}, 4), got {local.shape}")
@@ -96,6 +103,9 @@ def poses_from_world(skeleton: Skeleton, positions: NDArray[np.float64], rotatio
         positions: Joint positions [m], shape (F, J, 3).
         rotations: Rotation of each joint's bone from the rest pose, in world axes, unit quaternions x, y, z, w of
             either sign, shape (F, J, 4).
+
+    Raises:
+        InputError: Wrong shapes.
     """
     count = len(skeleton)
     for name, array, last in (("positions", positions, 3), ("rotations", rotations, 4)):
@@ -104,12 +114,12 @@ def poses_from_world(skeleton: Skeleton, positions: NDArray[np.float64], rotatio
     local = rotations.copy()
     for j, parent in enumerate(skeleton.parents):
         if parent >= 0:
-            local[:, j] = _multiply(rotations[:, parent] * np.array([-1.0, -1.0, -1.0, 1.0]), rotations[:, j])
+            local[:, j] = multiply(conjugate(rotations[:, parent]), rotations[:, j])
     local *= np.where(local[..., 3:] < 0.0, -1.0, 1.0)
     aligned = local.copy()
     for j, parent in enumerate(skeleton.parents):
         if parent >= 0:
-            aligned[:, j] = _multiply(aligned[:, parent], local[:, j])
+            aligned[:, j] = multiply(aligned[:, parent], local[:, j])
     return Poses(np.array(positions, dtype=np.float64), aligned, vertical_flexion(skeleton, local))
 
 
@@ -130,12 +140,12 @@ def _compose(
     positions = np.empty((frames, count, 3))
     for joints, parents in _levels(skeleton.parents):
         if parents[0] < 0:
-            turn = local[:, joints] if root_rotation is None else _multiply(root_rotation[:, None], local[:, joints])
+            turn = local[:, joints] if root_rotation is None else multiply(root_rotation[:, None], local[:, joints])
             rotations[:, joints] = turn
             positions[:, joints] = skeleton.rest[joints] + (0.0 if root_position is None else root_position[:, None])
         else:
-            rotations[:, joints] = _multiply(rotations[:, parents], local[:, joints])
-            offset = _turned(rotations[:, parents], skeleton.rest[joints] - skeleton.rest[parents])
+            rotations[:, joints] = multiply(rotations[:, parents], local[:, joints])
+            offset = rotate(rotations[:, parents], skeleton.rest[joints] - skeleton.rest[parents])
             positions[:, joints] = positions[:, parents] + offset
     return Poses(positions, rotations, vertical_flexion(skeleton, local))
 
@@ -153,7 +163,7 @@ def vertical_flexion(skeleton: Skeleton, local: NDArray[np.float64]) -> NDArray[
     length = np.linalg.norm(initial, axis=1, keepdims=True)
     bends = length[:, 0] >= 1e-6  # elsewhere the axis lies along the segment
     initial = initial / np.where(length >= 1e-6, length, 1.0)
-    moved = _turned(local, directions)
+    moved = rotate(local, directions)
     angle = np.arctan2((moved * np.cross(axes, initial)).sum(axis=-1), (moved * initial).sum(axis=-1))
     return np.asarray(np.where(bends, angle, 0.0))
 
@@ -165,34 +175,3 @@ def _levels(parents: NDArray[np.int32]) -> list[tuple[NDArray[np.int64], NDArray
         depth[j] = depth[parent] + 1 if parent >= 0 else 0
     levels = (np.flatnonzero(depth == d) for d in range(int(depth.max(initial=-1)) + 1))
     return [(joints, parents[joints]) for joints in levels]
-
-
-def _about(vector: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Quaternions of rotations about vectors by their length [rad]."""
-    half = 0.5 * np.linalg.norm(vector, axis=-1, keepdims=True)
-    return np.concatenate([0.5 * np.sinc(half / np.pi) * vector, np.cos(half)], axis=-1)
-
-
-def _turned(q: NDArray[np.float64], v: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Vectors turned by quaternions of any length: v + 2 u × (u × v + w v) / |q|², u the vector part."""
-    x, y, z, w = np.moveaxis(q, -1, 0)
-    vx, vy, vz = np.moveaxis(v, -1, 0)
-    tx, ty, tz = y * vz - z * vy + w * vx, z * vx - x * vz + w * vy, x * vy - y * vx + w * vz
-    twice = 2.0 / (x * x + y * y + z * z + w * w)
-    turned = (vx + twice * (y * tz - z * ty), vy + twice * (z * tx - x * tz), vz + twice * (x * ty - y * tx))
-    return np.stack(turned, axis=-1)
-
-
-def _multiply(a: NDArray[np.float64], b: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Hamilton product without the sign changes a rotation library may make."""
-    ax, ay, az, aw = np.moveaxis(a, -1, 0)
-    bx, by, bz, bw = np.moveaxis(b, -1, 0)
-    return np.stack(
-        [
-            aw * bx + ax * bw + ay * bz - az * by,
-            aw * by - ax * bz + ay * bw + az * bx,
-            aw * bz + ax * by - ay * bx + az * bw,
-            aw * bw - ax * bx - ay * by - az * bz,
-        ],
-        axis=-1,
-    )

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from warpjld.errors import InputError
+from warpjld.suggest import did_you_mean
 
 __all__ = ["CHANNELS", "Segment", "Skeleton"]
 
@@ -82,7 +83,11 @@ class Skeleton:
         return len(self.names)
 
     def index(self, name: str) -> int:
-        """Joint number of a canonical name; the side may be left out where only one hand or limb has it."""
+        """Joint number of a canonical name; the side may be left out where only one hand or limb has it.
+
+        Raises:
+            InputError: There is no such joint, or more than one.
+        """
         wanted = name.lower()
         matches = [
             i for i, n in enumerate(self.names) if n == wanted or (n.partition(".")[2] == wanted and n[:5] in _SIDED)
@@ -92,7 +97,7 @@ class Skeleton:
             return (exact or matches)[0]
         if matches:
             raise InputError(f"joint '{name}' is ambiguous: {', '.join(self.names[i] for i in matches)}")
-        raise InputError(f"no joint '{name}' in this skeleton{_did_you_mean(wanted, self.names)}")
+        raise InputError(f"no joint '{name}' in this skeleton{_similar(wanted, self.names)}")
 
     @cached_property
     def segments(self) -> tuple[Segment, ...]:
@@ -139,9 +144,5 @@ class Skeleton:
 _SIDED = ("left.", "right")
 
 
-def _did_you_mean(word: str, names: tuple[str, ...]) -> str:
-    from difflib import get_close_matches
-
-    pool = {n: n for n in names} | {n.partition(".")[2]: n for n in names if n[:5] in _SIDED}
-    close = get_close_matches(word, list(pool), n=1)
-    return f"; did you mean '{close[0]}'?" if close else ""
+def _similar(word: str, names: tuple[str, ...]) -> str:
+    return did_you_mean(word, [*names, *(n.partition(".")[2] for n in names if n[:5] in _SIDED)])

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import os
 import shutil
 import time
 from collections import Counter
@@ -22,6 +21,7 @@ from warpjld.study.rates import Rate, success_rates
 from warpjld.study.shards import Shards
 from warpjld.study.summary import write_summary
 from warpjld.study.table import gathered, require_parquet, write_arrays, write_csv, write_parquet
+from warpjld.threads import cores
 
 __all__ = ["StudyResult", "TableFormat", "opened", "run_study", "table_columns"]
 
@@ -92,7 +92,7 @@ def run_study(
     shards = opened(experiment, folder, fresh=fresh)
     shards.sweep()
     missing = shards.missing(experiment.trials)
-    workers = min(processes or os.cpu_count() or 1, max(len(missing), 1))
+    workers = min(processes or cores(), max(len(missing), 1))
     finished = experiment.trials - len(missing)
     report("trials", finished, experiment.trials)
 

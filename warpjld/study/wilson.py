@@ -22,6 +22,9 @@ def wilson_interval(successes: int, trials: int, confidence: float = 0.95) -> tu
         successes: How many succeeded.
         trials: Out of how many, failures of any kind included; 0 gives (0, 1).
         confidence: Two-sided, between 0 and 1.
+
+    Raises:
+        InputError: More successes than trials, or a confidence out of range.
     """
     if not 0 <= successes <= trials:
         raise InputError(f"successes: want 0…{trials}, got {successes}")

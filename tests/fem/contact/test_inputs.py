@@ -41,7 +41,7 @@ def test_no_pairs(body: Body) -> None:
 
 def test_faces_that_are_not_there(body: Body) -> None:
     held = symmetric(body.mesh)
-    with pytest.raises(InputError, match=r"slave: no face set 'outr', did you mean 'outer'\?"):
+    with pytest.raises(InputError, match=r"slave: no face set 'outr'; did you mean outer\?"):
         press(body, held, [Pair("outr", lid(0.1))])
     with pytest.raises(InputError, match="slave: no faces"):
         press(body, held, [Pair(np.empty((0, 2), np.int32), lid(0.1))])

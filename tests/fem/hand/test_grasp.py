@@ -17,7 +17,8 @@ from warpjld.fem.hand.bone_loads import loads_from_contact, loads_from_reactions
 from warpjld.fem.hand.muscles import Effort, effort_of
 from warpjld.fem.hand.tactile import tactile_of
 from warpjld.grasp import ObjectSet, Places
-from warpjld.grasp.close import close_hand, digit_chains
+from warpjld.grasp.close import close_hand
+from warpjld.grasp.digits import digit_chains
 from warpjld.grasp.postures import posture_angles
 from warpjld.grasp.shapes import ball
 from warpjld.hand import build_hand

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import csv
 import json
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import numpy as np
@@ -12,6 +12,7 @@ import pytest
 from numpy.typing import NDArray
 
 from warpjld.errors import InputError
+from warpjld.fem.contact import Pair
 from warpjld.fem.hand import FleshHand
 from warpjld.fem.hand.tactile import tactile_of
 from warpjld.fem.hand.tactile_files import TACTILE_COLUMNS, draw_tactile, write_tactile
@@ -88,9 +89,28 @@ def test_pads_of_a_slave_and_of_a_master(hand: FleshHand) -> None:
     assert np.isnan(found.sticking[2, p])
     assert found.area[2, p] > 0.0
     assert np.isnan(found.centre[1, p - 1]).all()
-    assert not tactile_of(hand, instants, only="plate").touching.any()
     with pytest.raises(InputError, match="at least one instant"):
         tactile_of(hand, [])
+
+
+def test_one_pair_of_several(hand: FleshHand) -> None:
+    still = np.zeros((len(hand.mesh.nodes) + 7, 3))
+    ball = pressed(hand, "left.index.distal", 8e3, slave=True)
+    plate = replace(pressed(hand, "left.thumb.distal", 5e3, slave=True), name="plate")
+    both = [Moment(1.0, still), Moment(2.0, still, (ball, plate))]
+    touched = {only: tactile_of(hand, both, only=only).touching[1] for only in (None, "ball", "plate")}
+    pads = tactile_of(hand, both).pads
+    assert [pads[p] for p in np.flatnonzero(touched["ball"])] == ["left.index.distal"]
+    assert [pads[p] for p in np.flatnonzero(touched["plate"])] == ["left.thumb.distal"]
+    np.testing.assert_array_equal(touched[None], touched["ball"] | touched["plate"])
+    with pytest.raises(InputError, match="no pair 'cup'; there are ball, plate"):
+        tactile_of(hand, both, only="cup")
+
+
+def test_pairs_are_known_by_their_names() -> None:
+    assert Pair("pad", "ball", name="grip").label == "grip"
+    assert Pair("pad", "ball").label == "pad–ball"
+    assert Pair("pad", "ball").title == "contact 'pad–ball'"
 
 
 def test_files(hand: FleshHand, tmp_path: Path) -> None:

@@ -123,6 +123,8 @@ def test_bad_arguments_are_named() -> None:
     for name, value in (("mass", 0.0), ("squeeze", -1.0), ("normal_stiffness", np.nan), ("tangential_stiffness", 0.0)):
         with pytest.raises(InputError, match=name):
             gravity_displacement(box, (0, 0, 0), **(good | {name: value}))  # type: ignore[arg-type]
+    with pytest.raises(InputError, match="directions: want finite vectors"):
+        gravity_displacement(box, (0, 0, 0), directions=[[0, 1, 0], [0, 0, 0]], **good)
     with pytest.raises(InputError, match="wrench"):
         resisted_wrench(box, [0.0] * 6)
     with pytest.raises(InputError, match="budget"):

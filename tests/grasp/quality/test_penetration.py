@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 import trimesh
 
-from warpjld.covering import bind
+from warpjld.covering import Covering
 from warpjld.grasp.quality import depth_inside, penetration
 from warpjld.grasp.shapes import ball, box
-from warpjld.hand import build_hand
+from warpjld.rig import Rig
 
 _BALL = trimesh.creation.icosphere(subdivisions=4, radius=0.02)
 
@@ -29,10 +29,9 @@ def test_an_open_surface_still_has_an_inside() -> None:
     assert depth == pytest.approx(0.01, abs=5e-5)
 
 
-def test_a_corner_between_skin_vertices_is_found_from_its_own_side() -> None:
+def test_a_corner_between_skin_vertices_is_found_from_its_own_side(rig: Rig, covering: Covering) -> None:
     """A box whose corner lies inside the palm holds no skin vertex there, or a less deep one."""
-    rig = build_hand("left", resolution=1500)
-    covering, skin = bind(rig.skeleton, rig.surface), rig.surface.vertices.astype(np.float32)
+    skin = rig.surface.vertices.astype(np.float32)
     middle = 0.5 * (
         rig.skeleton.rest[rig.skeleton.index("wrist")] + rig.skeleton.rest[rig.skeleton.index("middle.base")]
     )

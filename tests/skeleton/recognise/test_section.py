@@ -1,4 +1,4 @@
-"""Rays, winding numbers, sections and extremities against shapes whose answers are known."""
+"""Rays, sections and extremities against shapes whose answers are known."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ import pytest
 import trimesh
 
 from warpjld.skeleton.recognise.extremity import find_extremity
-from warpjld.skeleton.recognise.section import cross_section, first_hits, winding_numbers
+from warpjld.skeleton.recognise.section import cross_section, first_hits
 
 
 @pytest.fixture(scope="module")
@@ -16,28 +16,6 @@ def capsule() -> tuple[np.ndarray, np.ndarray]:
     mesh = trimesh.creation.capsule(height=0.04, radius=0.008, count=(48, 48))
     vertices = np.array(mesh.vertices)
     return vertices - [0, 0, vertices[:, 2].min() + 0.008], np.array(mesh.faces)
-
-
-def test_winding_number_of_closed_open_and_nested_surfaces(capsule):
-    vertices, faces = capsule
-    points = np.array([[0, 0, 0.02], [0.004, 0, 0.0], [0, 0, 0.1], [0.02, 0, 0.02]])
-    np.testing.assert_allclose(winding_numbers(vertices, faces, points), [1, 1, 0, 0], atol=1e-9)
-    both = np.vstack([faces, faces + len(vertices)])
-    inner = np.vstack([vertices, vertices * 0.5])
-    assert winding_numbers(inner, both, np.array([[0, 0, 0.01]]))[0] == pytest.approx(2.0, abs=1e-9)
-    opened = faces[vertices[faces].mean(axis=1)[:, 2] > 0.0]
-    assert winding_numbers(vertices, opened, points[:1])[0] > 0.8
-
-
-def test_winding_numbers_agree_with_their_definition():
-    random = np.random.default_rng(0)
-    mesh = trimesh.creation.icosphere(subdivisions=1)
-    points = random.normal(size=(50, 3))
-    inside = np.linalg.norm(points, axis=1) < 0.85
-    outside = np.linalg.norm(points, axis=1) > 1.0
-    got = winding_numbers(np.array(mesh.vertices) + 5.0, np.array(mesh.faces), points + 5.0)
-    np.testing.assert_allclose(got[inside], 1.0, atol=1e-9)
-    np.testing.assert_allclose(got[outside], 0.0, atol=1e-9)
 
 
 def test_first_hits_from_inside_a_box():

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 from warpjld.grasp import ObjectSet
 from warpjld.grasp.shapes import ball
-from warpjld.hand import build_hand
+from warpjld.rig import Rig
 from warpjld.study.grasping.plan import WristRange
 from warpjld.study.grasping.wrist import Palm, draw_approach, find_palm, place_palm, touch_along
 
@@ -60,9 +60,9 @@ def test_tracing_meets_a_ball_where_it_is() -> None:
 
 
 @pytest.mark.parametrize("side", ["left", "right"])
-def test_the_palm_of_the_built_in_hand(side: str) -> None:
+def test_the_palm_of_the_built_in_hand(hands: dict[str, Rig], side: str) -> None:
     """It lies palm down, fingers along −Z."""
-    rig = build_hand(side, resolution=1500)
+    rig = hands[side]
     palm = find_palm(rig.skeleton, rig.surface.vertices)
     assert palm.normal @ [0.0, -1.0, 0.0] > 0.95
     assert palm.fingers @ [0.0, 0.0, -1.0] > 0.95

@@ -7,6 +7,7 @@ leaves of overlap and slip is gone when forces balance (Simo & Laursen 1992; ref
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -28,8 +29,8 @@ from warpjld.fem.prescribed import Prescribed
 __all__ = ["Equilibrium", "Reached", "Step"]
 
 _ITERATIONS = 40
-_PENALTY = 300.0
-"""Contact stiffness over the stiffness of a node: more makes the linear solves slow, less makes them many."""
+_PENALTY = 60.0
+"""Contact stiffness over E* by the edge of a face: more makes the linear solves slow, less makes them many."""
 _ROUNDING = 1e-13
 """Part of stiffness times displacement that is rounding, where bodies move without a force."""
 _PLACES = 0.03
@@ -82,6 +83,7 @@ class Equilibrium:
     Args:
         body: All bodies, merged.
         interfaces: What may touch.
+        moduli: E* at each interface's slave nodes [Pa].
         tolerance: Relative residual.
         penetration: Overlap left, as a share of an edge.
         precision: Of the linear solver.
@@ -91,6 +93,7 @@ class Equilibrium:
         self,
         body: Body,
         interfaces: list[Interface],
+        moduli: list[NDArray[np.float64]],
         *,
         tolerance: float = 1e-5,
         penetration: float = 1e-3,
@@ -112,7 +115,7 @@ class Equilibrium:
         blocks = tangent.stiffness.diagonal()
         self._stiff = np.einsum("nii->n", blocks) / 3.0
         self._solver = StepSolver(body, self._stiff, precision)
-        self._interplay = Interplay(body.mesh.nodes, interfaces, self._stiff, penalty=penalty, penetration=penetration)
+        self._interplay = Interplay(body.mesh.nodes, interfaces, moduli, penalty=penalty, penetration=penetration)
 
     def find(
         self,
@@ -247,30 +250,31 @@ class Equilibrium:
             return length
         for _ in range(_LINE_SEARCH):
             there = u + length * move
-            trial = self._at(there, None) if self._rest is not None else body.at(there, stiffness=False)
+            trial = self._forces(there)
             if self._rest is not None or (trial.lowest > 0).all():
                 break
             length *= 0.5
         else:
             return 0.0
-        if not watched.any() or length < 1.0:
+        if not watched.any():
             return length
-        external = step.share * external_forces(body, step.loads, there if body.large_strain else None)
         along = np.where(watched, move, 0.0)
-        here = dot(residual - contact.forces, along)
-        ahead = dot(external - trial.forces, along)
 
         def pull(part: float) -> float:
-            """What drives on after part of the way: the bodies' forces change linearly, contact as it must."""
+            """What drives on after part of the way; contact as the linear model has it."""
+            here = u + part * move
+            bodies = trial if part == length else self._forces(here)
+            external = step.share * external_forces(body, step.loads, here if body.large_strain else None)
             foreseen = self._interplay.foreseen(contact, memory, part * move, step.allowed, patient=patient)
-            return here + part * (ahead - here) + dot(self._interplay.pushed(contact.points, foreseen), along)
+            return dot(external - bodies.forces + self._interplay.pushed(contact.points, foreseen), along)
 
-        start, end = pull(0.0), pull(1.0)
+        start, end = dot(residual, along), pull(length)
         if not (start > 0.0 and end < -0.5 * start):
-            return 1.0
-        from scipy.optimize import brentq
+            return length
+        return max(_balance(pull, length, start, end), 1e-6)
 
-        return max(float(brentq(pull, 0.0, 1.0, xtol=1e-14, rtol=1e-6, maxiter=60, disp=False)), 1e-12)
+    def _forces(self, u: NDArray[np.float64]) -> Tangent:
+        return self._at(u, None) if self._rest is not None else self.body.at(u, stiffness=False)
 
     def _at(self, u: NDArray[np.float64], pressures: NDArray[np.float64] | None) -> Tangent:
         if self._rest is None:
@@ -298,3 +302,26 @@ class Equilibrium:
         if self._loose is None or self._loose[0] != key:
             self._loose = (key, Loose(self.body, prescribed, self._stiff))
         return self._loose[1]
+
+
+def _balance(pull: Callable[[float], float], end: float, at_start: float, at_end: float) -> float:
+    """Part of the way up to ``end`` at which what drives on changes its sign, about (Illinois' regula falsi)."""
+    low, high, driving, against = 0.0, end, at_start, at_end
+    for _ in range(_LINE_SEARCH):
+        part = float(
+            np.clip(
+                (low * against - high * driving) / (against - driving),
+                low + 0.02 * (high - low),
+                high - 0.02 * (high - low),
+            )
+        )
+        there = pull(part)
+        if abs(there) <= 0.3 * at_start:
+            return part
+        if there > 0.0:
+            against *= 0.5 if low > 0.0 else 1.0
+            low, driving = part, there
+        else:
+            driving *= 0.5 if high < end else 1.0
+            high, against = part, there
+    return low or high

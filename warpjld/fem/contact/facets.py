@@ -10,6 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from warpjld.errors import InputError
 from warpjld.fem.contact.obstacles import Points, Touching
+from warpjld.threads import in_threads, threads_for
 
 __all__ = ["CREASE", "Facets", "Place"]
 
@@ -124,12 +125,8 @@ class Facets:
 
     def _nearest(self, points: Points) -> tuple[NDArray[np.int32], NDArray[np.bool_]]:
         """Nearest triangle, and inside or not, in single precision."""
-        import os
-
         import warp as wp
         from warpjld_kernels import fem_inside
-
-        from warpjld.grasp.distance import in_threads
 
         count = len(points)
         local = self._local(points)
@@ -147,9 +144,7 @@ class Facets:
             ]
             wp.launch(fem_inside.signed_distance, dim=end - begin, inputs=[*inputs, *outputs], device="cpu")
 
-        threads = min(os.cpu_count() or 1, max(1, count // _THREAD))
-        if count:
-            in_threads(span, count, threads, fem_inside.signed_distance, "cpu")
+        in_threads(span, count, threads_for(count, _THREAD), fem_inside.signed_distance, "cpu")
         return np.maximum(face, 0), distance < 0.0
 
     def _features(self, normals: NDArray[np.float64] | None) -> None:

@@ -14,6 +14,10 @@ __all__ = ["Contact", "Interplay", "alike", "shifted"]
 
 _SETTLED = 2e-3
 """Share of the contact forces by which the multipliers may still change."""
+_SLOW = 0.1
+"""Share of the overlap that a linear solve may leave; where it leaves more, the penalty grows,"""
+_FIRMER, _FIRMEST = 5.0, 25.0
+"""by the one factor, up to the other."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -32,8 +36,8 @@ class Interplay:
     Args:
         nodes: Rest positions of the bodies' nodes [m], shape (N, 3).
         interfaces: What may touch.
-        stiffness: Stiffness of each node [N/m], shape (N,).
-        penalty: Contact stiffness over that of a node.
+        moduli: E* at each interface's slave nodes [Pa].
+        penalty: Contact stiffness over E* by the edge of a face.
         penetration: Overlap left, as a share of an edge.
     """
 
@@ -41,7 +45,7 @@ class Interplay:
         self,
         nodes: NDArray[np.float64],
         interfaces: list[Interface],
-        stiffness: NDArray[np.float64],
+        moduli: list[NDArray[np.float64]],
         *,
         penalty: float,
         penetration: float,
@@ -49,7 +53,7 @@ class Interplay:
         self.interfaces = interfaces
         self._rest = nodes
         self._penetration = penetration
-        self._penalties = [penalty * _meeting(interface, stiffness) / interface.edge**2 for interface in interfaces]
+        self._penalties = [penalty * (i.share @ m) / i.edge for i, m in zip(interfaces, moduli, strict=True)]
 
     @property
     def reach(self) -> float:
@@ -82,7 +86,7 @@ class Interplay:
         since = (u - start).reshape(-1, 3)
         slips = [p.relative(since) - p.carried for p in points]
         responses = [
-            respond(i.pair, p, m, slip, self._penalty(k, p), allowed, keep=keep, patient=not keep)
+            respond(i.pair, p, m, slip, self._penalty(k, p, m), allowed, keep=keep, patient=not keep)
             for k, (i, p, m, slip) in enumerate(zip(self.interfaces, points, memory, slips, strict=True))
         ]
         return Contact(points, slips, responses, self.pushed(points, responses))
@@ -102,7 +106,7 @@ class Interplay:
         for k, (p, m, slip) in enumerate(zip(contact.points, memory, contact.slips, strict=True)):
             there = shifted(p, move.reshape(-1, 3))
             slip = slip + p.relative(move.reshape(-1, 3))
-            penalty = self._penalty(k, p)
+            penalty = self._penalty(k, p, m)
             out.append(respond(self.interfaces[k].pair, there, m, slip, penalty, allowed, patient=patient))
         return out
 
@@ -119,13 +123,25 @@ class Interplay:
         out = []
         for k, (m, p, r) in enumerate(zip(memory, contact.points, foreseen, strict=True)):
             slip = contact.slips[k] + p.relative(move.reshape(-1, 3))
-            pair, known, penalty = self.interfaces[k].pair, contact.responses[k].active, self._penalty(k, p)
-            out.append(remember(pair, m, p, r, slip, penalty, known, patient=patient))
+            pair, known, penalty = self.interfaces[k].pair, contact.responses[k].active, self._penalty(k, p, m)
+            m = remember(pair, m, p, r, slip, penalty, known, patient=patient)
+            out.append(replace(m, firm=self._firmer(k, m, p, contact.responses[k], r)))
         return out
 
-    def _penalty(self, k: int, points: ContactPoints) -> NDArray[np.float64]:
-        """ε of points [Pa/m]: a multiple of the stiffness of their nodes, over the area they would have whole."""
-        return np.asarray(self._penalties[k][points.sites])
+    def _firmer(
+        self, k: int, memory: Memory, points: ContactPoints, before: Response, foreseen: Response
+    ) -> NDArray[np.float64]:
+        """Penalties raised where flesh is so stiff that multipliers would find their values slowly, shape (s,)."""
+        at = points.sites
+        seen = before.active & foreseen.active & (before.error > self._penetration * self.interfaces[k].edge[at])
+        slow = at[seen & (foreseen.error > _SLOW * before.error)]
+        firm = memory.firm.copy()
+        firm[slow] = np.minimum(_FIRMER * firm[slow], _FIRMEST)
+        return firm
+
+    def _penalty(self, k: int, points: ContactPoints, memory: Memory) -> NDArray[np.float64]:
+        """ε of points [Pa/m]."""
+        return np.asarray((self._penalties[k] * memory.firm)[points.sites])
 
     def begun(self, memory: list[Memory], start: NDArray[np.float64], time: float) -> list[Memory]:
         """Memory that knows what is apart as the step begins, where friction asks for it."""
@@ -166,14 +182,6 @@ class Interplay:
             off = np.where(active[q.sites], off, np.minimum(off, np.maximum(-q.gap, 0.0)))
             worst = max(worst, float((off / edge[q.sites]).max(initial=0.0)))
         return worst
-
-
-def _meeting(interface: Interface, stiffness: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Stiffness of sites against what they meet [N/m], shape (s,)."""
-    own = interface.share @ stiffness[interface.slave.nodes]
-    if len(interface.opposite) == 0:
-        return np.asarray(own)
-    return np.asarray(np.minimum(own, float(np.median(stiffness[interface.opposite]))))
 
 
 def shifted(points: ContactPoints, move: NDArray[np.float64]) -> ContactPoints:

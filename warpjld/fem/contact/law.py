@@ -33,6 +33,7 @@ class Memory:
         stuck: Whether friction holds it, or it slides if not, shape (s,).
         bonded: Whether the bond holds, shape (s,).
         seam: Gap at which the bond was made [m], shape (s,).
+        firm: Penalty over the usual one: more where a multiplier does not find its value soon, shape (s,).
     """
 
     pressure: NDArray[np.float64]
@@ -44,6 +45,7 @@ class Memory:
     stuck: NDArray[np.bool_]
     bonded: NDArray[np.bool_]
     seam: NDArray[np.float64]
+    firm: NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)
@@ -84,6 +86,7 @@ def start_memory(count: int, pair: Pair) -> Memory:
         stuck=np.ones(count, dtype=bool),
         bonded=bonded,
         seam=np.full(count, np.nan),
+        firm=np.ones(count),
     )
 
 

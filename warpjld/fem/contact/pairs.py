@@ -55,7 +55,7 @@ class Pair:
         master: Face set or faces of the same (merged) body, or an obstacle. The same set again is self-contact: of two
             labels the lower one is then the slave.
         friction: Coulomb's μ.
-        name: For people.
+        name: For people, and to tell what touches by; its two sides' names if left out.
         exclusion: Facets that never meet.
         bond: Surfaces that are tied from the start.
         sites: Where an obstacle is looked for: at the slave's ``nodes``; or at the integration points of its ``faces``,
@@ -79,8 +79,13 @@ class Pair:
 
     @property
     def title(self) -> str:
-        """Its name in messages."""
+        """What it is called in messages."""
+        return f"contact '{self.label}'"
+
+    @property
+    def label(self) -> str:
+        """Its name, or its two sides' where it has none."""
         if self.name:
-            return f"contact '{self.name}'"
+            return self.name
         sides = [side if isinstance(side, str) else type(side).__name__.lower() for side in (self.slave, self.master)]
-        return f"contact {sides[0]}–{sides[1]}"
+        return f"{sides[0]}–{sides[1]}"

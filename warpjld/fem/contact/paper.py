@@ -249,7 +249,7 @@ def _touch(side: _Side, meeting: _Meeting, forces: NDArray[np.float64], x: NDArr
         corners = side.nodes[side.triangles[meeting.place.face]]
         np.add.at(nodal, corners, -meeting.place.weights[:, :, None] * forces[:, None, :])
     return Touch(
-        side.pair.title,
+        side.pair.label,
         nodes,
         x[nodes],
         -meeting.normal,

@@ -150,7 +150,7 @@ class _Run:
         self.guess = guess
         self.interfaces = interfaces_of(body.mesh, pairs, body.threads)
         self.moduli = [contact_modulus(body, interface) for interface in self.interfaces]
-        self.equilibrium = Equilibrium(body, self.interfaces, tolerance=tolerance, penetration=penetration)
+        self.equilibrium = Equilibrium(body, self.interfaces, self.moduli, tolerance=tolerance, penetration=penetration)
         if after is None:
             self.start = 0.0
             self.u = np.zeros(body.degrees)
@@ -162,7 +162,7 @@ class _Run:
             self.u = after.last.displacement.reshape(-1).copy()
             self.memory = list(after.memory)
         self.steps: list[int] = []
-        self.course: NDArray[np.float64] | None = None
+        self.course = None if after is None else after.course
 
     def _begin(self, interface: Interface) -> Memory:
         """Bonds made, and the overlap noted that there is at the start."""
@@ -213,7 +213,7 @@ class _Run:
                 todo.insert(0, 0.5 * (now + target))
                 continue
             self.steps.append(self.equilibrium.solves)
-            self.course = (found.displacement - self.u) / (target - now)
+            self.course = (found.displacement - self._carried(now, target)).reshape(-1, 3) / (target - now)
             self.u, self.memory, now = found.displacement, found.memory, target
             todo.pop(0)
             halvings = max(0, halvings - 1)
@@ -247,15 +247,21 @@ class _Run:
             status, found = self.equilibrium.find(self.u, memory, step, found.displacement)
         return Status.MAX_ITERATIONS, None
 
+    def _carried(self, before: float, time: float) -> NDArray[np.float64]:
+        """The displacement that a step begins from, carried on as the caller knows how, shape (3N,)."""
+        if self.guess is None:
+            return self.u
+        return np.asarray(self.guess(before, time, self.u.reshape(-1, 3)), dtype=np.float64).reshape(-1)
+
     def _first(self, step: Step) -> NDArray[np.float64] | None:
-        """Where to begin: as asked, or where things go if they go on as in the step before."""
-        if self.guess is not None:
-            return self.guess(step.before, step.time, self.u.reshape(-1, 3))
+        """Where to begin: as asked, and what it was off by in the step before is taken to be off by again."""
         if self.course is None:
-            return None
-        first = self.u + (step.time - step.before) * self.course
-        upright = not self.body.large_strain or bool((self.body.at(first, stiffness=False).lowest > 0.0).all())
-        return first if upright else None
+            return None if self.guess is None else self._carried(step.before, step.time)
+        carried = self._carried(step.before, step.time)
+        first: NDArray[np.float64] = carried + (step.time - step.before) * self.course.reshape(-1)
+        if not self.body.large_strain or bool((self.body.at(first, stiffness=False).lowest > 0.0).all()):
+            return first
+        return None if self.guess is None else carried
 
     def _instant(self, time: float, found: Reached, solves: int, iterations: int) -> ContactInstant:
         x = self.body.mesh.nodes + found.displacement.reshape(-1, 3)
@@ -279,7 +285,8 @@ class _Run:
         if not reached:
             nothing = np.zeros((len(self.body.mesh.nodes), 3))
             reached = [ContactInstant(self.start, self.u.reshape(-1, 3), nothing, (), 0, 0, 0.0)]
-        return ContactSolution(status, tuple(reached), message, tuple(self.memory), tuple(self.steps), step.loads)
+        memory, steps = tuple(self.memory), tuple(self.steps)
+        return ContactSolution(status, tuple(reached), message, memory, steps, step.loads, self.course)
 
 
 def _overstrained(k: int, interface: Interface, found: Reached) -> NDArray[np.bool_]:

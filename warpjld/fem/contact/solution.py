@@ -20,7 +20,7 @@ class Touch:
     """One pair at one instant; one row for each slave node that has something before it.
 
     Attributes:
-        name: The pair's.
+        name: The pair's ``label``.
         nodes: Nodes of the body, shape (m,).
         position: Where they are [m], shape (m, 3).
         normal: Unit, outward from the slave, shape (m, 3).
@@ -132,6 +132,7 @@ class ContactSolution:
         memory: Contact state at the last instant, one for each pair.
         steps: Load steps taken between instants, those that halving added included, and linear solves of each.
         loads: The loads at the last instant.
+        course: How fast the last step went on from where it was expected to [m per unit of time], shape (N, 3).
     """
 
     status: Status
@@ -140,6 +141,7 @@ class ContactSolution:
     memory: tuple[Memory, ...]
     steps: tuple[int, ...]
     loads: Loads
+    course: NDArray[np.float64] | None = None
 
     @property
     def converged(self) -> bool:

@@ -50,7 +50,7 @@ def touch_of(
     holds = mean @ bonded[points.sites].astype(float) > 0.0
     pressed = np.where(holds, area, pressed_at_nodes(interface, near, pressure, mean @ points.gap, area, modulus, x))
     return Touch(
-        name=interface.pair.title,
+        name=interface.pair.label,
         nodes=nodes,
         position=x[nodes],
         normal=np.divide(normal, size, out=np.zeros_like(normal), where=size > 0.0),

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from difflib import get_close_matches
 
 from warpjld.errors import InputError
 from warpjld.skeleton.hand import DIGITS
+from warpjld.suggest import one_of
 
 __all__ = ["FORCE_LIMITS", "force_limits"]
 
@@ -27,9 +27,7 @@ def force_limits(given: Mapping[str, float] | None = None) -> dict[str, float]:
     out = dict(FORCE_LIMITS)
     for digit, force in (given or {}).items():
         if digit not in DIGITS:
-            close = get_close_matches(digit, DIGITS, n=1)
-            hint = f"; did you mean '{close[0]}'?" if close else f"; want one of {', '.join(DIGITS)}"
-            raise InputError(f"force limits: no digit '{digit}'{hint}")
+            raise InputError(f"force limits: no digit '{digit}'{one_of(digit, DIGITS)}")
         if not 0.0 < force < float("inf"):
             raise InputError(f"force limit of the {digit}: want newtons above 0, got {force}")
         out[digit] = float(force)

@@ -90,13 +90,17 @@ def tactile_of(hand: FleshHand, instants: Sequence[_Instant], *, only: str | Non
     Args:
         hand: The hand, first in the merged mesh.
         instants: Equilibria in contact.
-        only: Name of the pairs to read, where not all are wanted.
+        only: Name of the pair to read (``Touch.name``), where not all are wanted.
 
     Raises:
-        InputError: No instant.
+        InputError: No instant, or no pair of that name.
     """
     if not instants:
         raise InputError("tactile: want at least one instant")
+    if only is not None:
+        known = sorted({touch.name for instant in instants for touch in instant.touches})
+        if only not in known:
+            raise InputError(f"tactile: there is no pair '{only}'; there are {', '.join(known) or 'none'}")
     pads = tuple(name for name in hand.label_names if not name.endswith(WEB))
     place = np.array([pads.index(n) if n in pads else -1 for n in hand.label_names])
     pad_of = np.where(hand.node_labels >= 0, place[hand.node_labels], -1)
@@ -193,10 +197,9 @@ def tactile_of_pairs(instants: Sequence[ContactInstant]) -> Tactile:
     """
     if not instants:
         raise InputError("tactile: want at least one instant")
-    titles = tuple(touch.name for touch in instants[0].touches)
-    if any(tuple(touch.name for touch in instant.touches) != titles for instant in instants):
+    pads = tuple(touch.name for touch in instants[0].touches)
+    if any(tuple(touch.name for touch in instant.touches) != pads for instant in instants):
         raise InputError("tactile: want the same pairs at every instant")
-    pads = tuple(title.removeprefix("contact ").strip("'") for title in titles)
     out = _nothing([instant.time for instant in instants], pads)
     for frame, instant in enumerate(instants):
         for pad, touch in enumerate(instant.touches):

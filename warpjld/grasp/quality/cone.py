@@ -30,6 +30,9 @@ def friction_cone(contacts: Contacts, edges: int = 8) -> list[NDArray[np.float64
     Returns:
         Per contact an array (4, k) of columns (f_t₁, f_t₂, f_n, τ_n) in the contact's own frame; k is ``edges`` for
         a point contact with friction, 1 for a frictionless one, and 2 more for a soft finger.
+
+    Raises:
+        InputError: Fewer than three edges.
     """
     if edges < 3:
         raise InputError(f"edges: a friction cone wants 3 or more, got {edges}")

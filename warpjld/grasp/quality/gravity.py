@@ -102,6 +102,11 @@ def gravity_displacement(
 
     Returns:
         A response per direction.
+
+    Raises:
+        InputError: A mass, length, stiffness or acceleration that is not positive, a negative squeeze, or a
+            direction without length.
+        WarpjldError: The solve did not reach balance.
     """
     stiffness = np.array([tangential_stiffness, tangential_stiffness, normal_stiffness, 0.0])
     for name, value in (("mass", mass), ("normal_stiffness", normal_stiffness), ("gravity", gravity)):
@@ -112,7 +117,10 @@ def gravity_displacement(
     if not (np.isfinite(squeeze) and squeeze >= 0.0):
         raise InputError(f"squeeze: want a force ≥ 0 [N], got {squeeze!r}")
     ways = np.asarray(directions, dtype=np.float64).reshape(-1, 3)
-    ways = ways / np.linalg.norm(ways, axis=1, keepdims=True)
+    lengths = np.linalg.norm(ways, axis=1, keepdims=True)
+    if not (np.isfinite(ways).all() and (lengths > 0.0).all()):
+        raise InputError(f"directions: want finite vectors that are not zero, got {directions!r}")
+    ways = ways / lengths
     count = len(ways)
     held = np.zeros(count, dtype=bool)
     motion = np.full((count, 6), np.inf)

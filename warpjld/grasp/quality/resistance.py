@@ -40,6 +40,10 @@ def resisted_wrench(
 
     Returns:
         λ ≥ 0; 0 where the wrench cannot be resisted at all.
+
+    Raises:
+        InputError: A wrench of another shape, zero or not finite, or a budget that is not positive.
+        WarpjldError: The linear program stopped.
     """
     from scipy.optimize import linprog
 

@@ -33,6 +33,9 @@ def grasp_matrix(contacts: Contacts, center: ArrayLike, torque_scale: float) -> 
 
     Returns:
         G, shape (6, 4C); per contact the columns f_t₁, f_t₂, f_n, τ_n; rows force [N], then torque/ρ [N].
+
+    Raises:
+        InputError: A centre that is not three finite numbers, or a length that is not positive.
     """
     middle = np.asarray(center, dtype=np.float64)
     if middle.shape != (3,) or not np.isfinite(middle).all():

@@ -76,6 +76,7 @@ class Cache(ABC):
 
         Raises:
             InputError: Wrong shape, not finite, more frames than announced, or the disk refuses.
+            WarpjldError: Outside of the cache's ``with`` statement.
         """
         if not self._open:
             raise WarpjldError("a cache is written inside its with statement: with open_cache(...) as cache: ...")

@@ -24,7 +24,11 @@ _SHAPES: dict[str, tuple[int, ...]] = {
 
 
 def read_accessor(gltf: Any, buffers: list[bytes], index: int) -> NDArray[Any]:
-    """Elements of accessor ``index`` as a fresh array; matrices as rows and columns."""
+    """Elements of accessor ``index`` as a fresh array; matrices as rows and columns.
+
+    Raises:
+        InputError: It does not exist, points beyond the file, or is of an unknown type.
+    """
     if not 0 <= index < len(gltf.accessors):
         raise InputError(f"accessor {index} does not exist: the file has {len(gltf.accessors)}")
     accessor = gltf.accessors[index]

@@ -33,7 +33,11 @@ class Document:
         return [self._buffer(i, buffer) for i, buffer in enumerate(self.gltf.buffers)]
 
     def accessor(self, index: int) -> NDArray[Any]:
-        """An accessor's elements, shape (n,), (n, k) or (n, rows, columns); normalised integers as float64."""
+        """An accessor's elements, shape (n,), (n, k) or (n, rows, columns); normalised integers as float64.
+
+        Raises:
+            InputError: It does not exist, points beyond the file, or is of an unknown type.
+        """
         try:
             return read_accessor(self.gltf, self.buffers, index)
         except InputError as error:
@@ -45,7 +49,11 @@ class Document:
 
     @cached_property
     def parents(self) -> NDArray[np.int64]:
-        """Parent of every node, -1 for roots."""
+        """Parent of every node, -1 for roots.
+
+        Raises:
+            InputError: Children that do not exist, have two parents, or are their own ancestors.
+        """
         count = len(self.gltf.nodes)
         parents = np.full(count, -1)
         for i, node in enumerate(self.gltf.nodes):
@@ -67,7 +75,11 @@ class Document:
 
     @cached_property
     def worlds(self) -> NDArray[np.float64]:
-        """Node-to-world transforms of the pose the file shows, shape (N, 4, 4)."""
+        """Node-to-world transforms of the pose the file shows, shape (N, 4, 4).
+
+        Raises:
+            InputError: A transform that is not finite, or out of all proportion.
+        """
         worlds = np.zeros((len(self.gltf.nodes), 4, 4))
         done = np.zeros(len(worlds), dtype=bool)
         for i in range(len(worlds)):
@@ -87,7 +99,11 @@ class Document:
         return worlds
 
     def local(self, node: int) -> NDArray[np.float64]:
-        """A node's transform relative to its parent, shape (4, 4)."""
+        """A node's transform relative to its parent, shape (4, 4).
+
+        Raises:
+            InputError: A rotation without length.
+        """
         record = self.gltf.nodes[node]
         if record.matrix is not None:
             return np.array(record.matrix, dtype=np.float64).reshape(4, 4).T  # glTF stores columns

@@ -12,7 +12,7 @@ from warpjld.script.arguments import Arguments
 from warpjld.script.commands.physical import read_object
 from warpjld.script.registry import command
 from warpjld.script.scene import Scene
-from warpjld.script.suggest import did_you_mean
+from warpjld.suggest import did_you_mean
 
 _KEYS = "<key1> <key2> <step>"
 _AXES = ("X", "Y", "Z")

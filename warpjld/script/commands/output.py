@@ -8,7 +8,7 @@ from warpjld.script.arguments import Arguments
 from warpjld.script.formats import EXPORTS, FILMS, PICTURES, VIEWS
 from warpjld.script.registry import command
 from warpjld.script.scene import Camera, ContactSheet, Export, Film, Output, Picture, Scene, Style
-from warpjld.script.suggest import did_you_mean
+from warpjld.suggest import did_you_mean
 
 _STYLES = ("SHADED", "WIREFRAME", "PRESSURE")
 

@@ -10,7 +10,7 @@ from warpjld.script.arguments import Arguments
 from warpjld.script.commands.animation import FINGERS
 from warpjld.script.registry import command
 from warpjld.script.scene import Scene
-from warpjld.script.suggest import did_you_mean
+from warpjld.suggest import did_you_mean
 
 if TYPE_CHECKING:
     from warpjld.script.props import Prop

@@ -9,7 +9,8 @@ from numpy.typing import NDArray
 
 from warpjld.skeleton.hand import DIGITS, FINGER_JOINTS
 from warpjld.skeleton.recognise.extremity import find_extremity
-from warpjld.skeleton.recognise.section import nearby, winding_numbers
+from warpjld.skeleton.recognise.section import nearby
+from warpjld.winding import winding_numbers
 
 __all__ = ["complete_hand"]
 

@@ -8,8 +8,9 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
-from warpjld.skeleton.recognise.section import first_hits, winding_numbers
+from warpjld.skeleton.recognise.section import first_hits
 from warpjld.skeleton.tree import Skeleton
+from warpjld.winding import winding_numbers
 
 __all__ = ["Finding", "check_placing"]
 

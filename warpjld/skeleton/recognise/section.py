@@ -1,4 +1,4 @@
-"""Looking at a surface from inside: rays, winding numbers and cross-sections around a point of the skeleton."""
+"""Looking at a surface from inside: rays and cross-sections around a point of the skeleton."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["CrossSection", "cross_section", "first_hits", "nearby", "winding_numbers"]
+__all__ = ["CrossSection", "cross_section", "first_hits", "nearby"]
 
 _CHUNK = 2_000_000  # ray–triangle pairs at a time: about 200 MB of temporaries
 
@@ -79,32 +79,6 @@ def _distances(
         t = (q * edge2).sum(axis=1) * inverse
         met = (u >= -1e-9) & (v >= -1e-9) & (u + v <= 1 + 1e-9) & (t > 1e-9) & np.isfinite(t)
     return np.where(met, t, np.inf)
-
-
-def winding_numbers(
-    vertices: NDArray[np.float64], faces: NDArray[np.int32], points: NDArray[np.float64]
-) -> NDArray[np.float64]:
-    """Generalised winding number of each point (van Oosterom and Strackee's solid angle), about 1 inside, shape (P,).
-
-    It stays meaningful for open wrists and for several closed parts in one another.
-    """
-    middle = vertices.mean(axis=0)
-    vertices, points = vertices - middle, points - middle
-    a, b, c = (vertices[faces[:, k]] for k in range(3))
-    # every term is linear in the point but for its square, so each is one matrix product
-    normal = np.cross(a, b) + np.cross(b, c) + np.cross(c, a)
-    volume = np.einsum("fk,fk->f", a, np.cross(b, c))
-    out = np.empty(len(points))
-    rows = max(1, _CHUNK // max(1, len(faces)))
-    for start in range(0, len(points), rows):
-        p = points[start : start + rows]
-        square = (p * p).sum(axis=1)[:, None]
-        gap = vertices[None] - p[:, None]
-        la, lb, lc = np.moveaxis(np.sqrt((gap * gap).sum(axis=2))[:, faces], 2, 0)
-        ab, bc, ca = (np.einsum("fk,fk->f", x, y) - p @ (x + y).T + square for x, y in ((a, b), (b, c), (c, a)))
-        solid = np.arctan2(volume - p @ normal.T, la * lb * lc + ab * lc + bc * la + ca * lb)
-        out[start : start + rows] = solid.sum(axis=1) / (2.0 * np.pi)
-    return out
 
 
 def cross_section(

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 from warpjld.errors import InputError
 from warpjld.study.manifest import file_hash
-from warpjld.study.toml_table import TomlTable
+from warpjld.toml_table import TomlTable
 
 if TYPE_CHECKING:
     from warpjld.grasp import GraspObject

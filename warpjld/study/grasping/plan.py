@@ -10,7 +10,7 @@ from warpjld.skeleton import CHANNELS, DIGITS
 from warpjld.skeleton.hand import HAND_PARENTS
 from warpjld.study.grasping.choices import HandChoice, ObjectChoice, read_hand, read_object
 from warpjld.study.manifest import versions
-from warpjld.study.toml_table import TomlTable, read_toml
+from warpjld.toml_table import TomlTable, read_toml
 
 __all__ = ["GraspPlan", "Measuring", "WristRange", "load_plan"]
 

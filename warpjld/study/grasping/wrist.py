@@ -55,7 +55,7 @@ class Approach:
 
 
 def find_palm(skeleton: Skeleton, vertices: NDArray[np.floating]) -> Palm:
-    """The palm of a hand: halfway along the middle finger's metacarpal, on the palmar side of the skin.
+    """The palm of a hand: seven tenths along the middle finger's metacarpal, on the palmar side of the skin.
 
     Args:
         skeleton: With one hand.

@@ -5,12 +5,12 @@ from __future__ import annotations
 import math
 import re
 import tomllib
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any, NoReturn
 
 from warpjld.errors import InputError
-from warpjld.script.suggest import did_you_mean
+from warpjld.suggest import did_you_mean
 
 __all__ = ["TomlTable", "read_toml"]
 
@@ -46,9 +46,18 @@ class TomlTable:
     def __contains__(self, key: str) -> bool:
         return key in self._content
 
+    def __iter__(self) -> Iterator[str]:
+        """Keys in the file's order."""
+        return iter(self._content)
+
     def is_table(self, key: str) -> bool:
         """Whether a key is there and holds a table."""
         return isinstance(self._content.get(key), dict)
+
+    @property
+    def name(self) -> str:
+        """Its own keys, from the top of the file."""
+        return self._name
 
     @property
     def folder(self) -> Path:
@@ -58,6 +67,15 @@ class TomlTable:
     def fail(self, key: str, message: str) -> NoReturn:
         """Raise InputError about a key, with the line it probably stands in."""
         raise InputError(f"{self._called(key)}: {message}", path=self._path, line=self._line(key))
+
+    def needed(self, *keys: str) -> None:
+        """Raise InputError where one of these keys is missing, or misspelt."""
+        for key in keys:
+            if key not in self._content:
+                for other in self._content:
+                    if other not in self._asked and other not in keys and (hint := did_you_mean(other, [key])):
+                        self.fail(other, f"unknown key{hint}")
+                self.fail(key, "is missing")
 
     def text(self, key: str, default: str | None = None, *, known: Sequence[str] = ()) -> str | None:
         """A string, one of ``known`` if given."""
@@ -79,9 +97,9 @@ class TomlTable:
 
     def integer(self, key: str, default: int | None = None, *, least: int = 0) -> int:
         """A whole number; required where there is no default."""
+        if default is None:
+            self.needed(key)
         value = self._take(key, default)
-        if value is None:
-            self.fail(key, "is missing")
         if not isinstance(value, int) or isinstance(value, bool) or value < least:
             self.fail(key, f"want a whole number from {least} on, got {value!r}")
         return value
@@ -105,6 +123,27 @@ class TomlTable:
             self.fail(key, f"want {count or 'one or more'} numbers, got {value!r}")
         return tuple(self._number(key, item, above, least, most) for item in items)
 
+    def vector(self, key: str, default: Sequence[float] = ()) -> tuple[float, float, float]:
+        """Three finite numbers."""
+        x, y, z = self.numbers(key, default, count=3)
+        return x, y, z
+
+    def like(self, key: str, default: object) -> Any:
+        """A value of its default's kind; None stands for a whole number that may be missing."""
+        if key not in self._content:
+            self._asked.append(key)
+            return default
+        if isinstance(default, bool):
+            return self.truth(key, default)
+        if default is None or isinstance(default, int):
+            return self.integer(key)
+        if isinstance(default, float):
+            return self.number(key)
+        if isinstance(default, str):
+            return self.text(key)
+        self.numbers(key, ())
+        return tuple(self._content[key])
+
     def texts(self, key: str, default: Sequence[str], *, known: Sequence[str]) -> tuple[str, ...]:
         """Different strings out of ``known``, one or more."""
         value = self._take(key, list(default))
@@ -124,10 +163,15 @@ class TomlTable:
             self.fail(key, f"want a table [{self._called(key)}], got {value!r}")
         return TomlTable(value, self._called(key), self._path, self._lines)
 
-    def tables(self, key: str) -> list[TomlTable]:
-        """One or more tables [[key]]."""
-        value = self._take(key, None)
-        if not isinstance(value, list) or not value or not all(isinstance(item, dict) for item in value):
+    def named_tables(self, key: str) -> dict[str, TomlTable]:
+        """Tables [key.NAME] by their names, none where the key is missing."""
+        table = self.table(key)
+        return {name: table.table(name) for name in table}
+
+    def tables(self, key: str, *, least: int = 1) -> list[TomlTable]:
+        """Tables [[key]], one or more unless fewer will do."""
+        value = self._take(key, [])
+        if not isinstance(value, list) or len(value) < least or not all(isinstance(item, dict) for item in value):
             self.fail(key, f"want one or more tables [[{self._called(key)}]]")
         return [TomlTable(v, f"{self._called(key)}[{k}]", self._path, self._lines) for k, v in enumerate(value)]
 

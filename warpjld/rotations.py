@@ -1,11 +1,11 @@
-"""Quaternion arithmetic of whole clips: products, minimal rotations, spherical interpolation. Order x, y, z, w."""
+"""Quaternion arithmetic of many frames: products, minimal rotations, spherical interpolation. Order x, y, z, w."""
 
 from __future__ import annotations
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-__all__ = ["conjugate", "minimal_rotation", "multiply", "rotate", "slerp", "unit"]
+__all__ = ["about", "conjugate", "minimal_rotation", "multiply", "rotate", "slerp", "unit"]
 
 _PARALLEL = 1e-12
 
@@ -17,10 +17,25 @@ def unit(vectors: ArrayLike) -> NDArray[np.float64]:
     return np.asarray(array / np.where(lengths > 0.0, lengths, 1.0))
 
 
+def about(vectors: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Rotations about vectors (…, 3) by their length [rad], shape (…, 4)."""
+    half = 0.5 * np.linalg.norm(vectors, axis=-1, keepdims=True)
+    return np.concatenate([0.5 * np.sinc(half / np.pi) * vectors, np.cos(half)], axis=-1)
+
+
 def multiply(a: NDArray[np.float64], b: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Hamilton product: first ``b``, then ``a``; shapes broadcast."""
-    va, wa, vb, wb = a[..., :3], a[..., 3:], b[..., :3], b[..., 3:]
-    return np.concatenate([wa * vb + wb * va + np.cross(va, vb), wa * wb - (va * vb).sum(-1, keepdims=True)], axis=-1)
+    """Hamilton product: first ``b``, then ``a``; shapes broadcast. Signs are kept: a rotation library may flip them."""
+    ax, ay, az, aw = np.moveaxis(a, -1, 0)
+    bx, by, bz, bw = np.moveaxis(b, -1, 0)
+    return np.stack(
+        [
+            aw * bx + ax * bw + ay * bz - az * by,
+            aw * by - ax * bz + ay * bw + az * bx,
+            aw * bz + ax * by - ay * bx + az * bw,
+            aw * bw - ax * bx - ay * by - az * bz,
+        ],
+        axis=-1,
+    )
 
 
 def conjugate(a: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -29,10 +44,16 @@ def conjugate(a: NDArray[np.float64]) -> NDArray[np.float64]:
 
 
 def rotate(a: NDArray[np.float64], vectors: ArrayLike) -> NDArray[np.float64]:
-    """Vectors turned by unit quaternions; shapes broadcast."""
-    v = np.asarray(vectors, dtype=np.float64)
-    across = 2.0 * np.cross(a[..., :3], v)
-    return np.asarray(v + a[..., 3:] * across + np.cross(a[..., :3], across))
+    """Vectors turned by quaternions of any length but zero; shapes broadcast.
+
+    v + 2 u × (u × v + w v) / |q|², u the vector part.
+    """
+    x, y, z, w = np.moveaxis(a, -1, 0)
+    vx, vy, vz = np.moveaxis(np.asarray(vectors, dtype=np.float64), -1, 0)
+    tx, ty, tz = y * vz - z * vy + w * vx, z * vx - x * vz + w * vy, x * vy - y * vx + w * vz
+    twice = 2.0 / (x * x + y * y + z * z + w * w)
+    turned = (vx + twice * (y * tz - z * ty), vy + twice * (z * tx - x * tz), vz + twice * (x * ty - y * tx))
+    return np.stack(turned, axis=-1)
 
 
 def minimal_rotation(start: ArrayLike, end: ArrayLike) -> NDArray[np.float64]:

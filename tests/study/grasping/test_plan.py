@@ -1,4 +1,4 @@
-"""Study files with mistakes: each is named, with its line and what was expected."""
+"""Plans with mistakes: each is named, with its line and what was expected."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ def read(folder: Path, text: str) -> object:
 @pytest.mark.parametrize(
     ("old", "new", "message"),
     [
-        ("seed = 1", "sed = 1", r"study.toml:2: sed: unknown key; did you mean seed\?|study.toml: seed: is missing"),
+        ("seed = 1", "sed = 1", r"study.toml:2: sed: unknown key; did you mean seed\?"),
         ("seed = 1", "seed = 1\nfrictoin = 0.5", r"study.toml:3: frictoin: unknown key; did you mean friction\?"),
         ("seed = 1", "seed = 1\nfriction = 0.0", r"study.toml:3: friction: want a number above 0.*got 0.0"),
         ("seed = 1", "seed = 1\nfriction = nan", r"study.toml:3: friction: want a finite number, got nan"),

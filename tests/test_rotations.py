@@ -5,7 +5,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation, Slerp
 
-from warpjld.motion.rotations import conjugate, minimal_rotation, multiply, rotate, slerp, unit
+from warpjld.rotations import conjugate, minimal_rotation, multiply, rotate, slerp, unit
 
 EXACT = 1e-12
 

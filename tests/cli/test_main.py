@@ -1,0 +1,60 @@
+"""What all commands share: help, misspelt names, and errors in one line."""
+
+from __future__ import annotations
+
+import errno
+from pathlib import Path
+
+import click
+import pytest
+
+from warpjld.cli import main
+
+COMMANDS = ["run", "shell", "inspect", "calibrate", "deform", "study", "fem"]
+
+
+def run(*arguments: str) -> int | str | None:
+    with pytest.raises(SystemExit) as ended:
+        main(list(arguments))
+    return ended.value.code
+
+
+def test_help_lists_every_command_and_the_units(capsys: pytest.CaptureFixture[str]) -> None:
+    assert run("--help") == 0
+    said = capsys.readouterr().out
+    assert [line.split()[0] for line in said.splitlines() if line.strip().startswith(tuple(COMMANDS))] == COMMANDS
+    assert "Metres, degrees" in said
+
+
+@pytest.mark.parametrize("name", COMMANDS)
+def test_every_command_has_help_and_one_name_for_its_output(name: str, capsys: pytest.CaptureFixture[str]) -> None:
+    assert run(name, "--help") == 0
+    said = capsys.readouterr().out
+    assert said.startswith(f"Usage: warpjld {name} ")
+    assert "-o, --out " in said
+
+
+@pytest.mark.parametrize(
+    ("name", "says"),
+    [("runn", "there is no command 'runn'; did you mean run?"), ("xyz", "no command 'xyz'; want one of run, shell, ")],
+)
+def test_misspelt_commands(name: str, says: str, capsys: pytest.CaptureFixture[str]) -> None:
+    assert run(name, "a.jld") == 2
+    assert says in capsys.readouterr().err
+
+
+def test_a_folder_that_is_a_file(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    (tmp_path / "out").touch()
+    example = Path(__file__).resolve().parents[2] / "examples" / "inflate_ball.toml"
+    assert run("fem", str(example), "-o", str(tmp_path / "out"), "-q") == 1
+    assert f"error: {tmp_path / 'out'}: cannot write into this folder" in capsys.readouterr().err
+
+
+def test_a_full_disk_is_one_line(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
+    @click.command()
+    def full() -> None:
+        raise OSError(errno.ENOSPC, "No space left on device", "out/a.npz")
+
+    monkeypatch.setattr("warpjld.cli.study.command", full)
+    assert run("study") == 1
+    assert capsys.readouterr().err == "error: out/a.npz: No space left on device\n"

@@ -1,0 +1,40 @@
+"""Pieces of work for threads."""
+
+import threading
+
+import pytest
+
+from warpjld.threads import cores, in_threads, threads_for
+
+
+@pytest.mark.parametrize("threads", [-1, 1, 2, 3, 16])
+@pytest.mark.parametrize("count", [0, 1, 2, 7, 100])
+def test_every_row_is_done_once_in_at_most_that_many_threads(count: int, threads: int) -> None:
+    from warpjld_kernels.overlaps import overlapping_boxes
+
+    pieces, names = [], set()
+
+    def span(begin: int, end: int) -> None:
+        pieces.append((begin, end))
+        names.add(threading.current_thread().name)
+
+    in_threads(span, count, threads, overlapping_boxes, "cpu")
+    assert [k for begin, end in sorted(pieces) for k in range(begin, end)] == list(range(count))
+    assert all(begin < end for begin, end in pieces)
+    assert len(names) <= max(1, min(threads, count))
+
+
+def test_an_error_in_any_thread_is_raised() -> None:
+    from warpjld_kernels.overlaps import overlapping_boxes
+
+    def span(begin: int, end: int) -> None:
+        if end == 10:
+            raise RuntimeError("in the last piece")
+
+    with pytest.raises(RuntimeError, match="last piece"):
+        in_threads(span, 10, 3, overlapping_boxes, "cpu")
+
+
+def test_little_work_is_not_split() -> None:
+    assert threads_for(0, 100) == threads_for(199, 100) == 1
+    assert threads_for(10**9, 1) == cores()

@@ -1,0 +1,47 @@
+"""Options that several commands have."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import click
+
+__all__ = ["commands", "device", "domains", "json", "out_folder", "quiet", "rig", "threads"]
+
+Decorator = Callable[[Callable[..., None]], Callable[..., None]]
+
+out_folder: Decorator = click.option(
+    "-o", "--out", type=click.Path(path_type=Path), default="out", show_default=True, help="Output folder."
+)
+device: Decorator = click.option("--device", default="cpu", show_default=True, help="Where to compute: cpu, cuda:0, …")
+threads: Decorator = click.option(
+    "--threads", type=click.IntRange(min=1), help="CPU threads; as many as pay by default."
+)
+commands: Decorator = click.option(
+    "--commands", multiple=True, type=click.Path(path_type=Path), help="Python file that adds commands; repeatable."
+)
+domains: Decorator = click.option(
+    "--domains",
+    type=click.Choice(["geometry", "skin"]),
+    default="geometry",
+    show_default=True,
+    help="Where a vertex's domain comes from: the surface alone, or painted weights.",
+)
+json: Decorator = click.option("--json", "as_json", is_flag=True, help="Write the result to stdout as JSON.")
+quiet: Decorator = click.option("-q", "--quiet", is_flag=True, help="Say nothing but errors.")
+
+
+def rig(command: Callable[..., Any]) -> Callable[..., Any]:
+    """How to read a RIG that does not say everything itself: ``skeleton``, ``side``, ``unit``, ``up``."""
+    for option in (
+        click.option("--up", type=click.Choice(["y", "z"]), help="RIG's up axis; guessed by default."),
+        click.option("--unit", type=click.Choice(["m", "cm", "mm"]), help="RIG's unit; guessed by default."),
+        click.option(
+            "--side", type=click.Choice(["left", "right"]), help="Which hand RIG is, if the file leaves it open."
+        ),
+        click.option("--skeleton", type=click.Path(path_type=Path), help="Skeleton file for a RIG without joints."),
+    ):
+        command = option(command)
+    return command

@@ -1,0 +1,56 @@
+"""Segments at rest, and the projection of points on them (A §4, R34–R39)."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from warpjld.skeleton.tree import Skeleton
+
+__all__ = ["SegmentTable"]
+
+
+@dataclass(frozen=True, eq=False)
+class SegmentTable:
+    """S segments at rest.
+
+    Attributes:
+        ends: Proximal and distal joint, shape (S, 2).
+        start: Proximal joint [m], shape (S, 3).
+        along: From there to the distal joint [m], shape (S, 3).
+        normals: Unit y axes at the proximal and distal joint, shape (S, 2, 3) (R20).
+        open_end: Whether it ends in an extremity, where the ratio may exceed 1, shape (S,).
+        open_start: Whether it begins at a root, where the ratio may fall below 0, shape (S,).
+    """
+
+    ends: NDArray[np.int32]
+    start: NDArray[np.float64]
+    along: NDArray[np.float64]
+    normals: NDArray[np.float64]
+    open_end: NDArray[np.bool_]
+    open_start: NDArray[np.bool_]
+
+    @staticmethod
+    def build(skeleton: Skeleton, ends: NDArray[np.int32]) -> SegmentTable:
+        """Of segments between these joints, shape (S, 2)."""
+        start = skeleton.rest[ends[:, 0]]
+        along = skeleton.rest[ends[:, 1]] - start
+        direction = along / np.linalg.norm(along, axis=1, keepdims=True)
+        normals = np.stack([np.cross(direction, skeleton.axes[ends[:, k]]) for k in (0, 1)], axis=1)
+        lengths = np.linalg.norm(normals, axis=2, keepdims=True)
+        # an axis along the segment says nothing of its sides: take the other end's, or any normal
+        normals = np.where(lengths > 1e-3, normals / np.maximum(lengths, 1e-30), normals[:, ::-1])
+        fallback = np.cross(direction, np.eye(3)[np.abs(direction).argmin(axis=1)])
+        lengths = np.linalg.norm(normals, axis=2, keepdims=True)
+        normals = np.where(lengths > 1e-3, normals / np.maximum(lengths, 1e-30), fallback[:, None, :])
+        leaf = np.array([not skeleton.children[d] for d in ends[:, 1]])
+        root = np.array([skeleton.parents[p] < 0 for p in ends[:, 0]])
+        return SegmentTable(ends, start, along, normals, leaf, root)
+
+    def project(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Ratio of every point on every segment, shape (V, S), clamped except beyond extremities (R37, C1)."""
+        t = (points @ self.along.T - (self.start * self.along).sum(axis=1)) / (self.along**2).sum(axis=1)
+        t = np.where((t < 0.0) & ~self.open_start, 0.0, t)
+        return np.where((t > 1.0) & ~self.open_end, 1.0, t)

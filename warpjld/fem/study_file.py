@@ -1,0 +1,174 @@
+"""Studies from TOML files, whose tables and keys ``examples/fem.md`` lists."""
+
+from __future__ import annotations
+
+import inspect
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from warpjld.errors import InputError
+from warpjld.fem.ball import ball, cylinder, finger
+from warpjld.fem.body import Body
+from warpjld.fem.box import box
+from warpjld.fem.hexmesh import HexMesh
+from warpjld.fem.linear import METHODS, PRECISIONS
+from warpjld.fem.loads import Centrifugal, Loads, external_forces
+from warpjld.fem.materials import Fung, LinearElastic, Material, MooneyRivlin, NeoHooke
+from warpjld.fem.static import FREE
+from warpjld.fem.study import Step, Study, Support
+from warpjld.toml_table import TomlTable, read_toml
+
+__all__ = ["load_study"]
+
+_MESHES: dict[str, Callable[..., HexMesh]] = {"box": box, "ball": ball, "cylinder": cylinder, "finger": finger}
+_LAWS: dict[str, tuple[Callable[..., Material], tuple[str, ...]]] = {
+    "linear": (LinearElastic, ("young", "poisson")),
+    "neo-hooke": (NeoHooke, ("young", "poisson")),
+    "mooney-rivlin": (MooneyRivlin, ("c10", "c01")),
+    "fung": (Fung, ("young", "stiffening")),
+}
+"""Laws, and the constants they cannot do without."""
+
+_AXES = ("x", "y", "z")
+
+
+def load_study(path: str | Path) -> Study:
+    """Read and check a study file.
+
+    Raises:
+        InputError: Not TOML, or an entry that is unknown, missing or wrong: file, line and entry named.
+    """
+    top = read_toml(path)
+    top.needed("mesh", "material", "step")
+    try:
+        title = top.text("title") or Path(path).stem
+        mesh, notes = _mesh(top.table("mesh"))
+        for name, chosen in top.named_tables("sets").items():
+            mesh = mesh.with_nodes(**{name: _nodes(mesh, chosen)})
+        materials = {region: _material(table) for region, table in top.named_tables("material").items()}
+        stress = top.numbers("initial_stress", (0.0,) * 6, count=6)
+        steps = tuple(_step(k, table) for k, table in enumerate(top.tables("step")))
+        solver = top.table("solver")
+        method = solver.text("method", "auto", known=METHODS) or "auto"
+        precision = solver.text("precision", "float64", known=PRECISIONS) or "float64"
+        solver.finish()
+        top.finish()
+        body = Body(mesh, materials, initial_stress=stress)
+        for step in steps:
+            external_forces(body, step.loads)
+            for support in step.prescribed:
+                support.on(mesh)
+    except InputError as error:
+        if error.path is None:
+            raise InputError(error.message, path=path) from error
+        raise
+    return Study(title, body, steps, method, precision, notes)
+
+
+def _mesh(table: TomlTable) -> tuple[HexMesh, tuple[str, ...]]:
+    """The mesh, and what was found while making it."""
+    table.needed("kind")
+    kind = table.text("kind", known=(*_MESHES, "surface", "file"))
+    if kind in _MESHES:
+        parameters = inspect.signature(_MESHES[kind]).parameters
+        options = {name: table.like(name, parameter.default) for name, parameter in parameters.items()}
+        table.finish()
+        return _MESHES[kind](**options), ()
+    table.needed("path")
+    file = table.folder / (table.text("path") or "")
+    scale = table.number("scale", 1.0, above=0.0) or 1.0
+    if kind == "file":
+        from warpjld.fem.exchange import read_mesh
+
+        table.finish()
+        return read_mesh(file, scale=scale), ()
+    from warpjld.fem.fit import mesh_surface_file
+
+    table.needed("spacing")
+    spacing = table.number("spacing", above=0.0)
+    table.finish()
+    assert spacing is not None
+    fit = mesh_surface_file(file, spacing=spacing, scale=scale)
+    fitted = f"fitted to the surface: gap at most {1e3 * fit.gap:.2g} mm, volume {100 * fit.volume:.1f} % of it"
+    return fit.mesh, (fitted, *fit.notes)
+
+
+def _material(table: TomlTable) -> Material:
+    table.needed("law")
+    law, constants = _LAWS[table.text("law", known=tuple(_LAWS)) or ""]
+    table.needed(*constants)
+    names = dict.fromkeys((*constants, "poisson", "density"))
+    given = {name: table.number(name) for name in names}
+    table.finish()
+    try:
+        return law(**{name: value for name, value in given.items() if value is not None})
+    except InputError as error:
+        name, _, message = error.message.partition(": ")
+        if name in given:
+            table.fail(name, message)
+        raise InputError(f"[{table.name}] {error.message}") from error
+
+
+def _nodes(mesh: HexMesh, table: TomlTable) -> NDArray[np.int32]:
+    """Nodes of a set, cut by planes."""
+    nodes = mesh.node_set(table.text("of", "surface") or "")
+    for key, sign in (("above", 1.0), ("below", -1.0)):
+        for axis, value in _along_axes(table.table(key)).items():
+            nodes = nodes[sign * mesh.nodes[nodes, axis] >= sign * value - 1e-9 * mesh.size]
+    table.finish()
+    if len(nodes) == 0:
+        raise InputError(f"[{table.name}] holds no node")
+    return nodes
+
+
+def _step(number: int, table: TomlTable) -> Step:
+    step = Step(
+        name=table.text("name") or f"step {number + 1}",
+        loads=Loads(
+            gravity=table.vector("gravity", (0.0, 0.0, 0.0)),
+            centrifugal=_centrifugal(table.table("centrifugal")) if "centrifugal" in table else None,
+            pressure=_numbers(table.table("pressure")),
+            traction=_vectors(table.table("traction")),
+            forces=_vectors(table.table("force")),
+        ),
+        prescribed=tuple(_support(entry) for entry in table.tables("prescribed", least=0)),
+        instants=table.integer("instants", 1, least=1),
+        free=table.text("free", "hold", known=FREE) or "hold",
+    )
+    table.finish()
+    return step
+
+
+def _centrifugal(table: TomlTable) -> Centrifugal:
+    table.needed("axis", "speed")
+    turn = Centrifugal(table.vector("axis"), table.number("speed") or 0.0, table.vector("point", (0.0, 0.0, 0.0)))
+    table.finish()
+    return turn
+
+
+def _support(table: TomlTable) -> Support:
+    table.needed("where")
+    where = table.text("where") or ""
+    onto = _along_axes(table.table("onto"))
+    moves = _along_axes(table)
+    if not moves and not onto:
+        table.fail("where", "is given no displacement x, y or z, and no planes onto")
+    return Support(where, moves, onto)
+
+
+def _along_axes(table: TomlTable) -> dict[int, float]:
+    """Numbers by the axes they are given for; refuses other keys than were asked for."""
+    found = {axis: table.number(name) for axis, name in enumerate(_AXES)}
+    table.finish()
+    return {axis: value for axis, value in found.items() if value is not None}
+
+
+def _numbers(table: TomlTable) -> dict[str, float]:
+    return {name: table.number(name) or 0.0 for name in table}
+
+
+def _vectors(table: TomlTable) -> dict[str, tuple[float, float, float]]:
+    return {name: table.vector(name) for name in table}

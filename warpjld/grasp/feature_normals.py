@@ -1,0 +1,39 @@
+"""Normals of a surface's triangles, edges and corners: they tell inside from outside at a nearest point."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+__all__ = ["face_normals", "feature_normals"]
+
+
+def face_normals(corners: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Unit normals of triangles with corners (t, 3, 3), shape (t, 3); zero where there is no area."""
+    normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    return np.asarray(normal / np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), 1e-300))
+
+
+def feature_normals(vertices: NDArray[np.float64], faces: NDArray[np.int32]) -> NDArray[np.float64]:
+    """Normals of every triangle, of its edges opposite to corner 0, 1, 2, and of its corners, shape (t, 7, 3).
+
+    An edge has the sum of the normals at it, a corner their sum weighted by angle (Bærentzen and Aanæs 2005).
+    Triangles without area have none and add none.
+    """
+    corner = vertices[faces]
+    normal = face_normals(corner)
+    out = np.empty((len(faces), 7, 3))
+    out[:, 0] = normal
+    edges = np.sort(faces[:, [[1, 2], [2, 0], [0, 1]]].reshape(-1, 2), axis=1)
+    _, place = np.unique(edges, axis=0, return_inverse=True)
+    total = np.zeros((int(place.max()) + 1, 3))
+    np.add.at(total, place.ravel(), np.repeat(normal, 3, axis=0))
+    out[:, 1:4] = total[place.reshape(-1, 3)]
+    at_corner = np.zeros((len(vertices), 3))
+    for k in range(3):
+        to_next, to_last = corner[:, (k + 1) % 3] - corner[:, k], corner[:, (k + 2) % 3] - corner[:, k]
+        sine = np.linalg.norm(np.cross(to_next, to_last), axis=1)
+        angle = np.arctan2(sine, (to_next * to_last).sum(axis=1))
+        np.add.at(at_corner, faces[:, k], angle[:, None] * normal)
+    out[:, 4:] = at_corner[faces]
+    return out
