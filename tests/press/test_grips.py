@@ -37,7 +37,7 @@ PHYSICAL BALL YOUNG 200000 POISSON 0.45 ELEMENT 0.004
 FLESH LEFT THUMB INDEX ELEMENT 0.003 ITSELF OFF
 SPLINE 1
 GRASP 0 10 LEFT BALL THUMB COUPLING 1 0.6
-SQUEEZE 10 14 LEFT 2
+SQUEEZE 10 15 LEFT 2
 """
 
 
@@ -133,14 +133,14 @@ def test_digits_that_bear_too_much_are_opened(run: Callable[[str], Scene], tmp_p
 @pytest.mark.parametrize(
     ("lines", "status", "text"),
     [
-        ("LIFT 14 18 LEFT BALL WEIGHT 30 MOST 0.5", "LIMIT", "30 N of BALL: does not hold at the firmest grip"),
-        ("STRENGTH LEFT THUMB 0.2\nLIFT 14 18 LEFT BALL WEIGHT 30", "TOO_WEAK", "than the muscles have"),
+        ("LIFT 15 19 LEFT BALL WEIGHT 3 MOST 0.5", "LIMIT", "3 N of BALL: does not hold at the firmest grip"),
+        ("STRENGTH LEFT THUMB 0.2\nLIFT 15 19 LEFT BALL WEIGHT 3", "TOO_WEAK", "than the muscles have"),
     ],
 )
 def test_what_is_too_heavy_is_said(
     run: Callable[[str], Scene], tmp_path: Path, lines: str, status: str, text: str
 ) -> None:
-    report = solved(run(f"{BALL}{lines}\nPRESS 8 18"), tmp_path)
+    report = solved(run(f"{BALL}{lines}\nPRESS 8 19"), tmp_path)
     (found,) = report.grips
     assert found.status == status
     assert text in found.text
@@ -148,23 +148,23 @@ def test_what_is_too_heavy_is_said(
     assert found.lowered is None
     assert any(text in line for line in report.verdict.content()["grips"])
     # the foot keeps it
-    ball = report.pressed.object("BALL", 18.0)
+    ball = report.pressed.object("BALL", 19.0)
     assert np.abs(ball.mean(axis=0) - [0.0411, -0.0568, -0.088]).max() < 1e-3
 
 
 @pytest.mark.parametrize(
     ("lines", "message"),
     [
-        ("LIFT 14 18 LEFT BALL\nPRESS 0 16", r"frames must lie in those of PRESS, after 0 and up to 16"),
-        ("LIFT 14 18 LEFT BALL\nPRESS 0 18 STATE 's.npz'", r"STATE keeps no grips"),
-        ("LIFT 14 18 LEFT BALL\nPRESS 0 18 METHOD PAPER", r"knows no friction"),
+        ("LIFT 15 19 LEFT BALL\nPRESS 0 16", r"frames must lie in those of PRESS, after 0 and up to 16"),
+        ("LIFT 15 19 LEFT BALL\nPRESS 0 19 STATE 's.npz'", r"STATE keeps no grips"),
+        ("LIFT 15 19 LEFT BALL\nPRESS 0 19 METHOD PAPER", r"knows no friction"),
         (
-            "POINTS BALL top UPPER Y 0.1\nVECTOR BALL top AT 0 0 0 0\nLIFT 14 18 LEFT BALL\nPRESS 0 18",
+            "POINTS BALL top UPPER Y 0.1\nVECTOR BALL top AT 0 0 0 0\nLIFT 15 19 LEFT BALL\nPRESS 0 19",
             r"nothing but HOLD",
         ),
-        ("GRAVITY 1 -9.81 0\nLIFT 14 18 LEFT BALL\nPRESS 0 18", r"a GRAVITY along one axis"),
-        ("PHYSICAL BALL DENSITY 0\nLIFT 14 18 LEFT BALL\nPRESS 0 18", r"BALL weighs nothing"),
-        ("LIFT 14 18 LEFT BALL\nPRESS 14 18", r"after 14 and up to 18, got 14 to 18"),
+        ("GRAVITY 1 -9.81 0\nLIFT 15 19 LEFT BALL\nPRESS 0 19", r"a GRAVITY along one axis"),
+        ("PHYSICAL BALL DENSITY 0\nLIFT 15 19 LEFT BALL\nPRESS 0 19", r"BALL weighs nothing"),
+        ("LIFT 15 19 LEFT BALL\nPRESS 15 19", r"after 15 and up to 19, got 15 to 19"),
     ],
 )
 def test_grips_that_cannot_be_are_refused(
