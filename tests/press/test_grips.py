@@ -133,8 +133,8 @@ def test_digits_that_bear_too_much_are_opened(run: Callable[[str], Scene], tmp_p
 @pytest.mark.parametrize(
     ("lines", "status", "text"),
     [
-        ("LIFT 15 19 LEFT BALL WEIGHT 3 MOST 0.5", "LIMIT", "3 N of BALL: does not hold at the firmest grip"),
-        ("STRENGTH LEFT THUMB 0.2\nLIFT 15 19 LEFT BALL WEIGHT 3", "TOO_WEAK", "than the muscles have"),
+        ("LIFT 15 19 LEFT BALL WEIGHT 1 MOST 0.2", "LIMIT", "1 N of BALL: does not hold at the firmest grip"),
+        ("STRENGTH LEFT THUMB 0.2\nLIFT 15 19 LEFT BALL WEIGHT 1", "TOO_WEAK", "than the muscles have"),
     ],
 )
 def test_what_is_too_heavy_is_said(
@@ -147,9 +147,9 @@ def test_what_is_too_heavy_is_said(
     assert found.grip == 0.0
     assert found.lowered is None
     assert any(text in line for line in report.verdict.content()["grips"])
-    # the foot keeps it
+    # the thumb pushes it aside, but its foot keeps it from falling
     ball = report.pressed.object("BALL", 19.0)
-    assert np.abs(ball.mean(axis=0) - [0.0411, -0.0568, -0.088]).max() < 1e-3
+    assert abs(ball[:, 1].min() - (-0.0568 - 0.012)) < 2e-4
 
 
 @pytest.mark.parametrize(
