@@ -19,7 +19,7 @@ from warpjld.skeleton import DIGITS
 pytestmark = pytest.mark.usefixtures("quick_hands")
 
 EXAMPLES = Path(__file__).resolve().parents[1] / "examples"
-SCRIPTS = sorted(path.name for path in EXAMPLES.glob("*.jld") if not path.name.startswith("press_"))
+SCRIPTS = sorted(path.name for path in EXAMPLES.glob("*.jld") if not path.name.startswith(("press_", "hold_")))
 PRESSED = sorted(path.name for path in EXAMPLES.glob("press_*.jld"))
 
 
@@ -82,6 +82,30 @@ def overlap(folder: Path) -> float:
     assert len(surfaces) > 1
     depths = [-one.project(other.vertices).distance.min() for one, other in permutations(surfaces, 2)]
     return float(max(depths))
+
+
+@pytest.mark.slow
+def test_holding_a_ball_as_gently_as_can_be(tmp_path) -> None:
+    summary = run_small("hold_ball.jld", tmp_path, frames=(41, 44))
+    assert summary["press"]["status"] == "CONVERGED"
+    (found,) = summary["press"]["searches"]
+    assert found["status"] == "HELD"
+    weight, friction = 0.5, 0.6
+    rows = list(csv.DictReader((tmp_path / "contact.csv").open(encoding="utf-8")))
+    for frame in ("41", "42", "43", "44"):
+        force = np.array([[float(r[f"f{k}_n"]) for k in "xyz"] for r in rows if r["frame"] == frame])
+        np.testing.assert_allclose(force.sum(axis=0), [0.0, -weight, 0.0], atol=1e-3 * weight)
+    pads = list(csv.DictReader((tmp_path / "touch.csv").open(encoding="utf-8")))
+    for row in pads:
+        force = [float(row[f"force_{k}"]) for k in "xyz"]
+        assert np.linalg.norm(force) <= (1.0 + 1e-6) * np.hypot(1.0, friction) * float(row["normal_force"]) + 1e-9
+    # friction bears at most its coefficient times the force that presses
+    assert found["force_n"] > weight / friction
+    slid = [trial for trial in found["trials"] if not trial["held"]]
+    assert slid
+    assert all(trial["grip_deg"] < found["grip_degrees"] for trial in slid)
+    assert max(trial["grip_deg"] for trial in slid) > 0.9 * found["grip_degrees"]
+    assert (tmp_path / "touch.png").is_file()
 
 
 def test_the_fist_closes_thumb_last_and_opens_again() -> None:

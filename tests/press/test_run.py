@@ -16,7 +16,8 @@ from warpjld.grasp import Places
 from warpjld.press.settle import settle
 from warpjld.press.state import load_state
 from warpjld.script import Scene
-from warpjld.script.pressing import approach, run_press
+from warpjld.script.approach import approach
+from warpjld.script.pressing import run_press
 from warpjld.script.runner import run_scene
 
 PLATE = """

@@ -12,8 +12,10 @@ from warpjld.errors import InputError
 from warpjld.fem.contact.barr import Barr
 from warpjld.fem.contact.meshes import Keyframed
 from warpjld.fem.contact.solids import Box, Sphere
+from warpjld.press.grips import FoundGrip
 from warpjld.press.wishes import Points
-from warpjld.script.pressing import prop_obstacle
+from warpjld.script.press_bodies import prop_obstacle
+from warpjld.script.press_keys import gripped_keys
 from warpjld.script.props import prop_places
 from warpjld.script.staging import frame_numbers
 
@@ -122,6 +124,28 @@ def test_built_in_shapes_are_exact_obstacles(run) -> None:
     assert ball.project(np.array([[1.1, 0.2, 0.3]]), 5.0).distance[0] == pytest.approx(-0.03)
 
 
+def test_grips_hold_their_angles_until_something_is_found(run) -> None:
+    scene = run(
+        "SPLINE 1\nOBJECT ball BALL 0.05 AT 0.012 -0.06 -0.085\nPHYSICAL ball\nFLESH left\n"
+        "GRASP 0 10 LEFT ball INDEX\nSTRENGTH LEFT INDEX 40\nSQUEEZE 10 14 LEFT FORCE 3 INDEX MOST 5\n"
+        "LIFT 14 24 LEFT ball WEIGHT 0.5\nRELEASE 30 40 LEFT"
+    )
+    force, lift = scene.contact.grips
+    assert (force.first, force.middle, force.last, force.force, force.digits) == (10, 14, 14, 3, ("index",))
+    assert (lift.first, lift.middle, lift.last, lift.weight) == (14, 19, 24, 0.5)
+    assert scene.contact.pull == (0.0, -9.81, 0.0)
+    assert scene.contact.strength == {"LEFT": {"index": 40}}
+    motion = scene.actor("left").motion
+    for channel in force.channels:
+        values = motion.value(channel, np.arange(10.0, 31.0))
+        np.testing.assert_array_equal(values, values[0])
+    found = FoundGrip(force, "REACHED", "", math.radians(2), None, 3.0, {})
+    gripped_keys(scene.actor("left"), found)
+    base = motion.value("left.index.base.flexion", np.array([10.0, 14.0, 19.0, 24.0, 30.0, 40.0]))
+    np.testing.assert_allclose(base[1:5] - base[0], math.radians(2), atol=1e-12)
+    assert base[5] == pytest.approx(0.0, abs=1e-12)
+
+
 @pytest.mark.parametrize(
     ("line", "message"),
     [
@@ -148,6 +172,12 @@ def test_built_in_shapes_are_exact_obstacles(run) -> None:
         ("PRESS 10 10", r"the last frame must come after the first"),
         ("PRESS 0 10 AITKEN", r"it goes with METHOD PAPER"),
         ("SQUEEZE 0 10 LEFT 5", r"LEFT has grasped nothing"),
+        ("SQUEEZE 0 10 LEFT FORCE 5", r"LEFT has grasped nothing"),
+        ("LIFT 0 10 LEFT ball", r"LEFT has grasped nothing"),
+        ("STRENGTH LEFT INDEX 0", r"the force in newtons must be greater than 0"),
+        ("STRENGTH LEFT TOE 5", r"expected the digit \(THUMB/INDEX/MIDDLE/RING/PINKY\)"),
+        ("PRESS 0 10 STOP CORRECT", r"STOP or CORRECT, not both"),
+        ("TACTILE 'touch.txt'", r"want a name that ends in \.csv, \.parquet, \.png"),
         ("PICTURE 0 'a.png' PRESSURE moon", r"there is no actor or object MOON"),
     ],
 )

@@ -14,9 +14,11 @@ from warpjld.fem import Body, Loads, Material, Prescribed, merge
 from warpjld.fem.contact import Bond, Exclusion, Obstacle, Pair
 from warpjld.fem.hand.blend import Moves
 from warpjld.grasp import Places
+from warpjld.press.drive import Drive
 from warpjld.press.outside import outside
 from warpjld.press.rest import Part
 from warpjld.press.settle import settle
+from warpjld.press.support import Support
 from warpjld.press.volumes import ObjectVolume
 from warpjld.press.wishes import ContactWishes, Prescribing, placed
 
@@ -37,6 +39,7 @@ class HandBody:
         moves: Motions of its bones from the rig's rest at a time.
         softness: Young's modulus of its skin [Pa].
         itself: Whether its skin may touch itself.
+        drive: What moves them, for searches that bend its joints otherwise.
     """
 
     name: str
@@ -45,6 +48,7 @@ class HandBody:
     moves: Callable[[float], Moves]
     softness: float
     itself: bool
+    drive: Drive
 
     def prescribed(self, time: float) -> Prescribed:
         """Displacements of the bones' nodes and of those where the flesh was cut off."""
@@ -72,26 +76,45 @@ class ObjectBody:
         place: Where the script puts it at a time: one placement.
         states: What is prescribed, and the nodes it is prescribed for.
         start: Frame of time 0.
+        support: What it stands on until a hand takes its weight.
+        other: What is prescribed instead of all this, at a time.
     """
 
     volume: ObjectVolume
     place: Callable[[float], Places]
     states: Sequence[tuple[Prescribing, NDArray[np.int64]]]
     start: float
+    support: Support | None = None
+    other: Callable[[float], Prescribed] | None = None
 
     @property
     def name(self) -> str:
         """Of the object."""
         return self.volume.name
 
+    def holds(self, state: Prescribing, time: float) -> bool:
+        """Whether points go where the object goes."""
+        stands = self.support is None or self.support.stands(time)
+        return self.other is None and stands and state.holds(self.start + time)
+
+    def guided(self, time: float) -> bool:
+        """Whether something else than its states leads it."""
+        if self.other is not None:
+            return True
+        return self.support is not None and not self.support.stands(time) and time < self.support.free
+
     def prescribed(self, time: float) -> Prescribed:
         """Displacements of its prescribed points (R128)."""
+        if self.other is not None:
+            return self.other(time)
         out = Prescribed(np.empty(0, np.int64), np.empty(0))
+        if self.support is not None:
+            out = self.support.prescribed(time)
         frame = self.start + time
         for state, nodes in self.states:
             moved = np.zeros((len(nodes), 3))
             axes = [k for k, axis in enumerate("xyz") if axis in state.tracks]
-            held = state.holds(frame)
+            held = self.holds(state, time)
             if held:
                 axes = [0, 1, 2]
                 moved = self.place(time).apply(self.volume.local[nodes])[0] - self.volume.mesh.nodes[nodes]
@@ -162,8 +185,10 @@ class Bodies:
         for one in self.objects:
             span = self.spans[one.name]
             at = one.volume.mesh.nodes + displacement[span]
-            if any(state.holds(self.start + time) for state, _ in one.states):
+            if any(one.holds(state, time) for state, _ in one.states):
                 out[span] += _rigid(one.place(before), one.place(time), at) - at
+            elif one.guided(time):
+                out[span] += _along_with(one.prescribed(time), displacement[span])
             elif not any(state.tracks for state, _ in one.states):
                 if one.name in self.carried:
                     out[span] += self._along(self.carried[one.name], before, time, at) - at
@@ -173,12 +198,33 @@ class Bodies:
         out.reshape(-1)[known.degrees] = known.values
         return out
 
-    def note(self, nodal: NDArray[np.float64]) -> None:
-        """Take note of what holds the free objects, from the contact forces of each pair (P, N, 3)."""
+    def loads_at(self, time: float) -> Loads:
+        """What pulls and pushes at a time beside contact."""
+        out = np.zeros((0, 3))
+        for one in self.objects:
+            fading = None if one.support is None else one.support.fading(time)
+            if fading is not None:
+                out = out if len(out) else np.zeros_like(self.body.mesh.nodes)
+                out[self.spans[one.name]] += fading
+        return replace(self.loads, nodal=out) if len(out) else self.loads
+
+    def note(
+        self, time: float, displacement: NDArray[np.float64], reactions: NDArray[np.float64], nodal: NDArray[np.float64]
+    ) -> None:
+        """Take note of what holds the free objects.
+
+        Args:
+            time: Of an equilibrium.
+            displacement: Of all nodes [m], shape (N, 3).
+            reactions: Of what is prescribed [N], shape (N, 3).
+            nodal: Contact forces of each pair [N], shape (P, N, 3).
+        """
         self.carried.clear()
         self.touched.clear()
         hands = {hand.name for hand in self.hands}
         for one in self.objects:
+            if one.support is not None:
+                one.support.note(time, displacement[self.spans[one.name]], reactions[self.spans[one.name]])
             pushes: dict[str, float] = {}
             for owner, forces in zip(self.owners, nodal[:, self.spans[one.name]], strict=True):
                 if one.name in (owner.slave, owner.master) and forces.any():
@@ -219,8 +265,12 @@ def assemble(
     objects: Sequence[ObjectBody],
     obstacles: Mapping[str, Obstacle],
     wishes: ContactWishes,
+    *,
+    start: float = 0.0,
 ) -> Bodies:
     """Merge bodies and pair their surfaces: the softer side of two is the one where pressures live.
+
+    ``start`` is the frame of time 0.
 
     Raises:
         InputError: Nothing that deforms, or a bond to what is not there.
@@ -245,8 +295,7 @@ def assemble(
     offset = None if paper else np.concatenate([*map(_outside, hands), *map(_outside, objects)])
     pairs, owners = _pairs(hands, objects, obstacles, wishes)
     pairs = [replace(pair, offset=offset) for pair in pairs]
-    loads = Loads(gravity=wishes.gravity, pressure=pressure)
-    start = objects[0].start if objects else 0.0
+    loads = Loads(gravity=wishes.pull, pressure=pressure)
     return Bodies(tuple(hands), tuple(objects), obstacles, body, spans, tuple(pairs), tuple(owners), loads, start)
 
 
@@ -302,6 +351,13 @@ def _whole(nodes: NDArray[np.int64], moved: NDArray[np.float64]) -> Prescribed:
     order = np.argsort(nodes)
     degrees = (3 * nodes[order][:, None] + np.arange(3)).ravel()
     return Prescribed(degrees, moved[order].ravel())
+
+
+def _along_with(known: Prescribed, displacement: NDArray[np.float64]) -> NDArray[np.float64]:
+    """How far an object goes, axis by axis, whose known degrees of freedom go to these values [m], shape (3,)."""
+    change = known.values - displacement.reshape(-1)[known.degrees]
+    axes = known.degrees % 3
+    return np.array([change[axes == axis].mean() if (axes == axis).any() else 0.0 for axis in range(3)])
 
 
 def _rigid(before: Places, after: Places, points: NDArray[np.float64]) -> NDArray[np.float64]:

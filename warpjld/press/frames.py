@@ -24,6 +24,7 @@ class TouchingPoints:
         area: [m²], shape (m,).
         position: [m], shape (m, 3).
         slides: Whether it slides, shape (m,).
+        slip: Way along the other side since the instant before [m], shape (m, 3).
     """
 
     pair: NDArray[np.int32]
@@ -32,6 +33,7 @@ class TouchingPoints:
     area: NDArray[np.float64]
     position: NDArray[np.float64]
     slides: NDArray[np.bool_]
+    slip: NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)
@@ -99,6 +101,7 @@ def solved_frame(frame: float, instant: ContactInstant) -> SolvedFrame:
         joined([t.area for t in touches], np.empty(0)),
         joined([t.position for t in touches], np.empty((0, 3))),
         joined([~t.sticking for t in touches], np.empty(0, bool)),
+        joined([t.slip for t in touches], np.empty((0, 3))),
     )
     nodal = np.stack([t.nodal for t in touches]) if touches else np.zeros((0, count, 3))
     deepest = max((float(np.maximum(-t.gap, 0.0).max(initial=0.0)) for t in touches), default=0.0)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -13,13 +13,11 @@ from warpjld.fem import Instant, Solution, Status, solve
 from warpjld.fem.contact import ContactInstant, ContactSolution, press
 from warpjld.press.bodies import Bodies
 from warpjld.press.checks import why_not
+from warpjld.press.detour import TOLERANCE
 from warpjld.press.frames import SolvedFrame, solved_frame
 from warpjld.press.state import State, load_state, save_state
 
 __all__ = ["Solved", "solve_frames"]
-
-_TOLERANCE = 1e-4
-"""Residual over the forces that balance: what a film and a table of newtons need."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -49,6 +47,8 @@ def solve_frames(
     method: str = "augmented",
     aitken: bool = False,
     watch: Callable[[SolvedFrame], str | None] | None = None,
+    mend: Callable[[ContactSolution, ContactSolution], ContactSolution] | None = None,
+    pauses: Mapping[float, Callable[[ContactSolution], None]] | None = None,
     state: Path | None = None,
     progress: Callable[[str, int, int], None] = lambda what, done, total: None,
 ) -> Solved:
@@ -60,6 +60,8 @@ def solve_frames(
         frames: Rising, after ``start``.
         method: The solver's; ``aitken`` relaxes the paper's loop.
         watch: Asked after each frame; a text stops the run there (R118).
+        mend: Given the equilibrium before and that of a frame; answers with the one to go on from (R120).
+        pauses: Called with the equilibrium of a frame before it is gone on from: they may change what comes.
         state: File that holds what was solved so far; an earlier run's is gone on from.
         progress: Told what is being done, how much of it is done, and how much there is.
 
@@ -74,7 +76,8 @@ def solve_frames(
         if found.mark != mark:
             raise InputError("this state belongs to another scene; remove it, or name another after STATE", path=state)
         done, after = list(found.frames), found.solution
-        bodies.note(done[-1].nodal)
+        for one in done:
+            bodies.note(one.frame - start, one.displacement, one.reactions, one.nodal)
     resumed = len(done)
     for solved in done:
         reason = watch(solved) if watch else None
@@ -88,27 +91,32 @@ def solve_frames(
             bodies.body,
             bodies.prescribed,
             bodies.pairs,
-            lambda time: bodies.loads,
+            bodies.loads_at,
             times=(frame - start,),
             after=after,
             method=method,
             aitken=aitken,
-            tolerance=_TOLERANCE,
+            tolerance=TOLERANCE,
             guess=bodies.guess,
             check=False,
         )
         if not solution.converged:
             reason = why_not(bodies, frame - start) or solution.message
             return Solved(solution.status, f"at frame {frame:g}: {reason}", start, tuple(done), resumed)
+        if mend is not None and after is not None:
+            solution = mend(after, solution)
         after = solution
         solved = solved_frame(float(frame), solution.last)
-        bodies.note(solved.nodal)
+        bodies.note(frame - start, solved.displacement, solved.reactions, solved.nodal)
         done.append(solved)
         if state is not None:
             save_state(state, State(mark, tuple(done), solution))
         reason = watch(solved) if watch else None
         if reason:
             return Solved(Status.STOPPED, reason, start, tuple(done), resumed)
+        if pauses and frame in pauses:
+            progress(f"looking for a grip, frame {frame:g}", len(done), len(frames))
+            pauses[frame](solution)
     return Solved(Status.CONVERGED, Status.CONVERGED.value, start, tuple(done), resumed)
 
 

@@ -25,6 +25,8 @@ class Verdict:
         lines: One for each digit that touched.
         suggestions: What to change.
         frames: First and last frame that were solved.
+        grips: What came of searches for a grip.
+        corrections: What was opened, and what could not be.
     """
 
     status: str
@@ -32,6 +34,8 @@ class Verdict:
     lines: tuple[str, ...]
     suggestions: tuple[str, ...]
     frames: tuple[float, float] | None
+    grips: tuple[str, ...] = ()
+    corrections: tuple[str, ...] = ()
 
     def content(self) -> dict[str, Any]:
         """As plain values."""
@@ -40,6 +44,8 @@ class Verdict:
             "verdict": self.text,
             "digits": list(self.lines),
             "suggestions": list(self.suggestions),
+            "grips": list(self.grips),
+            "corrections": list(self.corrections),
             "frames": None if self.frames is None else list(self.frames),
         }
 

@@ -20,6 +20,7 @@ __all__ = [
     "Bonded",
     "ContactWishes",
     "FleshWish",
+    "GripWish",
     "Physical",
     "Points",
     "Prescribing",
@@ -36,6 +37,8 @@ Law = Literal["linear", "neo-hooke", "mooney-rivlin"]
 LAWS: tuple[Law, ...] = ("linear", "neo-hooke", "mooney-rivlin")
 _FRICTION = 0.6
 """Skin on aluminium (Seo 2009)."""
+_EARTH = 9.81
+"""[m/s²]"""
 
 
 @dataclass(frozen=True)
@@ -206,6 +209,42 @@ class Barred:
 
 
 @dataclass(frozen=True)
+class GripWish:
+    """A grip that is to be found: the gentlest that holds an object's weight, or the one that presses with a force.
+
+    Attributes:
+        actor: Whose hand closes.
+        object: What it holds; a force needs none.
+        first, last: Frames between which it closes; where it lifts, it closes up to half-way and has the weight at the
+            last.
+        channels: Flexions that close, as ``left.index.base.flexion``.
+        most: Angle by which each may close at most [rad].
+        lift: Whether it is to hold the object.
+        weight: Of the object [N]; None: as its density has it.
+        force: Wished sum of the forces of the digits [N].
+        digits: Those whose forces count, as ``index``; none for all that close.
+        where: Place in a script, for messages.
+    """
+
+    actor: str
+    object: str
+    first: float
+    last: float
+    channels: tuple[str, ...]
+    most: float
+    lift: bool = False
+    weight: float | None = None
+    force: float | None = None
+    digits: tuple[str, ...] = ()
+    where: Where | None = None
+
+    @property
+    def middle(self) -> float:
+        """Frame at which the hand has closed."""
+        return round(0.5 * (self.first + self.last)) if self.lift else self.last
+
+
+@dataclass(frozen=True)
 class Pressing:
     """Frames to solve contact at.
 
@@ -215,6 +254,7 @@ class Pressing:
         method: The default, or the paper's loop (R113).
         aitken: Relaxation of the paper's loop.
         stop: Whether to stop where the muscles can do no more (R118).
+        correct: Whether to open digits that bear more than their muscles can (R120).
         state: File the state is kept in, so that a stopped run goes on; None keeps none.
         where: Place in a script, for messages.
     """
@@ -225,6 +265,7 @@ class Pressing:
     method: Literal["augmented", "paper"] = "augmented"
     aitken: bool = False
     stop: bool = False
+    correct: bool = False
     state: str | None = None
     where: Where | None = None
 
@@ -242,6 +283,8 @@ class ContactWishes:
         friction: Coefficients by pair of names, in alphabetical order.
         everywhere: Coefficient of all other pairs; None: that of skin, or none with the paper's loop, which knows none.
         gravity: [m/s²].
+        strength: Largest force of digits [N], by actor and digit, where it is not the default.
+        grips: Grips to find, in the order of their frames.
         pressing: What to solve, if anything.
     """
 
@@ -253,7 +296,19 @@ class ContactWishes:
     friction: dict[tuple[str, str], float] = field(default_factory=dict)
     everywhere: float | None = None
     gravity: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    strength: dict[str, dict[str, float]] = field(default_factory=dict)
+    grips: list[GripWish] = field(default_factory=list)
     pressing: Pressing | None = None
+
+    @property
+    def pull(self) -> tuple[float, float, float]:
+        """Acceleration [m/s²]: as asked, and that of the earth, downwards, where something is lifted without a word."""
+        lifts = any(wish.lift for wish in self.grips)
+        return (0.0, -_EARTH, 0.0) if lifts and not any(self.gravity) else self.gravity
+
+    def lifted(self, name: str) -> GripWish | None:
+        """The grip that is to hold an object, if any."""
+        return next((wish for wish in self.grips if wish.lift and wish.object == name), None)
 
     def coefficient(self, one: str, other: str) -> float:
         """Friction between two."""

@@ -62,6 +62,7 @@ _BUILT_IN = (
     "grasping",
     "physical",
     "deforming",
+    "gripping",
     "pressing",
     "covering",
     "output",

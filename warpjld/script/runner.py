@@ -19,7 +19,7 @@ from warpjld.script.formats import check_available, video_is_available
 from warpjld.script.grasping import contact_reports
 from warpjld.script.pictures import draw_contact_sheet, draw_picture, film_studio
 from warpjld.script.props import Prop, prop_surface
-from warpjld.script.scene import Actor, ContactSheet, Export, Film, Output, Picture, Scene, Table, Volume
+from warpjld.script.scene import Actor, ContactSheet, Export, Film, Grips, Output, Picture, Scene, Table, Touch, Volume
 from warpjld.script.staging import frame_numbers, notes, stage
 from warpjld.script.summary import Summary
 
@@ -74,6 +74,8 @@ def run_scene(
             summary.notes.append("the film is a GIF; for MP4: pip install 'warpjld[film]'")
     if scene.contact.pressing is not None and not any(isinstance(output, Table) for output in outputs):
         outputs.append(Table("contact.csv"))
+    if scene.contact.pressing is not None and scene.contact.grips:
+        outputs.append(Grips("grips.csv"))
     check_available([output.name for output in outputs])
     _check_press(scene, outputs)
     for actor in scene.actors.values():
@@ -90,8 +92,8 @@ def run_scene(
 
             with summary.timed("contact"):
                 report = run_press(scene, folder, progress)
-            crowd = replace(crowd, pressed=report.pressed)
-            summary.press = report.verdict.content()
+            crowd = replace(cast(scene, frames, device=device), pressed=report.pressed)
+            summary.press = report.verdict.content() | {"searches": [one.content() for one in report.grips]}
             summary.notes += report.notes
         with summary.timed("frames"):
             _make_sequences(scene, crowd, frames, outputs, out, threads, progress)
@@ -233,20 +235,38 @@ def _check_press(scene: Scene, outputs: Sequence[Output]) -> None:
     if scene.contact.pressing is not None:
         return
     for output in outputs:
-        if isinstance(output, Table | Volume) or (isinstance(output, Film | Picture) and output.style == "pressure"):
+        if isinstance(output, Table | Touch | Volume) or (
+            isinstance(output, Film | Picture) and output.style == "pressure"
+        ):
             raise InputError(f"'{output.name}' shows contact, but none is solved: PRESS <first> <last> asks for it")
 
 
 def _write_press(report: PressReport, outputs: Sequence[Output], out: OutputFolder) -> None:
     """Tables and volumes."""
+    from warpjld.press.grips import write_grips
     from warpjld.press.table import write_table
     from warpjld.press.volume_series import write_volumes
 
     for output in outputs:
         if isinstance(output, Table):
             write_table(out.place(output.name), report.rows)
+        elif isinstance(output, Grips):
+            write_grips(out.place(output.name), report.grips)
+        elif isinstance(output, Touch):
+            _write_touch(report, output, out.place(output.name))
         elif isinstance(output, Volume):
             write_volumes(out.place(output.name), report.pressed)
+
+
+def _write_touch(report: PressReport, output: Touch, path: Path) -> None:
+    from warpjld.fem.hand.tactile_files import draw_tactile, write_tactile
+
+    actor = output.actor or next((hand.name for hand in report.pressed.bodies.hands), "nobody")
+    felt = report.tactile(actor)
+    if path.suffix == ".png":
+        draw_tactile(path, felt, f"What {actor.lower()} feels")
+    else:
+        write_tactile(path, felt)
 
 
 def _make_pictures(

@@ -111,13 +111,28 @@ class Table:
 
 
 @dataclass(frozen=True)
+class Touch:
+    """What the skin of an actor, or of the first whose flesh deforms, feels over time: CSV, Parquet or a plot."""
+
+    name: str
+    actor: str | None
+
+
+@dataclass(frozen=True)
+class Grips:
+    """Grips that were searched for, and all that were tried, as CSV."""
+
+    name: str
+
+
+@dataclass(frozen=True)
 class Volume:
     """The deformed volumes as a VTK series."""
 
     name: str
 
 
-Output = Picture | Film | ContactSheet | Export | Table | Volume
+Output = Picture | Film | ContactSheet | Export | Table | Touch | Grips | Volume
 
 
 @dataclass(eq=False)

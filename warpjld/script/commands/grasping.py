@@ -10,6 +10,8 @@ import numpy as np
 from warpjld.errors import InputError
 from warpjld.script.arguments import Arguments
 from warpjld.script.commands.animation import FINGERS, SIDES
+from warpjld.script.commands.physical import read_object
+from warpjld.script.grips import read_frames, read_side
 from warpjld.script.keys import read_joint
 from warpjld.script.registry import command
 from warpjld.script.scene import Scene
@@ -95,7 +97,7 @@ def objects(scene: Scene, arguments: Arguments) -> None:
     """R69–R72, R85, C14."""
     from warpjld.grasp.attach import Association
 
-    prop = _prop(scene, arguments)
+    prop = read_object(scene, arguments)
     if arguments.keyword("JOINT"):
         actor, joint = read_joint(scene, arguments)
     else:
@@ -122,7 +124,7 @@ def objects(scene: Scene, arguments: Arguments) -> None:
 def auto_wrist(scene: Scene, arguments: Arguments) -> None:
     """R86."""
     key = arguments.number("the key (a frame)")
-    side = _side(scene, arguments)
+    side = read_side(scene, arguments)
     _search(scene, arguments, "AUTO_WRIST", key, side, "wrist", "middle")
 
 
@@ -135,7 +137,7 @@ def auto_wrist(scene: Scene, arguments: Arguments) -> None:
 def auto_f_1(scene: Scene, arguments: Arguments) -> None:
     """R87."""
     key = arguments.number("the key (a frame)")
-    side = _side(scene, arguments)
+    side = read_side(scene, arguments)
     finger = arguments.choice("the finger", FINGERS).lower()
     _search(scene, arguments, "AUTO_F_1", key, side, f"{finger}.base", finger)
 
@@ -149,7 +151,7 @@ def auto_f_1(scene: Scene, arguments: Arguments) -> None:
 def auto_f_2_3(scene: Scene, arguments: Arguments) -> None:
     """R87."""
     key = arguments.number("the key (a frame)")
-    side = _side(scene, arguments)
+    side = read_side(scene, arguments)
     finger, knuckle = arguments.choices(FINGERS, ("KNUCKLES2", "KNUCKLES3"))
     joint = f"{finger}.{knuckle.replace('KNUCKLES', 'knuckle')}".lower()
     _search(scene, arguments, "AUTO_F_2_3", key, side, joint, finger.lower())
@@ -169,12 +171,9 @@ def grasp(scene: Scene, arguments: Arguments) -> None:
     """R90."""
     from warpjld.script.grasping import close_digits
 
-    first = arguments.number("key1 (the frame at which the digits begin to close)")
-    last = arguments.number("key2 (the frame at which they touch)")
-    if last <= first:
-        raise arguments.error(f"key2 must come after key1 ({first:g}), got {last:g}")
-    side = _side(scene, arguments)
-    prop = _prop(scene, arguments)
+    first, last = read_frames(arguments, "at which the digits begin to close", "at which they touch")
+    side = read_side(scene, arguments)
+    prop = read_object(scene, arguments)
     if arguments.keyword("AUTO"):
         _grasp_auto(scene, arguments, side, prop, first, last)
         return
@@ -215,11 +214,8 @@ def _grasp_auto(  # type: ignore[no-untyped-def]
 )
 def release(scene: Scene, arguments: Arguments) -> None:
     """R69: objects are let go."""
-    first = arguments.number("key1 (the frame at which the digits begin to open)")
-    last = arguments.number("key2 (the frame at which they are open)")
-    if last <= first:
-        raise arguments.error(f"key2 must come after key1 ({first:g}), got {last:g}")
-    actor = scene.actor_with(_side(scene, arguments))
+    first, last = read_frames(arguments, "at which the digits begin to open", "at which they are open")
+    actor = scene.actor_with(read_side(scene, arguments))
     if actor.name not in scene.grips:
         raise arguments.error(f"actor {actor.name} has grasped nothing", arguments.position)
     for channel, value in scene.grips.pop(actor.name).items():
@@ -244,7 +240,7 @@ def _search(scene: Scene, arguments: Arguments, name: str, key: float, side: str
     else:
         last = len(covering.surface.vertices) - 1
         vertex = arguments.integer("the hand vertex (its number, or PAD)", minimum=0, maximum=last)
-    prop = _prop(scene, arguments)
+    prop = read_object(scene, arguments)
     if arguments.keyword("NEAREST"):
         facet = NEAREST
     else:
@@ -286,26 +282,6 @@ def _made(name: str, shape: str | None, sizes: list[float], path: object, option
         scale=scale,
         centre="centre" in options,
     )
-
-
-def _prop(scene: Scene, arguments: Arguments):  # type: ignore[no-untyped-def]
-    name = arguments.name("an object's name")
-    try:
-        return scene.prop(name)
-    except InputError as error:
-        raise arguments.error(error.message) from None
-
-
-def _side(scene: Scene, arguments: Arguments) -> str:
-    """The side as written, or that of the current actor where it has only one."""
-    side = arguments.keyword(*SIDES)
-    if side is not None:
-        return side.lower()
-    names = scene.actor().skeleton.names
-    sides = [s for s in ("left", "right") if any(n.startswith(f"{s}.") for n in names)]
-    if len(sides) != 1:
-        raise arguments.expected("LEFT/RIGHT")
-    return sides[0]
 
 
 def _joint(actor: Actor, name: str, arguments: Arguments) -> int:

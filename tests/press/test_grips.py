@@ -1,0 +1,174 @@
+"""Grips from scripts: a finger that presses with a wished force, is corrected, and feels; balls too heavy to lift."""
+
+from __future__ import annotations
+
+import csv
+import json
+import math
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from warpjld.errors import InputError
+from warpjld.fem import Status
+from warpjld.script import Interpreter, Scene
+from warpjld.script.pressing import PressReport, run_press
+from warpjld.script.runner import run_scene
+
+PLATE = """
+OBJECT plate BOX 0.036 0.006 0.036 AT 0.034 -0.0275 -0.165
+SPLINE 1
+GRASP 0 4 LEFT plate INDEX
+FLESH LEFT INDEX ELEMENT 0.003
+FRICTION 0.5
+FRAMES 0 8
+"""
+
+BALL = """
+OBJECT BALL BALL 0.024 AT 0.0411 -0.0568 -0.088
+FINGER1  LEFT INDEX FLEXION    AT 0 70
+FINGER23 LEFT INDEX KNUCKLES2  AT 0 40
+FINGER23 LEFT INDEX KNUCKLES3  AT 0 20
+FINGER1  LEFT THUMB ABDUCTION  AT 0 8
+FINGER1  LEFT THUMB FLEXION    AT 0 -15
+PHYSICAL BALL YOUNG 200000 POISSON 0.45 ELEMENT 0.004
+FLESH LEFT THUMB INDEX ELEMENT 0.003 ITSELF OFF
+SPLINE 1
+GRASP 0 10 LEFT BALL THUMB COUPLING 1 0.6
+SQUEEZE 10 15 LEFT 2
+"""
+
+
+@pytest.fixture(scope="module")
+def pressed(rig, tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, dict, Scene]:
+    """A finger presses a plate with 0.6 N: the script made once."""
+    scene = Scene(say=lambda text: None)
+    scene.add("left", rig)
+    Interpreter(scene).run_text(
+        PLATE + "SQUEEZE 5 8 LEFT FORCE 0.6\nPRESS 2 8\nSIZE 160 120\nPICTURE 8 'a.png'\n"
+        "TACTILE 'touch.csv'\nTACTILE 'touch.png' LEFT\nTACTILE 'touch.parquet'"
+    )
+    out = tmp_path_factory.mktemp("force")
+    return out, run_scene(scene, out), scene
+
+
+def test_a_finger_presses_with_the_force_asked_for(pressed: tuple[Path, dict, Scene]) -> None:
+    out, summary, scene = pressed
+    (found,) = summary["press"]["searches"]
+    assert found["status"] == "REACHED"
+    assert found["force_n"] == pytest.approx(0.6, rel=0.02)
+    assert list(found["digits"]) == ["left.index"]
+    assert "0.6 N asked for" in summary["press"]["grips"][0]
+    rows = [row for row in csv.DictReader((out / "contact.csv").open(encoding="utf-8")) if row["digit"] == "index"]
+    assert float(rows[-1]["force_n"]) == pytest.approx(0.6, rel=0.05)  # on another way: friction remembers
+    tried = list(csv.DictReader((out / "grips.csv").open(encoding="utf-8")))
+    assert sum(int(row["chosen"]) for row in tried) == 1
+    # the angle that was found is a key now
+    motion = scene.actor("left").motion
+    by = motion.value("left.index.base.flexion", 8.0) - motion.value("left.index.base.flexion", 5.0)
+    assert math.degrees(float(by)) == pytest.approx(found["grip_degrees"], abs=1e-3)
+    assert float(by) > 0.0
+
+
+def test_the_pad_feels_what_the_plate_bears(pressed: tuple[Path, dict, Scene]) -> None:
+    out, _, _ = pressed
+    rows = [r for r in csv.DictReader((out / "touch.csv").open(encoding="utf-8")) if r["pad"] == "left.index.distal"]
+    force = np.array([float(row["normal_force"]) for row in rows])
+    assert len(rows) >= 4
+    assert (np.diff(force) >= 0.0).all()
+    assert force[-1] == pytest.approx(0.6, rel=0.1)
+    assert float(rows[-1]["force_y"]) == pytest.approx(0.6, rel=0.1)
+    centre = [float(rows[-1][f"centre_{axis}"]) for axis in "xyz"]
+    np.testing.assert_allclose(centre, [0.034, -0.0245, -0.168], atol=6e-3)
+    assert float(rows[-1]["slip"]) >= 0.0
+    assert 0.0 <= float(rows[-1]["sticking"]) <= 1.0
+    assert (out / "touch.png").stat().st_size > 1e4
+    assert (out / "touch.parquet").is_file()
+    assert "N" in json.dumps(json.loads((out / "touch.columns.json").read_text(encoding="utf-8")))
+
+
+def solved(scene: Scene, out: Path) -> PressReport:
+    report = run_press(scene, out)
+    assert report.pressed.solved.status is Status.CONVERGED, report.verdict.text
+    return report
+
+
+@pytest.mark.slow
+def test_a_force_beyond_the_muscles_is_unreachable(run: Callable[[str], Scene], tmp_path: Path) -> None:
+    scene = run(PLATE + "STRENGTH LEFT INDEX 0.5\nSQUEEZE 5 8 LEFT FORCE 4 INDEX MOST 6\nPRESS 2 8")
+    report = solved(scene, tmp_path)
+    (found,) = report.grips
+    assert found.status == "TOO_WEAK"
+    assert "unreachable: more force would be needed than the muscles have; 4 N asked for" in found.text
+    assert found.force <= 0.5
+    assert max(row.share for row in report.rows if row.digit == "index") <= 1.05
+
+
+def test_a_force_beyond_the_range_of_motion_is_unreachable(run: Callable[[str], Scene], tmp_path: Path) -> None:
+    scene = run(PLATE + "SQUEEZE 5 8 LEFT FORCE 40 MOST 0.5\nPRESS 2 8 EVERY 3")
+    (found,) = solved(scene, tmp_path).grips
+    assert found.status == "LIMIT"
+    assert "bent as far as they may; 40 N asked for" in found.text
+    assert math.degrees(found.grip) == pytest.approx(0.5)
+
+
+@pytest.mark.slow
+def test_digits_that_bear_too_much_are_opened(run: Callable[[str], Scene], tmp_path: Path) -> None:
+    scene = run(PLATE + "STRENGTH LEFT INDEX 1\nSQUEEZE 5 8 LEFT 2.5\nPRESS 2 8 CORRECT")
+    wanted = float(scene.actor("left").motion.value("left.index.base.flexion", 8.0))
+    report = solved(scene, tmp_path)
+    last = next(row for row in report.rows if row.frame == 8.0 and row.digit == "index")
+    assert 0.9 <= last.share <= 1.0
+    assert max(row.share for row in report.rows if row.digit == "index") <= 1.0
+    assert float(scene.actor("left").motion.value("left.index.base.flexion", 8.0)) < wanted
+    (line,) = report.verdict.corrections
+    assert "LEFT index" in line
+    assert "of 1 N at frame" in line
+    assert "opened base by" in line
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("lines", "status", "text"),
+    [
+        ("LIFT 15 19 LEFT BALL WEIGHT 1 MOST 0.2", "LIMIT", "1 N of BALL: does not hold at the firmest grip"),
+        ("STRENGTH LEFT THUMB 0.2\nLIFT 15 19 LEFT BALL WEIGHT 1", "TOO_WEAK", "than the muscles have"),
+    ],
+)
+def test_what_is_too_heavy_is_said(
+    run: Callable[[str], Scene], tmp_path: Path, lines: str, status: str, text: str
+) -> None:
+    report = solved(run(f"{BALL}{lines}\nPRESS 8 19"), tmp_path)
+    (found,) = report.grips
+    assert found.status == status
+    assert text in found.text
+    assert found.grip == 0.0
+    assert found.lowered is None
+    assert any(text in line for line in report.verdict.content()["grips"])
+    # the thumb pushes it aside, but its foot keeps it from falling
+    ball = report.pressed.object("BALL", 19.0)
+    assert abs(ball[:, 1].min() - (-0.0568 - 0.012)) < 2e-4
+
+
+@pytest.mark.parametrize(
+    ("lines", "message"),
+    [
+        ("LIFT 15 19 LEFT BALL\nPRESS 0 16", r"frames must lie in those of PRESS, after 0 and up to 16"),
+        ("LIFT 15 19 LEFT BALL\nPRESS 0 19 STATE 's.npz'", r"STATE keeps no grips"),
+        ("LIFT 15 19 LEFT BALL\nPRESS 0 19 METHOD PAPER", r"knows no friction"),
+        (
+            "POINTS BALL top UPPER Y 0.1\nVECTOR BALL top AT 0 0 0 0\nLIFT 15 19 LEFT BALL\nPRESS 0 19",
+            r"nothing but HOLD",
+        ),
+        ("GRAVITY 1 -9.81 0\nLIFT 15 19 LEFT BALL\nPRESS 0 19", r"a GRAVITY along one axis"),
+        ("PHYSICAL BALL DENSITY 0\nLIFT 15 19 LEFT BALL\nPRESS 0 19", r"BALL weighs nothing"),
+        ("LIFT 15 19 LEFT BALL\nPRESS 15 19", r"after 15 and up to 19, got 15 to 19"),
+    ],
+)
+def test_grips_that_cannot_be_are_refused(
+    run: Callable[[str], Scene], tmp_path: Path, lines: str, message: str
+) -> None:
+    with pytest.raises(InputError, match=message):
+        run_press(run(BALL + lines), tmp_path)

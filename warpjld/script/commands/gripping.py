@@ -1,0 +1,121 @@
+"""Grips: digits close on what they have grasped, by an angle, to a force, or until they hold a weight (R123, R124)."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING, cast
+
+from warpjld.errors import InputError
+from warpjld.press.wishes import GripWish
+from warpjld.script.arguments import Arguments
+from warpjld.script.commands.animation import FINGERS
+from warpjld.script.commands.physical import place, read_object
+from warpjld.script.grips import flexions_of_grip, gripping_actor, read_actor, read_frames
+from warpjld.script.press_keys import REST
+from warpjld.script.registry import command
+from warpjld.script.scene import Scene
+
+if TYPE_CHECKING:
+    from warpjld.script.scene import Actor
+
+_MOST = 20.0
+"""Angle by which digits close on at most where nothing else is said [degrees]."""
+
+
+@command(
+    "SQUEEZE",
+    syntax=(
+        "SQUEEZE <key1> <key2> [LEFT/RIGHT] <degrees>, or SQUEEZE <key1> <key2> [LEFT/RIGHT] FORCE <newtons> "
+        "[THUMB/INDEX/MIDDLE/RING/PINKY …] [MOST <degrees>]"
+    ),
+    help="Closed digits bend on into the object: each joint by up to this much, or until they press with so much FORCE.",
+    group="Contact",
+)
+def squeeze(scene: Scene, arguments: Arguments) -> None:
+    """R112: fingers may end inside the object; contact says what comes of it. R118: or a force is reached."""
+    first, last = read_frames(arguments, "from which on the digits press", "at which they press most")
+    actor = gripping_actor(scene, arguments)
+    if not arguments.keyword("FORCE"):
+        degrees = arguments.number("the angle in degrees, or FORCE", minimum=-90, maximum=90)
+        for channel, now, (low, high) in flexions_of_grip(actor, scene.grips[actor.name], first):
+            actor.set_keys(channel, [first], now, scene.spline)
+            actor.set_keys(channel, [last], min(max(now + math.radians(degrees), low), high), scene.spline)
+        return
+    force = arguments.number("the force in newtons", above=0.0)
+    digits = []
+    while digit := arguments.keyword(*FINGERS):
+        digits.append(digit.lower())
+    most = _most(arguments)
+    channels = _held_keys(scene, actor, arguments, first, last)
+    closing = {channel.split(".")[-3] for channel in channels}
+    for digit in digits:
+        if digit not in closing:
+            raise arguments.error(f"{digit} does not close here; {', '.join(sorted(closing))} do", arguments.position)
+    here = place(arguments)
+    wish = GripWish(actor.name, "", first, last, channels, most, force=force, digits=tuple(digits), where=here)
+    scene.contact.grips.append(wish)
+
+
+@command(
+    "LIFT",
+    syntax="LIFT <key1> <key2> [LEFT/RIGHT] <object> [WEIGHT <newtons>] [MOST <degrees>]",
+    help=(
+        "Digits closed by GRASP close on as gently as holds the object's weight, half-way to key2; then its support "
+        "goes: its held or lowest points, which carry it until then."
+    ),
+    group="Contact",
+)
+def lift(scene: Scene, arguments: Arguments) -> None:
+    """R123, R124."""
+    first, last = read_frames(arguments, "from which on the digits close", "at which they hold the object")
+    if last - first < 4.0:
+        raise arguments.error(f"LIFT wants 4 frames or more, got {last - first:g}")
+    actor = gripping_actor(scene, arguments)
+    prop = read_object(scene, arguments)
+    if prop.name not in scene.contact.physical:
+        raise arguments.error(f"{prop.name} is not physical and weighs nothing: make it so with PHYSICAL {prop.name}")
+    if scene.contact.lifted(prop.name) is not None:
+        raise arguments.error(f"{prop.name} is lifted already")
+    options = arguments.options(
+        weight=lambda: arguments.number("the weight in newtons", above=0.0),
+        most=lambda: arguments.number("the angle in degrees", above=0.0, maximum=90.0),
+    )
+    most = math.radians(float(cast(float, options.get("most", _MOST))))
+    channels = _held_keys(scene, actor, arguments, first, round(0.5 * (first + last)), last)
+    weight = cast("float | None", options.get("weight"))
+    wish = GripWish(
+        actor.name, prop.name, first, last, channels, most, lift=True, weight=weight, where=place(arguments)
+    )
+    scene.contact.grips.append(wish)
+
+
+@command(
+    "STRENGTH",
+    syntax="STRENGTH [LEFT/RIGHT] <THUMB/INDEX/MIDDLE/RING/PINKY> <newtons>",
+    help="How hard a digit can press at most; thumb 69, index and ring 59, middle 82, pinky 33 at first.",
+    group="Contact",
+)
+def strength(scene: Scene, arguments: Arguments) -> None:
+    """R118."""
+    actor = read_actor(scene, arguments)
+    digit = arguments.choice("the digit", FINGERS).lower()
+    newtons = arguments.number("the force in newtons", above=0.0)
+    scene.contact.strength.setdefault(actor.name, {})[digit] = newtons
+
+
+def _most(arguments: Arguments) -> float:
+    options = arguments.options(most=lambda: arguments.number("the angle in degrees", above=0.0, maximum=90.0))
+    return math.radians(float(cast(float, options.get("most", _MOST))))
+
+
+def _held_keys(scene: Scene, actor: Actor, arguments: Arguments, first: float, *later: float) -> tuple[str, ...]:
+    """Keys that hold the grip, until what is found takes their place; the channels they are of."""
+    if actor.recorded is not None:
+        raise arguments.error(f"actor {actor.name} is driven by a MOTION file: no grip can be searched for")
+    channels = []
+    for channel, now, _ in flexions_of_grip(actor, scene.grips[actor.name], first):
+        actor.set_keys(channel, [first, *later], now, REST)
+        channels.append(channel)
+    if not channels:
+        raise InputError(f"actor {actor.name}: no joint of its grip can close on")
+    return tuple(channels)

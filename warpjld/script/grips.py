@@ -1,0 +1,80 @@
+"""What commands about grasps and grips have in common: two frames, a side, a hand that has grasped something."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import TYPE_CHECKING
+
+from warpjld.script.arguments import Arguments
+from warpjld.script.commands.animation import SIDES
+from warpjld.script.scene import Scene
+from warpjld.skeleton import CHANNELS
+
+if TYPE_CHECKING:
+    from warpjld.script.scene import Actor
+
+__all__ = ["flexions_of_grip", "gripping_actor", "read_actor", "read_frames", "read_side"]
+
+_FLEXION = CHANNELS.index("flexion")
+
+
+def read_frames(arguments: Arguments, begin: str, end: str) -> tuple[float, float]:
+    """Read ``<key1> <key2>``; the texts say what happens at these frames.
+
+    Raises:
+        InputError: key2 does not come after key1.
+    """
+    first = arguments.number(f"key1 (the frame {begin})")
+    last = arguments.number(f"key2 (the frame {end})")
+    if last <= first:
+        raise arguments.error(f"key2 must come after key1 ({first:g}), got {last:g}")
+    return first, last
+
+
+def read_side(scene: Scene, arguments: Arguments) -> str:
+    """Read ``[LEFT/RIGHT]``, in lower case: as written, or that of the current actor where it has only one."""
+    side = arguments.keyword(*SIDES)
+    if side is not None:
+        return side.lower()
+    names = scene.actor().skeleton.names
+    sides = [s for s in ("left", "right") if any(n.startswith(f"{s}.") for n in names)]
+    if len(sides) != 1:
+        raise arguments.expected("LEFT/RIGHT")
+    return sides[0]
+
+
+def read_actor(scene: Scene, arguments: Arguments) -> Actor:
+    """Read ``[LEFT/RIGHT]``: the actor whose hand is meant, the current one where none is named."""
+    side = arguments.keyword(*SIDES)
+    return scene.actor_with(side) if side else scene.actor()
+
+
+def gripping_actor(scene: Scene, arguments: Arguments) -> Actor:
+    """Read ``[LEFT/RIGHT]``: an actor whose digits were closed by GRASP.
+
+    Raises:
+        InputError: They were not.
+    """
+    actor = read_actor(scene, arguments)
+    if actor.name not in scene.grips:
+        raise arguments.error(
+            f"actor {actor.name} has grasped nothing: there is no grip to tighten", arguments.position
+        )
+    return actor
+
+
+def flexions_of_grip(
+    actor: Actor, grip: dict[str, float], frame: float
+) -> Iterator[tuple[str, float, tuple[float, float]]]:
+    """Flexions that close a grip further: channel, value at a frame, and limits [rad].
+
+    Knuckles that GRASP left straight stay so: their digit touches with what comes before them.
+    """
+    for channel in grip:
+        joint, _, kind = channel.rpartition(".")
+        if kind != CHANNELS[_FLEXION]:
+            continue
+        now = float(actor.motion.value(channel, frame))
+        low, high = actor.skeleton.limits[actor.skeleton.index(joint), _FLEXION]
+        if now > 1e-9 or not joint.endswith(("knuckle2", "knuckle3")):
+            yield channel, now, (float(low), float(high))
