@@ -28,7 +28,7 @@ _MOST = 20.0
         "SQUEEZE <key1> <key2> [LEFT/RIGHT] <degrees>, or SQUEEZE <key1> <key2> [LEFT/RIGHT] FORCE <newtons> "
         "[THUMB/INDEX/MIDDLE/RING/PINKY …] [MOST <degrees>]"
     ),
-    help="Closed digits bend on into the object: each joint by up to this much, or until they press with so much FORCE.",
+    help="Closed digits bend on into the object: each joint by up to this much, or until they press with a FORCE.",
     group="Contact",
 )
 def squeeze(scene: Scene, arguments: Arguments) -> None:
