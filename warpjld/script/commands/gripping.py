@@ -59,10 +59,7 @@ def squeeze(scene: Scene, arguments: Arguments) -> None:
 @command(
     "LIFT",
     syntax="LIFT <key1> <key2> [LEFT/RIGHT] <object> [WEIGHT <newtons>] [MOST <degrees>]",
-    help=(
-        "Digits closed by GRASP close on as gently as holds the object's weight, half-way to key2; then its support "
-        "goes: its held or lowest points, which carry it until then."
-    ),
+    help="Closed digits take an object's weight, as gently as holds it, half-way to key2; then its support goes.",
     group="Contact",
 )
 def lift(scene: Scene, arguments: Arguments) -> None:
