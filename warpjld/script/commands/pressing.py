@@ -17,7 +17,7 @@ from warpjld.script.scene import Scene, Table, Touch, Volume
         'PRESS <first> <last> [EVERY <frames>] [METHOD <AUGMENTED/PAPER>] [AITKEN] [STOP/CORRECT] [STATE "<file>.npz"]'
     ),
     help=(
-        "Solve contact at these frames; where the muscles can do no more, STOP, or CORRECT: open the digits; a run cut "
+        "Solve contact at these frames; where muscles can do no more, STOP, or CORRECT: open digits; a run cut "
         "off goes on from STATE."
     ),
     group="Contact",
