@@ -15,21 +15,23 @@ import numpy as np
 from numpy.typing import NDArray
 
 from warpjld.fem.blockmatrix import BlockMatrix
-from warpjld.fem.body import Body, Tangent
+from warpjld.fem.body import Body
 from warpjld.fem.conjugate import Iteration, Status
 from warpjld.fem.contact.damping import Damping
+from warpjld.fem.contact.elastic import Elastic
 from warpjld.fem.contact.interplay import Contact, Interplay, alike, shifted
 from warpjld.fem.contact.law import Memory, Response
+from warpjld.fem.contact.line_search import LineSearch
 from warpjld.fem.contact.loose import Loose
 from warpjld.fem.contact.points import ContactPoints, Interface
+from warpjld.fem.contact.step import Step
 from warpjld.fem.contact.step_solver import StepSolver
 from warpjld.fem.contact.stiffness import with_contact
-from warpjld.fem.dots import dot, norm
-from warpjld.fem.loads import Loads, external_forces, subtract_pressure_stiffness
+from warpjld.fem.dots import norm
 from warpjld.fem.multigrid import IndefiniteError
 from warpjld.fem.prescribed import Prescribed
 
-__all__ = ["Equilibrium", "Reached", "Step"]
+__all__ = ["Equilibrium", "Reached"]
 
 _ITERATIONS = 40
 _PENALTY = 200.0
@@ -46,29 +48,7 @@ _CARELESS = 8
 _SURE = 1
 """Iterations after which multipliers are good enough to take the derivatives of directions with; until then those of
 the equilibrium before are."""
-_LINE_SEARCH = 8
 _STRIDE = 0.25
-
-
-@dataclass(frozen=True, eq=False)
-class Step:
-    """What a load step goes from and to.
-
-    Attributes:
-        before: Time it starts from.
-        time: Time it goes to.
-        prescribed: Displacements at ``time``.
-        loads: Loads, and the share of them that acts at ``time``.
-        share: That share.
-        allowed: Share of the overlap at the start that is still allowed at ``time``.
-    """
-
-    before: float
-    time: float
-    prescribed: Prescribed
-    loads: Loads
-    share: float
-    allowed: float
 
 
 @dataclass(frozen=True, eq=False)
@@ -114,13 +94,8 @@ class Equilibrium:
         self.trouble = ""
         self._tolerance = tolerance
         self._penetration = penetration
-        self._tangent: Tangent | None = None
-        self._rest = None if body.large_strain else body.at()
         self._loose: tuple[bytes, Loose] | None = None
-        tangent = self._rest or body.at()
-        assert tangent.stiffness is not None
-        blocks = tangent.stiffness.diagonal()
-        self._stiff = np.einsum("nii->n", blocks) / 3.0
+        self._elastic = Elastic(body)
         self._solver = StepSolver(body, precision)
         self._damping = Damping(body)
         self._interplay = Interplay(body.mesh.nodes, interfaces, moduli, penalty=penalty, penetration=penetration)
@@ -137,7 +112,8 @@ class Equilibrium:
         known = step.prescribed.degrees
         free = step.prescribed.free(body.degrees)
         loose = self._unheld(step.prescribed)
-        play = self._interplay
+        play, elastic = self._interplay, self._elastic
+        search = LineSearch(elastic, play, step, start)
         self._solver.begin()
         self._damping.begin()
         memory = before = play.begun(memory, start, step.before)
@@ -151,22 +127,25 @@ class Equilibrium:
             u = guessed
             # a guess squeezes elements here and there: their false pressures would make K indefinite, those of the
             # equilibrium before do not
-            pressures = body.at(start, stiffness=False).pressures if body.large_strain else None
+            pressures = elastic.pressures(start)
         normals = play.normals(u)
         held = (play.points(u, step.before, step.time, normals), u)
         settled, since, falls = False, 0, 0
         contact = play.answered(held[0], u, start, memory, keep=True, allowed=step.allowed)
         for iteration in range(_ITERATIONS):
             careful = iteration - since >= _CARELESS
-            tangent = self._at(u, pressures)
-            external = step.share * external_forces(body, step.loads, u if body.large_strain else None)
+            tangent = elastic.at(u, pressures, step.loads)
+            external = elastic.external(step.loads, u)
             residual = np.where(free, external + contact.forces - tangent.forces, 0.0)
             balance = tangent.forces - external - contact.forces
             moved = not jump.any()
             pushed = norm(np.where(free, contact.forces, 0.0))
             scale = max(norm(external), pushed, norm(np.where(free, 0.0, balance)), 1e-300)
             now = norm(residual) / scale
-            noise = _ROUNDING * (norm(np.repeat(self._stiff, 3) * u) + _PLACES * norm(self._stiff) * body.mesh.size)
+            noise = _ROUNDING * (
+                norm(np.repeat(self._elastic.stiffness, 3) * u)
+                + _PLACES * norm(self._elastic.stiffness) * body.mesh.size
+            )
             negligible = max(self._tolerance * scale, noise)
             settled_down = pushed <= noise or play.settled(contact, memory, negligible)
             if moved and now <= max(self._tolerance, noise / scale) and settled_down:
@@ -182,8 +161,6 @@ class Equilibrium:
             contact = play.sloped(contact, memory, memory if iteration >= _SURE else before, u)
             stiffness = tangent.stiffness
             assert stiffness is not None
-            if body.large_strain:
-                subtract_pressure_stiffness(stiffness, body, step.loads, u, step.share)
             steadied = partial(loose.steadied, turn=iteration - since)
             done = self._solved(stiffness, contact, free, residual, jump, steadied)
             if done.status in (Status.INDEFINITE, Status.NOT_FINITE):
@@ -195,18 +172,19 @@ class Equilibrium:
                 stride = min(1.0, loose.leash(move, play.reach), _STRIDE * play.reach / far)
                 move *= stride
             watched = free if moved and careful else free & np.repeat(loose.falling(contact), 3)
-            length = self._search(u, move, contact, memory, step, residual, watched, patient=careful)
-            if careful and contact.beside is not None and not jump.any():
-                length = self._descent(u, start, move, length, memory, step, residual, free)
-            if length == 0.0:
+            length = search.upright(u, move)
+            if length > 0.0:
+                length = search.by_work(u, move, length, contact, memory, residual, watched, patient=careful)
+                if careful and contact.beside is not None and not jump.any():
+                    length = search.by_balance(u, move, length, memory, residual, free)
+            else:
                 if not self._damping.more():
                     return Status.INVERTED, None
                 continue
             if moved:
                 self._damping.judge(stride * length)
             move *= length
-            if body.large_strain:
-                pressures = body.at(u, stiffness=False, increment=move).pressures
+            pressures = elastic.pressures(u, move)
             u = u + move
             jump *= 1.0 - length
             if length == 1.0:
@@ -265,98 +243,7 @@ class Equilibrium:
             return None
         u = np.array(first, dtype=np.float64).reshape(-1)
         u[prescribed.degrees] = prescribed.values
-        if self._rest is not None:
-            return u
-        return u if (self.body.at(u, stiffness=False).lowest > 0).all() else None
-
-    def _search(
-        self,
-        u: NDArray[np.float64],
-        move: NDArray[np.float64],
-        contact: Contact,
-        memory: list[Memory],
-        step: Step,
-        residual: NDArray[np.float64],
-        watched: NDArray[np.bool_],
-        *,
-        patient: bool,
-    ) -> float:
-        """How far to go, zero for nowhere: no element inside out; and, where forces on the watched degrees of freedom
-        (3N,) pull back there harder than half of what drives here, to where they balance along the way. A contact that
-        opens and closes in turn settles so, and what falls freely stops where it first touches.
-        """
-        body = self.body
-        length = 1.0
-        if self._rest is not None and not watched.any():
-            return length
-        for _ in range(_LINE_SEARCH):
-            there = u + length * move
-            trial = self._forces(there)
-            if self._rest is not None or (trial.lowest > 0).all():
-                break
-            length *= 0.5
-        else:
-            return 0.0
-        if not watched.any():
-            return length
-        along = np.where(watched, move, 0.0)
-
-        def pull(part: float) -> float:
-            """What drives on after part of the way; contact as the linear model has it."""
-            here = u + part * move
-            bodies = trial if part == length else self._forces(here)
-            external = step.share * external_forces(body, step.loads, here if body.large_strain else None)
-            foreseen = self._interplay.foreseen(contact, memory, part * move, step.allowed, patient=patient)
-            return dot(external - bodies.forces + self._interplay.pushed(contact.points, foreseen), along)
-
-        start, end = dot(residual, along), pull(length)
-        if not (start > 0.0 and end < -0.5 * start):
-            return length
-        return max(_balance(pull, length, start, end), 1e-6)
-
-    def _forces(self, u: NDArray[np.float64]) -> Tangent:
-        return self._at(u, None) if self._rest is not None else self.body.at(u, stiffness=False)
-
-    def _descent(
-        self,
-        u: NDArray[np.float64],
-        start: NDArray[np.float64],
-        move: NDArray[np.float64],
-        most: float,
-        memory: list[Memory],
-        step: Step,
-        residual: NDArray[np.float64],
-        free: NDArray[np.bool_],
-    ) -> float:
-        """How far to go, ``most`` at most, for forces to balance better than here: where points come and go in turn, or
-        K is indefinite, the work along the way does not tell.
-        """
-        play, now = self._interplay, norm(residual)
-        length, best = most, (np.inf, most)
-        for _ in range(_LINE_SEARCH):
-            if length == 0.0:
-                break
-            there = u + length * move
-            points = play.points(there, step.before, step.time, play.normals(there))
-            contact = play.answered(points, there, start, memory, keep=False, allowed=step.allowed)
-            external = step.share * external_forces(self.body, step.loads, there if self.body.large_strain else None)
-            trial = self._forces(there)
-            left = norm(np.where(free, external + contact.forces - trial.forces, 0.0))
-            if left < (1.0 - 1e-4 * length) * now:
-                return length
-            if left < best[0]:
-                best = (left, length)
-            length *= 0.5
-        return best[1]
-
-    def _at(self, u: NDArray[np.float64], pressures: NDArray[np.float64] | None) -> Tangent:
-        if self._rest is None:
-            self._tangent = self.body.at(u, pressures=pressures, reuse=self._tangent)
-            return self._tangent
-        assert self._rest.stiffness is not None
-        return replace(
-            self._rest, forces=self._rest.forces + self._rest.stiffness.product(u, threads=self.body.threads)
-        )
+        return u if self._elastic.linear or self._elastic.upright(self._elastic.forces(u)) else None
 
     def _reached(
         self,
@@ -373,28 +260,5 @@ class Equilibrium:
     def _unheld(self, prescribed: Prescribed) -> Loose:
         key = prescribed.degrees.tobytes()
         if self._loose is None or self._loose[0] != key:
-            self._loose = (key, Loose(self.body, prescribed, self._stiff))
+            self._loose = (key, Loose(self.body, prescribed, self._elastic.stiffness))
         return self._loose[1]
-
-
-def _balance(pull: Callable[[float], float], end: float, at_start: float, at_end: float) -> float:
-    """Part of the way up to ``end`` at which what drives on changes its sign, about (Illinois' regula falsi)."""
-    low, high, driving, against = 0.0, end, at_start, at_end
-    for _ in range(_LINE_SEARCH):
-        part = float(
-            np.clip(
-                (low * against - high * driving) / (against - driving),
-                low + 0.02 * (high - low),
-                high - 0.02 * (high - low),
-            )
-        )
-        there = pull(part)
-        if abs(there) <= 0.3 * at_start:
-            return part
-        if there > 0.0:
-            against *= 0.5 if low > 0.0 else 1.0
-            low, driving = part, there
-        else:
-            driving *= 0.5 if high < end else 1.0
-            high, against = part, there
-    return low or high

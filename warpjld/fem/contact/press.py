@@ -13,11 +13,12 @@ from warpjld.fem.body import Body
 from warpjld.fem.conjugate import Status
 from warpjld.fem.contact.blocked import blocked
 from warpjld.fem.contact.border import contact_modulus
-from warpjld.fem.contact.equilibrium import Equilibrium, Reached, Step
+from warpjld.fem.contact.equilibrium import Equilibrium, Reached
 from warpjld.fem.contact.law import Memory, start_memory
 from warpjld.fem.contact.pairs import Pair
 from warpjld.fem.contact.points import Interface, interfaces_of
 from warpjld.fem.contact.solution import ContactError, ContactInstant, ContactSolution
+from warpjld.fem.contact.step import Step
 from warpjld.fem.contact.touches import touch_of
 from warpjld.fem.loads import Loads
 from warpjld.fem.prescribed import Prescribed
@@ -201,9 +202,9 @@ class _Run:
         share = time / self.times[-1]
         known = self.prescribed
         now = known(time) if callable(known) else known.scaled(share)
-        loads, part = (self.loads(time), 1.0) if callable(self.loads) else (self.loads, share)
+        loads = self.loads(time) if callable(self.loads) else self.loads.scaled(share)
         allowed = max(0.0, 1.0 - (time - self.start) / (self.times[0] - self.start))
-        return Step(before, time, now, loads, part, allowed)
+        return Step(before, time, now, loads, allowed)
 
     def through(
         self,
