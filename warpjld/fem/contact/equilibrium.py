@@ -169,7 +169,9 @@ class Equilibrium:
             stride = 1.0
             if not jump.any():
                 far = max(float(np.abs(move).max()), 1e-300)
-                stride = min(1.0, loose.leash(move, play.reach), _STRIDE * play.reach / far)
+                stride = min(1.0, loose.leash(move, play.reach))
+                if any(r.active.any() for r in contact.responses):
+                    stride = min(stride, _STRIDE * play.reach / far)
                 move *= stride
             watched = free if moved and careful else free & np.repeat(loose.falling(contact), 3)
             length = search.upright(u, move)
