@@ -18,7 +18,7 @@ _SETTLED = 2e-3
 """Share of the contact forces by which the multipliers may still change."""
 _SLOW = 0.1
 """Share of the overlap that a linear solve may leave; where it leaves more, the penalty grows,"""
-_FIRMER, _FIRMEST = 5.0, 25.0
+_FIRMER, _FIRMEST = 5.0, 3125.0
 """by the one factor, up to the other."""
 
 
