@@ -46,6 +46,8 @@ def save_state(path: Path, state: State) -> None:
                 arrays[f"frame{k}.{one.name}"] = getattr(frame, one.name)
         for one in fields(TouchingPoints):
             arrays[f"frame{k}.touching.{one.name}"] = getattr(frame.touching, one.name)
+    if state.solution.course is not None:
+        arrays["course"] = state.solution.course
     arrays["memories"] = len(state.solution.memory)
     for k, memory in enumerate(state.solution.memory):
         for one in fields(Memory):
@@ -80,8 +82,9 @@ def load_state(path: Path) -> State:
                 Memory(*(file[f"memory{k}.{f.name}"] for f in fields(Memory))) for k in range(int(file["memories"]))
             )
             mark, time = str(file["mark"]), float(file["time"])
+            course = file.get("course")
     except (OSError, KeyError, ValueError, zipfile.BadZipFile) as error:
         raise InputError(f"no state of a contact solve: {error}", path=path) from error
     last = frames[-1]
     instant = ContactInstant(time, last.displacement, last.reactions, (), last.solves, 0, 0.0)
-    return State(mark, tuple(frames), ContactSolution(Status.CONVERGED, (instant,), "", memory, (), Loads()))
+    return State(mark, tuple(frames), ContactSolution(Status.CONVERGED, (instant,), "", memory, (), Loads(), course))

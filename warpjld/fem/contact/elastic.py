@@ -25,6 +25,7 @@ class Elastic:
         self.linear = not body.large_strain
         self._rest = body.at()
         self._last: Tangent | None = None
+        self._there: tuple[NDArray[np.float64], Tangent] | None = None
         assert self._rest.stiffness is not None
         self.stiffness: NDArray[np.float64] = np.einsum("nii->n", self._rest.stiffness.diagonal()) / 3.0
         """Of each node at rest [N/m], shape (N,)."""
@@ -44,9 +45,11 @@ class Elastic:
         return self._last
 
     def forces(self, u: NDArray[np.float64]) -> Tangent:
-        """Internal forces alone."""
+        """Internal forces alone; line searches ask for the same place in turn, so the last is kept."""
         if not self.linear:
-            return self.body.at(u, stiffness=False)
+            if self._there is None or not np.array_equal(u, self._there[0]):
+                self._there = u.copy(), self.body.at(u, stiffness=False)
+            return self._there[1]
         assert self._rest.stiffness is not None
         own = self._rest.stiffness.product(u, threads=self.body.threads)
         return replace(self._rest, forces=self._rest.forces + own)
@@ -59,6 +62,6 @@ class Elastic:
         """Pressure of each element [Pa], shape (E,), as foreseen after a move (3N,); None at small strain."""
         return None if self.linear else self.body.at(u, stiffness=False, increment=move).pressures
 
-    def upright(self, tangent: Tangent) -> bool:
-        """Whether no element is inside out; at small strain none is."""
-        return self.linear or bool((tangent.lowest > 0.0).all())
+    def upright(self, u: NDArray[np.float64]) -> bool:
+        """Whether no element is inside out at displacement u (3N,); at small strain none is."""
+        return self.linear or bool((self.forces(u).lowest > 0.0).all())

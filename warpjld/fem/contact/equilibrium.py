@@ -1,7 +1,8 @@
 """One load step of bodies in contact: Newton's method on bodies and contact together.
 
 The system is K plus a moderate penalty at the contact points, symmetric and well conditioned, so that conjugate
-gradients keep working; the multipliers are brought up to date after every linear solve, so that what the penalty
+gradients keep working (between bodies that both deform it preconditions what is not symmetric of Newton's matrix, see
+``slopes``); the multipliers are brought up to date after every linear solve, so that what the penalty
 leaves of overlap and slip is gone when forces balance (Simo & Laursen 1992; reference: B §3.4, R108, R117).
 """
 
@@ -41,14 +42,15 @@ _ROUNDING = 1e-13
 _PLACES = 0.03
 """The same of positions, over that of displacements: gaps are differences of positions."""
 _TURNING = 1
-"""Iterations after which normals stay; weights follow until they no longer change the gaps. That both are right is
-looked at once forces balance. (Newton's method without their derivatives converges slowly, with them not symmetric.)"""
+"""Iterations after which normals stay where their derivatives are not known; weights follow until they no longer change
+the gaps. That both are right is looked at once forces balance."""
 _CARELESS = 8
 """Iterations with full steps and multipliers brought up to date at once; what has not settled by then takes turns."""
 _SURE = 1
 """Iterations after which multipliers are good enough to take the derivatives of directions with; until then those of
 the equilibrium before are."""
 _STRIDE = 0.25
+"""Farthest a node moves in an iteration where something presses, over what points look ahead (two edges)."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -245,7 +247,7 @@ class Equilibrium:
             return None
         u = np.array(first, dtype=np.float64).reshape(-1)
         u[prescribed.degrees] = prescribed.values
-        return u if self._elastic.linear or self._elastic.upright(self._elastic.forces(u)) else None
+        return u if self._elastic.upright(u) else None
 
     def _reached(
         self,

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from warpjld.fem.contact.pairs import Pair
 from warpjld.fem.contact.points import ContactPoints
+from warpjld.rotations import unit
 
 __all__ = ["Memory", "Response", "remember", "respond", "start_memory"]
 
@@ -148,11 +149,11 @@ def respond(
         size = np.linalg.norm(held, axis=1)
         if patient:
             sticking = grips & ((size <= limit) | bonded)
-            along = _unit(held)
+            along = unit(held)
             turning = penalty * np.divide(limit, size, out=np.zeros(count), where=size > 0.0)
         else:
             sticking = grips & (memory.stuck[at] | bonded)
-            along = _unit(carried)
+            along = unit(carried)
             # a sliding point resists what would turn its path, as much as it slides
             far = np.linalg.norm(slip, axis=1)
             turning = np.minimum(penalty, np.divide(limit, far, out=penalty.copy(), where=far > 0.0))
@@ -214,8 +215,8 @@ def remember(
             sliding = ~stick & against
             far = penalty * np.linalg.norm(slip, axis=1)
             turn = np.minimum(1.0, np.divide(far, limit, out=np.ones(len(at)), where=limit > 0.0))
-            path = _unit(traction)
-            path = np.where(sliding[:, None], _unit(path - turn[:, None] * _unit(slip)), path)
+            path = unit(traction)
+            path = np.where(sliding[:, None], unit(path - turn[:, None] * unit(slip)), path)
             fresh = memory.gripping[at] < _GRIPS
             stuck[at] = held | (~stick & ~against) | fresh
             friction[at] = np.where(held[:, None], traction, limit[:, None] * path)
@@ -228,8 +229,3 @@ def remember(
         anchor = anchor.copy()
         anchor[at[seizing]] = whole[seizing]
     return replace(memory, pressure=normal, friction=friction, gripping=gripping, anchor=anchor, stuck=stuck)
-
-
-def _unit(vectors: NDArray[np.float64]) -> NDArray[np.float64]:
-    size = np.linalg.norm(vectors, axis=1, keepdims=True)
-    return np.divide(vectors, size, out=np.zeros_like(vectors), where=size > 0.0)

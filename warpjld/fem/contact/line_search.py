@@ -42,11 +42,9 @@ class LineSearch:
 
     def upright(self, u: NDArray[np.float64], move: NDArray[np.float64]) -> float:
         """The longest of 1, ½, ¼ … that turns no element inside out, 0 where none does not."""
-        if self.elastic.linear:
-            return 1.0
         length = 1.0
         for _ in range(_TRIALS):
-            if self.elastic.upright(self.elastic.forces(u + length * move)):
+            if self.elastic.upright(u + length * move):
                 return length
             length *= 0.5
         return 0.0

@@ -12,7 +12,7 @@ from warpjld.fem.contact.interplay import Contact
 from warpjld.fem.contact.points import Interface
 from warpjld.fem.prescribed import Prescribed, free_motions
 
-__all__ = ["Loose", "stiffened"]
+__all__ = ["Loose"]
 
 _HELD = (3e-2, 0.4, 1e-4)
 """Stiffness given to bodies that only contact holds, over their own: it slows them down, and leaves no force. At first,
@@ -78,16 +78,7 @@ class Loose:
             return matrix
         first, falls, least = _HELD
         nodes = np.sort(np.concatenate(self._bodies))
-        return stiffened(matrix, max(least, first * falls**turn) * self._stiff, nodes)
-
-
-def stiffened(
-    matrix: BlockMatrix, stiffness: NDArray[np.float64], nodes: NDArray[np.int64] | None = None
-) -> BlockMatrix:
-    """A new matrix with a stiffness [N/m], shape (N,), added at nodes, at all by default."""
-    values = matrix.values.copy()
-    place = matrix.on_diagonal
-    if nodes is not None:
-        place, stiffness = place[nodes], stiffness[nodes]
-    values[place] += stiffness[:, None, None] * np.eye(3)
-    return BlockMatrix(matrix.rows, matrix.columns, values)
+        added = max(least, first * falls**turn) * self._stiff[nodes]
+        values = matrix.values.copy()
+        values[matrix.on_diagonal[nodes]] += added[:, None, None] * np.eye(3)
+        return BlockMatrix(matrix.rows, matrix.columns, values)

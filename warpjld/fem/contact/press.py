@@ -219,7 +219,8 @@ class _Run:
             target = todo[0]
             self.equilibrium.solves = self.equilibrium.iterations = 0
             step = self.step(now, target)
-            status, found = self._find(step)
+            carried = self._carried(step)
+            status, found = self._find(step, carried)
             solves += self.equilibrium.solves
             iterations += self.equilibrium.iterations
             if overlap := self._blocked(step, found):
@@ -237,7 +238,7 @@ class _Run:
                 todo.insert(0, 0.5 * (now + target))
                 continue
             self.steps.append(self.equilibrium.solves)
-            self.course = (found.displacement - self._carried(now, target)).reshape(-1, 3) / (target - now)
+            self.course = (found.displacement - carried).reshape(-1, 3) / (target - now)
             self.u, self.memory, now = found.displacement, found.memory, target
             todo.pop(0)
             halvings = max(0, halvings - 1)
@@ -271,9 +272,9 @@ class _Run:
             penetration=self.penetration,
         )
 
-    def _find(self, step: Step) -> tuple[Status, Reached | None]:
+    def _find(self, step: Step, carried: NDArray[np.float64]) -> tuple[Status, Reached | None]:
         """Equilibrium of a step; again after every bond that did not hold."""
-        first = self._first(step)
+        first = self._first(step, carried)
         status, found = self.equilibrium.find(self.u, self.memory, step, first)
         if found is None and first is not None and self.guess is None:
             status, found = self.equilibrium.find(self.u, self.memory, step)
@@ -289,17 +290,16 @@ class _Run:
             status, found = self.equilibrium.find(self.u, memory, step, found.displacement)
         return Status.MAX_ITERATIONS, None
 
-    def _carried(self, before: float, time: float) -> NDArray[np.float64]:
+    def _carried(self, step: Step) -> NDArray[np.float64]:
         """The displacement that a step begins from, carried on as the caller knows how, shape (3N,)."""
         if self.guess is None:
             return self.u
-        return np.asarray(self.guess(before, time, self.u.reshape(-1, 3)), dtype=np.float64).reshape(-1)
+        return np.asarray(self.guess(step.before, step.time, self.u.reshape(-1, 3)), dtype=np.float64).reshape(-1)
 
-    def _first(self, step: Step) -> NDArray[np.float64] | None:
+    def _first(self, step: Step, carried: NDArray[np.float64]) -> NDArray[np.float64] | None:
         """Where to begin: as asked, and what it was off by in the step before is taken to be off by again."""
         if self.course is None:
-            return None if self.guess is None else self._carried(step.before, step.time)
-        carried = self._carried(step.before, step.time)
+            return None if self.guess is None else carried
         first: NDArray[np.float64] = carried + _PART * (step.time - step.before) * self.course.reshape(-1)
         if not self.body.large_strain or bool((self.body.at(first, stiffness=False).lowest > 0.0).all()):
             return first

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from warpjld.errors import InputError
 from warpjld.fem.hexmesh import HexMesh
+from warpjld.rotations import unit
 
 __all__ = ["ContactSurface", "surface_of"]
 
@@ -45,9 +46,7 @@ class ContactSurface:
 
     def normals(self, x: NDArray[np.float64]) -> NDArray[np.float64]:
         """Outward unit normals at the nodes, the average of the faces' by area, shape (m, 3)."""
-        total = self.at_nodes(self.area_vectors(x))
-        size = np.linalg.norm(total, axis=1, keepdims=True)
-        return np.divide(total, size, out=np.zeros_like(total), where=size > 0)
+        return unit(self.at_nodes(self.area_vectors(x)))
 
 
 def surface_of(mesh: HexMesh, faces: str | NDArray[np.int32], what: str) -> ContactSurface:

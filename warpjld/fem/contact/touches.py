@@ -11,6 +11,7 @@ from warpjld.fem.contact.inside import Inside
 from warpjld.fem.contact.law import Response
 from warpjld.fem.contact.points import ContactPoints, Interface
 from warpjld.fem.contact.solution import Touch
+from warpjld.rotations import unit
 
 __all__ = ["touch_of"]
 
@@ -47,9 +48,7 @@ def touch_of(
     mean = (weight[near] / area[:, None]).tocsr()
     traction = response.traction(points)
     across = slip - np.einsum("mi,mi->m", slip, points.normal)[:, None] * points.normal
-    normal = mean @ points.normal
-    size = np.linalg.norm(normal, axis=1, keepdims=True)
-    normal = np.divide(normal, size, out=np.zeros_like(normal), where=size > 0.0)
+    normal = unit(mean @ points.normal)
     nodes = interface.slave.nodes[near]
     pressure, pushed = mean @ response.pressure, mean @ traction
     apart = _gaps(interface, points, near, mean)
