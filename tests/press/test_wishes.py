@@ -13,7 +13,7 @@ from warpjld.fem.contact.barr import Barr
 from warpjld.fem.contact.meshes import Keyframed
 from warpjld.fem.contact.solids import Box, Sphere
 from warpjld.press.grips import FoundGrip
-from warpjld.press.wishes import Points
+from warpjld.press.state_variables import Points
 from warpjld.script.press_bodies import prop_obstacle
 from warpjld.script.press_keys import gripped_keys
 from warpjld.script.props import prop_places

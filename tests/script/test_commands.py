@@ -8,7 +8,7 @@ import pytest
 from warpjld.covering import default_parameters, save_parameters
 from warpjld.errors import InputError
 from warpjld.script import Interpreter, Scene
-from warpjld.script.scene import Camera, ContactSheet, Export, Film, Picture
+from warpjld.script.outputs import Camera, ContactSheet, Export, Film, Picture
 from warpjld.script.staging import frame_numbers, stage
 
 pytestmark = pytest.mark.usefixtures("quick_hands")

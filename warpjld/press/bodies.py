@@ -18,9 +18,11 @@ from warpjld.press.drive import Drive
 from warpjld.press.outside import outside
 from warpjld.press.rest import Part
 from warpjld.press.settle import settle
+from warpjld.press.state_variables import Prescribing
 from warpjld.press.support import Support
 from warpjld.press.volumes import ObjectVolume
-from warpjld.press.wishes import ContactWishes, Prescribing, placed
+from warpjld.press.where import placed
+from warpjld.press.wishes import ContactWishes
 
 __all__ = ["Bodies", "HandBody", "ObjectBody", "PairOf", "assemble"]
 

@@ -9,7 +9,8 @@ from warpjld.errors import InputError
 from warpjld.fem import HexMesh
 from warpjld.fem.contact.facets import Facets
 from warpjld.press.bodies import Bodies
-from warpjld.press.wishes import ContactWishes, placed
+from warpjld.press.where import placed
+from warpjld.press.wishes import ContactWishes
 
 __all__ = ["refuse_hopeless", "why_not"]
 

@@ -14,7 +14,7 @@ from warpjld.fem.envelope import Envelope
 from warpjld.fem.fit import fit_mesh
 from warpjld.fem.stress import cauchy
 from warpjld.grasp.objects import GraspObject, Places
-from warpjld.press.wishes import Physical
+from warpjld.press.matter import Physical
 
 __all__ = ["ObjectVolume", "object_volume"]
 

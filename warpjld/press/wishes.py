@@ -3,209 +3,18 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Literal
+from typing import Literal
 
-import numpy as np
-from numpy.typing import NDArray
+from warpjld.press.matter import Bonded, FleshWish, Physical
+from warpjld.press.state_variables import Points, Prescribing
+from warpjld.press.where import Where
 
-from warpjld.errors import InputError
+__all__ = ["ContactWishes", "GripWish", "Pressing", "pair"]
 
-if TYPE_CHECKING:
-    from warpjld.fem import Material
-    from warpjld.motion import Track
-
-__all__ = [
-    "LAWS",
-    "Barred",
-    "Bonded",
-    "ContactWishes",
-    "FleshWish",
-    "GripWish",
-    "Physical",
-    "Points",
-    "Prescribing",
-    "Pressing",
-    "Where",
-    "pair",
-    "placed",
-]
-
-Where = tuple[str, int, int]
-"""File, line and column of a command, for messages."""
-
-Law = Literal["linear", "neo-hooke", "mooney-rivlin"]
-LAWS: tuple[Law, ...] = ("linear", "neo-hooke", "mooney-rivlin")
 _FRICTION = 0.6
 """Skin on aluminium (Seo 2009)."""
 _EARTH = 9.81
 """[m/s²]"""
-
-
-@dataclass(frozen=True)
-class Physical:
-    """An object that deforms (R92, R109).
-
-    Attributes:
-        law: Constitutive law.
-        young: Young's modulus at small strain [Pa].
-        poisson: Poisson's ratio at small strain.
-        density: [kg/m³].
-        wall: Thickness of its wall [m]; 0 for a solid object.
-        pressure: Inside a hollow one, above that outside [Pa] (R111).
-        element: Edge length of its elements [m]; None chooses.
-        where: Place in a script, for messages.
-    """
-
-    law: Law = "neo-hooke"
-    young: float = 1e6
-    poisson: float = 0.45
-    density: float = 1000.0
-    wall: float = 0.0
-    pressure: float = 0.0
-    element: float | None = None
-    where: Where | None = None
-
-    def __post_init__(self) -> None:
-        self.material()
-        if not (np.isfinite(self.wall) and self.wall >= 0.0):
-            raise InputError(f"wall: want a thickness of 0 m (solid) or more, got {self.wall:g}")
-        if not np.isfinite(self.pressure):
-            raise InputError(f"pressure: want a finite pressure in Pa, got {self.pressure:g}")
-        if self.pressure and not self.wall:
-            raise InputError("pressure: only a hollow object has an inside to put under pressure")
-
-    def material(self) -> Material:
-        """The law with its constants.
-
-        Raises:
-            InputError: A modulus, ratio or density that no material has.
-        """
-        from warpjld.fem import LinearElastic, MooneyRivlin, NeoHooke
-
-        if self.law == "linear":
-            return LinearElastic(self.young, self.poisson, self.density)
-        if self.law == "neo-hooke":
-            return NeoHooke(self.young, self.poisson, self.density)
-        # Mooney and Rivlin's constants in the usual ratio of rubber, of the same modulus at small strain
-        shear = self.young / (2.0 * (1.0 + self.poisson))
-        return MooneyRivlin(0.4 * shear, 0.1 * shear, self.poisson, self.density)
-
-
-@dataclass(frozen=True)
-class FleshWish:
-    """An actor whose flesh deforms (R105).
-
-    Attributes:
-        digits: Those whose flesh is meshed, as ``index``, or ``palm``; empty for the whole hand.
-        element: Edge length of the elements [m].
-        flesh: Young's modulus of what lies between skin and bone [Pa].
-        skin: Young's modulus of the outermost layer of elements [Pa].
-        poisson: Poisson's ratio of both.
-        stiffening: Exponent of Fung's law; 0 is neo-Hookean.
-        itself: Whether the skin may touch itself (R126).
-    """
-
-    digits: tuple[str, ...] = ()
-    element: float = 0.003
-    flesh: float = 34e3
-    skin: float = 80e3
-    poisson: float = 0.48
-    stiffening: float = 3.0
-    itself: bool = True
-
-
-@dataclass(frozen=True)
-class Points:
-    """Points of a deformable object (R128).
-
-    Attributes:
-        kind: ``all``, the ``upper`` or ``lower`` end along an axis, or those ``near`` a place.
-        axis: 0, 1 or 2, of the object's own frame.
-        share: Of its extent along the axis.
-        centre: Of a ball on the stage, where the object is at first [m].
-        radius: Its radius [m].
-    """
-
-    kind: Literal["all", "upper", "lower", "near"] = "all"
-    axis: int = 0
-    share: float = 0.0
-    centre: tuple[float, float, float] = (0.0, 0.0, 0.0)
-    radius: float = 0.0
-
-    def choose(self, local: NDArray[np.float64], stage: NDArray[np.float64]) -> NDArray[np.int64]:
-        """Numbers of the points that are meant, of positions in the object's frame and on the stage (n, 3) [m].
-
-        Raises:
-            InputError: None is.
-        """
-        if self.kind == "all":
-            return np.arange(len(local))
-        if self.kind == "near":
-            chosen = np.linalg.norm(stage - np.array(self.centre), axis=1) <= self.radius
-        else:
-            x = local[:, self.axis]
-            low, high = float(x.min()), float(x.max())
-            reach = (self.share + 1e-9) * (high - low)
-            chosen = x >= high - reach if self.kind == "upper" else x <= low + reach
-        if not chosen.any():
-            raise InputError("no point of the object lies there")
-        return np.flatnonzero(chosen)
-
-
-@dataclass(eq=False)
-class Prescribing:
-    """A state variable: displacements of object points from where they are at first, over keys (R128).
-
-    Attributes:
-        points: Which.
-        tracks: Keys of the prescribed axes ``x``, ``y``, ``z`` [m]: three of them (VECTOR) or fewer.
-        held: Whether the points go where the object's place goes; ``tracks`` then displace them from there.
-        until: Frame after which points that are held are free.
-    """
-
-    points: Points
-    tracks: dict[str, Track] = field(default_factory=dict)
-    held: bool = False
-    until: float = float("inf")
-
-    def holds(self, frame: float) -> bool:
-        """Whether the points go with the object at a frame."""
-        return self.held and frame <= self.until
-
-
-@dataclass(frozen=True)
-class Bonded:
-    """Two objects that are one until the traction between them is too much (R101, R102).
-
-    Attributes:
-        one, other: Objects.
-        normal, shear: Strength [Pa].
-        where: Place in a script, for messages.
-    """
-
-    one: str
-    other: str
-    normal: float
-    shear: float
-    where: Where | None = None
-
-
-@dataclass(eq=False)
-class Barred:
-    """Barr's deformations of an object, over keys (R94).
-
-    Attributes:
-        axis: ``x``, ``y`` or ``z``.
-        tracks: Keys of ``taper`` (share), ``twist`` and ``bend`` [rad].
-    """
-
-    axis: Literal["x", "y", "z"]
-    tracks: dict[str, Track] = field(default_factory=dict)
-
-    def at(self, kind: str, frame: float) -> float:
-        """The amount at a frame."""
-        track = self.tracks.get(kind)
-        return 0.0 if track is None else float(track.spline(frame))
 
 
 @dataclass(frozen=True)
@@ -322,14 +131,6 @@ class ContactWishes:
             if pair(bonded.one, bonded.other) == pair(one, other):
                 return bonded
         return None
-
-
-def placed(error: InputError, where: Where | None) -> InputError:
-    """The same error at a place in a script, unless it has one."""
-    if where is None or error.line is not None:
-        return error
-    path, line, column = where
-    return InputError(str(error), path=path, line=line, column=column)
 
 
 def pair(one: str, other: str) -> tuple[str, str]:

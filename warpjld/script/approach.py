@@ -9,7 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
-from warpjld.press.wishes import FleshWish, Pressing
+from warpjld.press.matter import FleshWish
+from warpjld.press.wishes import Pressing
 from warpjld.script.binding import cover
 from warpjld.script.press_bodies import prop_obstacle
 from warpjld.script.staging import stage

@@ -10,8 +10,9 @@ from typing import TYPE_CHECKING, Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from warpjld.script.outputs import Camera
 from warpjld.script.props import Prop
-from warpjld.script.scene import Actor, Camera
+from warpjld.script.scene import Actor
 from warpjld.script.staging import stage
 from warpjld.skeleton import Poses, Skeleton
 

@@ -13,8 +13,9 @@ from warpjld import render
 from warpjld.script.binding import cover
 from warpjld.script.crowd import Crowd, Role
 from warpjld.script.folder import OutputFolder
+from warpjld.script.outputs import Camera, ContactSheet, Film, Picture, Style
 from warpjld.script.pressure import PressureView
-from warpjld.script.scene import Camera, ContactSheet, Film, Picture, Scene, Style
+from warpjld.script.scene import Scene
 from warpjld.script.staging import stage
 
 __all__ = [

@@ -11,7 +11,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from warpjld.errors import InputError
-from warpjld.press.wishes import FleshWish, GripWish, Points, Prescribing, placed
+from warpjld.press.matter import FleshWish
+from warpjld.press.state_variables import Points, Prescribing
+from warpjld.press.where import placed
+from warpjld.press.wishes import GripWish
 from warpjld.script.binding import cover
 from warpjld.script.staging import stage
 

@@ -12,7 +12,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from warpjld.errors import InputError
-from warpjld.press.wishes import ContactWishes, GripWish, Pressing, placed
+from warpjld.press.where import placed
+from warpjld.press.wishes import ContactWishes, GripWish, Pressing
 from warpjld.script.approach import approach
 from warpjld.script.binding import cover
 from warpjld.script.press_bodies import hand_body, object_body, prop_obstacle

@@ -17,9 +17,10 @@ from warpjld.script.crowd import Crowd, Role
 from warpjld.script.folder import OutputFolder
 from warpjld.script.formats import check_available, video_is_available
 from warpjld.script.grasping import contact_reports
+from warpjld.script.outputs import ContactSheet, Export, Film, Grips, Output, Picture, Table, Touch, Volume
 from warpjld.script.pictures import draw_contact_sheet, draw_picture, film_studio
 from warpjld.script.props import Prop, prop_surface
-from warpjld.script.scene import Actor, ContactSheet, Export, Film, Grips, Output, Picture, Scene, Table, Touch, Volume
+from warpjld.script.scene import Actor, Scene
 from warpjld.script.staging import frame_numbers, notes, stage
 from warpjld.script.summary import Summary
 

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from warpjld.errors import InputError
 from warpjld.press.wishes import ContactWishes
+from warpjld.script.outputs import Camera, Output
 from warpjld.script.placement import Placement
 from warpjld.suggest import did_you_mean
 
@@ -24,22 +25,7 @@ if TYPE_CHECKING:
     from warpjld.script.props import Prop
     from warpjld.skeleton import Poses, Skeleton
 
-__all__ = [
-    "Actor",
-    "Camera",
-    "ContactSheet",
-    "Export",
-    "Film",
-    "Output",
-    "Picture",
-    "Scene",
-    "SplineConstants",
-    "Style",
-    "Table",
-    "Volume",
-]
-
-Style = Literal["shaded", "wireframe", "pressure"]
+__all__ = ["Actor", "Scene", "SplineConstants"]
 
 
 @dataclass(frozen=True)
@@ -49,90 +35,6 @@ class SplineConstants:
     tension: float = 0.0
     continuity: float = 0.0
     bias: float = 0.0
-
-
-@dataclass(frozen=True)
-class Camera:
-    """Where pictures are taken from: a named view, or a position and a target [m].
-
-    With ``follow`` it goes along with the root of the first actor.
-    """
-
-    view: str | None = None
-    position: tuple[float, float, float] | None = None
-    target: tuple[float, float, float] | None = None
-    zoom: float = 1.0
-    follow: bool = False
-
-
-@dataclass(frozen=True)
-class Picture:
-    """One frame as a PNG; coloured by pressure perhaps of one actor or object ``only``."""
-
-    name: str
-    frame: float
-    style: Style
-    camera: Camera
-    only: str | None = None
-
-
-@dataclass(frozen=True)
-class Film:
-    """All frames as a film; coloured by pressure perhaps of one actor or object ``only``."""
-
-    name: str
-    style: Style
-    camera: Camera
-    only: str | None = None
-
-
-@dataclass(frozen=True)
-class ContactSheet:
-    """Several frames on one PNG, each as wire-frame and shaded."""
-
-    name: str
-    frames: tuple[float, ...]
-    camera: Camera
-
-
-@dataclass(frozen=True)
-class Export:
-    """The animated surface of one actor, or of all."""
-
-    name: str
-    actor: str | None
-
-
-@dataclass(frozen=True)
-class Table:
-    """Forces, areas and pressures by frame and digit, as CSV or Parquet."""
-
-    name: str
-
-
-@dataclass(frozen=True)
-class Touch:
-    """What the skin of an actor, or of the first whose flesh deforms, feels over time: CSV, Parquet or a plot."""
-
-    name: str
-    actor: str | None
-
-
-@dataclass(frozen=True)
-class Grips:
-    """Grips that were searched for, and all that were tried, as CSV."""
-
-    name: str
-
-
-@dataclass(frozen=True)
-class Volume:
-    """The deformed volumes as a VTK series."""
-
-    name: str
-
-
-Output = Picture | Film | ContactSheet | Export | Table | Touch | Grips | Volume
 
 
 @dataclass(eq=False)
@@ -220,7 +122,7 @@ class Scene:
     last: int | None = None
     rate: float = 30.0
     spline: SplineConstants = SplineConstants()
-    camera: Camera = Camera()
+    camera: Camera = field(default_factory=Camera)
     size: tuple[int, int] = (960, 720)
     outputs: list[Output] = field(default_factory=list)
     folder: Path = Path("out")

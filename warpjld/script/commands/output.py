@@ -6,8 +6,9 @@ from typing import cast
 
 from warpjld.script.arguments import Arguments
 from warpjld.script.formats import EXPORTS, FILMS, PICTURES, VIEWS
+from warpjld.script.outputs import Camera, ContactSheet, Export, Film, Output, Picture, Style
 from warpjld.script.registry import command
-from warpjld.script.scene import Camera, ContactSheet, Export, Film, Output, Picture, Scene, Style
+from warpjld.script.scene import Scene
 from warpjld.suggest import did_you_mean
 
 _STYLES = ("SHADED", "WIREFRAME", "PRESSURE")

@@ -7,8 +7,9 @@ from warpjld.script.arguments import Arguments
 from warpjld.script.commands.output import ask_for
 from warpjld.script.commands.physical import place
 from warpjld.script.formats import PICTURES, TABLES, VOLUMES
+from warpjld.script.outputs import Table, Touch, Volume
 from warpjld.script.registry import command
-from warpjld.script.scene import Scene, Table, Touch, Volume
+from warpjld.script.scene import Scene
 
 
 @command(

@@ -1,0 +1,106 @@
+"""Files a script asks for, and the camera they are taken with."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal
+
+__all__ = [
+    "Camera",
+    "ContactSheet",
+    "Export",
+    "Film",
+    "Grips",
+    "Output",
+    "Picture",
+    "Style",
+    "Table",
+    "Touch",
+    "Volume",
+]
+
+Style = Literal["shaded", "wireframe", "pressure"]
+
+
+@dataclass(frozen=True)
+class Camera:
+    """Where pictures are taken from: a named view, or a position and a target [m].
+
+    With ``follow`` it goes along with the root of the first actor.
+    """
+
+    view: str | None = None
+    position: tuple[float, float, float] | None = None
+    target: tuple[float, float, float] | None = None
+    zoom: float = 1.0
+    follow: bool = False
+
+
+@dataclass(frozen=True)
+class Picture:
+    """One frame as a PNG; coloured by pressure perhaps of one actor or object ``only``."""
+
+    name: str
+    frame: float
+    style: Style
+    camera: Camera
+    only: str | None = None
+
+
+@dataclass(frozen=True)
+class Film:
+    """All frames as a film; coloured by pressure perhaps of one actor or object ``only``."""
+
+    name: str
+    style: Style
+    camera: Camera
+    only: str | None = None
+
+
+@dataclass(frozen=True)
+class ContactSheet:
+    """Several frames on one PNG, each as wire-frame and shaded."""
+
+    name: str
+    frames: tuple[float, ...]
+    camera: Camera
+
+
+@dataclass(frozen=True)
+class Export:
+    """The animated surface of one actor, or of all."""
+
+    name: str
+    actor: str | None
+
+
+@dataclass(frozen=True)
+class Table:
+    """Forces, areas and pressures by frame and digit, as CSV or Parquet."""
+
+    name: str
+
+
+@dataclass(frozen=True)
+class Touch:
+    """What the skin of an actor, or of the first whose flesh deforms, feels over time: CSV, Parquet or a plot."""
+
+    name: str
+    actor: str | None
+
+
+@dataclass(frozen=True)
+class Grips:
+    """Grips that were searched for, and all that were tried, as CSV."""
+
+    name: str
+
+
+@dataclass(frozen=True)
+class Volume:
+    """The deformed volumes as a VTK series."""
+
+    name: str
+
+
+Output = Picture | Film | ContactSheet | Export | Table | Touch | Grips | Volume
