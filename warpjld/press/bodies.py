@@ -169,6 +169,13 @@ class Bodies:
     carried: dict[str, str] = field(default_factory=dict)
     touched: set[str] = field(default_factory=set)
 
+    @property
+    def surfaces(self) -> dict[str, str]:
+        """The merged mesh's face set of each hand and object, by name."""
+        return {one.name: one.part.hand.name for one in self.hands} | {
+            one.name: one.volume.name for one in self.objects
+        }
+
     def prescribed(self, time: float) -> Prescribed:
         """All known displacements at a time."""
         out = Prescribed(np.empty(0, np.int64), np.empty(0))

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from warpjld.fem.contact.imprint import Imprint
 from warpjld.fem.hand.tactile import Tactile, tactile_of
 from warpjld.press.bodies import Bodies, HandBody
 from warpjld.press.frames import SolvedFrame
@@ -17,15 +18,11 @@ __all__ = ["felt"]
 
 @dataclass(frozen=True, eq=False)
 class _Touch:
-    """One pair, its nodes numbered as the hand's own; nodes of others get a number beyond."""
+    """One pair on the hand's own nodes."""
 
     name: str
-    nodes: NDArray[np.int32]
-    pressure: NDArray[np.float64]
-    area: NDArray[np.float64]
-    slip: NDArray[np.float64]
-    sticking: NDArray[np.bool_]
     nodal: NDArray[np.float64]
+    imprint: Imprint
 
 
 @dataclass(frozen=True, eq=False)
@@ -42,27 +39,13 @@ def felt(bodies: Bodies, hand: HandBody, frames: Sequence[SolvedFrame]) -> Tacti
         InputError: No frame.
     """
     span = bodies.spans[hand.name]
-    count = span.stop - span.start
-    instants = []
-    for frame in frames:
-        all_ = frame.touching
-        touches = []
-        for k, owner in enumerate(bodies.owners):
-            if hand.name not in (owner.slave, owner.master):
-                continue
-            mine = all_.pair == k
-            nodes = all_.node[mine]
-            own = (nodes >= span.start) & (nodes < span.stop)
-            touches.append(
-                _Touch(
-                    bodies.pairs[k].title,
-                    np.where(own, nodes - span.start, count).astype(np.int32),
-                    all_.pressure[mine],
-                    all_.area[mine],
-                    all_.slip[mine],
-                    ~all_.slides[mine],
-                    frame.nodal[k][span],
-                )
-            )
-        instants.append(_Instant(frame.frame, frame.displacement[span], tuple(touches)))
+    mine = [k for k, owner in enumerate(bodies.owners) if hand.name in (owner.slave, owner.master)]
+    instants = [
+        _Instant(
+            frame.frame,
+            frame.displacement[span],
+            tuple(_Touch(bodies.pairs[k].title, frame.nodal[k, span], frame.imprint.of((k, span))) for k in mine),
+        )
+        for frame in frames
+    ]
     return tactile_of(hand.part.hand, instants)

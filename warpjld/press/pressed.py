@@ -9,12 +9,13 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from warpjld.fem.embedding import Embedding
 from warpjld.fem.hexmesh import HexMesh
 from warpjld.grasp import Places
 from warpjld.press.bodies import Bodies
 from warpjld.press.clear import Cleared, Shown, clear
+from warpjld.press.finer import Finer, finer
 from warpjld.press.outside import outer_triangles
+from warpjld.press.pressure_map import PressureMap, pressure_map
 from warpjld.press.run import Solved
 from warpjld.press.smooth import Smoother
 
@@ -93,21 +94,24 @@ class Pressed:
                 )
         return out
 
+    def finer(self, name: str, faces: NDArray[np.int32], count: int) -> Finer:
+        """An actor's or object's surface, with triangles split where anything ever presses on them.
+
+        Args:
+            name: Of the actor or object.
+            faces: Its triangles, shape (T, 3).
+            count: Its vertices.
+        """
+        return self._maps[name][0] if name in self._maps else finer(faces, np.zeros(len(faces), dtype=bool), count)
+
     def pressure(self, name: str, frame: float) -> NDArray[np.float64] | None:
-        """Contact pressure on the visible surface of an actor or object [Pa], shape (V,); None where there is none."""
-        if name not in self.bodies.spans or not len(self._frames):
+        """Contact pressure on an actor or object [Pa], at the vertices of its finer surface, shape (V,); None where
+        there is none. Its integral over the surface is the force that presses."""
+        whole = self._between(self._forces, frame)
+        if name not in self._maps or whole is None:
             return None
-        whole = self._between(self._pressures, frame)
-        if whole is None:
-            return None
-        values = whole[self.bodies.spans[name]]
-        for hand in self.bodies.hands:
-            if hand.name == name:
-                flesh = hand.part.hand
-                shown = _shown(flesh.mesh, flesh.name, flesh.flesh.skin, values)
-                return self._smoothers[name].of(np.where(hand.part.blend > 0.0, shown, 0.0))
-        one = next(o for o in self.bodies.objects if o.name == name)
-        return self._smoothers[name].of(_shown(one.volume.mesh, one.volume.name, one.volume.visible, values))
+        surface, spread = self._maps[name]
+        return spread.of(whole[self.bodies.spans[name]], surface.of(self._cleared(frame)[1].vertices[name]))
 
     def _cleared(self, frame: float) -> tuple[dict[str, Shown], Cleared]:
         """Visible surfaces at a frame that was solved, or between two, as they are carried, and without overlap."""
@@ -135,9 +139,26 @@ class Pressed:
 
     @cached_property
     def high(self) -> float:
-        """Highest pressure that any surface shows at a frame that was solved [Pa]: less than single nodes bear."""
-        shown = (self.pressure(name, frame) for name in self.bodies.spans for frame in self._frames)
-        return max((float(one.max(initial=0.0)) for one in shown if one is not None), default=0.0)
+        """Highest pressure at any node and any frame that was solved [Pa]: as the table has it."""
+        return max((float(frame.pressure(self.bodies).max()) for frame in self.solved.frames), default=0.0)
+
+    @cached_property
+    def _maps(self) -> dict[str, tuple[Finer, PressureMap]]:
+        """Finer surfaces, and how forces on nodes are spread over them, by name; none where nothing was solved."""
+        if not len(self._frames):
+            return {}
+        force = self._forces.max(axis=0)
+        out = {}
+        for hand in self.bodies.hands:
+            part, flesh = hand.part, hand.part.hand
+            push = force[self.bodies.spans[hand.name]]
+            out[hand.name] = pressure_map(
+                flesh.mesh, flesh.name, flesh.flesh.skin, part.skin, flesh.surface.faces, push, part.blend > 0.0
+            )
+        for one in self.bodies.objects:
+            volume, push = one.volume, force[self.bodies.spans[one.name]]
+            out[one.name] = pressure_map(volume.mesh, volume.name, volume.visible, volume.surface, volume.faces, push)
+        return out
 
     @cached_property
     def _smoothers(self) -> dict[str, Smoother]:
@@ -156,9 +177,10 @@ class Pressed:
         return np.array([frame.frame for frame in self.solved.frames])
 
     @cached_property
-    def _pressures(self) -> NDArray[np.float64]:
+    def _forces(self) -> NDArray[np.float64]:
+        """What presses on the nodes, at the start and at the frames that were solved [N]."""
         nothing = np.zeros((1, len(self.bodies.body.mesh.nodes)))
-        return np.concatenate([nothing, *(f.pressure(self.bodies)[None] for f in self.solved.frames)])
+        return np.concatenate([nothing, *(f.imprint.force.sum(axis=0)[None] for f in self.solved.frames)])
 
     @cached_property
     def _displacements(self) -> NDArray[np.float64]:
@@ -176,15 +198,6 @@ class Pressed:
         after = int(np.clip(np.searchsorted(times, frame), 1, len(times) - 1))
         part = (frame - times[after - 1]) / (times[after] - times[after - 1])
         return np.asarray((1.0 - part) * values[after - 1] + part * values[after])
-
-
-def _shown(mesh: HexMesh, faces: str, surface: Embedding, values: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Values of the outer nodes at the points of a visible surface."""
-    outer = np.zeros(len(mesh.nodes))
-    outer[np.unique(mesh.quads(mesh.face_set(faces)))] = 1.0
-    weights = np.maximum(surface.weights, 0.0) * outer[surface.corners]
-    total = weights.sum(axis=1)
-    return np.asarray((weights * values[surface.corners]).sum(axis=1) / np.maximum(total, 1e-12))
 
 
 def _edge(mesh: HexMesh, faces: str) -> float:

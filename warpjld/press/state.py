@@ -12,8 +12,9 @@ import numpy as np
 from warpjld.errors import InputError
 from warpjld.fem import Loads, Status
 from warpjld.fem.contact import ContactInstant, ContactSolution
+from warpjld.fem.contact.imprint import Imprint
 from warpjld.fem.contact.law import Memory
-from warpjld.press.frames import SolvedFrame, TouchingPoints
+from warpjld.press.frames import SolvedFrame
 
 __all__ = ["State", "load_state", "save_state"]
 
@@ -42,10 +43,10 @@ def save_state(path: Path, state: State) -> None:
     arrays: dict[str, Any] = {"mark": state.mark, "count": len(state.frames), "time": state.solution.last.time}
     for k, frame in enumerate(state.frames):
         for one in fields(SolvedFrame):
-            if one.name != "touching":
+            if one.name != "imprint":
                 arrays[f"frame{k}.{one.name}"] = getattr(frame, one.name)
-        for one in fields(TouchingPoints):
-            arrays[f"frame{k}.touching.{one.name}"] = getattr(frame.touching, one.name)
+        for one in fields(Imprint):
+            arrays[f"frame{k}.imprint.{one.name}"] = getattr(frame.imprint, one.name)
     if state.solution.course is not None:
         arrays["course"] = state.solution.course
     arrays["memories"] = len(state.solution.memory)
@@ -73,11 +74,11 @@ def load_state(path: Path) -> State:
         with np.load(path, allow_pickle=False) as file:
             frames = []
             for k in range(int(file["count"])):
-                touching = TouchingPoints(*(file[f"frame{k}.touching.{f.name}"] for f in fields(TouchingPoints)))
-                one = {f.name: file[f"frame{k}.{f.name}"] for f in fields(SolvedFrame) if f.name != "touching"}
+                imprint = Imprint(*(file[f"frame{k}.imprint.{f.name}"] for f in fields(Imprint)))
+                one = {f.name: file[f"frame{k}.{f.name}"] for f in fields(SolvedFrame) if f.name != "imprint"}
                 one |= {"frame": float(one["frame"]), "solves": int(one["solves"])}
                 one["penetration"] = float(one["penetration"])
-                frames.append(SolvedFrame(touching=touching, **one))
+                frames.append(SolvedFrame(imprint=imprint, **one))
             memory = tuple(
                 Memory(*(file[f"memory{k}.{f.name}"] for f in fields(Memory))) for k in range(int(file["memories"]))
             )

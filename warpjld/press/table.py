@@ -7,7 +7,6 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
 from warpjld.fem.hand.muscles import Effort
 from warpjld.press.bodies import Bodies, HandBody
@@ -27,8 +26,9 @@ class Row:
         against: What it touches, joined by ``+``.
         force_n: Length of the sum of its contact forces [N].
         fx_n, fy_n, fz_n: That sum [N].
-        area_mm2: Area under pressure [mm²].
-        peak_kpa: Highest pressure [kPa].
+        area_mm2: Area under pressure, inside a border that runs between nodes [mm²].
+        peak_kpa: Highest pressure: what presses on a node over the skin around it [kPa]; the highest of all is the top
+            of the pictures' scale.
         bone_n: Length of what its bones bear [N]; NaN for the palm.
         limit_n: Largest force its muscles can bear [N]; NaN for the palm.
         share: Largest share of the limits of its force and its joints' torques; NaN for the palm.
@@ -55,24 +55,12 @@ class Row:
 
 def rows_of(bodies: Bodies, hand: HandBody, solved: SolvedFrame, effort: Effort) -> list[Row]:
     """Rows of a hand at a frame: its digits and its palm."""
-    from scipy.spatial import cKDTree
-
     span = bodies.spans[hand.name]
     flesh = hand.part.hand
     labels = [_digit(name) for name in flesh.label_names]
     digit_of = np.array([*labels, ""])[flesh.node_labels]  # "" for nodes inside
-    touching = solved.touching
-    mine = np.array([hand.name in (o.slave, o.master) for o in bodies.owners], dtype=bool)
-    # points of pairs whose other side is the hand's skin: they belong to the skin node nearest to them
-    own = (touching.node >= span.start) & (touching.node < span.stop)
-    points = np.full(len(touching.node), "", dtype=digit_of.dtype)
-    points[own] = digit_of[touching.node[own] - span.start]
-    others = np.flatnonzero(~own & mine[touching.pair]) if len(mine) else np.empty(0, int)
-    if len(others):
-        skin = np.flatnonzero(flesh.node_labels >= 0)
-        at = flesh.mesh.nodes[skin] + solved.displacement[span][skin]
-        points[others] = digit_of[skin[cKDTree(at).query(touching.position[others])[1]]]
-    opposite = _opposite(bodies, hand, solved, digit_of, points)
+    imprint = solved.imprint.of((slice(None), span))
+    pressure = solved.pressure(bodies)[span]
     rows = []
     for digit in [*(d.digit.rpartition(".")[2] for d in effort.digits), "palm"]:
         nodes = np.flatnonzero(digit_of == digit)
@@ -85,9 +73,8 @@ def rows_of(bodies: Bodies, hand: HandBody, solved: SolvedFrame, effort: Effort)
             for owner, push in zip(bodies.owners, pushes, strict=True)
             if np.abs(push).max(initial=0.0) > 0.0
         ]
-        here = np.flatnonzero((points == digit) | (opposite == digit))
-        area = float(touching.area[here].sum())
-        sliding = float(touching.area[here][touching.slides[here]].sum()) / area if area > 0.0 else float("nan")
+        area = float(imprint.area[:, nodes].sum())
+        sliding = 1.0 - float(imprint.held[:, nodes].sum()) / area if area > 0.0 else float("nan")
         work = None if digit == "palm" else effort[digit]
         rows.append(
             Row(
@@ -100,7 +87,7 @@ def rows_of(bodies: Bodies, hand: HandBody, solved: SolvedFrame, effort: Effort)
                 float(force[1]),
                 float(force[2]),
                 1e6 * area,
-                1e-3 * float(touching.pressure[here].max(initial=0.0)),
+                1e-3 * float(pressure[nodes].max(initial=0.0)),
                 float("nan") if work is None else work.force,
                 float("nan") if work is None else work.limit,
                 float("nan") if work is None else work.share,
@@ -109,28 +96,6 @@ def rows_of(bodies: Bodies, hand: HandBody, solved: SolvedFrame, effort: Effort)
             )
         )
     return rows
-
-
-def _opposite(
-    bodies: Bodies, hand: HandBody, solved: SolvedFrame, digit_of: NDArray[np.str_], points: NDArray[np.str_]
-) -> NDArray[np.str_]:
-    """Digit on the other side of every point where the hand touches itself, nothing for others: of the nearest skin
-    that belongs to another digit than the point's own."""
-    from scipy.spatial import cKDTree
-
-    out = np.full_like(points, "")
-    itself = np.array([o.slave == o.master == hand.name for o in bodies.owners], dtype=bool)
-    flesh = hand.part.hand
-    skin = np.flatnonzero(flesh.node_labels >= 0)
-    at = flesh.mesh.nodes[skin] + solved.displacement[bodies.spans[hand.name]][skin]
-    touching = solved.touching
-    mine = itself[touching.pair] if len(itself) else np.zeros(len(points), dtype=bool)
-    for digit in np.unique(points[mine]):
-        rows = np.flatnonzero(mine & (points == digit))
-        others = np.flatnonzero(digit_of[skin] != digit)
-        if len(others):
-            out[rows] = digit_of[skin[others[cKDTree(at[others]).query(touching.position[rows])[1]]]]
-    return out
 
 
 def write_table(path: Path, rows: Sequence[Row]) -> None:

@@ -24,6 +24,7 @@ class ColorScale:
         title: What the numbers are, with their unit.
         colormap: Matplotlib's name of the colours, or colours to go through.
         factor: Multiplies the numbers where they are written, e.g. 1000 for metres shown in mm.
+        highest: Whether the last number is written too, round or not.
     """
 
     low: float
@@ -31,6 +32,7 @@ class ColorScale:
     title: str = ""
     colormap: str | tuple[str, ...] = "viridis"
     factor: float = 1.0
+    highest: bool = False
 
     def __post_init__(self) -> None:
         if not (np.isfinite([self.low, self.high]).all() and self.low < self.high):
@@ -72,7 +74,7 @@ class ColorScale:
         canvas = Image.fromarray(picture.copy())
         ramp = self.colors(np.linspace(self.high, self.low, bar_height))
         canvas.paste(Image.fromarray(np.repeat(ramp[:, None], bar_width, axis=1)), (left, top))
-        for number in self.ticks():
+        for number in self.ticks(apart=1.3 * size / bar_height):
             y = top + bar_height * (1 - (number - self.low) / (self.high - self.low))
             text = f"{number * self.factor:.3g}"  # with a hyphen: the built-in font has no minus sign
             write(canvas, (left + bar_width + 0.5 * size, y), text, size=size, color=ink, anchor="lm")
@@ -80,14 +82,18 @@ class ColorScale:
             write(canvas, (width - 0.8 * size, top - 1.4 * size), self.title, size=size, color=ink, anchor="rm")
         return np.asarray(canvas)
 
-    def ticks(self) -> NDArray[np.float64]:
-        """Numbers to write beside the bar: four to eight, round as they are written."""
+    def ticks(self, apart: float = 0.0) -> NDArray[np.float64]:
+        """Numbers to write beside the bar: four to eight, round as they are written; and the highest where it is asked
+        for, without those nearer to it than this share of the bar."""
         low, high = sorted((self.low * self.factor, self.high * self.factor))
         rough = (high - low) / 7.0
         power = 10.0 ** np.floor(np.log10(rough))
         step = power * next(n for n in (1.0, 2.0, 2.5, 5.0, 10.0) if n * power >= rough * (1.0 - 1e-9))
         first, last = np.ceil(low / step - 1e-9), np.floor(high / step + 1e-9)
-        return np.asarray((step * np.arange(first, last + 1) + 0.0) / self.factor)
+        numbers = (step * np.arange(first, last + 1) + 0.0) / self.factor
+        if self.highest:
+            numbers = np.append(numbers[self.shares(numbers) < 1.0 - max(apart, 1e-9)], self.high)
+        return np.asarray(numbers)
 
     def table(self) -> NDArray[np.uint8]:
         """The colours from ``low`` to ``high``, shape (256, 3)."""

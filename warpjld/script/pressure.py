@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from warpjld import render
+from warpjld.press.finer import Finer, finer
 
 if TYPE_CHECKING:
     from warpjld.script.crowd import Crowd
@@ -40,17 +41,23 @@ class PressureView:
         self._colored = [k for k, p in enumerate(crowd.props) if p in colored and only in (None, p.name)]
         self._plain = [k for k, p in enumerate(crowd.props) if k not in self._colored and only in (None, p.name)]
         faces, start = [], 0
-        for role, span in self._roles:
-            faces.append(role.covering.surface.faces + start)
-            start += span.stop - span.start
-        for k in self._colored:
-            faces.append(crowd.props[k].thing.faces + start)
-            start += len(crowd.props[k].thing.vertices)
+        self._finer: list[Finer] = []
+        shown = [(role.actor.name, role.covering.surface.faces, span.stop - span.start) for role, span in self._roles]
+        things = [crowd.props[k] for k in self._colored]
+        shown += [(prop.name, prop.thing.faces, len(prop.thing.vertices)) for prop in things]
+        for name, triangles, count in shown:
+            surface = self._surface(name, triangles, count)
+            self._finer.append(surface)
+            faces.append(surface.faces + start)
+            start += count + len(surface.edges)
         if not faces:  # an obstacle alone: nothing is known of its own pressure
-            faces, self._colored, self._plain = [crowd.props[self._plain[0]].thing.faces], self._plain[:1], []
+            prop = crowd.props[self._plain[0]]
+            self._finer = [self._surface(prop.name, prop.thing.faces, len(prop.thing.vertices))]
+            faces, self._colored, self._plain = [prop.thing.faces], self._plain[:1], []
         self._faces = np.concatenate(faces).astype(np.int32)
         highest = _NOTHING if pressed is None else max(_NOTHING, pressed.high)
-        self._scale = render.ColorScale(0.0, highest, "contact pressure, kPa", _COLORS, factor=1e-3)
+        title = "contact pressure, kPa"
+        self._scale = render.ColorScale(0.0, highest, title, _COLORS, factor=1e-3, highest=True)
 
     def stage(
         self,
@@ -70,21 +77,24 @@ class PressureView:
     def at(self, frame: int, vertices: NDArray[np.float32]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """Vertices [m] and pressures [Pa] at the frame of that place, of actors' vertices (V, 3)."""
         number = float(self.crowd.frames[frame])
-        points: list[NDArray[np.floating]] = []
-        values: list[NDArray[np.float64]] = []
-        for role, span in self._roles:
-            points.append(vertices[span])
-            values.append(self._pressure(role.actor.name, number, span.stop - span.start))
         solids = self.crowd.solid_vertices(frame)
-        for k in self._colored:
-            points.append(solids[k])
-            values.append(self._pressure(self.crowd.props[k].name, number, len(solids[k])))
-        return np.concatenate(points).astype(np.float64), np.concatenate(values)
+        shown: list[tuple[str, NDArray[np.floating]]] = []
+        shown += [(role.actor.name, vertices[span]) for role, span in self._roles]
+        shown += [(self.crowd.props[k].name, solids[k]) for k in self._colored]
+        points = [surface.of(at) for surface, (_, at) in zip(self._finer, shown, strict=True)]
+        values = [self._pressure(name, number, len(at)) for (name, _), at in zip(shown, points, strict=True)]
+        return np.concatenate(points), np.concatenate(values)
 
     def others(self, frame: int) -> list[NDArray[np.float64]]:
         """Vertices of what is shown in its own colour."""
         solids = self.crowd.solid_vertices(frame)
         return [solids[k] for k in self._plain]
+
+    def _surface(self, name: str, faces: NDArray[np.int32], count: int) -> Finer:
+        pressed = self.crowd.pressed
+        if pressed is None:
+            return finer(faces, np.zeros(len(faces), dtype=bool), count)
+        return pressed.finer(name, faces, count)
 
     def _pressure(self, name: str, frame: float, count: int) -> NDArray[np.float64]:
         found = None if self.crowd.pressed is None else self.crowd.pressed.pressure(name, frame)

@@ -36,6 +36,7 @@ from numpy.typing import NDArray
 from warpjld.fem.body import Body
 from warpjld.fem.conjugate import Status
 from warpjld.fem.contact.facets import Facets, Place
+from warpjld.fem.contact.imprint import imprint_of
 from warpjld.fem.contact.law import Memory, start_memory
 from warpjld.fem.contact.obstacles import Obstacle
 from warpjld.fem.contact.pairs import Pair
@@ -390,6 +391,8 @@ def _without(given: Prescribed, known: Prescribed) -> Prescribed:
 
 
 def _touch(side: _Side, meeting: _Meeting, forces: NDArray[np.float64], x: NDArray[np.float64], count: int) -> Touch:
+    from scipy.sparse import csr_array
+
     surface = side.slave
     nodes = surface.nodes[meeting.rows]
     area = surface.at_nodes(np.linalg.norm(surface.area_vectors(x), axis=1))[meeting.rows]
@@ -397,9 +400,13 @@ def _touch(side: _Side, meeting: _Meeting, forces: NDArray[np.float64], x: NDArr
     pressure = np.einsum("mi,mi->m", traction, meeting.normal)
     nodal = np.zeros((count, 3))
     nodal[nodes] = forces
+    there = csr_array((len(nodes), count))
     if meeting.place is not None:
         corners = side.nodes[side.triangles[meeting.place.face]]
         np.add.at(nodal, corners, -meeting.place.weights[:, :, None] * forces[:, None, :])
+        rows = 3 * np.arange(len(nodes) + 1)
+        there = csr_array((meeting.place.weights.ravel(), corners.ravel(), rows), shape=there.shape)
+    pressed, still = np.where(pressure > 0.0, area, 0.0), np.zeros((len(nodes), 3))
     return Touch(
         side.pair.label,
         nodes,
@@ -409,10 +416,11 @@ def _touch(side: _Side, meeting: _Meeting, forces: NDArray[np.float64], x: NDArr
         traction,
         meeting.distance,
         area,
-        np.where(pressure > 0.0, area, 0.0),
-        np.where(pressure > 0.0, area, 0.0),
-        np.zeros((len(nodes), 3)),
+        pressed,
+        pressed,
+        still,
         pressure > 0.0,
         np.zeros(len(nodes), dtype=bool),
         nodal,
+        imprint_of(nodes, pressed * pressure, pressed, pressed, still, there, count),
     )

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from warpjld.errors import WarpjldError
 from warpjld.fem.conjugate import Status
+from warpjld.fem.contact.imprint import Imprint
 from warpjld.fem.contact.law import Memory
 from warpjld.fem.loads import Loads
 
@@ -34,6 +35,7 @@ class Touch:
         sticking: Whether friction or a bond holds, shape (m,).
         bonded: Whether the bond still holds, shape (m,).
         nodal: Forces on every node of the body, both sides [N], shape (N, 3).
+        imprint: What presses, area and slip on every node of the body, both sides.
     """
 
     name: str
@@ -50,6 +52,7 @@ class Touch:
     sticking: NDArray[np.bool_]
     bonded: NDArray[np.bool_]
     nodal: NDArray[np.float64]
+    imprint: Imprint
 
     @property
     def active(self) -> NDArray[np.bool_]:

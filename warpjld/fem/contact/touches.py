@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from warpjld.fem.contact.imprint import imprint_of
 from warpjld.fem.contact.inside import Inside
 from warpjld.fem.contact.law import Response
 from warpjld.fem.contact.points import ContactPoints, Interface
@@ -60,6 +61,10 @@ def touch_of(
     spare = np.where(sticking, np.maximum(limit - friction, _LEAST * limit), 0.0)
     inside = Inside(interface, near, area, x)
     pressed, held = inside.areas(pressure, mean @ points.gap if interface.averages else apart, modulus, spare)
+    pressed, held = np.where(holds, area, pressed), np.where(holds, area, held)
+    slipped = mean @ across
+    push = area * (mean @ np.maximum(response.pressure, 0.0))
+    there = mean @ (-points.weights).maximum(0.0)
     return Touch(
         name=interface.pair.label,
         nodes=nodes,
@@ -69,12 +74,13 @@ def touch_of(
         traction=pushed,
         gap=apart,
         area=area,
-        pressed=np.where(holds, area, pressed),
-        held=np.where(holds, area, held),
-        slip=mean @ across,
+        pressed=pressed,
+        held=held,
+        slip=slipped,
         sticking=sticking,
         bonded=holds,
         nodal=points.forces(traction),
+        imprint=imprint_of(nodes, push, pressed, held, slipped, there, len(x)),
     )
 
 

@@ -11,9 +11,9 @@ from numpy.typing import NDArray
 
 from warpjld.errors import InputError
 from warpjld.fem.contact import ContactInstant
+from warpjld.fem.contact.imprint import Imprint, skin_around
 from warpjld.fem.hand.flesh_hand import FleshHand
 from warpjld.fem.hand.labels import WEB
-from warpjld.fem.hexmesh import HexMesh
 
 __all__ = ["Tactile", "tactile_of", "tactile_of_pairs"]
 
@@ -24,17 +24,9 @@ class _Touch(Protocol):
     @property
     def name(self) -> str: ...
     @property
-    def nodes(self) -> NDArray[np.int32]: ...
-    @property
-    def pressure(self) -> NDArray[np.float64]: ...
-    @property
-    def area(self) -> NDArray[np.float64]: ...
-    @property
-    def slip(self) -> NDArray[np.float64]: ...
-    @property
-    def sticking(self) -> NDArray[np.bool_]: ...
-    @property
     def nodal(self) -> NDArray[np.float64]: ...
+    @property
+    def imprint(self) -> Imprint: ...
 
 
 class _Instant(Protocol):
@@ -58,11 +50,10 @@ class Tactile:
         force: On the pad, friction included [N], shape (T, P, 3).
         normal_force: Part of it that presses the skin in [N], shape (T, P).
         centre: Centre of pressure [m], shape (T, P, 3).
-        area: Area under pressure [m²], shape (T, P).
-        peak: Highest pressure [Pa], shape (T, P).
-        slip: Sliding since the instant before, mean over that area [m], shape (T, P); NaN where only the other side of
-            the contact measured it (the hand as master).
-        sticking: Share of the area that sticks, shape (T, P); NaN likewise.
+        area: Area under pressure, inside a border that runs between nodes [m²], shape (T, P).
+        peak: Highest pressure: what presses on a node over the skin around it [Pa], shape (T, P).
+        slip: Way along the other side since the instant before, mean over that area [m], shape (T, P).
+        sticking: Share of that area that friction holds, shape (T, P).
     """
 
     times: NDArray[np.float64]
@@ -82,10 +73,7 @@ class Tactile:
 
 
 def tactile_of(hand: FleshHand, instants: Sequence[_Instant], *, only: str | None = None) -> Tactile:
-    """Read the pads of a hand.
-
-    Where the hand is a pair's slave, its rows are read. Where it is the master, the forces handed to its nodes are:
-    area and pressure then come from the share of skin around each node.
+    """Read the pads of a hand, on whichever side of a pair it is: sums over the nodes of each pad.
 
     Args:
         hand: The hand, first in the merged mesh.
@@ -136,54 +124,23 @@ def _read(
 ) -> None:
     count, pads = len(hand.mesh.nodes), len(out.pads)
     x = hand.mesh.nodes + instant.displacement[:count]
-    directions = _node_areas(hand.mesh, hand.skin_faces, x)
-    share = np.linalg.norm(directions, axis=1)
-    outward = directions / np.maximum(share, 1e-300)[:, None]
-    pushed, weighted = np.zeros(pads), np.zeros((pads, 3))
-    measured, sliding, stuck = np.zeros(pads), np.zeros(pads), np.zeros(pads)
+    skin = np.flatnonzero(pad_of >= 0)
+    pad = pad_of[skin]
+    summed = {name: np.zeros(count) for name in ("force", "area", "held", "slid")}
     for touch in instant.touches:
-        if only is not None and touch.name != only:
-            continue
-        nodal = touch.nodal[:count]
-        felt = np.flatnonzero((pad_of >= 0) & nodal.any(axis=1))
-        np.add.at(out.force[frame], pad_of[felt], nodal[felt])
-        own = touch.nodes < count
-        rows = np.flatnonzero(own & (touch.pressure > 0.0))
-        if len(rows):
-            rows = rows[pad_of[touch.nodes[rows]] >= 0]
-        pad = pad_of[touch.nodes[rows]]
-        area, pressure = touch.area[rows], touch.pressure[rows]
-        np.add.at(measured, pad, area)
-        np.add.at(sliding, pad, area * np.linalg.norm(touch.slip[rows], axis=1))
-        np.add.at(stuck, pad, area * touch.sticking[rows])
-        # nodes of the hand that only the other side's rows push
-        passive = np.setdiff1d(felt, touch.nodes[own])
-        press = -np.einsum("ni,ni->n", nodal[passive], outward[passive])
-        passive, press = passive[press > 0.0], press[press > 0.0]
-        nodes = np.concatenate([touch.nodes[rows], passive])
-        pad = pad_of[nodes]
-        area = np.concatenate([area, share[passive]])
-        normal = np.concatenate([pressure * touch.area[rows], press])
-        np.add.at(pushed, pad, normal)
-        np.add.at(weighted, pad, normal[:, None] * x[nodes])
-        np.add.at(out.area[frame], pad, area)
-        np.maximum.at(out.peak[frame], pad, normal / np.maximum(area, 1e-300))
-    some, known = pushed > 0.0, measured > 0.0
-    out.normal_force[frame] = pushed
-    out.centre[frame, some] = weighted[some] / pushed[some, None]
-    out.slip[frame, known] = sliding[known] / measured[known]
-    out.sticking[frame, known] = stuck[known] / measured[known]
-
-
-def _node_areas(mesh: HexMesh, faces: NDArray[np.int32], x: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Each node's quarter of the faces around it as vectors outwards [m²], shape (N, 3)."""
-    quads = mesh.quads(faces)
-    corner = x[quads]
-    vector = 0.125 * np.cross(corner[:, 2] - corner[:, 0], corner[:, 3] - corner[:, 1])
-    out = np.zeros_like(x)
-    for k in range(4):
-        np.add.at(out, quads[:, k], vector)
-    return out
+        if only is None or touch.name == only:
+            np.add.at(out.force[frame], pad, touch.nodal[skin])
+            for name, values in summed.items():
+                values += getattr(touch.imprint, name)[:count]
+    force, area, held, slid = (np.bincount(pad, values[skin], pads) for values in summed.values())
+    around = skin_around(hand.mesh, hand.skin_faces, x)[skin]
+    weighted = np.stack([np.bincount(pad, summed["force"][skin] * x[skin, k], pads) for k in range(3)], axis=1)
+    np.maximum.at(out.peak[frame], pad, summed["force"][skin] / np.maximum(around, 1e-300))
+    some, known = force > 0.0, area > 0.0
+    out.normal_force[frame], out.area[frame] = force, area
+    out.centre[frame, some] = weighted[some] / force[some, None]
+    out.slip[frame, known] = slid[known] / area[known]
+    out.sticking[frame, known] = held[known] / area[known]
 
 
 def tactile_of_pairs(instants: Sequence[ContactInstant]) -> Tactile:
@@ -203,16 +160,14 @@ def tactile_of_pairs(instants: Sequence[ContactInstant]) -> Tactile:
     out = _nothing([instant.time for instant in instants], pads)
     for frame, instant in enumerate(instants):
         for pad, touch in enumerate(instant.touches):
-            pressed = touch.pressure > 0.0
-            if not pressed.any():
-                continue
-            area, force = touch.area[pressed], touch.area[pressed] * touch.pressure[pressed]
-            x = touch.position[pressed]
-            out.force[frame, pad] = touch.area @ touch.traction
-            out.normal_force[frame, pad] = force.sum()
-            out.centre[frame, pad] = force @ x / force.sum()
-            out.area[frame, pad] = area.sum()
-            out.peak[frame, pad] = touch.pressure.max()
-            out.slip[frame, pad] = area @ np.linalg.norm(touch.slip[pressed], axis=1) / area.sum()
-            out.sticking[frame, pad] = area @ touch.sticking[pressed] / area.sum()
+            area, total = touch.contact_area, touch.area @ np.maximum(touch.pressure, 0.0)
+            if total > 0.0:
+                out.force[frame, pad] = touch.force
+                out.normal_force[frame, pad] = total
+                out.centre[frame, pad] = touch.centre
+                out.peak[frame, pad] = touch.peak
+            if area > 0.0:
+                out.area[frame, pad] = area
+                out.slip[frame, pad] = touch.pressed @ np.linalg.norm(touch.slip, axis=1) / area
+                out.sticking[frame, pad] = 1.0 - touch.sliding
     return out

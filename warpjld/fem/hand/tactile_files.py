@@ -17,14 +17,14 @@ TACTILE_COLUMNS = (
     Column("force_x", "number", "N", "Force on the pad, friction included, world frame."),
     Column("force_y", "number", "N", "The same along y."),
     Column("force_z", "number", "N", "The same along z."),
-    Column("normal_force", "number", "N", "Sum of pressure × area."),
+    Column("normal_force", "number", "N", "Part of it that presses the skin in: pressure summed over the area."),
     Column("centre_x", "number", "m", "Centre of pressure, world frame; missing where nothing presses."),
     Column("centre_y", "number", "m", "The same along y."),
     Column("centre_z", "number", "m", "The same along z."),
-    Column("area", "number", "m²", "Area under pressure."),
-    Column("peak_pressure", "number", "Pa", "Highest pressure."),
-    Column("slip", "number", "m", "Sliding since the instant before, mean over the area; missing where unknown."),
-    Column("sticking", "number", "", "Share of the area that sticks; missing where nothing presses or unknown."),
+    Column("area", "number", "m²", "Area under pressure, inside a border that runs between nodes."),
+    Column("peak_pressure", "number", "Pa", "Highest pressure: what presses on a node over the skin around it."),
+    Column("slip", "number", "m", "Way along the other side since the instant before, mean over the area."),
+    Column("sticking", "number", "", "Share of the area that friction holds; missing where nothing presses."),
 )
 """One row for each time and pad."""
 
