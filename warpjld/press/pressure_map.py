@@ -34,7 +34,8 @@ class PressureMap:
         faces: Its face set.
         carried: How it carries the vertices.
         vertices: At the same moment [m], shape (V, 3).
-        triangles: Of the part of the surface that it carries, shape (T, 3).
+        triangles: Of the whole surface, shape (T, 3).
+        worn: Vertices that the volume carries, shape (V,).
     """
 
     def __init__(
@@ -44,6 +45,7 @@ class PressureMap:
         carried: Embedding,
         vertices: NDArray[np.float64],
         triangles: NDArray[np.int32],
+        worn: NDArray[np.bool_],
     ) -> None:
         from scipy.sparse import csr_array, diags_array
 
@@ -51,17 +53,16 @@ class PressureMap:
         self._triangles, self._count = triangles, count
         around = skin_around(mesh, faces, mesh.nodes)
         weights = np.maximum(carried.weights, 0.0) * (around > 0.0)[carried.corners]
-        shown = np.zeros(count, dtype=bool)
-        shown[triangles] = True
-        weights *= shown[:, None]
+        weights *= worn[:, None]
         weights /= np.maximum(weights.sum(axis=1), 1e-12)[:, None]
         table = csr_array((weights.ravel(), carried.corners.ravel(), 8 * np.arange(count + 1)), shape=(count, total))
         seen = table.T @ self._areas(vertices) > _SEEN * np.maximum(around, 1e-300)
         self._table: Any = table @ diags_array(seen.astype(float))
         self._bare = np.flatnonzero((around > 0.0) & ~seen)
         self._nearest: Any = csr_array((count, len(self._bare)))
-        if len(self._bare) and len(triangles):
-            surface = Facets(vertices, triangles)
+        whole = triangles[worn[triangles].all(axis=1)]
+        if len(self._bare) and len(whole):
+            surface = Facets(vertices, whole)
             place = surface.locate(mesh.nodes[self._bare])[1]
             corners = surface.faces[place.face]
             columns = 3 * np.arange(len(self._bare) + 1)
@@ -109,7 +110,7 @@ def pressure_map(
         more = (getattr(middles, name) for name in ("corners", "weights", "outside"))
         carried = Embedding(*(np.concatenate(pair) for pair in zip(columns, more, strict=True)))
     inside = np.concatenate([worn, worn[surface.edges].all(axis=1)])
-    return surface, PressureMap(mesh, faces, carried, where, surface.faces[inside[surface.faces].all(axis=1)])
+    return surface, PressureMap(mesh, faces, carried, where, surface.faces, inside)
 
 
 def _over(force: NDArray[np.float64], area: NDArray[np.float64]) -> NDArray[np.float64]:

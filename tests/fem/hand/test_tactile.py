@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from warpjld.errors import InputError
 from warpjld.fem.contact import Pair
+from warpjld.fem.contact.imprint import Imprint, skin_around
 from warpjld.fem.hand import FleshHand
 from warpjld.fem.hand.tactile import tactile_of
 from warpjld.fem.hand.tactile_files import TACTILE_COLUMNS, draw_tactile, write_tactile
@@ -22,12 +23,8 @@ from warpjld.fem.hand.tactile_files import TACTILE_COLUMNS, draw_tactile, write_
 class Touched:
     """As ``Touch`` of the contact package, as far as it is read."""
 
-    nodes: NDArray[np.int32]
-    pressure: NDArray[np.float64]
-    area: NDArray[np.float64]
-    slip: NDArray[np.float64]
-    sticking: NDArray[np.bool_]
     nodal: NDArray[np.float64]
+    imprint: Imprint
     name: str = "ball"
 
 
@@ -42,61 +39,52 @@ def pad_nodes(hand: FleshHand, name: str) -> NDArray[np.int64]:
     return np.flatnonzero(hand.node_labels == hand.label_names.index(name))
 
 
-def pressed(hand: FleshHand, name: str, pressure: float, *, slave: bool) -> Touched:
-    """Even pressure on a pad, half of it sticking, the rest slipped by 1 mm; as slave, or as the other side."""
+def pressed(hand: FleshHand, name: str, pressure: float) -> Touched:
+    """Even pressure on a pad, half of its nodes sticking, the others slipped by 1 mm."""
     nodes = pad_nodes(hand, name)
-    area = np.full(len(nodes), 4e-6)
+    count = len(hand.mesh.nodes) + 7
     quads = hand.mesh.quads(hand.skin_faces)
     x = hand.mesh.nodes[quads]
-    out = np.zeros_like(hand.mesh.nodes)
+    out = np.zeros((count, 3))
     np.add.at(out, quads, 0.125 * np.cross(x[:, 2] - x[:, 0], x[:, 3] - x[:, 1])[:, None].repeat(4, axis=1))
     normal = out[nodes] / np.linalg.norm(out[nodes], axis=1)[:, None]
-    nodal = np.zeros((len(hand.mesh.nodes) + 7, 3))
-    nodal[nodes] = -pressure * area[:, None] * normal
-    sticking = np.arange(len(nodes)) % 2 == 0
-    slip = np.where(sticking[:, None], 0.0, [1e-3, 0.0, 0.0])
-    if not slave:
-        return Touched(
-            np.array([len(hand.mesh.nodes) + 2], np.int32), np.array([5.0]), np.array([1.0]), np.zeros((1, 3)),
-            np.array([True]), nodal,
-        )  # fmt: skip
-    return Touched(nodes.astype(np.int32), np.full(len(nodes), pressure), area, slip, sticking, nodal)
+    area = np.zeros(count)
+    area[nodes] = skin_around(hand.mesh, hand.skin_faces, hand.mesh.nodes)[nodes]
+    nodal = np.zeros((count, 3))
+    nodal[nodes] = -pressure * area[nodes, None] * normal
+    held = np.where(np.arange(count) % 2 == 0, area, 0.0)
+    return Touched(nodal, Imprint(pressure * area, area, held, 1e-3 * (area - held)))
 
 
-def test_pads_of_a_slave_and_of_a_master(hand: FleshHand) -> None:
+def test_pads_read_what_presses_them(hand: FleshHand) -> None:
     still = np.zeros((len(hand.mesh.nodes) + 7, 3))
     name = "left.index.distal"
-    instants = [
-        Moment(1.0, still),
-        Moment(2.0, still, (pressed(hand, name, 8e3, slave=True),)),
-        Moment(3.0, still, (pressed(hand, name, 8e3, slave=False),)),
-    ]
-    found = tactile_of(hand, instants)
+    touched = pressed(hand, name, 8e3)
+    found = tactile_of(hand, [Moment(1.0, still), Moment(2.0, still, (touched,))])
     p = found.pads.index(name)
     nodes = pad_nodes(hand, name)
-    total = 8e3 * 4e-6 * len(nodes)
+    area = touched.imprint.area
     assert not found.touching[0].any()
     np.testing.assert_array_equal(np.flatnonzero(found.touching[1]), [p])
-    np.testing.assert_array_equal(np.flatnonzero(found.touching[2]), [p])
-    for frame in (1, 2):
-        assert found.normal_force[frame, p] == pytest.approx(total)
-        np.testing.assert_allclose(found.force[frame, p], instants[frame].touches[0].nodal.sum(axis=0))
-        np.testing.assert_allclose(found.centre[frame, p], hand.mesh.nodes[nodes].mean(axis=0))
-    assert found.area[1, p] == pytest.approx(4e-6 * len(nodes))
+    assert found.normal_force[1, p] == pytest.approx(8e3 * area.sum())
+    np.testing.assert_allclose(found.force[1, p], touched.nodal.sum(axis=0))
+    np.testing.assert_allclose(found.centre[1, p], area[nodes] @ hand.mesh.nodes[nodes] / area.sum())
+    assert found.area[1, p] == pytest.approx(area.sum())
     assert found.peak[1, p] == pytest.approx(8e3)
-    assert found.sticking[1, p] == pytest.approx(0.5, abs=0.02)
-    assert found.slip[1, p] == pytest.approx(0.5e-3, abs=2e-5)
-    assert np.isnan(found.sticking[2, p])
-    assert found.area[2, p] > 0.0
+    share = touched.imprint.held.sum() / area.sum()
+    assert 0.3 < share < 0.7
+    assert found.sticking[1, p] == pytest.approx(share)
+    assert found.slip[1, p] == pytest.approx(1e-3 * (1.0 - share))
     assert np.isnan(found.centre[1, p - 1]).all()
+    assert np.isnan(found.sticking[1, p - 1])
     with pytest.raises(InputError, match="at least one instant"):
         tactile_of(hand, [])
 
 
 def test_one_pair_of_several(hand: FleshHand) -> None:
     still = np.zeros((len(hand.mesh.nodes) + 7, 3))
-    ball = pressed(hand, "left.index.distal", 8e3, slave=True)
-    plate = replace(pressed(hand, "left.thumb.distal", 5e3, slave=True), name="plate")
+    ball = pressed(hand, "left.index.distal", 8e3)
+    plate = replace(pressed(hand, "left.thumb.distal", 5e3), name="plate")
     both = [Moment(1.0, still), Moment(2.0, still, (ball, plate))]
     touched = {only: tactile_of(hand, both, only=only).touching[1] for only in (None, "ball", "plate")}
     pads = tactile_of(hand, both).pads
@@ -115,7 +103,7 @@ def test_pairs_are_known_by_their_names() -> None:
 
 def test_files(hand: FleshHand, tmp_path: Path) -> None:
     still = np.zeros((len(hand.mesh.nodes) + 7, 3))
-    instants = [Moment(float(t), still, (pressed(hand, "left.thumb.distal", 1e3 * t, slave=True),)) for t in (1, 2)]
+    instants = [Moment(float(t), still, (pressed(hand, "left.thumb.distal", 1e3 * t),)) for t in (1, 2)]
     found = tactile_of(hand, instants)
     write_tactile(tmp_path / "tactile.csv", found)
     with (tmp_path / "tactile.csv").open(encoding="utf-8") as file:

@@ -1,0 +1,81 @@
+"""What presses on nodes, spread over visible surfaces: the sum stays, and so does the peak."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+import trimesh
+
+from warpjld.fem import HexMesh, ball
+from warpjld.fem.contact.imprint import skin_around
+from warpjld.fem.embedding import embed
+from warpjld.press.finer import finer
+from warpjld.press.pressure_map import pressure_map
+
+MESH = ball(1.0, n=8)
+OUTER = np.unique(MESH.quads(MESH.face_set("outer")))
+
+
+def cap(mesh: HexMesh) -> np.ndarray:
+    """Pressure that falls from 1 at the pole to 0 at half a radius from it, as forces on the nodes."""
+    away = np.linalg.norm(mesh.nodes - [0.0, 0.0, 1.0], axis=1)
+    return np.maximum(1.0 - (away / 0.5) ** 2, 0.0) * skin_around(mesh, "outer", mesh.nodes)
+
+
+def integral(vertices: np.ndarray, faces: np.ndarray, values: np.ndarray) -> float:
+    x = vertices[faces]
+    area = 0.5 * np.linalg.norm(np.cross(x[:, 1] - x[:, 0], x[:, 2] - x[:, 0]), axis=1)
+    return float(area @ values[faces].mean(axis=1))
+
+
+@pytest.mark.parametrize("detail", [1, 3, 4])
+def test_the_integral_is_the_force(detail: int) -> None:
+    """On surfaces coarser than the elements, alike, and finer, at rest and deformed."""
+    visible = trimesh.creation.icosphere(detail)
+    vertices, faces = np.asarray(visible.vertices), np.asarray(visible.faces, np.int32)
+    force = cap(MESH)
+    surface, spread = pressure_map(MESH, "outer", embed(MESH, vertices, reach=3.0), vertices, faces, force)
+    for stretch in (np.ones(3), np.array([1.2, 1.0, 0.8])):
+        at = surface.of(vertices * stretch)
+        found = spread.of(force, at)
+        assert integral(at, surface.faces, found) == pytest.approx(force.sum(), rel=1e-12)
+        assert (found >= 0.0).all()
+
+
+def test_the_peak_is_that_of_the_nodes() -> None:
+    visible = trimesh.creation.icosphere(4)
+    vertices, faces = np.asarray(visible.vertices), np.asarray(visible.faces, np.int32)
+    force = cap(MESH)
+    around = skin_around(MESH, "outer", MESH.nodes)
+    highest = float((force[OUTER] / around[OUTER]).max())
+    surface, spread = pressure_map(MESH, "outer", embed(MESH, vertices, reach=3.0), vertices, faces, force)
+    found = spread.of(force, surface.of(vertices))
+    assert found.max() == pytest.approx(highest, rel=0.06)
+    assert found[surface.of(vertices)[:, 2] < 0.5].max() == 0.0
+
+
+def test_what_a_cut_off_surface_lacks_goes_to_its_border() -> None:
+    """Nodes whose own surface is not carried press on what is nearest to them."""
+    visible = trimesh.creation.icosphere(4)
+    vertices, faces = np.asarray(visible.vertices), np.asarray(visible.faces, np.int32)
+    worn = vertices[:, 0] > 0.0
+    force = cap(MESH)
+    surface, spread = pressure_map(MESH, "outer", embed(MESH, vertices, reach=3.0), vertices, faces, force, worn)
+    found = spread.of(force, surface.of(vertices))
+    assert integral(surface.of(vertices), surface.faces, found) == pytest.approx(force.sum(), rel=1e-12)
+    assert not found[: len(vertices)][~worn].any()
+
+
+def test_finer_triangles_fit_those_beside_them() -> None:
+    visible = trimesh.creation.icosphere(2)
+    vertices, faces = np.asarray(visible.vertices), np.asarray(visible.faces, np.int32)
+    chosen = np.random.default_rng(1).random(len(faces)) < 0.3
+    found = finer(faces, chosen, len(vertices))
+    fine = trimesh.Trimesh(found.of(vertices), found.faces, process=False)
+    assert fine.is_watertight
+    assert fine.is_winding_consistent
+    assert fine.volume == pytest.approx(visible.volume, rel=1e-12)
+    assert len(found.faces) >= len(faces) + 3 * chosen.sum()
+    whole = finer(faces, np.zeros(len(faces), dtype=bool), len(vertices))
+    np.testing.assert_array_equal(whole.faces, faces)
+    np.testing.assert_array_equal(whole.of(vertices), vertices)
