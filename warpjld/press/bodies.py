@@ -18,6 +18,7 @@ from warpjld.press.drive import Drive
 from warpjld.press.outside import outside
 from warpjld.press.rest import Part
 from warpjld.press.settle import settle
+from warpjld.press.skin_parts import SkinParts
 from warpjld.press.state_variables import Prescribing
 from warpjld.press.support import Support
 from warpjld.press.volumes import ObjectVolume
@@ -42,6 +43,7 @@ class HandBody:
         softness: Young's modulus of its skin [Pa].
         itself: Whether its skin may touch itself.
         drive: What moves them, for searches that bend its joints otherwise.
+        parts: Of its visible skin.
     """
 
     name: str
@@ -51,6 +53,12 @@ class HandBody:
     softness: float
     itself: bool
     drive: Drive
+    parts: SkinParts
+
+    def worn(self, part: str, least: float) -> bool:
+        """Whether most of a digit's skin, or the palm's, has at least that share of flesh under it."""
+        mine = self.parts.part_of[self.parts.labels] == self.parts.names.index(part)
+        return bool((self.part.blend[mine] >= least).mean() > 0.5)
 
     def prescribed(self, time: float) -> Prescribed:
         """Displacements of the bones' nodes and of those where the flesh was cut off."""

@@ -2,7 +2,7 @@
 
 Contact holds for averages over the faces of elements. Visible surfaces are finer: between nodes they still overlap here
 and gape there by a fraction of an element. Overlaps are closed by moving both surfaces, the softer one more, so that
-they lie on each other as the bodies do.
+they lie on each other as the bodies do; of a hand's own parts both move half the way.
 """
 
 from __future__ import annotations
@@ -15,13 +15,12 @@ from numpy.typing import NDArray
 
 from warpjld.fem.contact import Obstacle
 from warpjld.fem.contact.facets import Facets
-from warpjld.fem.contact.obstacles import Touching
+from warpjld.press.overlap import Over, over, within_itself
+from warpjld.press.skin_parts import SkinParts
 
 __all__ = ["Cleared", "Shown", "clear"]
 
 _ROUNDS = 3
-_FACING = 0.3
-"""Surfaces that meet look at each other: cosine between their normals, at most."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -33,12 +32,16 @@ class Shown:
         faces: Triangles, shape (T, 3); vertices of none stay.
         modulus: Of what lies under it [Pa].
         most: How far a vertex may be moved [m]: a fraction of an element.
+        parts: Parts of it that may overlap, if any.
+        presses: Vertices whose overlap with other parts contact knows of, shape (V,); None: all.
     """
 
     vertices: NDArray[np.float64]
     faces: NDArray[np.int32]
     modulus: float
     most: float
+    parts: SkinParts | None = None
+    presses: NDArray[np.bool_] | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -48,7 +51,8 @@ class Cleared:
     Attributes:
         vertices: Of every surface [m], shape (V, 3).
         moved: Farthest move of each [m].
-        left: Overlap of each two that is too deep to be a matter of elements and stays [m].
+        left: Overlap of each two that is too deep to be a matter of elements and stays [m]; parts of one surface are
+            called by its name and theirs.
     """
 
     vertices: dict[str, NDArray[np.float64]]
@@ -68,6 +72,8 @@ def clear(surfaces: Mapping[str, Shown], obstacles: Mapping[str, Obstacle], time
     names = list(bodies)
     pairs = [(one, other) for k, one in enumerate(names) for other in names[k + 1 :]]
     pairs = [pair for pair in pairs if bodies[pair[0]].near(bodies[pair[1]])]
+    for body in bodies.values():
+        body.part_itself()
     for one, other in pairs:
         a, b = bodies[one], bodies[other]
         share = b.shown.modulus / (a.shown.modulus + b.shown.modulus)
@@ -85,6 +91,9 @@ def clear(surfaces: Mapping[str, Shown], obstacles: Mapping[str, Obstacle], time
     for one, other in pairs:
         left[one, other] = max(bodies[one].over(bodies[other]).depth, bodies[other].over(bodies[one]).depth)
     for name, body in bodies.items():
+        for (part, against), found in body.itself().items():
+            two = (f"{name} {min(part, against)}", f"{name} {max(part, against)}")
+            left[two] = max(found.depth, left.get(two, 0.0))
         for solid, obstacle in obstacles.items():
             left[name, solid] = body.sunk(obstacle, time).depth
     return Cleared(
@@ -92,18 +101,6 @@ def clear(surfaces: Mapping[str, Shown], obstacles: Mapping[str, Obstacle], time
         {name: body.moved for name, body in bodies.items()},
         left,
     )
-
-
-@dataclass(frozen=True, eq=False)
-class _Over:
-    """Vertices that are inside something, and the way out [m]."""
-
-    vertices: NDArray[np.integer]
-    way: NDArray[np.float64]
-
-    @property
-    def depth(self) -> float:
-        return float(np.linalg.norm(self.way, axis=1).max(initial=0.0))
 
 
 class _Body:
@@ -123,32 +120,46 @@ class _Body:
         (low, high), (bottom, top) = ((x.min(axis=0), x.max(axis=0)) for x in (self._points, other._points))
         return bool(((low <= top) & (bottom <= high)).all())
 
-    def over(self, other: _Body) -> _Over:
+    def over(self, other: _Body) -> Over:
         """Vertices of the other surface that are inside this one."""
         bottom, top = self._points.min(axis=0), self._points.max(axis=0)
         x = other._points
         some = other._used[((x >= bottom) & (x <= top)).all(axis=1)]
         if not len(some):
-            return _Over(some, np.empty((0, 3)))
-        return other._inside(Facets(self.at, self.shown.faces).project(other.at[some]), some)
+            return Over(some, np.empty((0, 3)))
+        found = Facets(self.at, self.shown.faces).project(other.at[some])
+        return over(other.at, other._normals(), some, found)[0]
 
-    def sunk(self, obstacle: Obstacle, time: float) -> _Over:
+    def sunk(self, obstacle: Obstacle, time: float) -> Over:
         """Vertices that are inside an obstacle."""
-        return self._inside(obstacle.project(self._points, time), self._used)
+        return over(self.at, self._normals(), self._used, obstacle.project(self._points, time))[0]
 
-    def _inside(self, found: Touching, some: NDArray[np.integer]) -> _Over:
-        """Of vertices for which something was found, those inside that look at what they are in."""
-        facing = np.einsum("vi,vi->v", self._normals()[some], found.normal) < _FACING
-        chosen = (found.distance < 0.0) & facing
-        return _Over(some[chosen], found.closest[chosen] - self.at[some[chosen]])
+    def itself(self) -> Mapping[tuple[str, str], Over]:
+        """Vertices of its parts that are inside other parts."""
+        parts = self.shown.parts
+        return {} if parts is None else within_itself(parts, self.at, self._normals())
 
-    def put(self, over: _Over, share: float) -> None:
+    def part_itself(self) -> None:
+        """Move the vertices of both parts that overlap half the way out, as far as contact knows of them."""
+        for turn in range(_ROUNDS + 2):
+            found = self.itself()
+            if self.shown.presses is not None:
+                found = {two: one.of(self.shown.presses) for two, one in found.items()}
+            if not any(len(one.vertices) for one in found.values()):
+                return
+            for (part, against), one in found.items():
+                if turn < _ROUNDS:
+                    self.put(one, 0.5)
+                elif (part < against) == (turn == _ROUNDS):  # what is left: first the one part, then the other
+                    self.put(one, 1.0)
+
+    def put(self, found: Over, share: float) -> None:
         """Move vertices a share of the way out, no farther than may be."""
-        there = self.at[over.vertices] + share * over.way
-        start = self.shown.vertices[over.vertices]
+        there = self.at[found.vertices] + share * found.way
+        start = self.shown.vertices[found.vertices]
         away = there - start
         length = np.linalg.norm(away, axis=1, keepdims=True)
-        self.at[over.vertices] = start + away * np.minimum(1.0, self.shown.most / np.maximum(length, 1e-300))
+        self.at[found.vertices] = start + away * np.minimum(1.0, self.shown.most / np.maximum(length, 1e-300))
 
     @property
     def _points(self) -> NDArray[np.float64]:

@@ -25,6 +25,8 @@ _SUNKEN = 0.5
 """How deep in one another visible surfaces may come to be shown apart, in edges of elements."""
 _KEPT = 64
 """Frames whose surfaces are kept: exports, films and objects ask for the same ones in turn."""
+_WORN = 0.5
+"""Share of the flesh in skin from which on it has flesh to give way with."""
 _SEEN = 2e-4
 """Overlap that is worth a note [m]."""
 
@@ -77,22 +79,36 @@ class Pressed:
         if self._displacement(frame) is None:
             return []
         shown, cleared = self._cleared(frame)
-        out = [
-            f"{one} and {other} are seen to overlap by {1e3 * depth:.1f} mm at frame {frame:g}: smaller elements "
-            "follow their shapes better"
-            for (one, other), depth in cleared.left.items()
-            if depth > _SEEN
-        ]
-        for hand in self.bodies.hands:
-            bare = hand.part.blend < 0.5
-            away = cleared.vertices[hand.name][bare] - shown[hand.name].vertices[bare]
-            depth = float(np.linalg.norm(away, axis=1).max(initial=0.0))
+        out = []
+        for two, depth in cleared.left.items():
             if depth > _SEEN:
+                seen = f"{two[0]} and {two[1]} are seen to overlap by {1e3 * depth:.1f} mm at frame {frame:g}"
+                out.append(f"{seen}: {self._why(*two)}")
+        for hand in self.bodies.hands:
+            bare = hand.part.blend < _WORN
+            away = cleared.vertices[hand.name][bare] - shown[hand.name].vertices[bare]
+            far = np.linalg.norm(away, axis=1)
+            deepest = float(far.max(initial=0.0))
+            if deepest > _SEEN:
+                where = hand.parts.name_of(np.flatnonzero(bare)[far > _SEEN])
                 out.append(
-                    f"{hand.name}: skin that FLESH leaves out is pushed aside by {1e3 * depth:.1f} mm at frame "
-                    f"{frame:g}, without a force"
+                    f"{hand.name}: skin of the {' and '.join(where)} without flesh is pushed aside by up to "
+                    f"{1e3 * deepest:.1f} mm at frame {frame:g}, and no force is counted there; FLESH {hand.name} … "
+                    f"{' '.join(where).upper()} gives it flesh"
                 )
         return out
+
+    def _why(self, one: str, other: str) -> str:
+        """What leaves two overlapping, and what to do."""
+        for hand in self.bodies.hands:
+            parts = [name.removeprefix(f"{hand.name} ") for name in (one, other)]
+            if all(part in hand.parts.names for part in parts):
+                bare = [part for part in parts if not hand.worn(part, _WORN)]
+                if bare:
+                    return f"FLESH {hand.name} … {' '.join(bare).upper()} makes them press on each other"
+                if not hand.itself:
+                    return f"FLESH {hand.name} … ITSELF ON makes them press on each other"
+        return "smaller elements follow their shapes better"
 
     def finer(self, name: str, faces: NDArray[np.int32], count: int) -> Finer:
         """An actor's or object's surface, with triangles split where anything ever presses on them.
@@ -126,7 +142,8 @@ class Pressed:
                 covered = np.asarray(self.covered(hand.name, frame), dtype=np.float64)
                 skin = hand.part.worn(moved[spans[hand.name]], covered)
                 skin = covered + self._smoothers[hand.name].of(skin - covered)
-                shown[hand.name] = Shown(skin, flesh.surface.faces, hand.softness, most)
+                presses = (hand.part.blend > _WORN) & hand.itself
+                shown[hand.name] = Shown(skin, flesh.surface.faces, hand.softness, most, hand.parts, presses)
             for one in self.bodies.objects:
                 volume = one.volume
                 most = _SUNKEN * _edge(volume.mesh, volume.name)

@@ -49,6 +49,7 @@ def hand_body(scene: Scene, actor: Actor, wish: FleshWish, start: float, notes: 
     from warpjld.fem.hand.laws import hand_laws
     from warpjld.press.bodies import HandBody
     from warpjld.press.rest import part_of, posed
+    from warpjld.press.skin_parts import skin_parts
 
     poses = stage(actor, np.array([start]), scene.rate)
     skin = cover(actor).deform(poses)[0].astype(np.float64)
@@ -67,7 +68,7 @@ def hand_body(scene: Scene, actor: Actor, wish: FleshWish, start: float, notes: 
     )
 
     drive = _drive(scene, actor, part.hand, start)
-    return HandBody(actor.name, part, laws, drive.moves, wish.skin, wish.itself, drive)
+    return HandBody(actor.name, part, laws, drive.moves, wish.skin, wish.itself, drive, skin_parts(hand, skin))
 
 
 def _drive(scene: Scene, actor: Actor, hand: FleshHand, start: float) -> Drive:

@@ -259,7 +259,9 @@ class Equilibrium:
     ) -> Reached:
         kept = self._interplay.remembered(memory, contact, contact.responses, np.zeros_like(u), patient=True)
         kept = [replace(m, anchor=np.zeros_like(m.anchor)) for m in kept]
-        return Reached(u, reactions, contact.points, contact.responses, contact.slips, kept, residual)
+        # on the way to where friction took hold of it, what was apart slid on nothing
+        slips = [s - m.anchor[p.sites] for s, m, p in zip(contact.slips, memory, contact.points, strict=True)]
+        return Reached(u, reactions, contact.points, contact.responses, slips, kept, residual)
 
     def _unheld(self, prescribed: Prescribed) -> Loose:
         key = prescribed.degrees.tobytes()

@@ -31,7 +31,8 @@ class Touch:
         area: Slave area of each row [m²], shape (m,).
         pressed: The part of it inside the border of contact, which runs between nodes [m²], shape (m,).
         held: The part of that which friction or a bond holds; its border runs between nodes as well [m²], shape (m,).
-        slip: Tangential displacement relative to the other side since the instant before [m], shape (m, 3).
+        slip: Tangential displacement relative to the other side since the instant before, or since friction took hold
+            of what was apart then [m], shape (m, 3).
         sticking: Whether friction or a bond holds, shape (m,).
         bonded: Whether the bond still holds, shape (m,).
         nodal: Forces on every node of the body, both sides [N], shape (N, 3).
