@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -47,11 +48,14 @@ class SolvedFrame:
         return np.divide(force, area, out=np.zeros(len(x)), where=area > 0.0)
 
 
-def solved_frame(frame: float, instant: ContactInstant) -> SolvedFrame:
-    """What an equilibrium leaves."""
-    touches = instant.touches
-    count = len(instant.displacement)
-    nodal = np.stack([t.nodal for t in touches]) if touches else np.zeros((0, count, 3))
-    imprint = stacked([t.imprint for t in touches], count)
-    deepest = max((float(np.maximum(-t.gap, 0.0).max(initial=0.0)) for t in touches), default=0.0)
-    return SolvedFrame(frame, instant.displacement, instant.reactions, nodal, imprint, instant.solves, deepest)
+def solved_frame(frame: float, instants: Sequence[ContactInstant]) -> SolvedFrame:
+    """What equilibria on the way from the frame before leave, the last of them at the frame."""
+    last = instants[-1]
+    count = len(last.displacement)
+    nodal = np.stack([t.nodal for t in last.touches]) if last.touches else np.zeros((0, count, 3))
+    imprint = stacked([t.imprint for t in last.touches], count)
+    slid = sum((stacked([t.imprint for t in instant.touches], count).slid for instant in instants[:-1]), imprint.slid)
+    deepest = max((float(np.maximum(-t.gap, 0.0).max(initial=0.0)) for t in last.touches), default=0.0)
+    solves = sum(instant.solves for instant in instants)
+    whole = replace(imprint, slid=slid)
+    return SolvedFrame(frame, last.displacement, last.reactions, nodal, whole, solves, deepest)

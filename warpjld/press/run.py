@@ -12,9 +12,11 @@ from warpjld.errors import InputError
 from warpjld.fem import Instant, Solution, Status, solve
 from warpjld.fem.contact import ContactInstant, ContactSolution, press
 from warpjld.press.bodies import Bodies
+from warpjld.press.brushes import Brush, brushes_between
 from warpjld.press.checks import why_not
 from warpjld.press.detour import TOLERANCE
 from warpjld.press.frames import SolvedFrame, solved_frame
+from warpjld.press.passing import Passing
 from warpjld.press.state import State, load_state, save_state
 
 __all__ = ["Solved", "solve_frames"]
@@ -30,6 +32,7 @@ class Solved:
         start: Frame of time 0.
         frames: In order.
         resumed: How many of them an earlier run left.
+        brushes: Touches between frames that no frame shows.
     """
 
     status: Status
@@ -37,6 +40,7 @@ class Solved:
     start: float
     frames: tuple[SolvedFrame, ...]
     resumed: int = 0
+    brushes: tuple[Brush, ...] = ()
 
 
 def solve_frames(
@@ -68,8 +72,15 @@ def solve_frames(
     Raises:
         InputError: A state that belongs to something else.
     """
+
+    def ended(status: Status, message: str) -> Solved:
+        return Solved(status, message, start, tuple(done), resumed, tuple(brushes))
+
     done: list[SolvedFrame] = []
+    resumed = 0
     after: ContactSolution | None = None
+    passing = Passing(bodies)
+    brushes: list[Brush] = []
     mark = f"{bodies.body.mesh.nodes.sum():.17g} {len(bodies.pairs)} {start:g} {[float(f) for f in frames]}"
     if state is not None and state.is_file():
         found = load_state(state)
@@ -82,17 +93,20 @@ def solve_frames(
     for solved in done:
         reason = watch(solved) if watch else None
         if reason:
-            return Solved(Status.STOPPED, reason, start, tuple(done), resumed)
+            return ended(Status.STOPPED, reason)
     if not bodies.pairs:
         return _alone(bodies, start, frames, watch, progress)
     for frame in frames[len(done) :]:
         progress(f"contact, frame {frame:g}", len(done), len(frames))
+        before = 0.0 if after is None else after.last.time
+        now = np.zeros_like(bodies.body.mesh.nodes) if after is None else after.last.displacement
+        steps = passing.times(before, frame - start, now)
         solution = press(
             bodies.body,
             bodies.prescribed,
             bodies.pairs,
             bodies.loads_at,
-            times=(frame - start,),
+            times=steps,
             after=after,
             method=method,
             aitken=aitken,
@@ -101,23 +115,25 @@ def solve_frames(
             check=False,
         )
         if not solution.converged:
-            reason = why_not(bodies, frame - start) or solution.message
-            return Solved(solution.status, f"at frame {frame:g}: {reason}", start, tuple(done), resumed)
+            ahead = [why_not(bodies, time) for time in steps if time > solution.last.time]
+            reason = next(filter(None, ahead), solution.message)
+            return ended(solution.status, f"at frame {frame:g}: {reason}")
         if mend is not None and after is not None:
             solution = mend(after, solution)
+        brushes += brushes_between(bodies, None if after is None else after.last, solution.instants, start)
         after = solution
-        solved = solved_frame(float(frame), solution.last)
+        solved = solved_frame(float(frame), solution.instants)
         bodies.note(frame - start, solved.displacement, solved.reactions, solved.nodal)
         done.append(solved)
         if state is not None:
             save_state(state, State(mark, tuple(done), solution))
         reason = watch(solved) if watch else None
         if reason:
-            return Solved(Status.STOPPED, reason, start, tuple(done), resumed)
+            return ended(Status.STOPPED, reason)
         if pauses and frame in pauses:
             progress(f"looking for a grip, frame {frame:g}", len(done), len(frames))
             pauses[frame](solution)
-    return Solved(Status.CONVERGED, Status.CONVERGED.value, start, tuple(done), resumed)
+    return ended(Status.CONVERGED, Status.CONVERGED.value)
 
 
 def _alone(
@@ -144,7 +160,7 @@ def _alone(
         instant = ContactInstant(
             frame - start, last.displacement, last.reactions, (), last.newton, last.iterations, last.residual
         )
-        done.append(solved_frame(float(frame), instant))
+        done.append(solved_frame(float(frame), [instant]))
         reason = watch(done[-1]) if watch else None
         if reason:
             return Solved(Status.STOPPED, reason, start, tuple(done))

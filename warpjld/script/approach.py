@@ -28,6 +28,11 @@ _CLEAR = 2e-4
 _PARTED = 0.01
 """Skin of two digits that is nearer than this at rest belongs to where they part [m]."""
 
+_DIGIT = 0.01
+"""Skin that goes no farther than this passes no digit unseen [m]."""
+_MOST = 40
+"""Moments between two frames at most."""
+
 
 @dataclass(frozen=True, eq=False)
 class Approach:
@@ -63,14 +68,48 @@ def approach(scene: Scene, pressing: Pressing) -> Approach:
     # a grip is searched for from digits that touch, and may do so without pressing: that has to be solved
     latest = min([pressing.last - 1.0, *(np.ceil(wish.first) - 1.0 for wish in wishes.grips)])
     for frame in range(pressing.first, int(latest) + 1):
-        held, places = _held(scene, float(frame), free, moved)
-        if held:
-            return Approach(float(max(pressing.first, frame - 1)), moved)
-        for name, place in places.items():
-            frames, sequence = moved.setdefault(name, ([], []))
-            frames.append(float(frame))
-            sequence.append(place)
+        for moment in [float(frame)] if frame == pressing.first else _moments(scene, frame, moved):
+            held, places = _held(scene, moment, free, moved)
+            if held:
+                return Approach(float(max(pressing.first, frame - 1)), moved)
+            for name, place in places.items():
+                frames, sequence = moved.setdefault(name, ([], []))
+                frames.append(moment)
+                sequence.append(place)
     return Approach(latest, moved)
+
+
+def _moments(scene: Scene, frame: int, moved: dict[str, tuple[list[float], list[Places]]]) -> list[float]:
+    """Moments after the frame before and up to this one, so close that skin passes nothing from one to the next."""
+    from warpjld.fem.contact.meshes import RigidMesh
+    from warpjld.press.passing import half_thickness, way_past
+
+    times = [0.0, 0.5, 1.0]
+    count = 1.0
+    skins = [_skins(scene, frame - 1.0 + time) for time in times]
+    paths = {name: [at[name] for at in skins] for name in scene.contact.flesh}
+    for path in paths.values():
+        farthest = float(np.linalg.norm(path[-1] - path[0], axis=1).max(initial=0.0))
+        count = max(count, farthest / _DIGIT)
+    for prop in scene.props.values():
+        obstacle = prop_obstacle(scene, prop, frame - 1.0)
+        if prop.name in moved:
+            obstacle = RigidMesh(moved[prop.name][1][-1].apply(prop.thing.vertices)[0], prop.thing.faces)
+        ways = [way_past(obstacle, times, path) for path in paths.values()]
+        if any(way > 0.0 for way in ways):
+            count = max(count, max(ways) / half_thickness(obstacle))
+    pieces = min(_MOST, int(np.ceil(count)))
+    return [frame - 1.0 + (k + 1) / pieces for k in range(pieces)]
+
+
+def _skins(scene: Scene, frame: float) -> dict[str, NDArray[np.float64]]:
+    """Of the actors whose flesh deforms, as the covering has them, by name [m]."""
+    moment = np.array([frame])
+    return {
+        name: cover(actor).deform(stage(actor, moment, scene.rate))[0].astype(np.float64)
+        for name in scene.contact.flesh
+        for actor in (scene.actor(name),)
+    }
 
 
 def _held(
@@ -81,11 +120,7 @@ def _held(
     from warpjld.press.settle import settle
 
     moment = np.array([frame])
-    skins = {
-        name: cover(actor).deform(stage(actor, moment, scene.rate))[0].astype(np.float64)
-        for name in scene.contact.flesh
-        for actor in (scene.actor(name),)
-    }
+    skins = _skins(scene, frame)
     if any(_meets_itself(scene.actor(name), wish, skins[name]) for name, wish in scene.contact.flesh.items()):
         return True, {}
     obstacles = {p.name: prop_obstacle(scene, p, frame) for p in scene.props.values() if p.name not in free}

@@ -137,6 +137,7 @@ def _run(scene: Scene, pressing: Pressing, folder: Path, progress: Report) -> Pr
         return np.asarray(cover(one).deform(stage(one, np.array([frame]), scene.rate))[0])
 
     pressed = Pressed(bodies, solved, covered, pushed, shapes)
+    notes += [brush.text for brush in solved.brushes]
     if solved.frames:
         notes += pressed.notes(solved.frames[-1].frame)
     return PressReport(pressed, table.rows, verdict, grips, notes)

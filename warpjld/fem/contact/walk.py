@@ -160,7 +160,8 @@ class Walk:
         contact = self.contact
         nothing = np.zeros_like(self.u)
         kept = self._play.remembered(self.memory, contact, contact.responses, nothing, patient=True)
-        kept = [replace(m, anchor=np.zeros_like(m.anchor)) for m in kept]
+        left = 1.0 if self._step.allowed > 0.0 else 0.0  # what was parted stays so
+        kept = [replace(m, anchor=np.zeros_like(m.anchor), allowance=left * m.allowance) for m in kept]
         # on the way to where friction took hold of it, what was apart slid on nothing
         slips = [s - m.anchor[p.sites] for s, m, p in zip(contact.slips, self.memory, contact.points, strict=True)]
         return Reached(self.u, self._reactions, contact.points, contact.responses, slips, kept, self.unbalanced)
