@@ -25,8 +25,10 @@ from warpjld.press.volumes import ObjectVolume
 from warpjld.press.where import placed
 from warpjld.press.wishes import ContactWishes
 
-__all__ = ["Bodies", "HandBody", "ObjectBody", "PairOf", "assemble"]
+__all__ = ["WORN", "Bodies", "HandBody", "ObjectBody", "PairOf", "assemble"]
 
+WORN = 0.5
+"""Share of the flesh in skin from which on it has flesh to give way with."""
 _ON = 2e-4
 """An object nearer to an obstacle than this lies on it [m]."""
 
@@ -55,10 +57,10 @@ class HandBody:
     drive: Drive
     parts: SkinParts
 
-    def worn(self, part: str, least: float) -> bool:
-        """Whether most of a digit's skin, or the palm's, has at least that share of flesh under it."""
+    def worn(self, part: str) -> bool:
+        """Whether most of a digit's skin, or the palm's, has flesh to give way with."""
         mine = self.parts.part_of[self.parts.labels] == self.parts.names.index(part)
-        return bool((self.part.blend[mine] >= least).mean() > 0.5)
+        return bool((self.part.blend[mine] > WORN).mean() > 0.5)
 
     def prescribed(self, time: float) -> Prescribed:
         """Displacements of the bones' nodes and of those where the flesh was cut off."""

@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+
 import numpy as np
 from numpy.typing import NDArray
 
 from warpjld.errors import InputError
 from warpjld.fem import HexMesh
 from warpjld.fem.contact.facets import Facets
-from warpjld.press.bodies import Bodies
+from warpjld.fem.contact.surface import surface_of
+from warpjld.press.bodies import Bodies, HandBody
+from warpjld.press.passing import LOOKS_AHEAD
 from warpjld.press.where import placed
 from warpjld.press.wishes import ContactWishes
 
@@ -22,7 +26,8 @@ _DEEP = 5e-4
 
 
 def refuse_hopeless(bodies: Bodies, wishes: ContactWishes) -> None:
-    """Refuse bonds between bodies that do not meet, and objects inside flesh.
+    """Refuse bonds between bodies that do not meet, objects inside flesh, and skin that begins deeper in something than
+    contact looks (R112).
 
     Raises:
         InputError: Names the command's line.
@@ -44,6 +49,29 @@ def refuse_hopeless(bodies: Bodies, wishes: ContactWishes) -> None:
         for name, vertices in shapes.items():
             if (flesh.project(np.asarray(vertices)).distance < 0.0).all():
                 raise InputError(f"{name} lies inside {hand.name}: nothing can press it out; move it out of the flesh")
+        _refuse_deep(bodies, hand, surfaces)
+
+
+def _refuse_deep(bodies: Bodies, hand: HandBody, surfaces: Mapping[str, Facets]) -> None:
+    """Refuse skin that begins deeper in an object than overlap is parted from.
+
+    Raises:
+        InputError: Names the digits and what they are in.
+    """
+    flesh = hand.part.hand
+    skin = surface_of(flesh.mesh, flesh.name, hand.name)
+    x, most = flesh.mesh.nodes[skin.nodes], LOOKS_AHEAD * float(skin.edge.max())
+    depths = {name: -surface.project(x).distance for name, surface in surfaces.items()}
+    depths |= {name: -obstacle.project(x, 0.0).distance for name, obstacle in bodies.obstacles.items()}
+    for name, depth in depths.items():
+        if depth.max() > most:
+            part = hand.parts.part_of[flesh.node_labels[skin.nodes[depth > most]]]
+            digits = " and ".join(hand.parts.names[k] for k in np.unique(part))
+            where = f"{1e3 * depth.max():.2g} mm inside {name} at frame {bodies.start:g}, where contact begins"
+            raise InputError(
+                f"{hand.name} {digits}: {where}; with these elements it parts {1e3 * most:.2g} mm at most: begin "
+                "farther out, or take a larger ELEMENT"
+            )
 
 
 def why_not(bodies: Bodies, time: float) -> str:

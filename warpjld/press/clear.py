@@ -51,13 +51,22 @@ class Cleared:
     Attributes:
         vertices: Of every surface [m], shape (V, 3).
         moved: Farthest move of each [m].
-        left: Overlap of each two that is too deep to be a matter of elements and stays [m]; parts of one surface are
-            called by its name and theirs.
+        inside: Vertices that stay inside something, too deep to be a matter of elements, by the surface's name and that
+            of what they are in. Parts of one surface are called by its name and theirs.
     """
 
     vertices: dict[str, NDArray[np.float64]]
     moved: dict[str, float]
-    left: dict[tuple[str, str], float] = field(default_factory=dict)
+    inside: dict[tuple[str, str], Over] = field(default_factory=dict)
+
+    @property
+    def left(self) -> dict[tuple[str, str], float]:
+        """Overlap that stays of each two [m]."""
+        out: dict[tuple[str, str], float] = {}
+        for (one, other), found in self.inside.items():
+            two = (other, one) if (other, one) in out else (one, other)
+            out[two] = max(found.depth, out.get(two, 0.0))
+        return out
 
 
 def clear(surfaces: Mapping[str, Shown], obstacles: Mapping[str, Obstacle], time: float) -> Cleared:
@@ -87,19 +96,18 @@ def clear(surfaces: Mapping[str, Shown], obstacles: Mapping[str, Obstacle], time
     for body in bodies.values():
         for obstacle in obstacles.values():
             body.put(body.sunk(obstacle, time), 1.0)
-    left: dict[tuple[str, str], float] = {}
+    inside: dict[tuple[str, str], Over] = {}
     for one, other in pairs:
-        left[one, other] = max(bodies[one].over(bodies[other]).depth, bodies[other].over(bodies[one]).depth)
+        inside[one, other] = bodies[other].over(bodies[one])
+        inside[other, one] = bodies[one].over(bodies[other])
     for name, body in bodies.items():
-        for (part, against), found in body.itself().items():
-            two = (f"{name} {min(part, against)}", f"{name} {max(part, against)}")
-            left[two] = max(found.depth, left.get(two, 0.0))
-        for solid, obstacle in obstacles.items():
-            left[name, solid] = body.sunk(obstacle, time).depth
+        parts = sorted(body.itself().items(), key=lambda item: item[0])
+        inside |= {(f"{name} {part}", f"{name} {other}"): found for (part, other), found in parts}
+        inside |= {(name, solid): body.sunk(obstacle, time) for solid, obstacle in obstacles.items()}
     return Cleared(
         {name: body.at for name, body in bodies.items()},
         {name: body.moved for name, body in bodies.items()},
-        left,
+        inside,
     )
 
 

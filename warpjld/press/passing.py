@@ -16,17 +16,17 @@ from warpjld.fem.contact import Obstacle
 from warpjld.fem.contact.surface import surface_of
 from warpjld.press.bodies import Bodies, HandBody, ObjectBody
 
-__all__ = ["Passing", "half_thickness", "way_past"]
+__all__ = ["LOOKS_AHEAD", "Passing", "half_thickness", "way_past"]
 
-_AHEAD = 2.0
-"""How far contact looks, in edges."""
+LOOKS_AHEAD = 2.0
+"""How far contact looks, ahead and behind, in edges (``warpjld.fem.contact.points.Interface``)."""
 _LOOKS = 4
 """Moments of a step at which its way is looked at."""
 _MOST = 40
 """Steps that one is cut to at most."""
 _POINTS = 200
 _THIN = 5.0
-"""Percentage of an obstacle's points that may be thinner than it is said to be."""
+"""Percentage of an obstacle's surface where it may be thinner than it is said to be."""
 _FINEST, _WIDEST, _GROWS = 2.5e-4, 0.02, 1.6
 """Depths at which an obstacle's thickness is looked for [m]: the first, the last, and from one to the next."""
 
@@ -35,10 +35,11 @@ def half_thickness(obstacle: Obstacle, time: float = 0.0) -> float:
     """How deep a point may lie in an obstacle and be nearest to the side it came from [m], at most ``_WIDEST``."""
     vertices, faces = obstacle.mesh(time)
     corners = np.asarray(vertices, dtype=np.float64)[faces]
-    some = corners[np.linspace(0, len(corners) - 1, min(_POINTS, len(corners))).astype(int)]
-    normal = np.cross(some[:, 1] - some[:, 0], some[:, 2] - some[:, 0])
+    normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     size = np.linalg.norm(normal, axis=1)
-    points, normal = some.mean(axis=1)[size > 0.0], (normal / np.maximum(size, 1e-300)[:, None])[size > 0.0]
+    share = np.cumsum(size) / max(float(size.sum()), 1e-300)
+    some = np.minimum(np.searchsorted(share, (np.arange(_POINTS) + 0.5) / _POINTS), len(size) - 1)  # evenly by area
+    points, normal = corners[some].mean(axis=1), normal[some] / np.maximum(size[some], 1e-300)[:, None]
     depth, deepest = _FINEST, np.full(len(points), _FINEST)
     while depth <= _WIDEST:
         deepest = np.maximum(deepest, -obstacle.project(points - depth * normal, time).distance)
@@ -84,11 +85,11 @@ class Passing:
         paths = {one.name: self._path(one, times, displacement) for one in movers}
         worst = 0.0
         for name, path in paths.items():
-            reach = _AHEAD * float(self._surfaces[name].edge.max())
+            reach = LOOKS_AHEAD * float(self._surfaces[name].edge.max())
             for solid, obstacle in bodies.obstacles.items():
                 worst = max(worst, way_past(obstacle, times, path) / min(reach, self._thickness[solid]))
         for hand in bodies.hands:
-            reach = _AHEAD * float(self._surfaces[hand.name].edge.max())
+            reach = LOOKS_AHEAD * float(self._surfaces[hand.name].edge.max())
             for other in movers:
                 if other is hand:
                     way = self._past_itself(hand, paths[hand.name]) if hand.itself else 0.0

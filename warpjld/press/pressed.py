@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from warpjld.fem.hexmesh import HexMesh
 from warpjld.grasp import Places
-from warpjld.press.bodies import Bodies
+from warpjld.press.bodies import WORN, Bodies
 from warpjld.press.clear import Cleared, Shown, clear
 from warpjld.press.finer import Finer, finer
 from warpjld.press.outside import outer_triangles
@@ -25,10 +25,6 @@ _SUNKEN = 0.5
 """How deep in one another visible surfaces may come to be shown apart, in edges of elements."""
 _KEPT = 64
 """Frames whose surfaces are kept: exports, films and objects ask for the same ones in turn."""
-_WORN = 0.5
-"""Share of the flesh in skin from which on it has flesh to give way with."""
-_SEEN = 2e-4
-"""Overlap that is worth a note [m]."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -58,7 +54,7 @@ class Pressed:
         """An actor's surface (V, 3) at a frame; None where contact was not solved."""
         if not any(hand.name == actor for hand in self.bodies.hands) or self._displacement(frame) is None:
             return None
-        return self._cleared(frame)[1].vertices[actor]
+        return self.cleared(frame).vertices[actor]
 
     def object(self, name: str, frame: float) -> NDArray[np.float64] | None:
         """An object's surface (V, 3) at a frame; None where contact was not solved."""
@@ -71,44 +67,7 @@ class Pressed:
             if not len(frames) or not frames[0] <= frame <= frames[-1]:
                 return None
             return np.asarray(places[int(np.searchsorted(frames, frame))].apply(self.shapes[name])[0])
-        return self._cleared(frame)[1].vertices[name]
-
-    def notes(self, frame: float) -> list[str]:
-        """What there is to say of a frame's picture: overlap deeper than elements of their size explain, which stays,
-        and skin that is pressed but has no flesh to give way with."""
-        if self._displacement(frame) is None:
-            return []
-        shown, cleared = self._cleared(frame)
-        out = []
-        for two, depth in cleared.left.items():
-            if depth > _SEEN:
-                seen = f"{two[0]} and {two[1]} are seen to overlap by {1e3 * depth:.1f} mm at frame {frame:g}"
-                out.append(f"{seen}: {self._why(*two)}")
-        for hand in self.bodies.hands:
-            bare = hand.part.blend < _WORN
-            away = cleared.vertices[hand.name][bare] - shown[hand.name].vertices[bare]
-            far = np.linalg.norm(away, axis=1)
-            deepest = float(far.max(initial=0.0))
-            if deepest > _SEEN:
-                where = hand.parts.name_of(np.flatnonzero(bare)[far > _SEEN])
-                out.append(
-                    f"{hand.name}: skin of the {' and '.join(where)} without flesh is pushed aside by up to "
-                    f"{1e3 * deepest:.1f} mm at frame {frame:g}, and no force is counted there; FLESH {hand.name} … "
-                    f"{' '.join(where).upper()} gives it flesh"
-                )
-        return out
-
-    def _why(self, one: str, other: str) -> str:
-        """What leaves two overlapping, and what to do."""
-        for hand in self.bodies.hands:
-            parts = [name.removeprefix(f"{hand.name} ") for name in (one, other)]
-            if all(part in hand.parts.names for part in parts):
-                bare = [part for part in parts if not hand.worn(part, _WORN)]
-                if bare:
-                    return f"FLESH {hand.name} … {' '.join(bare).upper()} makes them press on each other"
-                if not hand.itself:
-                    return f"FLESH {hand.name} … ITSELF ON makes them press on each other"
-        return "smaller elements follow their shapes better"
+        return self.cleared(frame).vertices[name]
 
     def finer(self, name: str, faces: NDArray[np.int32], count: int) -> Finer:
         """An actor's or object's surface, with triangles split where anything ever presses on them.
@@ -127,28 +86,41 @@ class Pressed:
         if name not in self._maps or whole is None:
             return None
         surface, spread = self._maps[name]
-        return spread.of(whole[self.bodies.spans[name]], surface.of(self._cleared(frame)[1].vertices[name]))
+        return spread.of(whole[self.bodies.spans[name]], surface.of(self.cleared(frame).vertices[name]))
 
-    def _cleared(self, frame: float) -> tuple[dict[str, Shown], Cleared]:
-        """Visible surfaces at a frame that was solved, or between two, as they are carried, and without overlap."""
+    def shown(self, frame: float) -> dict[str, Shown]:
+        """Visible surfaces at a frame that was solved, or between two, as they are carried, by name."""
+        return self._surfaces(frame)[0]
+
+    def cleared(self, frame: float) -> Cleared:
+        """The same without overlap."""
+        return self._surfaces(frame)[1]
+
+    def most(self, name: str) -> float:
+        """How far vertices of a surface may be moved to be shown apart from others [m]."""
+        for hand in self.bodies.hands:
+            if hand.name == name:
+                return _SUNKEN * _edge(hand.part.hand.mesh, hand.part.hand.name)
+        volume = next(one.volume for one in self.bodies.objects if one.name == name)
+        return _SUNKEN * _edge(volume.mesh, volume.name)
+
+    def _surfaces(self, frame: float) -> tuple[dict[str, Shown], Cleared]:
         if frame not in self._latest:
             moved = self._displacement(frame)
             assert moved is not None
             spans = self.bodies.spans
             shown: dict[str, Shown] = {}
             for hand in self.bodies.hands:
-                flesh = hand.part.hand
-                most = _SUNKEN * _edge(flesh.mesh, flesh.name)
+                faces, most = hand.part.hand.surface.faces, self.most(hand.name)
                 covered = np.asarray(self.covered(hand.name, frame), dtype=np.float64)
                 skin = hand.part.worn(moved[spans[hand.name]], covered)
                 skin = covered + self._smoothers[hand.name].of(skin - covered)
-                presses = (hand.part.blend > _WORN) & hand.itself
-                shown[hand.name] = Shown(skin, flesh.surface.faces, hand.softness, most, hand.parts, presses)
+                presses = (hand.part.blend > WORN) & hand.itself
+                shown[hand.name] = Shown(skin, faces, hand.softness, most, hand.parts, presses)
             for one in self.bodies.objects:
                 volume = one.volume
-                most = _SUNKEN * _edge(volume.mesh, volume.name)
                 surface = volume.worn(moved[spans[one.name]])
-                shown[one.name] = Shown(surface, volume.faces, volume.physical.young, most)
+                shown[one.name] = Shown(surface, volume.faces, volume.physical.young, self.most(one.name))
             if len(self._latest) >= _KEPT:
                 self._latest.pop(next(iter(self._latest)))
             self._latest[frame] = shown, clear(shown, self.bodies.obstacles, frame - self.solved.start)

@@ -10,6 +10,7 @@ import numpy as np
 
 from warpjld.fem import Status
 from warpjld.press.run import Solved
+from warpjld.press.seen import Missed
 from warpjld.press.table import Row
 
 __all__ = ["Verdict", "verdict_of"]
@@ -20,7 +21,7 @@ class Verdict:
     """How a contact solve ended.
 
     Attributes:
-        status: Name of the solver's status.
+        status: Name of the solver's status; ``OVERLAP`` where it did not keep apart what it was to.
         text: One line.
         lines: One for each digit that touched.
         suggestions: What to change.
@@ -50,13 +51,16 @@ class Verdict:
         }
 
 
-def verdict_of(solved: Solved, rows: Sequence[Row], suggestions: Sequence[str]) -> Verdict:
+def verdict_of(
+    solved: Solved, rows: Sequence[Row], suggestions: Sequence[str], overlaps: Sequence[Missed] = ()
+) -> Verdict:
     """Judge what was solved.
 
     Args:
         solved: The frames.
         rows: The table.
         suggestions: What the muscles' report suggests at the frame that strains them most.
+        overlaps: What contact was to keep apart and did not, deepest first.
     """
     frames = (solved.frames[0].frame, solved.frames[-1].frame) if solved.frames else None
     lines = []
@@ -77,8 +81,12 @@ def verdict_of(solved: Solved, rows: Sequence[Row], suggestions: Sequence[str]) 
         lines.append(line)
     over = [row for row in rows if row.share > 1.0]
     touched = any(row.force_n > 0.0 for row in rows)
+    status = solved.status.name
     if solved.status not in (Status.CONVERGED, Status.STOPPED):
         text = f"no equilibrium: {solved.message}"
+    elif overlaps:
+        status = "OVERLAP"
+        text = f"not solved: {overlaps[0].text}, and forces there are wrong"
     elif over:
         worst = max(over, key=lambda row: row.share)
         need = f"{100 * worst.share:.0f} % of what muscles can do"
@@ -90,6 +98,8 @@ def verdict_of(solved: Solved, rows: Sequence[Row], suggestions: Sequence[str]) 
     elif touched:
         share = max((row.share for row in rows if not np.isnan(row.share)), default=0.0)
         text = f"realistic: muscles do at most {100 * share:.0f} % of what they can"
+    elif solved.brushes:
+        text = f"nothing touches at any frame, but between them: {solved.brushes[0].text}"
     else:
         text = "nothing touches at any frame"
-    return Verdict(solved.status.name, text, tuple(lines), tuple(suggestions), frames)
+    return Verdict(status, text, tuple(lines), tuple(suggestions), frames)

@@ -91,6 +91,7 @@ def _run(scene: Scene, pressing: Pressing, folder: Path, progress: Report) -> Pr
     from warpjld.press.mend import Mending
     from warpjld.press.pressed import Pressed
     from warpjld.press.run import solve_frames
+    from warpjld.press.seen import missed, seen
     from warpjld.press.verdict import verdict_of
 
     wishes = scene.contact
@@ -123,12 +124,6 @@ def _run(scene: Scene, pressing: Pressing, folder: Path, progress: Report) -> Pr
     )
     if solved.resumed:
         notes.append(f"{solved.resumed} of {len(solved.frames)} frames were in {pressing.state} already")
-    verdict = verdict_of(solved, table.rows, table.suggestions())
-    verdict = replace(
-        verdict,
-        grips=tuple(f"{one.wish.actor} at frame {one.wish.first:g}: {one.text}" for one in grips),
-        corrections=(*(one.text for one in mending.worst), *mending.failed),
-    )
     pushed = {name: (np.array(frames), places) for name, (frames, places) in before.moved.items()}
     shapes = {name: scene.prop(name).thing.vertices for name in pushed}
 
@@ -137,9 +132,15 @@ def _run(scene: Scene, pressing: Pressing, folder: Path, progress: Report) -> Pr
         return np.asarray(cover(one).deform(stage(one, np.array([frame]), scene.rate))[0])
 
     pressed = Pressed(bodies, solved, covered, pushed, shapes)
+    verdict = verdict_of(solved, table.rows, table.suggestions(), missed(pressed))
+    verdict = replace(
+        verdict,
+        grips=tuple(f"{one.wish.actor} at frame {one.wish.first:g}: {one.text}" for one in grips),
+        corrections=(*(one.text for one in mending.worst), *mending.failed),
+    )
     notes += [brush.text for brush in solved.brushes]
     if solved.frames:
-        notes += pressed.notes(solved.frames[-1].frame)
+        notes += seen(pressed, solved.frames[-1].frame)
     return PressReport(pressed, table.rows, verdict, grips, notes)
 
 
