@@ -74,13 +74,15 @@ class FleshWish:
     """An actor whose flesh deforms (R105).
 
     Attributes:
-        digits: Those whose flesh is meshed, as ``index``, or ``palm``; empty for the whole hand.
+        digits: Those whose flesh is meshed, as ``index``, or ``palm``; empty for the whole hand. With the thumb comes
+            its ball.
         element: Edge length of the elements [m].
         flesh: Young's modulus of what lies between skin and bone [Pa].
         skin: Young's modulus of the outermost layer of elements [Pa].
         poisson: Poisson's ratio of both.
         stiffening: Exponent of Fung's law; 0 is neo-Hookean.
         itself: Whether the skin may touch itself (R126).
+        where: Place in a script, for messages.
     """
 
     digits: tuple[str, ...] = ()
@@ -90,6 +92,7 @@ class FleshWish:
     poisson: float = 0.48
     stiffening: float = 3.0
     itself: bool = True
+    where: Where | None = None
 
 
 @dataclass(frozen=True)

@@ -200,7 +200,8 @@ def part_of(hand: FleshHand, poses: Poses, skin: NDArray[np.float64], digits: Se
         hand: At rest in ``poses``.
         poses: That pose.
         skin: Its surface there [m], shape (V, 3).
-        digits: Their names, as ``index``, or ``palm``; none for the whole hand.
+        digits: Their names, as ``index``, or ``palm``; none for the whole hand. The thumb comes with its ball, the
+            thenar, which lies on what it grasps.
 
     Raises:
         InputError: No bone belongs to a digit.
@@ -208,7 +209,7 @@ def part_of(hand: FleshHand, poses: Poses, skin: NDArray[np.float64], digits: Se
     start = hand.moves(poses)
     if not digits:
         return Part(hand, start, np.empty(0, np.int64), np.ones(len(skin)), skin)
-    mine = np.array([bool(set(segment.split(".")[:-1]) & set(digits)) for segment in hand.segments])
+    mine = np.array([bool(_digits(segment) & set(digits)) for segment in hand.segments])
     if not mine.any():
         raise InputError(f"flesh: no bone belongs to {', '.join(digits)}")
     own = hand.weights[:, mine].sum(axis=1)
@@ -243,6 +244,12 @@ def part_of(hand: FleshHand, poses: Poses, skin: NDArray[np.float64], digits: Se
         hand, flesh=flesh, weights=hand.weights[used], skin_faces=skin_faces, skin_labels=hand.skin_labels[faces]
     )
     return Part(smaller, start, cut, blend, skin)
+
+
+def _digits(segment: str) -> set[str]:
+    """What a segment's flesh belongs to; that over the thumb's metacarpal, its ball, to the thumb and to the palm."""
+    *before, last = segment.split(".")
+    return {*before, *({last} if before[-1:] == ["palm"] and last == "thumb" else ())}
 
 
 def _harmonic(

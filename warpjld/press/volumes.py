@@ -23,6 +23,8 @@ _ACROSS = 12
 
 _WALL = 2
 """Elements through a wall."""
+_MANY = 1e6
+"""Elements of an object that are too many."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -75,6 +77,7 @@ def object_volume(name: str, thing: GraspObject, physical: Physical, place: Plac
         InputError: Elements too large for it, a wall too thick, or a pressure its wall cannot hold.
     """
     size = physical.element or float(thing.size.min()) / _ACROSS
+    _refuse_many(thing, physical.wall, size)
     if thing.origin == "ball":
         mesh = _ball(thing, physical.wall, size)
     elif thing.origin == "box" and not physical.wall:
@@ -109,6 +112,17 @@ def object_volume(name: str, thing: GraspObject, physical: Physical, place: Plac
         thing.faces,
         _turned(stress, turn.T),
     )
+
+
+def _refuse_many(thing: GraspObject, wall: float, size: float) -> None:
+    """Raise before hours are spent on meshing."""
+    x, y, z = (float(extent) for extent in thing.size)
+    room = 2.0 * _WALL * (x * y + y * z + z * x) * size if wall else x * y * z
+    if room > _MANY * size**3:
+        least = (room / size / _MANY) ** 0.5 if wall else (room / _MANY) ** (1.0 / 3.0)
+        raise InputError(
+            f"elements of {size:g} m would be some {room / size**3:,.0f}, more than can be solved: take {least:.2g} m or more"
+        )
 
 
 def _ball(thing: GraspObject, wall: float, size: float) -> HexMesh:

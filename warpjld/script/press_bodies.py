@@ -43,7 +43,7 @@ def hand_body(scene: Scene, actor: Actor, wish: FleshWish, start: float, notes: 
     """An actor's flesh, in the shape it has at a frame.
 
     Raises:
-        InputError: It cannot be meshed in that pose.
+        InputError: It cannot be meshed in that pose; names the line of its FLESH.
     """
     from warpjld.fem.hand.flesh_hand import build_flesh_hand
     from warpjld.fem.hand.laws import hand_laws
@@ -54,7 +54,11 @@ def hand_body(scene: Scene, actor: Actor, wish: FleshWish, start: float, notes: 
     poses = stage(actor, np.array([start]), scene.rate)
     skin = cover(actor).deform(poses)[0].astype(np.float64)
     rig = replace(actor.rig, skeleton=actor.skeleton)
-    built = build_flesh_hand(rig, wish.element, name=actor.name.lower())
+    try:
+        built = build_flesh_hand(rig, wish.element, name=actor.name.lower())
+    except InputError as error:
+        what = error.message.replace("spacing:", "ELEMENT:")
+        raise placed(InputError(f"FLESH {actor.name}: {what}"), wish.where) from error
     hand, gap = posed(built, poses, skin)
     if gap > 0.5 * wish.element:
         notes.append(f"{actor.name}: the volume stays up to {1e3 * gap:.1f} mm off the skin where it folds")

@@ -6,26 +6,23 @@ from collections.abc import Callable, Sequence
 from contextlib import ExitStack
 from dataclasses import replace
 from pathlib import Path, PurePosixPath
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from warpjld.errors import InputError
 from warpjld.script.binding import cover
 from warpjld.script.crowd import Crowd, Role
 from warpjld.script.folder import OutputFolder
 from warpjld.script.formats import check_available, video_is_available
 from warpjld.script.grasping import contact_reports
-from warpjld.script.outputs import ContactSheet, Export, Film, Grips, Output, Picture, Table, Touch, Volume
+from warpjld.script.outputs import ContactSheet, Export, Film, Grips, Output, Picture, Table
 from warpjld.script.pictures import draw_contact_sheet, draw_picture, film_studio
+from warpjld.script.press_files import check_press, write_press
 from warpjld.script.props import Prop, prop_surface
 from warpjld.script.scene import Actor, Scene
 from warpjld.script.staging import frame_numbers, notes, stage
 from warpjld.script.summary import Summary
-
-if TYPE_CHECKING:
-    from warpjld.script.pressing import PressReport
 
 __all__ = ["Report", "cast", "run_scene"]
 
@@ -78,7 +75,7 @@ def run_scene(
     if scene.contact.pressing is not None and scene.contact.grips:
         outputs.append(Grips("grips.csv"))
     check_available([output.name for output in outputs])
-    _check_press(scene, outputs)
+    summary.notes += check_press(scene, outputs, frames)
     for actor in scene.actors.values():
         stage(actor, frames[:1], scene.rate)  # keys beyond limits are found here
         summary.notes += notes(actor, frames)
@@ -99,7 +96,7 @@ def run_scene(
         with summary.timed("frames"):
             _make_sequences(scene, crowd, frames, outputs, out, threads, progress)
         if report is not None:
-            _write_press(report, outputs, out)
+            write_press(report, outputs, out)
         if scene.props:
             with summary.timed("contacts"):
                 summary.contacts = contact_reports(scene, crowd)
@@ -229,45 +226,6 @@ def _make_sequences(
                 together = np.concatenate([vertices[k] for vertices in worn])
                 for studio in studios:
                     studio.take(start + k, together)
-
-
-def _check_press(scene: Scene, outputs: Sequence[Output]) -> None:
-    """Raise where something is asked for that only PRESS gives."""
-    if scene.contact.pressing is not None:
-        return
-    for output in outputs:
-        if isinstance(output, Table | Touch | Volume) or (
-            isinstance(output, Film | Picture) and output.style == "pressure"
-        ):
-            raise InputError(f"'{output.name}' shows contact, but none is solved: PRESS <first> <last> asks for it")
-
-
-def _write_press(report: PressReport, outputs: Sequence[Output], out: OutputFolder) -> None:
-    """Tables and volumes."""
-    from warpjld.press.grips import write_grips
-    from warpjld.press.table import write_table
-    from warpjld.press.volume_series import write_volumes
-
-    for output in outputs:
-        if isinstance(output, Table):
-            write_table(out.place(output.name), report.rows)
-        elif isinstance(output, Grips):
-            write_grips(out.place(output.name), report.grips)
-        elif isinstance(output, Touch):
-            _write_touch(report, output, out.place(output.name))
-        elif isinstance(output, Volume):
-            write_volumes(out.place(output.name), report.pressed)
-
-
-def _write_touch(report: PressReport, output: Touch, path: Path) -> None:
-    from warpjld.fem.hand.tactile_files import draw_tactile, write_tactile
-
-    actor = output.actor or next((hand.name for hand in report.pressed.bodies.hands), "nobody")
-    felt = report.tactile(actor)
-    if path.suffix == ".png":
-        draw_tactile(path, felt, f"What {actor.lower()} feels")
-    else:
-        write_tactile(path, felt)
 
 
 def _make_pictures(

@@ -1,0 +1,75 @@
+"""Files that show contact: whether they can be made, and their making (R95)."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from warpjld.errors import InputError
+from warpjld.press.where import placed
+from warpjld.script.folder import OutputFolder
+from warpjld.script.outputs import Film, Grips, Output, Picture, Table, Touch, Volume
+
+if TYPE_CHECKING:
+    from warpjld.script.pressing import PressReport
+    from warpjld.script.scene import Scene
+
+__all__ = ["check_press", "write_press"]
+
+
+def check_press(scene: Scene, outputs: Sequence[Output], frames: NDArray[np.float64]) -> list[str]:
+    """Raise where something is asked for that only PRESS gives, at frames it does not solve; notes on the others.
+
+    Args:
+        scene: What the script described.
+        outputs: Files to make.
+        frames: Frames to make, shape (F,).
+    """
+    pressing = scene.contact.pressing
+    shows = [o for o in outputs if isinstance(o, Film | Picture) and o.style == "pressure"]
+    if pressing is None:
+        for output in [*(o for o in outputs if isinstance(o, Table | Touch | Volume)), *shows]:
+            raise InputError(f"'{output.name}' shows contact, but none is solved: PRESS <first> <last> asks for it")
+        return []
+    first, last = float(frames[0]), float(frames[-1])
+    span = f"PRESS solves frames {pressing.first} to {pressing.last}"
+    if pressing.last < first or pressing.first > last:
+        raise placed(InputError(f"{span}, but {first:g} to {last:g} are made: see FRAMES"), pressing.where)
+    for output in shows:
+        if isinstance(output, Picture) and not pressing.first <= output.frame <= pressing.last:
+            raise placed(
+                InputError(f"'{output.name}' shows pressure at frame {output.frame:g}, but {span}"), pressing.where
+            )
+    return [f"{span}, of which those after {last:g} are not made: see FRAMES"] if pressing.last > last else []
+
+
+def write_press(report: PressReport, outputs: Sequence[Output], out: OutputFolder) -> None:
+    """Tables and volumes."""
+    from warpjld.press.grips import write_grips
+    from warpjld.press.table import write_table
+    from warpjld.press.volume_series import write_volumes
+
+    for output in outputs:
+        if isinstance(output, Table):
+            write_table(out.place(output.name), report.rows)
+        elif isinstance(output, Grips):
+            write_grips(out.place(output.name), report.grips)
+        elif isinstance(output, Touch):
+            _write_touch(report, output, out.place(output.name))
+        elif isinstance(output, Volume):
+            write_volumes(out.place(output.name), report.pressed)
+
+
+def _write_touch(report: PressReport, output: Touch, path: Path) -> None:
+    from warpjld.fem.hand.tactile_files import draw_tactile, write_tactile
+
+    actor = output.actor or next((hand.name for hand in report.pressed.bodies.hands), "nobody")
+    felt = report.tactile(actor)
+    if path.suffix == ".png":
+        draw_tactile(path, felt, f"What {actor.lower()} feels")
+    else:
+        write_tactile(path, felt)
