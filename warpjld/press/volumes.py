@@ -121,7 +121,8 @@ def _refuse_many(thing: GraspObject, wall: float, size: float) -> None:
     if room > _MANY * size**3:
         least = (room / size / _MANY) ** 0.5 if wall else (room / _MANY) ** (1.0 / 3.0)
         raise InputError(
-            f"elements of {size:g} m would be some {room / size**3:,.0f}, more than can be solved: take {least:.2g} m or more"
+            f"elements of {size:g} m would be some {room / size**3:,.0f}: more than can be solved; take {least:.2g} m "
+            "or more"
         )
 
 

@@ -30,20 +30,26 @@ def check_press(scene: Scene, outputs: Sequence[Output], frames: NDArray[np.floa
         frames: Frames to make, shape (F,).
     """
     pressing = scene.contact.pressing
-    shows = [o for o in outputs if isinstance(o, Film | Picture) and o.style == "pressure"]
+    span = "" if pressing is None else f"PRESS solves frames {pressing.first} to {pressing.last}"
+    for output in outputs:
+        problem = ""
+        colored = isinstance(output, Film | Picture) and output.style == "pressure"
+        if pressing is None:
+            if colored or isinstance(output, Table | Touch | Volume):
+                problem = "shows contact, but none is solved: PRESS <first> <last> asks for it"
+        elif isinstance(output, Picture) and colored and not pressing.first <= output.frame <= pressing.last:
+            problem = f"shows pressure at frame {output.frame:g}, but {span}"
+        elif isinstance(output, Touch) and (output.actor or "") not in ("", *scene.contact.flesh):
+            problem = f"shows what {output.actor} feels, but it has no flesh: FLESH {output.actor} makes it so"
+        elif isinstance(output, Touch) and not scene.contact.flesh:
+            problem = "shows what skin feels, but no actor has flesh: FLESH <actor> makes it so"
+        if problem:
+            raise placed(InputError(f"'{output.name}' {problem}"), scene.asked.get(output.name))
     if pressing is None:
-        for output in [*(o for o in outputs if isinstance(o, Table | Touch | Volume)), *shows]:
-            raise InputError(f"'{output.name}' shows contact, but none is solved: PRESS <first> <last> asks for it")
         return []
     first, last = float(frames[0]), float(frames[-1])
-    span = f"PRESS solves frames {pressing.first} to {pressing.last}"
     if pressing.last < first or pressing.first > last:
         raise placed(InputError(f"{span}, but {first:g} to {last:g} are made: see FRAMES"), pressing.where)
-    for output in shows:
-        if isinstance(output, Picture) and not pressing.first <= output.frame <= pressing.last:
-            raise placed(
-                InputError(f"'{output.name}' shows pressure at frame {output.frame:g}, but {span}"), pressing.where
-            )
     return [f"{span}, of which those after {last:g} are not made: see FRAMES"] if pressing.last > last else []
 
 
@@ -70,6 +76,6 @@ def _write_touch(report: PressReport, output: Touch, path: Path) -> None:
     actor = output.actor or next((hand.name for hand in report.pressed.bodies.hands), "nobody")
     felt = report.tactile(actor)
     if path.suffix == ".png":
-        draw_tactile(path, felt, f"What {actor.lower()} feels")
+        draw_tactile(path, felt, f"What the skin of {actor} feels", "frame")
     else:
         write_tactile(path, felt)

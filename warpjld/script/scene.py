@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from warpjld.errors import InputError
+from warpjld.press.where import Where
 from warpjld.press.wishes import ContactWishes
 from warpjld.script.outputs import Camera, Output
 from warpjld.script.placement import Placement
@@ -108,6 +109,7 @@ class Scene:
         camera: For the outputs that follow.
         size: Width and height of pictures and films [pixels].
         outputs: Files to make, relative to the output folder.
+        asked: Where in a script they were asked for, by name.
         folder: The output folder.
         say: Where PRINT and SHOW write.
     """
@@ -125,6 +127,7 @@ class Scene:
     camera: Camera = field(default_factory=Camera)
     size: tuple[int, int] = (960, 720)
     outputs: list[Output] = field(default_factory=list)
+    asked: dict[str, Where] = field(default_factory=dict)
     folder: Path = Path("out")
     say: Callable[[str], None] = print
 

@@ -65,8 +65,15 @@ def write_tactile(path: Path, tactile: Tactile) -> None:
         write_csv(path, tactile_rows(tactile), TACTILE_COLUMNS, described=f"{path.stem}.columns.json")
 
 
-def draw_tactile(path: Path, tactile: Tactile, title: str = "") -> None:
-    """Plot normal force, area, and slip and sticking of every pad that is ever touched, digits in columns."""
+def draw_tactile(path: Path, tactile: Tactile, title: str = "", axis: str = "time") -> None:
+    """Plot normal force, area, and slip and sticking of every pad that is ever touched, digits in columns.
+
+    Args:
+        path: PNG.
+        tactile: Readings.
+        title: Above all.
+        axis: What times are.
+    """
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
 
@@ -82,24 +89,24 @@ def draw_tactile(path: Path, tactile: Tactile, title: str = "") -> None:
     rows = (
         ("normal force, N", tactile.normal_force, 1.0),
         ("area, mm²", tactile.area, 1e6),
-        ("slip since the last instant, mm", tactile.slip, 1e3),
+        ("slip in the step, mm", tactile.slip, 1e3),
         ("share that sticks", tactile.sticking, 1.0),
     )
     for column, (group, members) in enumerate(groups.items()):
         axes[0, column].set_title(group, fontsize=11)
-        axes[-1, column].set_xlabel("time")
+        axes[-1, column].set_xlabel(axis)
         for row, (label, values, scale) in enumerate(rows):
-            axis = axes[row, column]
+            place = axes[row, column]
             for shade, p in zip(_SHADES * (1 + len(members) // len(_SHADES)), members, strict=False):
                 name = tactile.pads[p].rpartition(".")[2]
-                axis.plot(tactile.times, scale * values[:, p], color=shade, marker="o", markersize=2.5, label=name)
-            axis.grid(alpha=0.25)
+                place.plot(tactile.times, scale * values[:, p], color=shade, marker="o", markersize=2.5, label=name)
+            place.grid(alpha=0.25)
             if column == 0:
-                axis.set_ylabel(label, fontsize=9)
+                place.set_ylabel(label, fontsize=9)
             if row == 0:
-                axis.legend(fontsize=8, frameon=False)
-    for axis in axes[3]:
-        axis.set_ylim(-0.05, 1.05)
+                place.legend(fontsize=8, frameon=False)
+    for place in axes[3]:
+        place.set_ylim(-0.05, 1.05)
     if not groups:
         axes[0, 0].text(0.5, 0.5, "nothing touches", ha="center", transform=axes[0, 0].transAxes)
     beside = path.with_name(path.stem + ".part.png")

@@ -125,3 +125,5 @@ def ask_for(scene: Scene, arguments: Arguments, output: Output) -> None:
     if any(other.name.lower() == output.name.lower() for other in scene.outputs):
         raise arguments.error(f"'{output.name}' is asked for twice")
     scene.outputs.append(output)
+    at = arguments.position
+    scene.asked[output.name] = (at.path, at.line, at.column)
