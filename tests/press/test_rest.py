@@ -77,6 +77,16 @@ def test_a_part_is_one_digit_and_blends_into_the_covering(hand: FleshHand, cover
     np.testing.assert_allclose(part.hand.prescribed_by(again).values, 0.0, atol=1e-12)
 
 
+def test_the_thumb_comes_with_its_ball(hand: FleshHand, rig: Rig) -> None:
+    rest = rest_poses(rig.skeleton)
+    thumb, palm = (part_of(hand, rest, rig.surface.vertices, (name,)) for name in ("thumb", "palm"))
+    names = np.array(thumb.hand.label_names)
+    assert {"left.palm.thumb", "left.thumb.proximal", "left.thumb.distal"} <= set(names[thumb.hand.skin_labels])
+    assert not any("index.middle" in name for name in names[thumb.hand.skin_labels])
+    assert ((thumb.blend > 0.5) & (palm.blend > 0.5)).sum() > 50
+    assert len(thumb.hand.mesh.nodes) < 0.6 * len(palm.hand.mesh.nodes)
+
+
 def test_a_whole_hand_is_its_own_part(hand: FleshHand, rig: Rig) -> None:
     part = part_of(hand, rest_poses(rig.skeleton), rig.surface.vertices)
     assert len(part.cut) == 0

@@ -149,6 +149,11 @@ def test_bones_in_a_rigid_object_are_named(run: Callable[[str], Scene], tmp_path
             r"<script>:2:1: A: points P: no point of the object lies there",
         ),
         ("OBJECT a GLASS\nPHYSICAL a ELEMENT 0.01", r"<script>:2:1: A: "),
+        (
+            "MOVE LEFT 0 0 0 0\nFLESH left INDEX ELEMENT 0.05",
+            r"<script>:2:1: FLESH LEFT: ELEMENT: 0.05 m is too coarse",
+        ),
+        ("FLESH left INDEX ELEMENT 0.00005", r"<script>:1:1: FLESH LEFT: ELEMENT: 5e-05 m would make a grid of"),
     ],
 )
 def test_hopeless_scenes_are_refused(run: Callable[[str], Scene], tmp_path: Path, lines: str, message: str) -> None:
@@ -157,9 +162,36 @@ def test_hopeless_scenes_are_refused(run: Callable[[str], Scene], tmp_path: Path
         run_press(scene, tmp_path)
 
 
-def test_pressure_wants_a_press(run: Callable[[str], Scene], tmp_path: Path) -> None:
-    with pytest.raises(InputError, match=r"'a.png' shows contact, but none is solved"):
-        run_scene(run("PICTURE 0 'a.png' PRESSURE"), tmp_path, dry=True)
+@pytest.mark.parametrize(
+    ("lines", "message"),
+    [
+        ("PICTURE 0 'a.png' PRESSURE", r"<script>:1:1: 'a.png' shows contact, but none is solved"),
+        ("TABLE 't.csv'", r"<script>:1:1: 't.csv' shows contact, but none is solved"),
+        (
+            "FLESH left\nPRESS 2 6\nPICTURE 9 'a.png' PRESSURE",
+            r"<script>:3:1: 'a.png' shows pressure at frame 9, but PRESS solves frames 2 to 6",
+        ),
+        (
+            "OBJECT a BALL 0.06\nPHYSICAL a\nPRESS 2 6\nTACTILE 't.csv'",
+            r"<script>:4:1: 't.csv' shows what skin feels, but no actor has flesh",
+        ),
+        (
+            "OBJECT a BALL 0.06\nPHYSICAL a\nPRESS 2 6\nTACTILE 't.csv' LEFT",
+            r"<script>:4:1: 't.csv' shows what LEFT feels, but it has no flesh: FLESH LEFT makes it so",
+        ),
+        ("FRAMES 0 4\nFLESH left\nPRESS 10 20", r"<script>:3:1: PRESS solves frames 10 to 20, but 0 to 4 are made"),
+    ],
+)
+def test_what_cannot_be_shown_is_refused_before_anything_is_solved(
+    run: Callable[[str], Scene], tmp_path: Path, lines: str, message: str
+) -> None:
+    with pytest.raises(InputError, match=message):
+        run_scene(run(lines), tmp_path, dry=True)
+
+
+def test_frames_solved_but_not_made_are_noted(run: Callable[[str], Scene], tmp_path: Path) -> None:
+    summary = run_scene(run("FRAMES 0 4\nFLESH left\nPRESS 2 20"), tmp_path, dry=True)
+    assert "PRESS solves frames 2 to 20, of which those after 4 are not made: see FRAMES" in summary["notes"]
 
 
 def test_a_free_ball_settles_between_what_closes_on_it() -> None:

@@ -69,6 +69,9 @@ def test_a_pressurised_ball_keeps_its_shape() -> None:
 def test_volumes_that_cannot_be() -> None:
     with pytest.raises(InputError, match=r"elements of 0\.02 m are too large|too coarse"):
         made(glass(), element=0.02)
+    for wall in (0.0, 0.002):
+        with pytest.raises(InputError, match=r"elements of 5e-05 m would be some [0-9,]+: more than can be"):
+            made(ball(0.06), element=5e-5, wall=wall)
     with pytest.raises(InputError, match=r"would burst a wall of 0\.0005 m"):
         made(ball(0.06), wall=0.0005, pressure=1e6, young=1e5)
 
