@@ -191,7 +191,8 @@ def facet_pairs(
     // what turns away, or lies far off, fades: a pair that comes or goes at once would make gaps jump
     auto fade = [](double t) { return t <= 0 ? 0.0 : t >= 1 ? 1.0 : t * t * (3 - 2 * t); };
     gap /= area;
-    const double weight = fade((facing - cosine) / turn) * fade(2 - 2 * fabs(gap) / reach);
+    const double farthest = gap < 0 ? depth.data[pair] : reach;
+    const double weight = fade((facing - cosine) / turn) * fade(2 - 2 * fabs(gap) / farthest);
     for (int i = 0; i < 32; ++i) out[i] *= weight;
     out[32] = area * weight;
 """
@@ -202,6 +203,7 @@ def integrate_pair(
     slave: wp.array(dtype=wp.int32),
     master: wp.array(dtype=wp.int32),
     x: wp.array(dtype=wp.float64),
+    depth: wp.array(dtype=wp.float64),
     facing: wp.float64,
     turn: wp.float64,
     reach: wp.float64,
@@ -216,6 +218,7 @@ def integrate(
     slave: wp.array(dtype=wp.int32),
     master: wp.array(dtype=wp.int32),
     x: wp.array(dtype=wp.float64),
+    depth: wp.array(dtype=wp.float64),
     facing: wp.float64,
     turn: wp.float64,
     reach: wp.float64,
@@ -223,4 +226,4 @@ def integrate(
     integrals: wp.array(dtype=wp.float64),
 ):
     """∫ N_a N_b and ∫ N_a M_b of each pair, (4 × 4) each, then the area; the area is zero where they do not face."""
-    integrate_pair(first + wp.tid(), pairs, slave, master, x, facing, turn, reach, integrals)
+    integrate_pair(first + wp.tid(), pairs, slave, master, x, depth, facing, turn, reach, integrals)

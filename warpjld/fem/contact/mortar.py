@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from warpjld.errors import InputError
+from warpjld.fem.contact.depth import deepest
 from warpjld.fem.contact.pairs import Pair
 from warpjld.fem.contact.surface import ContactSurface
 from warpjld.fem.rows import on_rows, shared
@@ -35,14 +36,16 @@ class Mortar:
         slave: Where pressures live.
         master: The other side; may be the same.
         pair: Exclusions.
-        count: Nodes of the body, N.
+        nodes: Rest positions of the body's nodes [m], shape (N, 3).
         threads: Threads.
     """
 
-    def __init__(self, slave: ContactSurface, master: ContactSurface, pair: Pair, count: int, threads: int) -> None:
+    def __init__(
+        self, slave: ContactSurface, master: ContactSurface, pair: Pair, nodes: NDArray[np.float64], threads: int
+    ) -> None:
         self.slave, self.master = slave, master
         self.offset = pair.offset
-        self._count, self._threads = count, threads
+        self._count, self._threads = len(nodes), threads
         exclusion = pair.exclusion
         if exclusion is None:
             mine, other = np.zeros(len(slave.quads), np.int32), np.zeros(len(master.quads), np.int32)
@@ -65,11 +68,14 @@ class Mortar:
                 raise InputError(f"{pair.title}: a surface against itself wants an exclusion, to know its parts")
             never |= np.tril(np.ones_like(never))
         self._labels = [np.ascontiguousarray(a) for a in (mine, other, never)]
+        own = deepest(slave, nodes)
+        self._deepest = own, own if same else deepest(master, nodes)
 
     def points(self, x: NDArray[np.float64], reach: float, normals: NDArray[np.float64]) -> ContactPoints:
         """Points at positions x (N, 3) with slave normals (m, 3).
 
-        Of facets face to face, no farther apart than ``reach``, nor deeper.
+        Of facets face to face, no farther apart than ``reach``, nor deeper in each other than that, or than the middle
+        of either body.
         """
         from scipy.sparse import coo_array, csr_array
 
@@ -77,7 +83,7 @@ class Mortar:
 
         slave, master = self.slave, self.master
         pairs = self._neighbours(x, reach)
-        found = self.integrals(pairs, slave.quads, master.quads, x, reach)
+        found = self.integrals(pairs, slave.quads, master.quads, x, reach, self.depths(pairs, reach))
         some = found[:, 32] > 0.0
         pairs, found = pairs[some], found[some]
         corner = slave.corners[pairs[:, 0]]
@@ -96,6 +102,11 @@ class Mortar:
         gap = np.asarray(-np.einsum("mi,mi->m", normal, table @ x), np.float64)
         gap += self.aside(nodes, area[nodes])[0]
         return ContactPoints(nodes, table, normal, area[nodes], gap, np.zeros((len(nodes), 3)), facets=pairs)
+
+    def depths(self, pairs: NDArray[np.int32], reach: float) -> NDArray[np.float64]:
+        """How deep in each other pairs (P, 2) of facets may be [m], shape (P,)."""
+        own, far = self._deepest
+        return np.minimum(reach, np.minimum(own[pairs[:, 0]], far[pairs[:, 1]]))
 
     def aside(
         self, sites: NDArray[np.int64], area: NDArray[np.float64]
@@ -139,13 +150,15 @@ class Mortar:
         master: NDArray[np.int32],
         x: NDArray[np.float64],
         reach: float,
+        depth: NDArray[np.float64],
     ) -> NDArray[np.float64]:
-        """Of pairs (P, 2) of quadrilaterals with corners at x (n, 3), see the kernel, shape (P, 33)."""
+        """Of pairs (P, 2) of quadrilaterals with corners at x (n, 3), see the kernel, shape (P, 33); no farther apart
+        than ``reach``, nor deeper than each one's ``depth`` (P,)."""
         from warpjld_kernels import contact_mortar
 
         out = np.zeros((len(pairs), 33))
         if len(pairs):
-            tables = [np.ascontiguousarray(a).reshape(-1) for a in (pairs, slave, master, x)]
+            tables = [np.ascontiguousarray(a).reshape(-1) for a in (pairs, slave, master, x, depth)]
             arguments = [*(shared(t) for t in tables), _FACING, _TURN, reach, shared(out.reshape(-1))]
             on_rows(contact_mortar.integrate, len(pairs), arguments, threads=self._threads, least=200)
         return out

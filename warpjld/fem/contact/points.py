@@ -99,7 +99,7 @@ class Interface:
         self.share: Any
         if not isinstance(pair.master, Obstacle):
             master = surface_of(mesh, pair.master, f"{pair.title}: master")
-            self.mortar = Mortar(self.slave, master, pair, self._count, threads)
+            self.mortar = Mortar(self.slave, master, pair, mesh.nodes, threads)
             self.opposite = master.nodes
             self.edge = self.slave.edge
             self.share = eye_array(len(self.slave.nodes), format="csr")
