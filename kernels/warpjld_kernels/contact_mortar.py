@@ -165,7 +165,7 @@ def facet_pairs(
         {0.797426985353087, 0.101286507323456, 0.101286507323456, 0.125939180544827},
         {0.101286507323456, 0.797426985353087, 0.101286507323456, 0.125939180544827},
         {0.101286507323456, 0.101286507323456, 0.797426985353087, 0.125939180544827}};
-    double area = 0, gap = 0;
+    double area = 0, gap = 0, deepest = 0;
     for (int i = 0; i < count; ++i) {
         const double* u = poly[now][i];
         const double* v = poly[now][(i + 1) % count];
@@ -178,6 +178,7 @@ def facet_pairs(
             double ns[4], nm[4];
             if (!invert(ps, px, py, ns) || !invert(pm, px, py, nm)) continue;
             area += w;
+            for (int j = 0; j < 4; ++j) deepest += w * ns[j] * depth.data[4 * pair + j];
             for (int k = 0; k < 3; ++k)
                 for (int j = 0; j < 4; ++j) gap += w * n[k] * (nm[j] * xm[j][k] - ns[j] * xs[j][k]);
             for (int s = 0; s < 4; ++s)
@@ -191,8 +192,8 @@ def facet_pairs(
     // what turns away, or lies far off, fades: a pair that comes or goes at once would make gaps jump
     auto fade = [](double t) { return t <= 0 ? 0.0 : t >= 1 ? 1.0 : t * t * (3 - 2 * t); };
     gap /= area;
-    const double farthest = gap < 0 ? depth.data[pair] : reach;
-    const double weight = fade((facing - cosine) / turn) * fade(2 - 2 * fabs(gap) / farthest);
+    const double far = gap < 0 ? deepest / area : reach;
+    const double weight = fade((facing - cosine) / turn) * fade(2 - 2 * fabs(gap) / far);
     for (int i = 0; i < 32; ++i) out[i] *= weight;
     out[32] = area * weight;
 """
