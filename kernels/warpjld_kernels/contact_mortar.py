@@ -165,7 +165,7 @@ def facet_pairs(
         {0.797426985353087, 0.101286507323456, 0.101286507323456, 0.125939180544827},
         {0.101286507323456, 0.797426985353087, 0.101286507323456, 0.125939180544827},
         {0.101286507323456, 0.101286507323456, 0.797426985353087, 0.125939180544827}};
-    double area = 0, gap = 0, deepest = 0;
+    double area = 0, gap = 0;
     for (int i = 0; i < count; ++i) {
         const double* u = poly[now][i];
         const double* v = poly[now][(i + 1) % count];
@@ -178,7 +178,6 @@ def facet_pairs(
             double ns[4], nm[4];
             if (!invert(ps, px, py, ns) || !invert(pm, px, py, nm)) continue;
             area += w;
-            for (int j = 0; j < 4; ++j) deepest += w * ns[j] * depth.data[4 * pair + j];
             for (int k = 0; k < 3; ++k)
                 for (int j = 0; j < 4; ++j) gap += w * n[k] * (nm[j] * xm[j][k] - ns[j] * xs[j][k]);
             for (int s = 0; s < 4; ++s)
@@ -192,8 +191,7 @@ def facet_pairs(
     // what turns away, or lies far off, fades: a pair that comes or goes at once would make gaps jump
     auto fade = [](double t) { return t <= 0 ? 0.0 : t >= 1 ? 1.0 : t * t * (3 - 2 * t); };
     gap /= area;
-    const double far = gap < 0 ? deepest / area : reach;
-    const double weight = fade((facing - cosine) / turn) * fade(2 - 2 * fabs(gap) / far);
+    const double weight = fade((facing - cosine) / turn) * fade(2 - 2 * fabs(gap) / reach);
     for (int i = 0; i < 32; ++i) out[i] *= weight;
     out[32] = area * weight;
 """
@@ -204,7 +202,6 @@ def integrate_pair(
     slave: wp.array(dtype=wp.int32),
     master: wp.array(dtype=wp.int32),
     x: wp.array(dtype=wp.float64),
-    depth: wp.array(dtype=wp.float64),
     facing: wp.float64,
     turn: wp.float64,
     reach: wp.float64,
@@ -219,7 +216,6 @@ def integrate(
     slave: wp.array(dtype=wp.int32),
     master: wp.array(dtype=wp.int32),
     x: wp.array(dtype=wp.float64),
-    depth: wp.array(dtype=wp.float64),
     facing: wp.float64,
     turn: wp.float64,
     reach: wp.float64,
@@ -227,4 +223,4 @@ def integrate(
     integrals: wp.array(dtype=wp.float64),
 ):
     """∫ N_a N_b and ∫ N_a M_b of each pair, (4 × 4) each, then the area; the area is zero where they do not face."""
-    integrate_pair(first + wp.tid(), pairs, slave, master, x, depth, facing, turn, reach, integrals)
+    integrate_pair(first + wp.tid(), pairs, slave, master, x, facing, turn, reach, integrals)

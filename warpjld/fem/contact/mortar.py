@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from warpjld.errors import InputError
 from warpjld.fem.contact.pairs import Pair
+from warpjld.fem.contact.passed import counted
 from warpjld.fem.contact.surface import ContactSurface
 from warpjld.fem.rows import on_rows, shared
 
@@ -26,9 +27,6 @@ _LEAST = 1e-4
 _SLIVER, _OFF = 0.1, 0.25
 """Share of a node's surface below which its average hangs on a sliver, and by how many edges the least of slivers seem
 farther off than they are: what presses beside them is to hold them, not a pressure without bound on hardly any area."""
-_PASSED, _PASSING = 4.0, 0.5
-"""Depth, over the distance of the nearest part of the other side, and added to it in edges, from which on parts of one
-surface have come in from beside and not through the facet; see ``Mortar.depths``."""
 
 
 class Mortar:
@@ -68,12 +66,12 @@ class Mortar:
                 raise InputError(f"{pair.title}: a surface against itself wants an exclusion, to know its parts")
             never |= np.tril(np.ones_like(never))
         self._labels = [np.ascontiguousarray(a) for a in (mine, other, never)]
-        self._same = same
+        self._itself = exclusion if same else None
 
     def points(self, x: NDArray[np.float64], reach: float, normals: NDArray[np.float64]) -> ContactPoints:
         """Points at positions x (N, 3) with slave normals (m, 3).
 
-        Of facets face to face, no farther apart than ``reach``, nor deeper in each other than ``depths`` has it.
+        Of facets face to face, no farther apart than ``reach``, nor deeper.
         """
         from scipy.sparse import coo_array, csr_array
 
@@ -81,10 +79,15 @@ class Mortar:
 
         slave, master = self.slave, self.master
         pairs = self._neighbours(x, reach)
-        depth = self.depths(pairs, x, reach)
-        found = self.integrals(pairs, slave.quads, master.quads, x, reach, depth)
+        found = self.integrals(pairs, slave.quads, master.quads, x, reach)
         some = found[:, 32] > 0.0
-        pairs, found, depth = pairs[some], found[some], depth[some]
+        pairs, found = pairs[some], found[some]
+        share = np.ones(len(pairs))
+        if self._itself is not None:
+            share = counted(slave, self._itself, pairs, found, normals, x, reach, self._threads)
+            some = share > 0.0
+            pairs, share = pairs[some], share[some]
+            found = share[:, None] * found[some]
         corner = slave.corners[pairs[:, 0]]
         rows = np.repeat(corner, 4, axis=1)
         own = np.tile(slave.quads[pairs[:, 0]], 4)
@@ -100,29 +103,7 @@ class Mortar:
         normal = normals[nodes]
         gap = np.asarray(-np.einsum("mi,mi->m", normal, table @ x), np.float64)
         gap += self.aside(nodes, area[nodes])[0]
-        return ContactPoints(nodes, table, normal, area[nodes], gap, np.zeros((len(nodes), 3)), pairs, depth)
-
-    def depths(self, pairs: NDArray[np.int32], x: NDArray[np.float64], reach: float) -> NDArray[np.float64]:
-        """How deep in each other pairs (P, 2) may be at the corners of their slave facets [m], shape (P, 4).
-
-        Of two fingers side by side, the back of one faces the palmar side of the other as surfaces do that overlap,
-        only a finger deep: where their sides overlap by a little, one would be pushed out through the whole other one.
-        What is that much nearer to another part of a surface has not come in through a facet.
-        """
-        if not (self._same and len(pairs)):
-            return np.full((len(pairs), 4), reach)
-        import warp as wp
-        from warpjld_kernels import contact_near
-
-        slave = self.slave
-        away = np.empty((len(pairs), 4))
-        tables = [np.ascontiguousarray(a) for a in (pairs, slave.quads, self.master.quads)]
-        arguments = [*(shared(t) for t in tables), wp.array(np.ascontiguousarray(x), dtype=wp.vec3d, device="cpu", copy=False), shared(away)]
-        on_rows(contact_near.corner_distances, len(pairs), arguments, threads=self._threads, least=500)
-        corner = slave.corners[pairs[:, 0]]
-        nearest = np.full(len(slave.nodes), reach)
-        np.minimum.at(nearest, corner.ravel(), away.ravel())
-        return np.minimum(_PASSED * nearest + _PASSING * slave.edge, reach)[corner]
+        return ContactPoints(nodes, table, normal, area[nodes], gap, np.zeros((len(nodes), 3)), pairs, share)
 
     def aside(
         self, sites: NDArray[np.int64], area: NDArray[np.float64]
@@ -166,15 +147,13 @@ class Mortar:
         master: NDArray[np.int32],
         x: NDArray[np.float64],
         reach: float,
-        depth: NDArray[np.float64],
     ) -> NDArray[np.float64]:
-        """Of pairs (P, 2) of quadrilaterals with corners at x (n, 3), see the kernel, shape (P, 33); no farther apart
-        than ``reach``, and no deeper than ``depth`` (P, 4) at the slave's corners."""
+        """Of pairs (P, 2) of quadrilaterals with corners at x (n, 3), see the kernel, shape (P, 33)."""
         from warpjld_kernels import contact_mortar
 
         out = np.zeros((len(pairs), 33))
         if len(pairs):
-            tables = [np.ascontiguousarray(a).reshape(-1) for a in (pairs, slave, master, x, depth)]
+            tables = [np.ascontiguousarray(a).reshape(-1) for a in (pairs, slave, master, x)]
             arguments = [*(shared(t) for t in tables), _FACING, _TURN, reach, shared(out.reshape(-1))]
             on_rows(contact_mortar.integrate, len(pairs), arguments, threads=self._threads, least=200)
         return out

@@ -39,11 +39,14 @@ class Exclusion:
         slave: Label of each slave face, shape (F,).
         master: Label of each master face, shape (G,).
         never: Pairs of labels that are left out, shape (L, L).
+        joined: Those among them that are left out since they belong together, and not for being near at rest; all of
+            them if left out.
     """
 
     slave: NDArray[np.int32]
     master: NDArray[np.int32]
     never: NDArray[np.bool_]
+    joined: NDArray[np.bool_] | None = None
 
 
 @dataclass(frozen=True, eq=False)

@@ -104,18 +104,19 @@ class _Pairs:
     def __init__(
         self, mortar: Mortar, points: ContactPoints, rows: NDArray[np.int64], x: NDArray[np.float64], reach: float
     ) -> None:
-        assert points.facets is not None and points.depth is not None
+        assert points.facets is not None and points.share is not None
         slave = mortar.slave
         number = np.full(len(slave.nodes), -1)
         number[points.sites[rows]] = rows
         some = (number[slave.corners[points.facets[:, 0]]] >= 0).any(axis=1)
-        facets, depth = points.facets[some], points.depth[some]
+        facets, share = points.facets[some], points.share[some]
         nodes = np.concatenate([slave.quads[facets[:, 0]], mortar.master.quads[facets[:, 1]]], axis=1)
         self.rows = rows
         self.corner = number[slave.corners[facets[:, 0]]]
         self.column = (3 * nodes[:, :, None] + np.arange(3)).reshape(-1, 24)
         self._mortar, self._points, self._at, self._size = mortar, points, x[nodes], x.size
-        change = _differences(mortar, self._at, reach, depth, _STEP * float(np.median(slave.edge)))
+        change = _differences(mortar, self._at, reach, _STEP * float(np.median(slave.edge)))
+        change *= share[:, None, None]
         self.own, self.far = (change[:, :, k : k + 16].reshape(-1, 24, 4, 4) for k in (0, 16))
 
     def gaps(self) -> Any:
@@ -150,9 +151,7 @@ class _Pairs:
         return csr_array(coo_array((block.ravel(), (row.ravel(), column.ravel())), shape=shape))
 
 
-def _differences(
-    mortar: Mortar, at: NDArray[np.float64], reach: float, depth: NDArray[np.float64], step: float
-) -> NDArray[np.float64]:
+def _differences(mortar: Mortar, at: NDArray[np.float64], reach: float, step: float) -> NDArray[np.float64]:
     """Derivatives of each facet pair's integrals by the coordinates of its corners at (P, 8, 3), shape (P, 24, 33)."""
     count = len(at)
     moved = np.tile(at[:, None], (1, 25, 1, 1)).reshape(count, 25, 24)
@@ -160,7 +159,7 @@ def _differences(
     moved[:, 1 + k, k] += step
     corners = np.arange(count * 25 * 8, dtype=np.int32).reshape(-1, 2, 4)
     pairs = np.repeat(np.arange(count * 25, dtype=np.int32)[:, None], 2, axis=1)
-    found = mortar.integrals(pairs, corners[:, 0], corners[:, 1], moved, reach, np.repeat(depth, 25, axis=0))
+    found = mortar.integrals(pairs, corners[:, 0], corners[:, 1], moved, reach)
     found = found.reshape(count, 25, 33)
     return np.asarray((found[:, 1:] - found[:, :1]) / step)
 

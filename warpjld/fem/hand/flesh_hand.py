@@ -10,9 +10,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from warpjld.errors import InputError
+from warpjld.fem.contact.pairs import Exclusion
 from warpjld.fem.flesh import Flesh, flesh_of
 from warpjld.fem.hand.blend import Moves, moves_of
-from warpjld.fem.hand.labels import WEB, excluded_pairs, segment_name, skin_labels
+from warpjld.fem.hand.labels import WEB, excluded_pairs, joined_pairs, segment_name, skin_labels
 from warpjld.fem.hand.weights import bone_weights
 from warpjld.fem.hexmesh import HexMesh
 from warpjld.fem.prescribed import Prescribed
@@ -82,9 +83,9 @@ class FleshHand:
         np.add.at(votes, (self.mesh.quads(self.skin_faces), plain[self.skin_labels][:, None]), 1)
         return np.where(votes.any(axis=1), votes.argmax(axis=1), -1).astype(np.int32)
 
-    def self_contact(self) -> tuple[NDArray[np.int32], NDArray[np.int32], NDArray[np.bool_]]:
-        """Labels of slave and master faces and the pairs never tested, for the skin against itself (R126)."""
-        return self.skin_labels, self.skin_labels, self.excluded
+    def self_contact(self) -> Exclusion:
+        """What of the skin never meets, for the skin against itself (R126, R127)."""
+        return Exclusion(self.skin_labels, self.skin_labels, self.excluded, joined_pairs(self.label_names))
 
     def moves(self, poses: Poses, frame: int = 0) -> Moves:
         """Rigid motion of every bone from where it rests."""

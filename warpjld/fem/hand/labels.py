@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from warpjld.fem.hexmesh import HexMesh
 from warpjld.skeleton.hand import DIGITS
 
-__all__ = ["WEB", "excluded_pairs", "segment_name", "skin_labels"]
+__all__ = ["WEB", "excluded_pairs", "joined_pairs", "segment_name", "skin_labels"]
 
 _ENDS = {"tip": "distal", "knuckle3": "middle", "knuckle2": "proximal", "base": "palm", "carpometacarpal": "wrist"}
 _THUMB = {"tip": "distal", "knuckle3": "proximal", "knuckle2": "palm", "base": "wrist"}
@@ -77,14 +77,33 @@ def skin_labels(
     return out, tuple(names)
 
 
+def joined_pairs(names: Sequence[str]) -> NDArray[np.bool_]:
+    """Pairs of labels that belong together, symmetric, shape (L, L) (R127).
+
+    They are: a label with itself; neighbouring phalanges, and the first one with its metacarpal; parts of the palm and
+    the wrist. The last phalanx of a finger meets its first in a tight fist.
+    """
+    count = len(names)
+    out = np.eye(count, dtype=bool)
+    for a in range(count):
+        for b in range(a):
+            one, other = names[a].removesuffix(WEB), names[b].removesuffix(WEB)
+            digit = _digit(one)
+            if digit == _digit(other):
+                together = digit == "" or {_segment(one), _segment(other)} != {"proximal", "distal"} or _short(digit)
+            else:
+                together = _base_of(one, other) or _base_of(other, one)
+            out[a, b] = out[b, a] = together
+    return out
+
+
 def excluded_pairs(
     mesh: HexMesh, faces: NDArray[np.int32], label: NDArray[np.int32], names: Sequence[str], near: float
 ) -> NDArray[np.bool_]:
     """Pairs of labels that are never tested for contact, symmetric, shape (L, L) (R127).
 
-    They are: a label with itself; segments of one digit with one another (B: the third phalanx cannot interpenetrate
-    the second and first) and its first phalanx with its metacarpal; parts of the palm and the wrist; and whatever
-    lies within ``near`` of one another at rest (webs, and digits drawn side by side).
+    They are those that belong together (``joined_pairs``), and whatever lies within ``near`` of one another at rest
+    (webs, and digits drawn side by side).
 
     Args:
         mesh: At rest.
@@ -96,12 +115,7 @@ def excluded_pairs(
     from scipy.spatial import cKDTree
 
     count = len(names)
-    out = np.eye(count, dtype=bool)
-    digits = [_digit(name) for name in names]
-    for a in range(count):
-        for b in range(a):
-            joined = _base_of(names[a], names[b]) or _base_of(names[b], names[a])
-            out[a, b] = out[b, a] = digits[a] == digits[b] or joined
+    out = joined_pairs(names)
     quads = mesh.quads(faces)
     points = np.concatenate([mesh.nodes[quads].reshape(-1, 3), mesh.nodes[quads].mean(axis=1)])
     kinds = np.concatenate([np.repeat(label, 4), label])
@@ -126,5 +140,15 @@ def _digit(name: str) -> str:
 
 def _base_of(palm: str, phalanx: str) -> bool:
     """Whether a part of the palm lies over the metacarpal that carries this first phalanx."""
-    *side, kind, digit = palm.removesuffix(WEB).rsplit(".", 2)
-    return kind == "palm" and phalanx.removesuffix(WEB) == ".".join([*side, digit, "proximal"])
+    *side, kind, digit = palm.rsplit(".", 2)
+    return kind == "palm" and phalanx == ".".join([*side, digit, "proximal"])
+
+
+def _segment(name: str) -> str:
+    """``distal`` of ``left.index.distal``."""
+    return name.rpartition(".")[2]
+
+
+def _short(digit: str) -> bool:
+    """Whether a digit has two phalanges, which are neighbours."""
+    return _segment(digit) == "thumb"
