@@ -1,9 +1,9 @@
 """Facets of one surface that seem to overlap and do not.
 
-Of two fingers side by side the back of one faces the palmar side of the other, as surfaces do that overlap, only a whole
-finger deep. Where their sides touch, slivers of such facets lie one before the other, and one finger would be pushed out
-through the other. In the bottom of a crease normals of nodes are far from those of the facets around, and what is
-opposite a facet seems to be behind its node. What really overlaps so deep is that deep inside.
+Of two fingers side by side the back of one faces the palmar side of the other, as surfaces do that overlap, only a
+whole finger deep. Where their sides touch, slivers of such facets lie one before the other, and one finger would be
+pushed out through the other. In the bottom of a crease normals of nodes are far from those of the facets around, and
+what is opposite a facet seems to be behind its node. What really overlaps so deep is that deep inside.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from warpjld.rotations import unit
 
 __all__ = ["counted"]
 
-_TIMES, _SLACK = 3.0, 0.5
+_TIMES, _SLACK = 3.0, 0.25
 """Overlap along the normal that counts for nothing: over how deep facets are inside each other, and that of facets that
 only touch, in edges. Half of it counts fully."""
 
@@ -45,7 +45,10 @@ def counted(
         reach: Farthest that facets look at each other [m].
         threads: Threads.
     """
+    joined = _joined(exclusion)[exclusion.slave[pairs[:, 0]], exclusion.master[pairs[:, 1]]]
     out = np.ones(len(pairs))
+    if exclusion.fringe is not None:
+        out[joined] = exclusion.fringe[pairs[joined]].min(axis=1)
     own = integrals[:, :16].reshape(-1, 4, 4).sum(axis=1)
     far = integrals[:, 16:32].reshape(-1, 4, 4).sum(axis=1)
     area = own.sum(axis=1, keepdims=True)
@@ -56,7 +59,7 @@ def counted(
     between -= np.einsum("pk,pki->pi", own, x[surface.quads[pairs[:, 0]]])
     overlap = -np.einsum("pki,pi->pk", facing, between).min(axis=1)
     slack = _SLACK * surface.edge[surface.corners[pairs[:, 0]]].mean(axis=1)
-    some = np.flatnonzero(overlap > 0.5 * slack)
+    some = np.flatnonzero((overlap > 0.5 * slack) & ~joined)
     if not len(some):
         return out
     asked, rows = np.unique(pairs[some], return_inverse=True)
@@ -65,6 +68,10 @@ def counted(
     t = np.clip(2.0 - 2.0 * overlap[some] / (_TIMES * inside + slack[some]), 0.0, 1.0)
     out[some] = t * t * (3.0 - 2.0 * t)
     return out
+
+
+def _joined(exclusion: Exclusion) -> NDArray[np.bool_]:
+    return exclusion.never if exclusion.joined is None else exclusion.joined
 
 
 def _depths(
@@ -83,8 +90,8 @@ def _depths(
     corners = x[surface.quads] - origin
     boxes = (np.ascontiguousarray(b, dtype=np.float32) for b in (corners.min(axis=1), corners.max(axis=1)))
     bvh = wp.Bvh(*(wp.array(b, dtype=wp.vec3, device="cpu") for b in boxes))
-    joined = exclusion.never if exclusion.joined is None else exclusion.joined
-    tables = [np.ascontiguousarray(a) for a in (surface.quads, exclusion.slave.astype(np.int32), np.uint8(joined))]
+    label, joined = exclusion.slave.astype(np.int32), _joined(exclusion).astype(np.uint8)
+    tables = [np.ascontiguousarray(a) for a in (surface.quads, label, joined)]
     nodes = wp.array(np.ascontiguousarray(x), dtype=wp.vec3d, device="cpu", copy=False)
     out = np.empty((len(asked), 4))
     arguments = [bvh.id, wp.vec3d(*origin), *(shared(t) for t in tables), nodes, shared(asked), reach, shared(out)]

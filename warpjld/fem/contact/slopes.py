@@ -104,7 +104,8 @@ class _Pairs:
     def __init__(
         self, mortar: Mortar, points: ContactPoints, rows: NDArray[np.int64], x: NDArray[np.float64], reach: float
     ) -> None:
-        assert points.facets is not None and points.share is not None
+        assert points.facets is not None
+        assert points.share is not None
         slave = mortar.slave
         number = np.full(len(slave.nodes), -1)
         number[points.sites[rows]] = rows
