@@ -43,7 +43,7 @@ class Mortar:
         slave, master, threads: As given.
         offset: How far what is seen lies outside the nodes [m], shape (N,), where it does.
         labels: Of the slave's and the master's facets, shapes (F,) and (G,).
-        joined: Labels that belong together, shape (L, L).
+        joined, fringe: See ``Exclusion``.
     """
 
     def __init__(self, slave: ContactSurface, master: ContactSurface, pair: Pair, count: int, threads: int) -> None:
@@ -74,6 +74,7 @@ class Mortar:
             never |= np.tril(np.ones_like(never))
         self.labels = np.ascontiguousarray(mine), np.ascontiguousarray(other)
         self.joined = joined
+        self.fringe = None if exclusion is None else exclusion.fringe
         self._never = never
 
     def points(self, x: NDArray[np.float64], reach: float, normals: NDArray[np.float64]) -> ContactPoints:

@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 
 __all__ = ["counted"]
 
-_TIMES, _SLACK = 3.0, 0.5
+_TIMES, _SLACK = 3.0, 0.25
 """Overlap along the normal that counts for nothing: over how deep facets are inside each other, and that of facets that
 only touch, in edges. Half of it counts fully."""
 
@@ -47,7 +47,11 @@ def counted(
         reach: Farthest that facets look at each other [m].
     """
     slave, master = mortar.slave, mortar.master
+    mine, others = mortar.labels
+    joined = mortar.joined[mine[pairs[:, 0]], others[pairs[:, 1]]] > 0
     out = np.ones(len(pairs))
+    if mortar.fringe is not None:
+        out[joined] = mortar.fringe[pairs[joined]].min(axis=1)
     own = integrals[:, :16].reshape(-1, 4, 4).sum(axis=1)
     far = integrals[:, 16:32].reshape(-1, 4, 4).sum(axis=1)
     area = own.sum(axis=1, keepdims=True)
@@ -59,10 +63,9 @@ def counted(
     between -= np.einsum("pk,pki->pi", own, x[slave.quads[pairs[:, 0]]])
     overlap = -np.einsum("pki,pi->pk", facing, between).min(axis=1)
     slack = _SLACK * slave.edge[corners].mean(axis=1)
-    some = np.flatnonzero(overlap > 0.5 * slack)
+    some = np.flatnonzero((overlap > 0.5 * slack) & ~joined)
     if not len(some):
         return out
-    mine, others = mortar.labels
     inside = np.zeros(len(some))
     sides: list[_Side] = [(slave, mine), (master, others)]
     for side, shares in enumerate((own, far)):

@@ -13,7 +13,7 @@ from warpjld.errors import InputError
 from warpjld.fem.contact.pairs import Exclusion
 from warpjld.fem.flesh import Flesh, flesh_of
 from warpjld.fem.hand.blend import Moves, moves_of
-from warpjld.fem.hand.labels import WEB, excluded_pairs, joined_pairs, segment_name, skin_labels
+from warpjld.fem.hand.labels import WEB, excluded_pairs, fringes, joined_pairs, segment_name, skin_labels
 from warpjld.fem.hand.weights import bone_weights
 from warpjld.fem.hexmesh import HexMesh
 from warpjld.fem.prescribed import Prescribed
@@ -46,6 +46,7 @@ class FleshHand:
         skin_labels: Label of each of them, shape (F,).
         label_names: ``left.index.distal``, ``left.palm.index``, ``left.wrist``, …; ``….web`` near another digit.
         excluded: Pairs of labels that never touch, shape (L, L) (R127).
+        skin_fringes: Share with which skin faces touch others of their own finger, shape (F,).
     """
 
     name: str
@@ -58,6 +59,7 @@ class FleshHand:
     skin_labels: NDArray[np.int32]
     label_names: tuple[str, ...]
     excluded: NDArray[np.bool_]
+    skin_fringes: NDArray[np.float64]
 
     @property
     def mesh(self) -> HexMesh:
@@ -85,7 +87,8 @@ class FleshHand:
 
     def self_contact(self) -> Exclusion:
         """What of the skin never meets, for the skin against itself (R126, R127)."""
-        return Exclusion(self.skin_labels, self.skin_labels, self.excluded, joined_pairs(self.label_names))
+        labels, joined = self.skin_labels, joined_pairs(self.label_names)
+        return Exclusion(labels, labels, self.excluded, joined, self.skin_fringes)
 
     def moves(self, poses: Poses, frame: int = 0) -> Moves:
         """Rigid motion of every bone from where it rests."""
@@ -210,7 +213,8 @@ def build_flesh_hand(
     labels, names = skin_labels(mesh, faces, weights, joints, apart * spacing)
     excluded = excluded_pairs(mesh, faces, labels, names, 0.5 * apart * spacing)
     place = Moves(np.tile([0.0, 0.0, 0.0, 1.0], (len(joints), 1)), np.zeros((len(joints), 3)))
-    return FleshHand(name, flesh, rig.skeleton, rig.surface, place, weights, faces, labels, names, excluded)
+    fringe = fringes(mesh, faces, labels, names, apart * spacing)
+    return FleshHand(name, flesh, rig.skeleton, rig.surface, place, weights, faces, labels, names, excluded, fringe)
 
 
 def _between(mesh: HexMesh, weights: NDArray[np.float64], flesh: Flesh, joints: Sequence[str]) -> NDArray[np.bool_]:
