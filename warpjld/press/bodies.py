@@ -11,7 +11,7 @@ from scipy.spatial.transform import Rotation
 
 from warpjld.errors import InputError
 from warpjld.fem import Body, Loads, Material, Prescribed, merge
-from warpjld.fem.contact import Bond, Exclusion, Obstacle, Pair
+from warpjld.fem.contact import Bond, Obstacle, Pair
 from warpjld.fem.hand.blend import Moves
 from warpjld.grasp import Places
 from warpjld.press.drive import Drive
@@ -353,9 +353,8 @@ def _pairs(
     for hand in hands:
         if hand.itself and not paper:
             flesh = hand.part.hand
-            exclusion = Exclusion(flesh.skin_labels, flesh.skin_labels, flesh.excluded)
             friction = wishes.coefficient(hand.name, hand.name)
-            pairs.append(Pair(flesh.name, flesh.name, friction, f"{hand.name}–{hand.name}", exclusion))
+            pairs.append(Pair(flesh.name, flesh.name, friction, f"{hand.name}–{hand.name}", flesh.self_contact()))
             owners.append(PairOf(hand.name, hand.name))
     known = {o.name for o in objects}
     for bonded in wishes.bonds:

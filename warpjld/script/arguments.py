@@ -144,13 +144,13 @@ class Arguments:
             return value.text.upper()
         return None
 
-    def choice(self, what: str, options: Iterable[str]) -> str:
-        """One of these keywords, in capitals."""
+    def choice(self, what: str, options: Iterable[str], beside: Iterable[str] = ()) -> str:
+        """One of these keywords, in capitals; ``beside`` are others that a slip of the pen may have meant."""
         wanted = list(options)
         word = self.keyword(*wanted)
         if word is None:
             value = self._peek()
-            hint = did_you_mean(value.text, wanted) if isinstance(value, Word) else ""
+            hint = did_you_mean(value.text, [*wanted, *beside]) if isinstance(value, Word) else ""
             raise self.expected(f"{what} ({'/'.join(wanted)})" if what else "/".join(wanted), hint)
         return word
 
@@ -168,11 +168,14 @@ class Arguments:
             found[next(g for g in missing if word in groups[g])] = word
         return [found[g] for g in range(len(groups))]
 
-    def options(self, **readers: Callable[[], object]) -> dict[str, object]:
-        """Named options ``NAME value …`` in any order up to the end of the line: name in lower case → value."""
+    def options(self, *beside: str, **readers: Callable[[], object]) -> dict[str, object]:
+        """Named options ``NAME value …`` in any order up to the end of the line: name in lower case → value.
+
+        ``beside`` are words that could have stood before them, for hints.
+        """
         out: dict[str, object] = {}
         while self:
-            name = self.choice("an option", [n.upper() for n in readers]).lower()
+            name = self.choice("an option", [n.upper() for n in readers], beside).lower()
             if name in out:
                 raise self.error(f"{name.upper()} is given twice")
             out[name] = readers[name]()

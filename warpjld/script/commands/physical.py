@@ -76,6 +76,8 @@ def flesh(scene: Scene, arguments: Arguments) -> None:
     while (digit := arguments.keyword(*FINGERS, "PALM")) is not None:
         digits.append(digit.lower())
     options = arguments.options(
+        *FINGERS,
+        "PALM",
         element=lambda: arguments.number("the elements' size in metres", above=0.0),
         young=lambda: arguments.number("the flesh's modulus in Pa", above=0.0),
         skin=lambda: arguments.number("the skin's modulus in Pa", above=0.0),

@@ -43,6 +43,12 @@ def press(scene: Scene, arguments: Arguments) -> None:
         raise arguments.error("STOP or CORRECT, not both: corrected digits never bear too much")
     if not (scene.contact.flesh or scene.contact.physical):
         raise arguments.error("nothing deforms: make a body do so with FLESH or PHYSICAL first", arguments.position)
+    before = scene.contact.pressing
+    if before is not None and before.where is not None:
+        raise arguments.error(
+            f"line {before.where[1]} asks for frames {before.first} to {before.last} already: one PRESS solves them all",
+            arguments.position,
+        )
     scene.contact.pressing = Pressing(first, last, **options, where=place(arguments))  # type: ignore[arg-type]
 
 
