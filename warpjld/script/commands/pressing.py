@@ -46,7 +46,7 @@ def press(scene: Scene, arguments: Arguments) -> None:
     before = scene.contact.pressing
     if before is not None and before.where is not None:
         raise arguments.error(
-            f"line {before.where[1]} asks for frames {before.first} to {before.last} already: one PRESS solves them all",
+            f"line {before.where[1]} asks for frames {before.first} to {before.last} already: one PRESS is enough",
             arguments.position,
         )
     scene.contact.pressing = Pressing(first, last, **options, where=place(arguments))  # type: ignore[arg-type]
