@@ -1,40 +1,46 @@
-"""What contact puts on the muscles of a hand, from an equilibrium (R118)."""
+"""What contact puts on the bones of a hand and on its muscles, from an equilibrium (B eq. 8, R118).
+
+Bones are held by reactions. Less those that hold the same hand in the same pose when nothing touches it
+(``HandBody.alone``), they are what contact asks of the muscles. Contact of the hand's own skin, of two fingers, counts
+as contact: muscles press them together.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
 
-import numpy as np
-from numpy.typing import NDArray
-
-from warpjld.fem.hand.bone_loads import loads_from_contact
+from warpjld.fem import Loads
+from warpjld.fem.hand.bone_loads import loads_from_contact, loads_from_reactions
 from warpjld.fem.hand.muscles import Effort, effort_of
-from warpjld.press.bodies import Bodies, HandBody
+from warpjld.press.bodies import Bodies
+from warpjld.press.frames import SolvedFrame
+from warpjld.press.hand_body import HandBody
 from warpjld.skeleton import Poses
 
 __all__ = ["effort_at"]
 
 
 def effort_at(
-    bodies: Bodies,
-    hand: HandBody,
-    poses: Poses,
-    displacement: NDArray[np.float64],
-    nodal: NDArray[np.float64],
-    limits: Mapping[str, float] | None = None,
+    bodies: Bodies, hand: HandBody, poses: Poses, solved: SolvedFrame, limits: Mapping[str, float] | None = None
 ) -> Effort:
     """Compare what contact puts on the bones with what muscles can do.
 
-    Bent joints strain their own flesh, which is not the muscles' concern: contact alone is counted.
+    Where the flesh alone finds no equilibrium, contact forces are handed on to the bones by nearness instead, and the
+    digits' ``flesh`` is NaN.
 
     Args:
         bodies: Everything.
         hand: Whose.
         poses: One pose of it.
-        displacement: Of all nodes [m], shape (N, 3).
-        nodal: Contact forces of each pair [N], shape (P, N, 3).
+        solved: The equilibrium in that pose.
         limits: Digit → largest force [N], where it is not the default.
     """
     span = bodies.spans[hand.name]
-    loads = loads_from_contact(hand.part.hand, displacement[span], nodal.sum(axis=0)[span])
-    return effort_of(hand.drive.skeleton, poses, loads, limits=limits)
+    flesh = hand.part.hand
+    u, reactions, contact = solved.displacement[span], solved.reactions[span], solved.nodal.sum(axis=0)[span]
+    alone = hand.alone.at(u, reactions, contact, Loads(gravity=bodies.loads.gravity))
+    if alone is None:
+        return effort_of(hand.drive.skeleton, poses, loads_from_contact(flesh, u, contact), limits=limits)
+    own = loads_from_reactions(flesh, alone.displacement, alone.reactions)
+    loads = loads_from_reactions(flesh, u, reactions) - own
+    return effort_of(hand.drive.skeleton, poses, loads, limits=limits, flesh=own)

@@ -122,6 +122,7 @@ def _run(scene: Scene, pressing: Pressing, folder: Path, progress: Report) -> Pr
     )
     if solved.resumed:
         notes.append(f"{solved.resumed} of {len(solved.frames)} frames were in {pressing.state} already")
+    notes += table.notes()
     verdict = verdict_of(solved, table.rows, table.suggestions())
     verdict = replace(
         verdict,

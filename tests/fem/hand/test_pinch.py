@@ -13,7 +13,7 @@ from warpjld.fem import Body
 from warpjld.fem.contact import ContactSolution, Exclusion, Pair, press
 from warpjld.fem.hand import FleshHand, hand_laws
 from warpjld.hand import build_hand
-from warpjld.press.bodies import HandBody
+from warpjld.press.hand_body import HandBody
 from warpjld.press.rest import part_of, posed
 from warpjld.skeleton import CHANNELS, Poses, Skeleton, poses_from_angles
 
