@@ -38,7 +38,8 @@ def effort_at(
     span = bodies.spans[hand.name]
     flesh = hand.part.hand
     u, reactions, contact = solved.displacement[span], solved.reactions[span], solved.nodal.sum(axis=0)[span]
-    alone = hand.alone.at(u, reactions, contact, Loads(gravity=bodies.loads.gravity))
+    moves = hand.part.start.to(flesh.moves(poses))
+    alone = hand.alone.at(moves, u, reactions, contact, Loads(gravity=bodies.loads.gravity))
     if alone is None:
         return effort_of(hand.drive.skeleton, poses, loads_from_contact(flesh, u, contact), limits=limits)
     own = loads_from_reactions(flesh, alone.displacement, alone.reactions)

@@ -59,7 +59,8 @@ class HandBody:
     @cached_property
     def alone(self) -> FleshAlone:
         """Its flesh without what touches it."""
-        return FleshAlone(Body(self.part.hand.mesh, self.laws), self.prescribed(0.0).degrees)
+        hand = self.part.hand
+        return FleshAlone(hand, Body(hand.mesh, self.laws), self.prescribed(0.0).degrees)
 
 
 def _whole(nodes: NDArray[np.int64], moved: NDArray[np.float64]) -> Prescribed:

@@ -70,7 +70,6 @@ def hand_body(scene: Scene, actor: Actor, wish: FleshWish, start: float, notes: 
 
 def _drive(scene: Scene, actor: Actor, hand: FleshHand, start: float) -> Drive:
     from warpjld.press.drive import Drive
-    from warpjld.press.hand_body import HandBody
     from warpjld.skeleton import poses_from_angles
 
     def pose(time: float) -> Poses:
