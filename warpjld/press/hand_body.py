@@ -60,7 +60,7 @@ class HandBody:
     def alone(self) -> FleshAlone:
         """Its flesh without what touches it."""
         hand = self.part.hand
-        return FleshAlone(hand, Body(hand.mesh, self.laws), self.prescribed(0.0).degrees)
+        return FleshAlone(hand, Body(hand.mesh, self.laws), self.prescribed(0.0).degrees, self.drive.pose(0.0))
 
 
 def _whole(nodes: NDArray[np.int64], moved: NDArray[np.float64]) -> Prescribed:

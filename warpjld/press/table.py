@@ -32,9 +32,9 @@ class Row:
         peak_kpa: Highest pressure [kPa].
         bone_n: Length of the sum of the reactions that hold its bones, less those of the same hand in the same pose
             when nothing touches it [N]. Where flesh is cut off, the cut bears with the bones that move it.
-        flesh_n: Length of the latter alone: of what its flesh, strained by bent joints since time 0, puts on its bones
-            [N]; NaN for the palm, and where no equilibrium of the flesh alone was found: ``bone_n`` is then what
-            contact hands on to the bones by nearness.
+        flesh_n: Length of the latter [N]: of the weight of its flesh, and of the strain in it since time 0 where joints
+            bend; NaN for the palm, and where the flesh alone finds no equilibrium: ``bone_n`` is then what contact
+            hands on to the bones by nearness.
         limit_n: Largest force its muscles can bear [N]; NaN for the palm.
         share: Largest share of the limits of ``bone_n`` and of the torques it makes about the digit's joints; NaN for
             the palm.

@@ -4,9 +4,9 @@ Reactions that hold the bones of a pressed hand balance two things: contact, and
 are bent. Muscles' work is the former. The latter is found by an equilibrium of the hand's own mesh, without contact.
 
 It is gone to as a hand that nothing touches goes there: from the nearest pose that is known, the flesh carried along by
-its bones. That start lies so near that Newton's method takes two or three steps, and which way skin folds, where it may
-fold either way, is what such a hand has folded to. The pressed shape is no place to start from: without what presses
-it, and with its forces no less, it may be unstable where flesh is pressed hard.
+its bones, by way of poses between where that is too far. From one frame to the next Newton's method takes two or three
+steps; and where skin could fold either way, it folds as it would without contact. The pressed shape is no place to
+start from: with the forces that press it, but without what presses, hard pressed flesh is unstable.
 """
 
 from __future__ import annotations
@@ -17,23 +17,27 @@ import numpy as np
 from numpy.typing import NDArray
 
 from warpjld.errors import InputError
-from warpjld.fem.body import Body
+from warpjld.fem.body import Body, Tangent
 from warpjld.fem.conjugate import Status
+from warpjld.fem.contact.damping import Damping
 from warpjld.fem.contact.elastic import Elastic
 from warpjld.fem.contact.step_solver import StepSolver
 from warpjld.fem.dots import norm
 from warpjld.fem.hand.blend import Moves
 from warpjld.fem.hand.flesh_hand import FleshHand
+from warpjld.fem.hand.motion import halfway
 from warpjld.fem.loads import Loads
 from warpjld.fem.multigrid import IndefiniteError
 from warpjld.fem.prescribed import Prescribed
-from warpjld.fem.solution import Instant, Solution
-from warpjld.fem.static import solve
+from warpjld.skeleton.kinematics import Poses
 
 __all__ = ["FleshAlone", "Untouched"]
 
-_STEPS = 8
-"""Newton steps from a first guess; one that needs more is on its way to somewhere else."""
+_STEPS = 12
+"""Newton steps; where more are needed the pose between is a better start."""
+_SHORTEST = 0.05
+_HALVINGS = 6
+"""Times a way to another pose may be cut in two."""
 _TOLERANCE = 1e-4
 """Residual over the contact forces that are missing: what contact itself is solved to."""
 _ROUNDING = 1e-10
@@ -46,12 +50,12 @@ class Untouched:
     """Equilibrium of a hand that nothing touches.
 
     Attributes:
-        moves: Motions of its bones from where they rest.
+        poses: One pose.
         displacement: [m], shape (N, 3).
         reactions: Forces that hold the prescribed nodes [N], zero elsewhere, shape (N, 3).
     """
 
-    moves: Moves
+    poses: Poses
     displacement: NDArray[np.float64]
     reactions: NDArray[np.float64]
 
@@ -63,21 +67,24 @@ class FleshAlone:
         hand: At rest.
         body: Its own mesh and laws.
         degrees: Prescribed degrees of freedom, shape (n,): those of bones, and of nodes where flesh was cut off.
+        rest: The pose in which nothing is displaced.
     """
 
-    def __init__(self, hand: FleshHand, body: Body, degrees: NDArray[np.int64]) -> None:
+    def __init__(self, hand: FleshHand, body: Body, degrees: NDArray[np.int64], rest: Poses) -> None:
         self.body = body
         self._hand = hand
+        self._start = hand.moves(rest)
         self._degrees = degrees
         self._free = Prescribed(degrees, np.zeros(len(degrees))).free(body.degrees)
         self._elastic = Elastic(body)
         self._solver = StepSolver(body, "float64")
+        self._damping = Damping(body)
         nothing = np.zeros_like(body.mesh.nodes)
-        self._known = [Untouched(hand.place.still(), nothing, nothing)]
+        self._known = [Untouched(rest, nothing, nothing)]
 
     def at(
         self,
-        moves: Moves,
+        poses: Poses,
         displacement: NDArray[np.float64],
         reactions: NDArray[np.float64],
         contact: NDArray[np.float64],
@@ -86,7 +93,7 @@ class FleshAlone:
         """The hand with its bones as they are and nothing that touches it; None where no equilibrium is found.
 
         Args:
-            moves: Motions of its bones from where they rest.
+            poses: One pose.
             displacement: Of an equilibrium with contact in that pose [m], shape (N, 3).
             reactions: Forces that hold its prescribed nodes [N], shape (N, 3).
             contact: Contact forces on its nodes [N], shape (N, 3).
@@ -104,9 +111,10 @@ class FleshAlone:
         if away[nearest] == 0.0 and nearest > 0:
             return self._known[nearest]
         if contact.any():
-            found = self._from(self._known[nearest], moves, bones, norm(contact.reshape(-1)), loads or Loads())
+            pushed = norm(contact.reshape(-1))
+            found = self._from(self._known[nearest], poses, bones, pushed, loads or Loads(), _HALVINGS)
         else:
-            found = Untouched(moves, displacement, reactions)
+            found = Untouched(poses, displacement, reactions)
         if found is not None:
             if len(self._known) > _KEPT:
                 self._known.pop(1)  # rest stays
@@ -114,51 +122,76 @@ class FleshAlone:
         return found
 
     def _from(
-        self, before: Untouched, moves: Moves, bones: NDArray[np.float64], pushed: float, loads: Loads
+        self,
+        before: Untouched,
+        poses: Poses,
+        bones: NDArray[np.float64],
+        pushed: float,
+        loads: Loads,
+        halvings: int,
     ) -> Untouched | None:
-        """From another pose."""
-        guess = self._hand.guess(before.moves, moves, before.displacement).reshape(-1)
-        guess[self._degrees] = bones
-        found = self._newton(before, guess, pushed, loads)
-        if found is None:
-            last = Instant(1.0, before.displacement, before.reactions, 0, 0, 0.0)
-            solution = solve(
-                self.body,
-                Prescribed(self._degrees, bones),
-                loads,
-                after=Solution(Status.CONVERGED, (last,), "", np.empty(0, np.int64), loads),
-                tolerance=_TOLERANCE,
-                check=False,
-            )
-            if not solution.converged:
-                return None
-            found = solution.displacement, solution.reactions
-        return Untouched(moves, *found)
+        """From another pose, by way of the one between where that is too far."""
+        found = self._newton(before, poses, bones, pushed, loads)
+        if found is None and halvings > 0:
+            between = halfway(self._hand, before.poses, poses)
+            half = self._from(before, between, self._bones(between), pushed, loads, halvings - 1)
+            if half is not None:
+                found = self._from(half, poses, bones, pushed, loads, halvings - 1)
+        return found
+
+    def _moves(self, poses: Poses) -> Moves:
+        """Motions of the bones from rest."""
+        return self._start.to(self._hand.moves(poses))
+
+    def _bones(self, poses: Poses) -> NDArray[np.float64]:
+        """Where that takes the prescribed degrees of freedom, shape (n,)."""
+        nodes = self._degrees[::3] // 3
+        x = self.body.mesh.nodes[nodes]
+        return (self._moves(poses).blended(self._hand.weights[nodes], x) - x).reshape(-1)
 
     def _newton(
-        self, before: Untouched, u: NDArray[np.float64], pushed: float, loads: Loads
-    ) -> tuple[NDArray[np.float64], NDArray[np.float64]] | None:
-        """Displacement and reactions from a first guess (3N,), if that is near enough."""
-        elastic, free = self._elastic, self._free
+        self, before: Untouched, poses: Poses, bones: NDArray[np.float64], pushed: float, loads: Loads
+    ) -> Untouched | None:
+        """Another pose by Newton's method, if that is near enough."""
+        elastic, free, damping = self._elastic, self._free, self._damping
+        u = self._hand.guess(self._moves(before.poses), self._moves(poses), before.displacement).reshape(-1)
+        u[self._degrees] = bones
         if not elastic.upright(u):
             return None
         # a guess squeezes elements here and there, an equilibrium does not
         pressures = elastic.pressures(before.displacement.reshape(-1))
         self._solver.begin()
+        damping.begin()
         for _ in range(_STEPS):
             forces, external = elastic.forces(u).forces, elastic.external(loads, u)
             residual = np.where(free, external - forces, 0.0)
             balance = np.where(free, 0.0, forces - external)
             if norm(residual) <= max(_TOLERANCE * pushed, _ROUNDING * norm(balance)):
-                return u.reshape(-1, 3), balance.reshape(-1, 3)
-            stiffness = elastic.at(u, pressures, loads).stiffness
-            assert stiffness is not None
-            try:
-                done = self._solver.solve(stiffness, free, residual)
-            except IndefiniteError:
+                return Untouched(poses, u.reshape(-1, 3), balance.reshape(-1, 3))
+            move = self._move(elastic.at(u, pressures, loads), residual)
+            if move is None:
                 return None
-            if done.status is not Status.CONVERGED or not elastic.upright(u + done.x):
-                return None
-            pressures = elastic.pressures(u, done.x)
-            u = u + done.x
+            length = 1.0
+            while not elastic.upright(u + length * move):
+                length *= 0.5
+                if length < _SHORTEST:
+                    return None
+            damping.judge(length)
+            pressures = elastic.pressures(u, length * move)
+            u = u + length * move
         return None
+
+    def _move(self, tangent: Tangent, residual: NDArray[np.float64]) -> NDArray[np.float64] | None:
+        """A Newton step (3N,), damped as far as its matrix asks for it; None where that is no help."""
+        assert tangent.stiffness is not None
+        while True:
+            try:
+                done = self._solver.solve(self._damping.lend(tangent.stiffness), self._free, residual)
+                if done.status is Status.CONVERGED:
+                    return done.x
+                if done.status is not Status.INDEFINITE:
+                    return None
+            except IndefiniteError:
+                pass
+            if not self._damping.more():
+                return None

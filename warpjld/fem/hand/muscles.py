@@ -41,8 +41,8 @@ class DigitEffort:
         torques: Of base, knuckle 2 and knuckle 3 [N m], positive where flexors work, shape (3,).
         limit: Largest force [N].
         torque_limits: [N m], shape (3,).
-        flesh: Length of the sum of what flesh alone puts on its phalanges in that pose [N]: not in ``load``; NaN where
-            it is not known.
+        flesh: Length of the sum of what flesh alone, its weight and the strain of bent joints, puts on its phalanges in
+            that pose [N]: not in ``load``; NaN where it is not known.
     """
 
     digit: str
