@@ -5,12 +5,12 @@ Bones are held by reactions. Less those that hold the same hand in the same pose
 as contact: muscles press them together.
 
 Contact forces handed on to the bones by nearness (``loads_from_contact``) are near, and are what is left where the
-flesh alone finds no equilibrium. In ``examples/press_ball.jld`` they differ by less than 0.7 % in a digit's force, 0.3 %
-in the torque about its base, 7 % about knuckle 2 and 3 to 7 % about knuckle 3, there a third at the thumb and the
-pinky, which are pressed beside that joint; for a fingertip on a plate by less than 0.01 %, 0.01 %, 0.1 % and 4 %; for a
-force beside the root of a finger, which finger and palm share, by 10 % in force and 17 % in torque. Reactions with what
-flesh alone takes would be off by 0.15 N a finger in that example, and by 5 N at the thumb of a hand whose flesh is at
-rest when it is flat.
+flesh alone finds no equilibrium. In ``examples/press_ball.jld`` they differ by less than 0.7 % in a digit's force,
+0.3 % in the torque about its base, 7 % about knuckle 2 and 3 to 7 % about knuckle 3, there a third at the thumb and
+the pinky, which are pressed beside that joint; for a fingertip on a plate by less than 0.01 %, 0.01 %, 0.1 % and 4 %;
+for a force beside the root of a finger, which finger and palm share, by 10 % in force and 17 % in torque. Reactions
+with what flesh alone takes would be off by 0.15 N a finger in that example, and by 5 N at the thumb of a hand whose
+flesh is at rest when it is flat.
 """
 
 from __future__ import annotations

@@ -75,7 +75,7 @@ def balanced(hand: FleshHand, instant: ContactInstant) -> None:
 
 
 def test_rigid_ball(closing: HandMotion) -> None:
-    """Flesh at rest in the open hand is strained when it closes: by several newtons at the thumb, which do not count."""
+    """Flesh at rest in the open hand is strained when it closes, by newtons at the thumb: they do not count."""
     hand = closing.hand
     body = Body(hand.mesh, hand_laws(hand.mesh.region_names))
     alone = FleshAlone(hand, body, closing.prescribed(0.0).degrees, closing.pose(0.0))
