@@ -126,3 +126,20 @@ def test_without_a_measure_contact_is_handed_on_and_said_so(bending: Bending, mo
     (note,) = table.notes()
     assert f"no equilibrium in the pose of frame {solved.frame:g}" in note
     assert not any("estimated" in one for one in bending.report.notes)
+
+
+def test_muscles_stop_and_suggest_by_what_bones_bear(bending: Bending, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Of 1 N: the run stops, and it is said which joint to open."""
+    monkeypatch.setitem(bending.scene.contact.strength, "LEFT", {"index": 1.0})
+    table = PressRows(bending.scene, bending.bodies)
+    told = [table.take(solved) for solved in bending.frames]
+    solved = bending.frames[-1]
+    borne = bending.effort(solved)["index"].force
+    assert told[:-1] == [None] * (len(told) - 1)
+    assert told[-1] is not None
+    assert told[-1].startswith(
+        f"stopped at frame {solved.frame:g}: more than muscles can do: left.index {borne:.3g} N of"
+    )
+    (found,) = table.suggestions()
+    assert f"left.index {borne:.3g} N of 1 N" in found
+    assert "open " in found
