@@ -39,9 +39,9 @@ _SHORTEST = 0.05
 _HALVINGS = 6
 """Times a way to another pose may be cut in two."""
 _TOLERANCE = 1e-4
-"""Residual over the contact forces that are missing: what contact itself is solved to."""
-_ROUNDING = 1e-10
-"""The same over the forces that hold the bones, where contact forces are next to nothing."""
+"""Residual over the forces that hold the bones, or over the contact forces that are missing where those are less."""
+_ROUNDING = 1e-7
+"""Residual over the latter that is not worth a step."""
 _KEPT = 16
 
 
@@ -166,7 +166,7 @@ class FleshAlone:
             forces, external = elastic.forces(u).forces, elastic.external(loads, u)
             residual = np.where(free, external - forces, 0.0)
             balance = np.where(free, 0.0, forces - external)
-            if norm(residual) <= max(_TOLERANCE * pushed, _ROUNDING * norm(balance)):
+            if norm(residual) <= max(_TOLERANCE * min(pushed, norm(balance)), _ROUNDING * pushed):
                 return Untouched(poses, u.reshape(-1, 3), balance.reshape(-1, 3))
             move = self._move(elastic.at(u, pressures, loads), residual)
             if move is None:
