@@ -17,7 +17,11 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
+import numpy as np
+from numpy.typing import NDArray
+
 from warpjld.fem import Loads
+from warpjld.fem.contact import ContactInstant
 from warpjld.fem.hand.bone_loads import loads_from_contact, loads_from_reactions
 from warpjld.fem.hand.muscles import Effort, effort_of
 from warpjld.press.bodies import Bodies
@@ -29,7 +33,11 @@ __all__ = ["effort_at"]
 
 
 def effort_at(
-    bodies: Bodies, hand: HandBody, poses: Poses, solved: SolvedFrame, limits: Mapping[str, float] | None = None
+    bodies: Bodies,
+    hand: HandBody,
+    poses: Poses,
+    found: SolvedFrame | ContactInstant,
+    limits: Mapping[str, float] | None = None,
 ) -> Effort:
     """Compare what contact puts on the bones with what muscles can do.
 
@@ -40,15 +48,21 @@ def effort_at(
         bodies: Everything.
         hand: Whose.
         poses: One pose of it.
-        solved: The equilibrium in that pose.
+        found: The equilibrium in that pose.
         limits: Digit → largest force [N], where it is not the default.
     """
     span = bodies.spans[hand.name]
     flesh = hand.part.hand
-    u, reactions, contact = solved.displacement[span], solved.reactions[span], solved.nodal.sum(axis=0)[span]
+    u, reactions, contact = found.displacement[span], found.reactions[span], _contact(found, span)
     alone = hand.alone.at(poses, u, reactions, contact, Loads(gravity=bodies.loads.gravity))
     if alone is None:
         return effort_of(hand.drive.skeleton, poses, loads_from_contact(flesh, u, contact), limits=limits)
     own = loads_from_reactions(flesh, alone.displacement, alone.reactions)
     loads = loads_from_reactions(flesh, u, reactions) - own
     return effort_of(hand.drive.skeleton, poses, loads, limits=limits, flesh=own)
+
+
+def _contact(found: SolvedFrame | ContactInstant, span: slice) -> NDArray[np.float64]:
+    """Contact forces on some of the nodes, all pairs together [N], shape (n, 3)."""
+    nodal = found.nodal if isinstance(found, SolvedFrame) else [touch.nodal for touch in found.touches]
+    return sum((one[span] for one in nodal), np.zeros((span.stop - span.start, 3)))

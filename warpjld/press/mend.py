@@ -15,7 +15,6 @@ from warpjld.fem.hand.muscles import JOINT_WORDS, DigitEffort, Effort
 from warpjld.press.bodies import Bodies
 from warpjld.press.detour import detour
 from warpjld.press.efforts import effort_at
-from warpjld.press.frames import solved_frame
 from warpjld.press.hand_body import HandBody
 from warpjld.skeleton.tree import CHANNELS
 
@@ -168,5 +167,4 @@ class Mending:
     def _effort(self, hand: HandBody, angles: NDArray[np.float64], solution: ContactSolution) -> Effort:
         assert hand.drive.posed is not None
         poses = hand.drive.posed(angles, solution.last.time)
-        solved = solved_frame(self._bodies.start + solution.last.time, solution.last)
-        return effort_at(self._bodies, hand, poses, solved, self._limits.get(hand.name))
+        return effort_at(self._bodies, hand, poses, solution.last, self._limits.get(hand.name))

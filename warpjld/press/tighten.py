@@ -13,7 +13,6 @@ from warpjld.fem.hand.muscles import Effort
 from warpjld.press.bodies import Bodies
 from warpjld.press.detour import detour
 from warpjld.press.efforts import effort_at
-from warpjld.press.frames import solved_frame
 from warpjld.press.hand_body import HandBody
 from warpjld.skeleton.tree import CHANNELS
 
@@ -100,4 +99,4 @@ class Tightening:
         drive = self.hand.drive
         assert drive.posed is not None
         poses = drive.posed(self.angles(grip), self._time)
-        return effort_at(self.bodies, self.hand, poses, solved_frame(self._time, instant), self._limits)
+        return effort_at(self.bodies, self.hand, poses, instant, self._limits)
