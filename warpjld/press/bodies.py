@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -12,133 +12,18 @@ from scipy.spatial.transform import Rotation
 from warpjld.errors import InputError
 from warpjld.fem import Body, Loads, Material, Prescribed, merge
 from warpjld.fem.contact import Bond, Obstacle, Pair
-from warpjld.fem.hand.blend import Moves
 from warpjld.grasp import Places
-from warpjld.press.drive import Drive
+from warpjld.press.hand_body import HandBody
+from warpjld.press.object_body import ObjectBody
 from warpjld.press.outside import outside
-from warpjld.press.rest import Part
 from warpjld.press.settle import settle
-from warpjld.press.skin_parts import SkinParts
-from warpjld.press.state_variables import Prescribing
-from warpjld.press.support import Support
-from warpjld.press.volumes import ObjectVolume
 from warpjld.press.where import placed
 from warpjld.press.wishes import ContactWishes
 
-__all__ = ["WORN", "Bodies", "HandBody", "ObjectBody", "PairOf", "assemble"]
+__all__ = ["Bodies", "PairOf", "assemble"]
 
-WORN = 0.5
-"""Share of the flesh in skin from which on it has flesh to give way with."""
 _ON = 2e-4
 """An object nearer to an obstacle than this lies on it [m]."""
-
-
-@dataclass(frozen=True, eq=False)
-class HandBody:
-    """A hand that is driven by its bones.
-
-    Attributes:
-        name: Of the actor.
-        part: Its flesh at time 0.
-        laws: By region.
-        moves: Motions of its bones from the rig's rest at a time.
-        softness: Young's modulus of its skin [Pa].
-        itself: Whether its skin may touch itself.
-        drive: What moves them, for searches that bend its joints otherwise.
-        parts: Of its visible skin.
-    """
-
-    name: str
-    part: Part
-    laws: Mapping[str, Material]
-    moves: Callable[[float], Moves]
-    softness: float
-    itself: bool
-    drive: Drive
-    parts: SkinParts
-
-    def worn(self, part: str) -> bool:
-        """Whether most of a digit's skin, or the palm's, has flesh to give way with."""
-        mine = self.parts.part_of[self.parts.labels] == self.parts.names.index(part)
-        return bool((self.part.blend[mine] > WORN).mean() > 0.5)
-
-    def prescribed(self, time: float) -> Prescribed:
-        """Displacements of the bones' nodes and of those where the flesh was cut off."""
-        hand, cut = self.part.hand, self.part.cut
-        moves = self.part.start.to(self.moves(time))
-        known = hand.prescribed_by(moves)
-        cut = np.setdiff1d(cut, known.degrees[::3] // 3)
-        if not len(cut):
-            return known
-        x = hand.mesh.nodes[cut]
-        return known + _whole(cut, moves.blended(hand.weights[cut], x) - x)
-
-    def guess(self, before: float, time: float, displacement: NDArray[np.float64]) -> NDArray[np.float64]:
-        """First guess of a displacement (N, 3) from that at an earlier time."""
-        start = self.part.start
-        return self.part.hand.guess(start.to(self.moves(before)), start.to(self.moves(time)), displacement)
-
-
-@dataclass(frozen=True, eq=False)
-class ObjectBody:
-    """An object that deforms.
-
-    Attributes:
-        volume: Its mesh at time 0.
-        place: Where the script puts it at a time: one placement.
-        states: What is prescribed, and the nodes it is prescribed for.
-        start: Frame of time 0.
-        support: What it stands on until a hand takes its weight.
-        other: What is prescribed instead of all this, at a time.
-    """
-
-    volume: ObjectVolume
-    place: Callable[[float], Places]
-    states: Sequence[tuple[Prescribing, NDArray[np.int64]]]
-    start: float
-    support: Support | None = None
-    other: Callable[[float], Prescribed] | None = None
-
-    @property
-    def name(self) -> str:
-        """Of the object."""
-        return self.volume.name
-
-    def holds(self, state: Prescribing, time: float) -> bool:
-        """Whether points go where the object goes."""
-        stands = self.support is None or self.support.stands(time)
-        return self.other is None and stands and state.holds(self.start + time)
-
-    def guided(self, time: float) -> bool:
-        """Whether something else than its states leads it."""
-        if self.other is not None:
-            return True
-        return self.support is not None and not self.support.stands(time) and time < self.support.free
-
-    def prescribed(self, time: float) -> Prescribed:
-        """Displacements of its prescribed points (R128)."""
-        if self.other is not None:
-            return self.other(time)
-        out = Prescribed(np.empty(0, np.int64), np.empty(0))
-        if self.support is not None:
-            out = self.support.prescribed(time)
-        frame = self.start + time
-        for state, nodes in self.states:
-            moved = np.zeros((len(nodes), 3))
-            axes = [k for k, axis in enumerate("xyz") if axis in state.tracks]
-            held = self.holds(state, time)
-            if held:
-                axes = [0, 1, 2]
-                moved = self.place(time).apply(self.volume.local[nodes])[0] - self.volume.mesh.nodes[nodes]
-            begun = held
-            for axis, track in state.tracks.items():
-                begun = begun or frame >= track.keys[0].frame
-                moved[:, "xyz".index(axis)] += float(track.spline(frame))
-            if begun:
-                degrees = (3 * nodes[:, None] + np.array(axes)).ravel()
-                order = np.argsort(degrees)
-                out = out + Prescribed(degrees[order], moved[:, axes].ravel()[order])
-        return out
 
 
 @dataclass(frozen=True)
@@ -362,13 +247,6 @@ def _pairs(
             if name not in known:
                 raise placed(InputError(f"a bond to nothing: {name} does not deform here"), bonded.where)
     return pairs, owners
-
-
-def _whole(nodes: NDArray[np.int64], moved: NDArray[np.float64]) -> Prescribed:
-    """All three displacements of nodes."""
-    order = np.argsort(nodes)
-    degrees = (3 * nodes[order][:, None] + np.arange(3)).ravel()
-    return Prescribed(degrees, moved[order].ravel())
 
 
 def _along_with(known: Prescribed, displacement: NDArray[np.float64]) -> NDArray[np.float64]:

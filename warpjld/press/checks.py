@@ -11,7 +11,8 @@ from warpjld.errors import InputError
 from warpjld.fem import HexMesh
 from warpjld.fem.contact.facets import Facets
 from warpjld.fem.contact.surface import surface_of
-from warpjld.press.bodies import Bodies, HandBody
+from warpjld.press.bodies import Bodies
+from warpjld.press.hand_body import HandBody
 from warpjld.press.passing import LOOKS_AHEAD
 from warpjld.press.where import placed
 from warpjld.press.wishes import ContactWishes

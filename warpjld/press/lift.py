@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 from warpjld.fem import Prescribed, Status
 from warpjld.fem.contact import ContactInstant, ContactSolution
 from warpjld.fem.hand.grip import Trial
-from warpjld.press.bodies import ObjectBody
 from warpjld.press.detour import detour
+from warpjld.press.object_body import ObjectBody
 from warpjld.press.tighten import Tightening
 
 __all__ = ["Lift", "Taken"]

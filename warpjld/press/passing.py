@@ -14,7 +14,9 @@ from numpy.typing import NDArray
 
 from warpjld.fem.contact import Obstacle
 from warpjld.fem.contact.surface import surface_of
-from warpjld.press.bodies import Bodies, HandBody, ObjectBody
+from warpjld.press.bodies import Bodies
+from warpjld.press.hand_body import HandBody
+from warpjld.press.object_body import ObjectBody
 
 __all__ = ["LOOKS_AHEAD", "Passing", "half_thickness", "way_past"]
 

@@ -11,9 +11,10 @@ from numpy.typing import NDArray
 
 from warpjld.fem.hexmesh import HexMesh
 from warpjld.grasp import Places
-from warpjld.press.bodies import WORN, Bodies
+from warpjld.press.bodies import Bodies
 from warpjld.press.clear import Cleared, Shown, clear
 from warpjld.press.finer import Finer, finer
+from warpjld.press.hand_body import WORN
 from warpjld.press.outside import outer_triangles
 from warpjld.press.pressure_map import PressureMap, pressure_map
 from warpjld.press.run import Solved

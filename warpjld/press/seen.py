@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from warpjld.press.bodies import WORN, HandBody
+from warpjld.press.hand_body import WORN, HandBody
 from warpjld.press.overlap import Over
 from warpjld.press.pressed import Pressed
 

@@ -122,6 +122,7 @@ def _run(scene: Scene, pressing: Pressing, folder: Path, progress: Report) -> Pr
         state=None if pressing.state is None else folder / pressing.state,
         progress=progress,
     )
+    notes += table.notes()
     if solved.resumed:
         notes.append(f"{solved.resumed} of {len(solved.frames)} frames were in {pressing.state} already")
     pushed = {name: (np.array(frames), places) for name, (frames, places) in before.moved.items()}

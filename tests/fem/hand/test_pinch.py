@@ -13,9 +13,10 @@ from warpjld.fem import Body
 from warpjld.fem.contact import ContactSolution, Pair, press
 from warpjld.fem.hand import FleshHand, hand_laws
 from warpjld.hand import build_hand
-from warpjld.press.bodies import HandBody
 from warpjld.press.drive import Drive
+from warpjld.press.hand_body import HandBody
 from warpjld.press.rest import part_of, posed
+from warpjld.press.skin_parts import skin_parts
 from warpjld.skeleton import CHANNELS, Poses, Skeleton, poses_from_angles
 
 pytestmark = pytest.mark.slow
@@ -58,7 +59,7 @@ class Hand:
         self.hand = part.hand
         self.laws = hand_laws(self.hand.mesh.region_names)
         drive = Drive(hand, whole.skeleton, poses)
-        self.driven = HandBody("hand", part, self.laws, drive.moves, 80e3, True, drive)
+        self.driven = HandBody("hand", part, self.laws, drive.moves, 80e3, True, drive, skin_parts(hand, skin))
 
     def pressed(self, times: Sequence[float], friction: float = 0.0) -> ContactSolution:
         pair = Pair("hand", "hand", friction, exclusion=self.hand.self_contact(), name="itself")
