@@ -38,7 +38,8 @@ def pressed(rig, tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, dict]:
     scene.add("left", rig)
     Interpreter(scene).run_text(
         PLATE + "PRESS 0 8 EVERY 2 STATE 'state.npz'\nSIZE 160 120\nPICTURE 8 'a.png' PRESSURE LEFT\n"
-        "PICTURE 8 'b.png' PRESSURE\nPICTURE 8 'c.png' SHADED\nTABLE 't.csv'\nTABLE 't.parquet'\nVOLUME 'v.pvd'\n"
+        "PICTURE 8 'b.png' PRESSURE\nPICTURE 8 'd.png' PRESSURE LEFT INDEX\n"
+        "PICTURE 8 'c.png' SHADED\nTABLE 't.csv'\nTABLE 't.parquet'\nVOLUME 'v.pvd'\n"
         "EXPORT 'e.npz'"
     )
     out = tmp_path_factory.mktemp("plate")
@@ -69,7 +70,7 @@ def test_everything_asked_for_is_made(pressed: tuple[Path, dict]) -> None:
 
     out, summary = pressed
     names = {file["name"] for file in summary["files"]}
-    assert {"a.png", "b.png", "c.png", "t.csv", "t.parquet", "v.pvd"} <= names
+    assert {"a.png", "b.png", "c.png", "d.png", "t.csv", "t.parquet", "v.pvd"} <= names
     table = pyarrow.parquet.read_table(out / "t.parquet").to_pylist()
     assert table[-1]["frame"] == 8
     assert json.loads((out / "summary.json").read_text())["press"]["digits"]

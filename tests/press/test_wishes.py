@@ -181,6 +181,11 @@ def test_grips_hold_their_angles_until_something_is_found(run) -> None:
         ("PRESS 0 10 STOP CORRECT", r"STOP or CORRECT, not both"),
         ("TACTILE 'touch.txt'", r"want a name that ends in \.csv, \.parquet, \.png"),
         ("PICTURE 0 'a.png' PRESSURE moon", r"there is no actor or object MOON"),
+        ("PICTURE 0 'a.png' PRESSURE left INDX", r"expected a digit .*found INDX; did you mean INDEX"),
+        (
+            "PICTURE 0 'a.png' PRESSURE left INDEX",
+            r"LEFT has no flesh whose digits can be shown",
+        ),
     ],
 )
 def test_wrong_words_are_refused_with_their_place(run, line: str, message: str) -> None:

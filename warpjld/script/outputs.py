@@ -38,23 +38,25 @@ class Camera:
 
 @dataclass(frozen=True)
 class Picture:
-    """One frame as a PNG; coloured by pressure perhaps of one actor or object ``only``."""
+    """One frame as a PNG; coloured by pressure perhaps of one actor or object ``only``, or of its ``digits``."""
 
     name: str
     frame: float
     style: Style
     camera: Camera
     only: str | None = None
+    digits: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)
 class Film:
-    """All frames as a film; coloured by pressure perhaps of one actor or object ``only``."""
+    """All frames as a film; coloured by pressure perhaps of one actor or object ``only``, or of its ``digits``."""
 
     name: str
     style: Style
     camera: Camera
     only: str | None = None
+    digits: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)

@@ -69,7 +69,7 @@ def film_studio(scene: Scene, crowd: Crowd, film: Film, path: Path) -> Iterator[
     quality = render.Quality.film()
     with render.Film(path, rate=scene.rate) as writer:
         if film.style == "pressure":
-            view = PressureView(crowd, film.only)
+            view = PressureView(crowd, film.only, film.digits)
             with view.stage(camera, scene.size, quality, 0) as stage_:
                 yield PressureStudio(view, film.camera, stage_, writer)
             return
@@ -91,7 +91,7 @@ def draw_picture(scene: Scene, crowd: Crowd, picture: Picture, path: Path) -> No
     shift = now.shift(picture.camera, 0)
     camera = crowd.camera(picture.camera, scene.size)
     if picture.style == "pressure":
-        view = PressureView(now, picture.only)
+        view = PressureView(now, picture.only, picture.digits)
         points, values = view.at(0, now.surface(0))
         with view.stage(camera, scene.size, render.Quality(), shift) as stage_:
             render.save_picture(path, stage_.draw(points - shift, values=values))

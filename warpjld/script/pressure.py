@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -25,9 +26,10 @@ class PressureView:
     Args:
         crowd: Actors and objects, pressed.
         only: Name of the one to show.
+        digits: Those of it to show, or its palm; none for all.
     """
 
-    def __init__(self, crowd: Crowd, only: str | None) -> None:
+    def __init__(self, crowd: Crowd, only: str | None, digits: Sequence[str] = ()) -> None:
         self.crowd = crowd
         self._only = only
         counts = np.cumsum([0, *(len(role.covering.surface.vertices) for role in crowd.roles)])
@@ -48,7 +50,7 @@ class PressureView:
         for name, triangles, count in shown:
             surface = self._surface(name, triangles, count)
             self._finer.append(surface)
-            faces.append(surface.faces + start)
+            faces.append(self._of_digits(name, surface, digits) + start)
             start += count + len(surface.edges)
         if not faces:  # an obstacle alone: nothing is known of its own pressure
             prop = crowd.props[self._plain[0]]
@@ -95,6 +97,17 @@ class PressureView:
         if pressed is None:
             return finer(faces, np.zeros(len(faces), dtype=bool), count)
         return pressed.finer(name, faces, count)
+
+    def _of_digits(self, name: str, surface: Finer, digits: Sequence[str]) -> NDArray[np.int32]:
+        """Faces of an actor's digits."""
+        pressed = self.crowd.pressed
+        hands = [] if pressed is None or not digits else [hand for hand in pressed.bodies.hands if hand.name == name]
+        if not hands:
+            return surface.faces
+        parts = hands[0].parts
+        shown = np.isin(parts.part_of, [parts.names.index(digit) for digit in digits])[parts.labels]
+        whole = np.concatenate([shown, shown[surface.edges].all(axis=1)])
+        return surface.faces[whole[surface.faces].all(axis=1)]
 
     def _pressure(self, name: str, frame: float, count: int) -> NDArray[np.float64]:
         found = None if self.crowd.pressed is None else self.crowd.pressed.pressure(name, frame)

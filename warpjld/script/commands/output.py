@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import cast
 
 from warpjld.script.arguments import Arguments
+from warpjld.script.commands.animation import FINGERS
 from warpjld.script.formats import EXPORTS, FILMS, PICTURES, VIEWS
 from warpjld.script.outputs import Camera, ContactSheet, Export, Film, Output, Picture, Style
 from warpjld.script.registry import command
@@ -12,6 +13,7 @@ from warpjld.script.scene import Scene
 from warpjld.suggest import did_you_mean
 
 _STYLES = ("SHADED", "WIREFRAME", "PRESSURE")
+_SHOWN = "[SHADED/WIREFRAME/PRESSURE [<actor or object> [THUMB/INDEX/MIDDLE/RING/PINKY/PALM …]]]"
 
 
 @command(
@@ -52,8 +54,8 @@ def size(scene: Scene, arguments: Arguments) -> None:
 
 @command(
     "PICTURE",
-    syntax='PICTURE <frame> "<name>.png" [SHADED/WIREFRAME/PRESSURE [<actor or object>]]',
-    help="A picture of a frame; PRESSURE colours what touches, all or one actor or object alone.",
+    syntax=f'PICTURE <frame> "<name>.png" {_SHOWN}',
+    help="A picture of a frame; PRESSURE colours what touches: all, or one actor, digit or object alone.",
     group="Output",
 )
 def picture(scene: Scene, arguments: Arguments) -> None:
@@ -61,12 +63,12 @@ def picture(scene: Scene, arguments: Arguments) -> None:
     frame = arguments.number("the frame")
     name = arguments.output_name("the picture's name", PICTURES)
     style = _style(arguments)
-    ask_for(scene, arguments, Picture(name, frame, style, scene.camera, _only(scene, arguments, style)))
+    ask_for(scene, arguments, Picture(name, frame, style, scene.camera, *_only(scene, arguments, style)))
 
 
 @command(
     "FILM",
-    syntax=f'FILM "<name>{"/".join(FILMS)}" [SHADED/WIREFRAME/PRESSURE [<actor or object>]]',
+    syntax=f'FILM "<name>{"/".join(FILMS)}" {_SHOWN}',
     help="A film of all frames.",
     group="Output",
 )
@@ -74,7 +76,7 @@ def film(scene: Scene, arguments: Arguments) -> None:
     """R67."""
     name = arguments.output_name("the film's name", FILMS)
     style = _style(arguments)
-    ask_for(scene, arguments, Film(name, style, scene.camera, _only(scene, arguments, style)))
+    ask_for(scene, arguments, Film(name, style, scene.camera, *_only(scene, arguments, style)))
 
 
 @command(
@@ -109,15 +111,20 @@ def _style(arguments: Arguments) -> Style:
     return cast(Style, arguments.choice("the style", _STYLES).lower()) if arguments else "shaded"
 
 
-def _only(scene: Scene, arguments: Arguments, style: Style) -> str | None:
-    """What is shown alone."""
+def _only(scene: Scene, arguments: Arguments, style: Style) -> tuple[str | None, tuple[str, ...]]:
+    """What is shown alone, and which digits of it."""
     if style != "pressure" or not arguments:
-        return None
+        return None, ()
     name = arguments.name("an actor's or an object's name").upper()
     known = [*scene.actors, *scene.props]
     if name not in known:
         raise arguments.error(f"there is no actor or object {name}{did_you_mean(name, known)}")
-    return name
+    digits: list[str] = []
+    while name in scene.actors and arguments:
+        digits.append(arguments.choice("a digit", (*FINGERS, "PALM")).lower())
+    if digits and name not in scene.contact.flesh:
+        raise arguments.error(f"{name} has no flesh whose digits can be shown: FLESH {name} makes it so")
+    return name, tuple(dict.fromkeys(digits))
 
 
 def ask_for(scene: Scene, arguments: Arguments, output: Output) -> None:
