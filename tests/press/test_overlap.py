@@ -85,7 +85,7 @@ def test_a_hand_overlaps_itself_where_digits_cross(rig: Rig) -> None:
     covering = bind(rig.skeleton, rig.surface)
     angles = np.zeros((len(rig.skeleton), 4))
     rest = covering.deform(poses_from_angles(rig.skeleton, angles[None]))[0].astype(np.float64)
-    parts = skin_parts(hand, rest)
+    parts = skin_parts(hand)
     assert {part.name for part in parts.parts} == {"thumb", "index", "middle", "ring", "pinky", "palm"}
     assert within_itself(parts, rest, normals(rest, parts.faces)) == {}
     for knuckle, degrees in (("base", 90.0), ("knuckle2", 100.0), ("knuckle3", 60.0)):

@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 import trimesh
 
-from warpjld.fem import HexMesh, ball
+from warpjld.fem import HexMesh, ball, merge
 from warpjld.fem.contact.imprint import skin_around
-from warpjld.fem.embedding import embed
+from warpjld.fem.embedding import Embedding, embed
 from warpjld.press.finer import finer
 from warpjld.press.pressure_map import pressure_map
 
@@ -79,3 +81,27 @@ def test_finer_triangles_fit_those_beside_them() -> None:
     whole = finer(faces, np.zeros(len(faces), dtype=bool), len(vertices))
     np.testing.assert_array_equal(whole.faces, faces)
     np.testing.assert_array_equal(whole.of(vertices), vertices)
+
+
+def test_what_lies_beside_another_part_takes_nothing_of_its_pressure() -> None:
+    """Two balls that touch as one skin: one is pressed where they touch, and the other shows nothing."""
+    mesh = merge(*(replace(MESH, nodes=MESH.nodes + shift, faces={f"{k}.outer": MESH.faces["outer"]}) for k, shift in
+                   enumerate(np.array([[0.0, 0.0, 0.0], [0.0, 0.0, 2.0]]))))  # fmt: skip
+    outer = np.concatenate([mesh.face_set("0.outer"), mesh.face_set("1.outer")])
+    mesh = replace(mesh, faces={"outer": outer})
+    visible = trimesh.creation.icosphere(4)
+    x, faces = np.asarray(visible.vertices), np.asarray(visible.faces, np.int32)
+    vertices, both = np.concatenate([x, x + np.array([0.0, 0.0, 2.0])]), np.concatenate([faces, faces + len(x)])
+    apart = embed(MESH, x, reach=3.0)
+    corners = np.concatenate([apart.corners, apart.corners + len(MESH.nodes)])
+    carried = Embedding(corners, np.tile(apart.weights, (2, 1)), np.tile(apart.outside, 2))
+    force = np.concatenate([cap(MESH), np.zeros(len(MESH.nodes))])
+    surface, spread = pressure_map(mesh, "outer", carried, vertices, both, force)
+    found = spread.of(force, surface.of(vertices))
+    other = np.zeros(len(vertices), dtype=bool)
+    other[len(x) :] = True
+    of_middles = other[surface.edges].all(axis=1)
+    assert not found[np.concatenate([other, of_middles])].any()
+    assert found.max() == pytest.approx(
+        float((cap(MESH)[OUTER] / skin_around(MESH, "outer", MESH.nodes)[OUTER]).max()), rel=0.06
+    )

@@ -11,7 +11,7 @@ from warpjld.errors import InputError
 from warpjld.fem.hexmesh import HexMesh
 from warpjld.fem.shape import CENTRE_GRADIENT, shape_at, slope_at
 
-__all__ = ["Embedding", "embed"]
+__all__ = ["Embedding", "embed", "embed_between"]
 
 _NEAR = 12
 """Elements looked at for each point, nearest centres first."""
@@ -85,6 +85,27 @@ def embed(mesh: HexMesh, points: NDArray[np.float64], *, reach: float = 1.0) -> 
         worst = int(np.argmax(best))
         raise InputError(f"point {worst} lies {best[worst]:.2g} element sizes outside the mesh, more than {reach:g}")
     return Embedding(mesh.elements[owner], shape_at(place), best)
+
+
+def embed_between(mesh: HexMesh, ends: Embedding, edges: NDArray[np.integer], points: NDArray[np.float64]) -> Embedding:
+    """Embed points between others in the elements of these: another part of the mesh may lie nearer, but is not theirs.
+
+    Args:
+        mesh: The volume mesh, at rest.
+        ends: How it carries the others.
+        edges: The two that each point lies between, shape (P, 2).
+        points: [m], shape (P, 3).
+    """
+    corners, weights = ends.corners[edges[:, 0]].copy(), ends.weights[edges[:, 0]].copy()
+    best = np.full(len(points), np.inf)
+    for side in edges.T:
+        at = _local(mesh.nodes[ends.corners[side]], points)
+        beyond = 0.5 * np.maximum(np.abs(at).max(axis=1) - 1.0, 0.0)
+        better = beyond < best
+        best[better], corners[better] = beyond[better], ends.corners[side[better]]
+        weights[better] = shape_at(at[better])
+    best = np.where(np.isfinite(best), best, ends.outside[edges[:, 0]])
+    return Embedding(corners, weights, best)
 
 
 def _local(x: NDArray[np.float64], points: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from warpjld.fem.contact.facets import Facets
 from warpjld.fem.contact.imprint import skin_around
-from warpjld.fem.embedding import Embedding, embed
+from warpjld.fem.embedding import Embedding, embed_between
 from warpjld.fem.hexmesh import HexMesh
 from warpjld.press.finer import Finer, finer
 
@@ -18,9 +18,6 @@ __all__ = ["PressureMap", "pressure_map"]
 _SEEN = 0.5
 """Share of the element faces around a node that its visible surface has at least: what presses on others, where a
 surface is coarser than elements or cut off, goes to the place nearest to them."""
-
-_REACH = 3.0
-"""How far middles of edges may lie off the elements, in element sizes."""
 
 
 class PressureMap:
@@ -104,8 +101,8 @@ def pressure_map(
     pressed = worn & (np.where(carried.weights > 0.0, force[carried.corners], 0.0).max(axis=1) > 0.0)
     surface = finer(triangles, worn[triangles].all(axis=1) & pressed[triangles].any(axis=1), count)
     where = surface.of(vertices)
-    middles = embed(mesh, where[count:], reach=_REACH) if len(surface.edges) else None
-    if middles is not None:
+    if len(surface.edges):
+        middles = embed_between(mesh, carried, surface.edges, where[count:])
         columns = (getattr(carried, name) for name in ("corners", "weights", "outside"))
         more = (getattr(middles, name) for name in ("corners", "weights", "outside"))
         carried = Embedding(*(np.concatenate(pair) for pair in zip(columns, more, strict=True)))

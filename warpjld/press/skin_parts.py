@@ -83,12 +83,12 @@ class SkinParts:
         return np.asarray(real & ~self.never[self.labels[vertices], other])
 
 
-def skin_parts(hand: FleshHand, skin: NDArray[np.float64]) -> SkinParts:
-    """Parts of the skin of a whole hand, posed as ``skin`` (V, 3) [m], as its flesh names them."""
+def skin_parts(hand: FleshHand) -> SkinParts:
+    """Parts of the skin of a whole hand as it is built: at the rig's rest, where digits are apart."""
     from scipy.spatial import cKDTree
 
     middle = hand.mesh.nodes[hand.mesh.quads(hand.skin_faces)].mean(axis=1)
-    labels = hand.skin_labels[cKDTree(middle).query(skin)[1]]
+    labels = hand.skin_labels[cKDTree(middle).query(hand.surface.vertices)[1]]
     names = (*DIGITS, "palm")
     part_of = np.array([names.index(_part(name)) for name in hand.label_names], np.int32)
     return SkinParts(labels, hand.excluded, part_of, names, hand.surface.faces)

@@ -73,7 +73,7 @@ def hand_body(scene: Scene, actor: Actor, wish: FleshWish, start: float, notes: 
     )
 
     drive = _drive(scene, actor, part.hand, start)
-    return HandBody(actor.name, part, laws, drive.moves, wish.skin, wish.itself, drive, skin_parts(hand, skin))
+    return HandBody(actor.name, part, laws, drive.moves, wish.skin, wish.itself, drive, skin_parts(built))
 
 
 def _drive(scene: Scene, actor: Actor, hand: FleshHand, start: float) -> Drive:

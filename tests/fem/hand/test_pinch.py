@@ -59,7 +59,7 @@ class Hand:
         self.hand = part.hand
         self.laws = hand_laws(self.hand.mesh.region_names)
         drive = Drive(hand, whole.skeleton, poses)
-        self.driven = HandBody("hand", part, self.laws, drive.moves, 80e3, True, drive, skin_parts(hand, skin))
+        self.driven = HandBody("hand", part, self.laws, drive.moves, 80e3, True, drive, skin_parts(whole))
 
     def pressed(self, times: Sequence[float], friction: float = 0.0) -> ContactSolution:
         pair = Pair("hand", "hand", friction, exclusion=self.hand.self_contact(), name="itself")
