@@ -12,6 +12,7 @@ from warpjld.fem.body import Body
 from warpjld.fem.solution import Instant
 from warpjld.fem.stress import at_nodes, cauchy, mises
 from warpjld.fem.vtk import grid_of
+from warpjld.rotations import unit
 
 __all__ = ["QUANTITIES", "draw"]
 
@@ -79,8 +80,8 @@ def _panel(
         )
     plotter.camera_position = [tuple(centre + 3 * reach * eye), tuple(centre), tuple(up)]
     plotter.enable_parallel_projection()
-    right = np.cross(up, eye) / np.linalg.norm(np.cross(up, eye))
-    above = np.cross(eye, right) / np.linalg.norm(eye)
+    right = unit(np.cross(up, eye))
+    above = unit(np.cross(eye, right))
     spread = (np.asarray(whole.points) - centre) @ np.stack([right, above], axis=1)
     plotter.camera.parallel_scale = 1.12 * float(np.abs(spread).max())
     plotter.camera.clipping_range = (0.1 * reach, 10 * reach)

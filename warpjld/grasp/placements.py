@@ -13,6 +13,7 @@ from warpjld.grasp.distance import ObjectSet
 from warpjld.grasp.objects import GraspObject
 from warpjld.grasp.opening import Opening
 from warpjld.grasp.widths import Widths
+from warpjld.rotations import unit
 from warpjld.skeleton import Poses, Skeleton, poses_from_angles
 
 __all__ = ["Candidates", "across_widths", "palm_frame", "sample_wrists"]
@@ -70,11 +71,9 @@ def palm_frame(skeleton: Skeleton, side: str) -> tuple[NDArray[np.float64], NDAr
     product, shape (3, 3)."""
     knuckle = skeleton.index(f"{side}.middle.base")
     wrist = skeleton.index(f"{side}.wrist")
-    fingers = skeleton.rest[knuckle] - skeleton.rest[wrist]
-    fingers = fingers / np.linalg.norm(fingers)
+    fingers = unit(skeleton.rest[knuckle] - skeleton.rest[wrist])
     look = -np.cross(skeleton.directions[knuckle], skeleton.axes[knuckle])
-    look = look - fingers * (look @ fingers)
-    look /= np.linalg.norm(look)
+    look = unit(look - fingers * (look @ fingers))
     middle = 0.75 * skeleton.rest[knuckle] + 0.25 * skeleton.rest[wrist]
     return middle, np.stack([look, fingers, np.cross(look, fingers)])
 
@@ -156,8 +155,7 @@ def across_widths(
     fingers = np.stack([one.fingers[k] for one, k in zip(rows, fit, strict=True)])
     between = 0.5 * (thumb + fingers)
     own = _frame(fingers - thumb, between - middle)
-    line = widths.second - widths.first
-    line /= np.linalg.norm(line, axis=1, keepdims=True)
+    line = unit(widths.second - widths.first)
     wanted = _frame(line, _around(line, rng))
     rotation = Rotation.from_matrix(np.einsum("gki,gkj->gij", wanted, own))
     root = skeleton.rest[0]
@@ -193,15 +191,13 @@ def _come(covering: Covering, hands: Candidates, objects: ObjectSet, reach: NDAr
 
 def _around(axis: NDArray[np.float64], rng: np.random.Generator) -> NDArray[np.float64]:
     """Unit vectors normal to others (G, 3), the angle about them even."""
-    aside = np.cross(axis, np.eye(3)[np.abs(axis).argmin(axis=1)])
-    aside /= np.linalg.norm(aside, axis=1, keepdims=True)
+    aside = unit(np.cross(axis, np.eye(3)[np.abs(axis).argmin(axis=1)]))
     roll = rng.uniform(0.0, 2.0 * np.pi, size=(len(axis), 1))
     return np.asarray(np.cos(roll) * aside + np.sin(roll) * np.cross(axis, aside))
 
 
 def _frame(first: NDArray[np.float64], second: NDArray[np.float64]) -> NDArray[np.float64]:
     """Right-handed frames as rows: along the first vectors, along the second as far as square to them, (G, 3, 3)."""
-    x = first / np.linalg.norm(first, axis=1, keepdims=True)
-    y = second - x * (x * second).sum(axis=1, keepdims=True)
-    y /= np.linalg.norm(y, axis=1, keepdims=True)
+    x = unit(first)
+    y = unit(second - x * (x * second).sum(axis=1, keepdims=True))
     return np.stack([x, y, np.cross(x, y)], axis=1)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from warpjld.rotations import unit
 from warpjld.script.scene import Actor, Scene
 from warpjld.skeleton import Poses
 
@@ -58,8 +59,7 @@ def _resample(poses: Poses, at: NDArray[np.float64]) -> Poses:
     first, second = poses.rotations[before], poses.rotations[after]
     # one sign for the whole frame: signs are aligned along the tree, and stay so
     flip = np.where((first * second).sum((1, 2)) < 0, -1.0, 1.0)[:, None, None]
-    rotations = (1 - part) * first + part * flip * second
-    rotations /= np.linalg.norm(rotations, axis=-1, keepdims=True)
+    rotations = unit((1 - part) * first + part * flip * second)
     positions = (1 - part) * poses.positions[before] + part * poses.positions[after]
     flexion = (1 - part[..., 0]) * poses.flexion[before] + part[..., 0] * poses.flexion[after]
     return Poses(positions, rotations, flexion)

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from warpjld.errors import InputError
+from warpjld.rotations import unit
 from warpjld.skeleton.hand import FINGER_JOINTS, PALM_SEGMENTS
 from warpjld.skeleton.limits import default_limits
 from warpjld.skeleton.recognise.axes import body_axes, hand_axes, perpendicular
@@ -164,7 +165,7 @@ def _skeleton(
     for j, name in enumerate(layout.names):
         source = layout.sources[j]
         if source in given_axes:
-            axes[j] = given_axes[source] / np.linalg.norm(given_axes[source])
+            axes[j] = unit(given_axes[source])
         else:
             axes[j] = perpendicular(found.get(name, _bend(blank, j)), blank.directions[j])
         for channel, pair in given_limits.get(source, {}).items():
@@ -191,8 +192,7 @@ def _facing(layout: Layout, number: Mapping[str, int]) -> tuple[NDArray[np.float
     """Up and forward of a body; Y and Z where it does not tell."""
     up, forward = np.array([0.0, 1.0, 0.0]), np.array([0.0, 0.0, 1.0])
     if "head" in number and "pelvis" in number:
-        up = layout.positions[number["head"]] - layout.positions[number["pelvis"]]
-        up /= np.linalg.norm(up)
+        up = unit(layout.positions[number["head"]] - layout.positions[number["pelvis"]])
     for part in ("hip", "shoulder"):
         if f"left.{part}" in number and f"right.{part}" in number:
             left = layout.positions[number[f"left.{part}"]] - layout.positions[number[f"right.{part}"]]
