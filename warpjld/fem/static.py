@@ -13,9 +13,9 @@ from warpjld.fem.blockmatrix import BlockMatrix
 from warpjld.fem.body import Body, Tangent
 from warpjld.fem.conjugate import Iteration, Status
 from warpjld.fem.dots import norm
+from warpjld.fem.indefinite import IndefiniteError
 from warpjld.fem.linear import LinearSolver
 from warpjld.fem.loads import Loads, external_forces, subtract_pressure_stiffness
-from warpjld.fem.multigrid import IndefiniteError
 from warpjld.fem.prescribed import Prescribed, held_in_place, refuse_free
 from warpjld.fem.solution import Instant, Solution, SolveError
 
