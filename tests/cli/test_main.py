@@ -3,12 +3,16 @@
 from __future__ import annotations
 
 import errno
+import json
+import math
 from pathlib import Path
 
 import click
+import numpy as np
 import pytest
 
 from warpjld.cli import main
+from warpjld.cli.answer import answer
 
 COMMANDS = ["run", "shell", "inspect", "calibrate", "deform", "study", "fem"]
 
@@ -32,6 +36,19 @@ def test_every_command_has_help_and_one_name_for_its_output(name: str, capsys: p
     said = capsys.readouterr().out
     assert said.startswith(f"Usage: warpjld {name} ")
     assert "-o, --out " in said
+
+
+@pytest.mark.parametrize("name", [name for name in COMMANDS if name != "shell"])
+def test_every_command_that_ends_by_itself_answers_in_json(name: str, capsys: pytest.CaptureFixture[str]) -> None:
+    assert run(name, "--help") == 0
+    assert "  --json " in capsys.readouterr().out
+
+
+def test_an_answer_is_ascii_and_without_nan(capsys: pytest.CaptureFixture[str]) -> None:
+    answer({"a": [1.5, math.nan, {"b": -math.inf}], "c": ("µ", np.float64(2.0)), "d": True})
+    said = capsys.readouterr().out
+    assert said.isascii()
+    assert json.loads(said) == {"a": [1.5, None, {"b": None}], "c": ["µ", 2.0], "d": True}
 
 
 @pytest.mark.parametrize(

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
@@ -10,6 +9,7 @@ from typing import TYPE_CHECKING, Any, Literal
 import click
 
 from warpjld.cli import options
+from warpjld.cli.answer import answer
 
 if TYPE_CHECKING:
     from warpjld.covering.calibrate import Calibration, PoseQuality
@@ -75,7 +75,7 @@ def command(
         found = calibrate(covering, chosen, iterations=iterations, progress=report)
     save_parameters(out, opened.skeleton, found.parameters)
     if as_json:
-        click.echo(json.dumps(_summary(rig, out, found), indent=1))
+        answer(_summary(rig, out, found))
     elif not quiet:
         _table(found)
         click.echo(f"{found.status.value}; {out} written")

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import time
 from pathlib import Path
 from typing import Any
@@ -10,6 +9,7 @@ from typing import Any
 import click
 
 from warpjld.cli import options
+from warpjld.cli.answer import answer
 from warpjld.errors import InputError
 from warpjld.io.caches import FORMATS
 
@@ -116,7 +116,7 @@ def command(
         "notes": [*moved.notes, *([cache.note] if cache.note else [])],
     }
     if as_json:
-        click.echo(json.dumps(summary, indent=1, ensure_ascii=False))
+        answer(summary)
     elif not quiet:
         _tell(summary)
 

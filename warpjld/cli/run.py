@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-import json
 from pathlib import Path
 
 import click
 
 from warpjld.cli import options
+from warpjld.cli.answer import answer
 
 __all__ = ["command"]
 
@@ -52,6 +52,6 @@ def command(
     with progress(quiet) as report:
         summary = run_scene(scene, out, script=script, device=device, threads=threads, dry=check, progress=report)
     if as_json:
-        click.echo(json.dumps(summary, indent=1))
+        answer(summary)
     elif not quiet:
         table(summary, click.echo)

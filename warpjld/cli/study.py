@@ -2,16 +2,17 @@
 
 from __future__ import annotations
 
-import json
 from pathlib import Path
 from typing import TYPE_CHECKING, Literal
 
 import click
 
 from warpjld.cli import options
+from warpjld.cli.answer import answer
 
 if TYPE_CHECKING:
     from warpjld.study import Rerun, StudyResult
+    from warpjld.study.grasping import GraspPlan
 
 __all__ = ["command"]
 
@@ -74,21 +75,22 @@ def command(
                 click.echo(f"stopped; the same command goes on from what is in {out}", err=True)
                 raise
     if check:
-        if not quiet:
-            for note in notes:
-                click.echo(f"note: {note}")
-            click.echo(f"{plan}: {settings.trials} trials of {_combinations(settings.trials, experiment)}")
+        _tell_checked(plan, settings, notes, as_json, quiet)
         return
     _tell(result, notes, as_json, quiet)
 
 
-def _combinations(trials: int, experiment: object) -> str:
-    from warpjld.study.grasping import GraspExperiment
-
-    assert isinstance(experiment, GraspExperiment)
-    plan = experiment.settings
-    count = len(plan.hands) * len(plan.objects) * len(plan.scales) * len(plan.frictions)
-    return f"{min(count, trials)} of {count} combinations of hand, object, scale and friction"
+def _tell_checked(path: Path, plan: GraspPlan, notes: list[str], as_json: bool, quiet: bool) -> None:
+    combinations = len(plan.hands) * len(plan.objects) * len(plan.scales) * len(plan.frictions)
+    tried = min(combinations, plan.trials)
+    if as_json:
+        counts = {"trials": plan.trials, "combinations": combinations, "combinations_tried": tried}
+        answer({"plan": str(path), **counts, "notes": notes})
+    elif not quiet:
+        for note in notes:
+            click.echo(f"note: {note}")
+        of = f"{tried} of {combinations} combinations of hand, object, scale and friction"
+        click.echo(f"{path}: {plan.trials} trials of {of}")
 
 
 def _tell(result: StudyResult, notes: list[str], as_json: bool, quiet: bool) -> None:
@@ -102,7 +104,7 @@ def _tell(result: StudyResult, notes: list[str], as_json: bool, quiet: bool) -> 
             "seconds": round(result.seconds, 3),
             "notes": notes,
         }
-        click.echo(json.dumps(summary, indent=1, ensure_ascii=False))
+        answer(summary)
         return
     if quiet:
         return
@@ -121,7 +123,7 @@ def _tell_rerun(again: Rerun, as_json: bool, quiet: bool) -> None:
     if as_json:
         files = [str(file) for file in again.files]
         content = {"row": again.row, "differences": again.differences, "files": files}
-        click.echo(json.dumps(content, indent=1, ensure_ascii=False))
+        answer(content)
     elif not quiet:
         for name, value in again.row.items():
             click.echo(f"{name:16} {'' if value is None else value}")
