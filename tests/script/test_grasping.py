@@ -176,6 +176,18 @@ def test_grasp_auto(run) -> None:
         run("GRASP 35 45 LEFT apple AUTO POSTURE PLATES")
 
 
+def test_grasp_auto_keeps_out_of_other_objects(run) -> None:
+    scene = run(
+        "OBJECT apple BALL 0.06\nOBJECT table BOX 0.4 0.02 0.4\nMOVE table 0 0 -0.5 0\nMOVE table 15 0 -0.04 0\n"
+        "GRASP 5 15 LEFT apple AUTO TRIES 12"
+    )
+    attempt = scene.attempts[0]
+    assert "left.thumb" in attempt.values["digits"]
+    skin = cover(scene.actor()).deform(stage(scene.actor(), np.array([15.0]), 30))[0]
+    assert skin[:, 1].min() > -0.0301
+    assert attempt.values["collisions"] == []
+
+
 def test_what_else_a_closing_hand_runs_into_is_told(run) -> None:
     boxes = "OBJECT table BOX 0.4 0.02 0.4 AT 0 -0.092 0\nOBJECT floor BOX 0.4 0.02 0.4 AT 0 -0.3 0\n"
     scene = run(f"{READY}{boxes}GRASP 5 15 LEFT apple")
