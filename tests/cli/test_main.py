@@ -64,7 +64,17 @@ def test_a_folder_that_is_a_file(tmp_path: Path, capsys: pytest.CaptureFixture[s
     (tmp_path / "out").touch()
     example = Path(__file__).resolve().parents[2] / "examples" / "inflate_ball.toml"
     assert run("fem", str(example), "-o", str(tmp_path / "out"), "-q") == 1
-    assert f"error: {tmp_path / 'out'}: cannot write into this folder" in capsys.readouterr().err
+    assert capsys.readouterr().err == f"error: {tmp_path / 'out'}: is a file; want a folder to write into\n"
+
+
+def test_too_little_memory_is_one_line(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
+    @click.command()
+    def greedy() -> None:
+        np.empty(10**17)
+
+    monkeypatch.setattr("warpjld.cli.study.command", greedy)
+    assert run("study") == 1
+    assert capsys.readouterr().err.startswith("error: not enough memory: Unable to allocate")
 
 
 def test_a_full_disk_is_one_line(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:

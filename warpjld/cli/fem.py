@@ -8,9 +8,11 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 import click
+import numpy as np
 
 from warpjld.cli import options
-from warpjld.errors import InputError, WarpjldError
+from warpjld.errors import WarpjldError
+from warpjld.folders import make_folder
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -18,6 +20,8 @@ if TYPE_CHECKING:
     from warpjld.fem.study_results import Reaction
 
 __all__ = ["command"]
+
+_ROUNDING = 1e-9  # of the largest reaction: smaller ones are shown as none
 
 
 @click.command("fem")
@@ -48,10 +52,7 @@ def command(study: Path, out: Path | None, no_pictures: bool, as_json: bool, qui
     for note in notes:
         console.print(f"note: {note}")
     folder = out or Path(study.stem)
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise InputError(f"cannot write into this folder: {error.strerror}", path=folder) from error
+    make_folder(folder)
     mesh = loaded.body.mesh
     console.print(
         f"{loaded.title}: {len(mesh.elements)} elements, {loaded.body.degrees} degrees of freedom, "
@@ -78,6 +79,8 @@ def _table(console: Console, reactions: list[Reaction]) -> None:
     from rich.table import Table
 
     table = Table("step", "load", "where", "Rx, N", "Ry, N", "Rz, N", title="Reactions")
+    largest = max((float(np.abs(row.force).max()) for row in reactions), default=0.0)
     for row in reactions:
-        table.add_row(row.step, f"{row.load:.3f}", row.where, *(f"{f:.4g}" for f in row.force))
+        force = np.where(np.abs(row.force) > _ROUNDING * largest, row.force, 0.0)
+        table.add_row(row.step, f"{row.load:.3f}", row.where, *(f"{f:.4g}" for f in force))
     console.print(table)

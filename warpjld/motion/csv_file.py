@@ -13,6 +13,7 @@ from warpjld.errors import InputError
 from warpjld.motion.channels import ROOT_CHANNELS, canonical_channels, resolve_channel
 from warpjld.motion.tracks import Motion
 from warpjld.skeleton import Skeleton
+from warpjld.text_file import read_text
 
 __all__ = ["read_csv", "write_csv"]
 
@@ -29,13 +30,7 @@ def read_csv(path: str | Path, *, skeleton: Skeleton | None = None, rate: float 
         InputError: Unreadable, no or a wrong header, an unknown joint, a cell that is not a number, frames that
             are missing or do not increase; with its line and column.
     """
-    try:
-        text = Path(path).read_text(encoding="utf-8-sig")
-    except OSError as error:
-        raise InputError(f"cannot read motion: {error.strerror}", path=path) from error
-    except UnicodeDecodeError as error:
-        raise InputError("not a text file in UTF-8", path=path) from error
-    reader = csv.reader(text.splitlines())
+    reader = csv.reader(read_text(path).splitlines())
     motion = Motion(rate=rate)
     header: list[str] | None = None
     last = -math.inf

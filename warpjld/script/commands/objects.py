@@ -56,7 +56,7 @@ def object_(scene: Scene, arguments: Arguments) -> None:
         scale=lambda: arguments.number("the scale", above=0.0),
         at=lambda: arguments.vector("the place's"),
         turn=lambda: arguments.vector("the rotation about"),
-        color=lambda: arguments.text("a colour"),
+        color=lambda: _color(arguments),
     )
     if path is None and {"unit", "up", "centre"} & set(options):
         raise arguments.error("UNIT, UP and CENTRE are for surfaces from files", where)
@@ -108,6 +108,16 @@ def objects(scene: Scene, arguments: Arguments) -> None:
             taken = f"{other.start:g} to {other.stop:g}"
             raise arguments.error(f"{prop.name} follows another joint from {taken} already")
     prop.associations.append(Association(actor.name, joint, start, stop))
+
+
+def _color(arguments: Arguments) -> str:
+    from warpjld.render.colors import as_hex
+
+    name = arguments.text("a colour")
+    try:
+        return as_hex(name)
+    except InputError as error:
+        raise arguments.error(error.message) from None
 
 
 def _made(name: str, shape: str | None, sizes: list[float], path: object, options: dict[str, object]) -> GraspObject:
