@@ -28,105 +28,32 @@ nodes stick. Nor are bonds, nor a surface that meets itself.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from warpjld.fem.body import Body
 from warpjld.fem.conjugate import Status
-from warpjld.fem.contact.facets import Facets, Place
-from warpjld.fem.contact.law import Memory, start_memory
-from warpjld.fem.contact.obstacles import Obstacle
 from warpjld.fem.contact.pairs import Pair
-from warpjld.fem.contact.solution import ContactInstant, ContactSolution, Touch
-from warpjld.fem.contact.surface import ContactSurface, surface_of
+from warpjld.fem.contact.paper_sides import Side
+from warpjld.fem.contact.paper_turns import Turns
+from warpjld.fem.contact.solution import ContactInstant, ContactSolution
 from warpjld.fem.loads import Loads, external_forces
 from warpjld.fem.prescribed import Prescribed
 from warpjld.fem.solution import Instant, Solution
-from warpjld.fem.static import solve
 
 __all__ = ["by_turns"]
 
-_TURNS = 60
 _CAUTION = 0.25
 """First relaxation where the two sides are as stiff as one another."""
-_LEAST, _MOST = 0.1, 2.0
-"""Factors by which it may change in a turn."""
-_DEEPEST = 5.0
-"""Overlap, over an edge, beyond which a node is taken to have another side of the master behind it."""
 _REPEL = 0.25
 """Overlap, over an edge, that nodes are repelled by at once; where there is more, the step in time is halved."""
 _HALVINGS = 5
-_RUNAWAY = 1e3
-"""Growth of the move from its least that is called divergence."""
 _ADVICE = {
     False: "it settles where the skin is the stiffer body; else relax it after Aitken, or use the default method",
     True: "take shorter steps in time, or use the default method",
 }
-
-
-@dataclass(frozen=True, eq=False)
-class _Meeting:
-    """Where a pair's slave nodes are repelled to."""
-
-    rows: NDArray[np.int64]
-    target: NDArray[np.float64]
-    normal: NDArray[np.float64]
-    place: Place | None
-    distance: NDArray[np.float64]
-
-
-class _Side:
-    """A pair, its surfaces, and which slave nodes are pushed."""
-
-    def __init__(self, body: Body, pair: Pair) -> None:
-        self.pair = pair
-        self.slave: ContactSurface = surface_of(body.mesh, pair.slave, f"{pair.title}: slave")
-        self.touching = np.zeros(len(self.slave.nodes), dtype=bool)
-        self.obstacle = pair.master if isinstance(pair.master, Obstacle) else None
-        self.nodes = np.empty(0, np.int32)
-        if not isinstance(pair.master, Obstacle):
-            master = surface_of(body.mesh, pair.master, f"{pair.title}: master")
-            self.nodes = master.nodes
-            corners = master.corners
-            self._facets = Facets(body.mesh.nodes[self.nodes], np.concatenate([corners[:, :3], corners[:, [0, 2, 3]]]))
-            self.triangles = self._facets.faces
-
-    def memory(self) -> Memory:
-        """Who was pushed, for a later run: nodes with a pressure."""
-        return replace(start_memory(len(self.slave.nodes), self.pair), pressure=self.touching.astype(np.float64))
-
-    def meet(self, x: NDArray[np.float64], skin: NDArray[np.float64], time: float) -> _Meeting:
-        """Nodes that overlap or were pushed, at positions x (N, 3), and the polygons of ``skin`` (N, 3) under them."""
-        place = None
-        points = x[self.slave.nodes]
-        if self.obstacle is not None:
-            found = self.obstacle.project(points, time)
-        else:
-            self._facets.move(skin[self.nodes])
-            found, place = self._facets.locate(points)
-        # by the side of the nearest polygon: a master need not be closed
-        depth = np.einsum("mi,mi->m", found.closest - points, found.normal)
-        overlapping = (depth > 0.0) & (depth < _DEEPEST * self.slave.edge)
-        rows = np.flatnonzero(overlapping | self.touching)
-        if place is not None:
-            place = Place(place.face[rows], place.weights[rows])
-        return _Meeting(rows, found.closest[rows], found.normal[rows], place, -depth[rows])
-
-    def share(self, meeting: _Meeting, reactions: NDArray[np.float64], out: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Add forces on slave nodes (m, 3), and their opposites on the facets' nodes, to ``out`` (N, 3); what pulls is
-        let go. The forces that stay, shape (m, 3).
-        """
-        pushes = np.einsum("mi,mi->m", reactions, meeting.normal) > 0.0
-        forces = reactions * pushes[:, None]
-        self.touching[:] = False
-        self.touching[meeting.rows[pushes]] = True
-        np.add.at(out, self.slave.nodes[meeting.rows], forces)
-        if meeting.place is not None:
-            corners = self.nodes[self.triangles[meeting.place.face]]
-            np.add.at(out, corners, -meeting.place.weights[:, :, None] * forces[:, None, :])
-        return forces
 
 
 def by_turns(
@@ -158,7 +85,7 @@ def by_turns(
         watch: See ``press``.
         progress: See ``press``.
     """
-    sides = [_Side(body, pair) for pair in pairs]
+    sides = [Side(body, pair) for pair in pairs]
     edge = min(float(side.slave.edge.min()) for side in sides)
     reached: list[ContactInstant] = []
     steps: list[int] = []
@@ -178,7 +105,7 @@ def by_turns(
         first = None if guess is None else guess(now, time, last.displacement)
         touched = [side.touching.copy() for side in sides]
         deepest = _REPEL * edge if halvings < _HALVINGS else np.inf
-        turns = _Turns(
+        turns = Turns(
             body, prescribed(time), sides, loads(time), time, forces, omega if aitken else None, edge * threshold
         )
         status = turns.through(last, first, deepest)
@@ -223,7 +150,7 @@ def _missing(body: Body, loads: Loads, at: ContactInstant) -> NDArray[np.float64
     )
 
 
-def _first_omega(body: Body, sides: list[_Side]) -> float:
+def _first_omega(body: Body, sides: list[Side]) -> float:
     """A cautious relaxation to begin with: the stiffer what is repelled, the more the skin overshoots; no obstacle."""
     stiffness = body.at().stiffness
     assert stiffness is not None
@@ -235,184 +162,3 @@ def _first_omega(body: Body, sides: list[_Side]) -> float:
                 out, _CAUTION * min(1.0, float(np.median(stiff[side.nodes]) / np.median(stiff[side.slave.nodes])))
             )
     return out
-
-
-class _Turns:
-    """Repelling and releasing at one time, in turns.
-
-    Attributes:
-        last: The last equilibrium of released bodies.
-        forces: Contact forces on all nodes under which it is one [N], shape (N, 3).
-        omega: Share of the forces found that bodies are released under, over those of the turn before; plainly all.
-        solves: Static solves, two a turn.
-        moves: Farthest move or overlap of any point in each turn [m].
-        report: How it ended, in words.
-        diverged: Whether turns did not settle, though each found its equilibria.
-    """
-
-    def __init__(
-        self,
-        body: Body,
-        known: Prescribed,
-        sides: list[_Side],
-        loads: Loads,
-        time: float,
-        forces: NDArray[np.float64],
-        omega: float | None,
-        threshold: float,
-    ) -> None:
-        self._body, self._known, self._sides, self._loads, self._time = body, known, sides, loads, time
-        self._aitken, self._threshold = omega is not None, threshold
-        self._touches: list[Touch] = []
-        self._iterations = 0
-        self.forces, self.omega = forces, 1.0 if omega is None else omega
-        self.solves = 0
-        self.moves: list[float] = []
-        self.report = ""
-        self.diverged = False
-
-    def through(self, last: Solution, first: NDArray[np.float64] | None, deepest: float) -> Status:
-        """Turn until no point moves any more. Overlap beyond ``deepest`` [m] at the start is left to shorter steps."""
-        rest, surface = self._body.mesh.nodes, _surface(self._sides)
-        self.last = self._solve(self._known, self._loaded(self.forces), last, first)
-        if not self.last.converged:
-            return self._ended(self.last.status, f"the bodies do not follow what is prescribed: {self.last.message}")
-        before = np.zeros(0)
-        for turn in range(_TURNS):
-            u = self.last.displacement
-            meetings = [side.meet(rest + u, rest + u, self._time) for side in self._sides]
-            overlap = max(float(np.maximum(-m.distance, 0.0).max(initial=0.0)) for m in meetings)
-            if turn == 0 and overlap > deepest:
-                return self._ended(Status.STAGNATED, f"bodies overlap by {1e3 * overlap:.3g} mm at once")
-            fixed, found = self._repelled(surface, meetings)
-            if not fixed.converged:
-                return self._ended(fixed.status, f"repelled bodies found no equilibrium: {fixed.message}")
-            off = (found - self.forces).ravel()
-            if self._aitken and len(before) and (off != before).any():
-                change = off - before
-                wanted = -self.omega * float(before @ change) / float(change @ change)
-                self.omega = float(np.clip(wanted, _LEAST * self.omega, min(_MOST * self.omega, 1.0)))
-            before = off
-            forces = self.forces + self.omega * off.reshape(-1, 3)
-            # from where they were repelled to, if under nearly those forces: that is in equilibrium already
-            start = fixed if self.omega > 0.5 else self.last
-            freed = self._solve(self._known, self._loaded(forces), start)
-            if not freed.converged:
-                return self._ended(freed.status, f"released bodies give way under the forces found: {freed.message}")
-            self.last, self.forces = freed, forces
-            self.solves += 2
-            moved = float(np.abs(freed.displacement - u).max())
-            # what is relaxed moves less than it has yet to go
-            self.moves.append(max(moved, self._way(fixed, u)))
-            if self.moves[-1] < self._threshold:
-                return self._ended(Status.CONVERGED, f"{turn + 1} turns")
-            if self.moves[-1] > _RUNAWAY * min(self.moves):
-                break
-        self.diverged = True
-        grows = self.growth
-        how = f"each turn moves {grows:.2f} times as far as the one before"
-        status = Status.STAGNATED if grows >= 1.0 else Status.MAX_ITERATIONS
-        return self._ended(status, f"repelling and releasing did not settle in {len(self.moves)} turns: {how}")
-
-    def _way(self, fixed: Solution, u: NDArray[np.float64]) -> float:
-        """How far nodes that stay pushed were repelled [m]."""
-        pushed = np.concatenate([side.slave.nodes[side.touching] for side in self._sides])
-        return float(np.abs(fixed.displacement[pushed] - u[pushed]).max(initial=0.0))
-
-    def _loaded(self, forces: NDArray[np.float64]) -> Loads:
-        nodal = forces if self._loads.nodal is None else self._loads.nodal + forces
-        return replace(self._loads, nodal=nodal)
-
-    @property
-    def growth(self) -> float:
-        """Of the moves from turn to turn, as their geometric mean over the last ten; below 1 it settles."""
-        moves = self.moves[-11:]
-        return float((moves[-1] / moves[0]) ** (1.0 / (len(moves) - 1))) if len(moves) > 1 else np.nan
-
-    def instant(self) -> ContactInstant:
-        """What was reached."""
-        found = self.last.last
-        touches = tuple(self._touches)
-        return ContactInstant(
-            self._time, found.displacement, found.reactions, touches, self.solves, self._iterations, found.residual
-        )
-
-    def _repelled(self, surface: NDArray[np.int64], meetings: list[_Meeting]) -> tuple[Solution, NDArray[np.float64]]:
-        """Steps 2 to 4: bodies with the skin held and slave nodes on it, and the forces of that on all nodes [N]."""
-        rest, u = self._body.mesh.nodes, self.last.displacement
-        repelled = _without(_repelled(rest, surface, u[surface], self._sides, meetings), self._known)
-        fixed = self._solve(self._known + repelled, self._loads, self.last)
-        forces = np.zeros_like(rest)
-        self._touches = []
-        for side, meeting in zip(self._sides, meetings, strict=True):
-            own = side.share(meeting, fixed.reactions[side.slave.nodes[meeting.rows]], forces)
-            self._touches.append(_touch(side, meeting, own, rest + fixed.displacement, len(rest)))
-        return fixed, forces
-
-    def _solve(
-        self, known: Prescribed, loads: Loads, after: Solution, guess: NDArray[np.float64] | None = None
-    ) -> Solution:
-        found = solve(self._body, known, loads, after=after, guess=guess, free="hold", check=False)
-        self._iterations += found.last.iterations
-        return found
-
-    def _ended(self, status: Status, report: str) -> Status:
-        self.report = report
-        return status
-
-
-def _surface(sides: list[_Side]) -> NDArray[np.int64]:
-    """Nodes of all masters."""
-    return np.unique(np.concatenate([side.nodes for side in sides])).astype(np.int64)
-
-
-def _repelled(
-    rest: NDArray[np.float64],
-    surface: NDArray[np.int64],
-    skin: NDArray[np.float64],
-    sides: list[_Side],
-    meetings: list[_Meeting],
-) -> Prescribed:
-    """The skin where it is, and slave nodes on its polygons; a node that is both is skin."""
-    nodes = [surface]
-    places = [skin]
-    for side, meeting in zip(sides, meetings, strict=True):
-        nodes.append(side.slave.nodes[meeting.rows].astype(np.int64))
-        places.append(meeting.target - rest[nodes[-1]])
-    found, first = np.unique(np.concatenate(nodes), return_index=True)
-    values = np.concatenate(places)[first]
-    return Prescribed((3 * found[:, None] + np.arange(3)).ravel(), values.ravel())
-
-
-def _without(given: Prescribed, known: Prescribed) -> Prescribed:
-    keep = ~np.isin(given.degrees, known.degrees)
-    return Prescribed(given.degrees[keep], given.values[keep])
-
-
-def _touch(side: _Side, meeting: _Meeting, forces: NDArray[np.float64], x: NDArray[np.float64], count: int) -> Touch:
-    surface = side.slave
-    nodes = surface.nodes[meeting.rows]
-    area = surface.at_nodes(np.linalg.norm(surface.area_vectors(x), axis=1))[meeting.rows]
-    traction = forces / area[:, None]
-    pressure = np.einsum("mi,mi->m", traction, meeting.normal)
-    nodal = np.zeros((count, 3))
-    nodal[nodes] = forces
-    if meeting.place is not None:
-        corners = side.nodes[side.triangles[meeting.place.face]]
-        np.add.at(nodal, corners, -meeting.place.weights[:, :, None] * forces[:, None, :])
-    return Touch(
-        side.pair.label,
-        nodes,
-        x[nodes],
-        -meeting.normal,
-        pressure,
-        traction,
-        meeting.distance,
-        area,
-        np.where(pressure > 0.0, area, 0.0),
-        np.where(pressure > 0.0, area, 0.0),
-        np.zeros((len(nodes), 3)),
-        pressure > 0.0,
-        np.zeros(len(nodes), dtype=bool),
-        nodal,
-    )

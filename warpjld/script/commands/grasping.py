@@ -66,7 +66,7 @@ def auto_f_2_3(scene: Scene, arguments: Arguments) -> None:
         "[COUPLING <second joint> <third joint>], or GRASP <key1> <key2> [LEFT/RIGHT] <object> AUTO "
         "[TRIES <placements>] [POSTURE <SPHERE/CYLINDER/PINCH/PLATE>]"
     ),
-    help="Digits close from key1 on and touch at key2; COUPLING: joints together; AUTO finds out how, past other objects.",
+    help="Digits close from key1 on and touch at key2; COUPLING bends joints together; AUTO finds a way to take it.",
     group="Grasping",
 )
 def grasp(scene: Scene, arguments: Arguments) -> None:
