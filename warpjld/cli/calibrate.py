@@ -56,13 +56,14 @@ def command(
 
     RIG is a rig file (.glb, .gltf), a surface with --skeleton, or builtin:left, builtin:right. Scripts load the file
     written with PARAMETERS. The result is never worse than the start."""
-    from warpjld.cli.progress import progress, silence_warp
+    from warpjld.cli.progress import progress
     from warpjld.cli.rig_argument import open_rig
     from warpjld.covering import bind
     from warpjld.covering.calibrate import calibrate
     from warpjld.covering.parameters import load_parameters, save_parameters
     from warpjld.covering.pose_sets import calibration_poses
     from warpjld.errors import InputError
+    from warpjld.quiet import silence_warp
 
     silence_warp()
     if not out.absolute().parent.is_dir():

@@ -74,11 +74,12 @@ def command(
 
     RIG is a rig file, or builtin:left or builtin:right for the built-in hand.
     """
-    from warpjld.cli.progress import progress, silence_warp
+    from warpjld.cli.progress import progress
     from warpjld.cli.rig_argument import open_rig
     from warpjld.covering import bind, load_parameters
     from warpjld.io.caches import open_cache
     from warpjld.motion import open_motion
+    from warpjld.quiet import silence_warp
 
     silence_warp()
     began = time.perf_counter()

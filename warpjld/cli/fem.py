@@ -39,9 +39,9 @@ def command(study: Path, out: Path | None, no_pictures: bool, as_json: bool, qui
     from rich.console import Console
 
     from warpjld.cli.answer import answer
-    from warpjld.cli.progress import silence_warp
     from warpjld.fem.study_file import load_study
     from warpjld.fem.study_results import StudyResults
+    from warpjld.quiet import silence_warp
 
     silence_warp()
     console = Console(quiet=quiet, highlight=False, markup=False, soft_wrap=True, stderr=as_json)

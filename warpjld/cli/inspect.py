@@ -42,8 +42,8 @@ def command(
     RIG is a rig file (.glb, .gltf), a surface with --skeleton, or builtin:left, builtin:right. A picture of the
     surface's wire-frame with the named skeleton in it is written beside, unless --no-picture.
     """
-    from warpjld.cli.progress import silence_warp
     from warpjld.cli.rig_argument import open_rig
+    from warpjld.quiet import silence_warp
 
     silence_warp()
     opened = open_rig(rig, skeleton=skeleton, side=side, unit=unit, up=up)

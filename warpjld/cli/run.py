@@ -33,7 +33,8 @@ def command(
 ) -> None:
     """Run SCRIPT and make the pictures, films and exports it asks for; if it asks for none, an animated surface (NPZ),
     a film and a contact sheet. A summary goes to summary.json in the output folder."""
-    from warpjld.cli.progress import progress, silence_warp
+    from warpjld.cli.progress import progress
+    from warpjld.quiet import silence_warp
     from warpjld.script import Interpreter, Scene
     from warpjld.script.plugin import load_commands
     from warpjld.script.runner import run_scene

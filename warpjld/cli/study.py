@@ -48,8 +48,9 @@ def command(
 
     Leaves a table, the poses, a manifest and a summary in the output folder. The table is the same, byte for byte,
     whatever the number of processes and however often the study was stopped."""
-    from warpjld.cli.progress import progress, silence_warp
+    from warpjld.cli.progress import progress
     from warpjld.errors import InputError
+    from warpjld.quiet import silence_warp
     from warpjld.study import rerun_trial, run_study
     from warpjld.study.grasping import GraspExperiment, load_plan
 
@@ -126,7 +127,8 @@ def _tell_rerun(again: Rerun, as_json: bool, quiet: bool) -> None:
         answer(content)
     elif not quiet:
         for name, value in again.row.items():
-            click.echo(f"{name:16} {'' if value is None else value}")
+            shown = f"{value:.6g}" if isinstance(value, float) else value
+            click.echo(f"{name:16} {'' if value is None else shown}")
         click.echo("the same as in the study, bit for bit" if same else f"differs in: {', '.join(again.differences)}")
         click.echo(", ".join(str(file) for file in again.files))
     if not same:
