@@ -15,7 +15,6 @@ from warpjld.fem.fit import fit_mesh
 from warpjld.fem.stress import cauchy
 from warpjld.grasp.objects import GraspObject, Places
 from warpjld.press.wishes import Physical
-from warpjld.rotations import unit
 
 __all__ = ["ObjectVolume", "object_volume"]
 
@@ -140,7 +139,7 @@ def _shell(solid: HexMesh, wall: float) -> HexMesh:
     normal = np.zeros_like(x)
     facing = np.cross(x[corners[:, 2]] - x[corners[:, 0]], x[corners[:, 3]] - x[corners[:, 1]])
     np.add.at(normal, corners, facing[:, None, :].repeat(4, axis=1))
-    normal = unit(normal)
+    normal /= np.linalg.norm(normal, axis=1, keepdims=True)
     depths = np.linspace(wall, 0.0, _WALL + 1)
     nodes = np.concatenate([x - depth * normal for depth in depths])
     layers = [
