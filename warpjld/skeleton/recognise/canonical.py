@@ -84,7 +84,7 @@ def canonical_skeleton(
         layout.positions[layout.names.index("pelvis")] = place
     if roles.body:
         _extremities(layout, vertices, faces)
-    skeleton = _skeleton(layout, roles, hand_points, axes or {}, limits or {})
+    skeleton = _skeleton(layout, hand_points, axes or {}, limits or {})
     return Canonical(skeleton, tuple(layout.sources), layout.owner, (*notes, *layout.notes))
 
 
@@ -139,7 +139,6 @@ def _last_bones(tree: SourceTree, hand: HandRoles) -> dict[str, NDArray[np.float
 
 def _skeleton(
     layout: Layout,
-    roles: Roles,
     hand_points: Mapping[str, Mapping[str, NDArray[np.float64]]],
     given_axes: Mapping[int, NDArray[np.float64]],
     given_limits: Mapping[int, Mapping[str, tuple[float, float]]],
