@@ -14,6 +14,7 @@ from warpjld.errors import InputError
 from warpjld.skeleton.tree import CHANNELS, Skeleton
 from warpjld.suggest import one_of
 from warpjld.text_file import read_json
+from warpjld.whole_file import whole_file
 
 __all__ = ["Parameters", "default_parameters", "load_parameters", "save_parameters"]
 
@@ -114,12 +115,10 @@ def save_parameters(path: str | Path, skeleton: Skeleton, parameters: Parameters
         name: {f.name: np.round(getattr(parameters, f.name)[j], 6).tolist() for f in fields(parameters)}
         for j, name in enumerate(skeleton.names)
     }
-    target = Path(path)
-    beside = target.with_name(target.name + ".part")
     content = json.dumps({"warpjld": "parameters", "version": 1, "joints": joints}, indent=1)
     try:
-        beside.write_text(content + "\n", encoding="utf-8")
-        beside.replace(target)
+        with whole_file(Path(path)) as part:
+            part.write_text(content + "\n", encoding="utf-8")
     except OSError as error:
         raise InputError(f"cannot write parameters: {error.strerror}", path=path) from error
 

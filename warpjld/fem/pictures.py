@@ -13,6 +13,7 @@ from warpjld.fem.solution import Instant
 from warpjld.fem.stress import at_nodes, cauchy, mises
 from warpjld.fem.vtk import grid_of
 from warpjld.rotations import unit
+from warpjld.whole_file import whole_file
 
 __all__ = ["QUANTITIES", "draw"]
 
@@ -51,9 +52,8 @@ def draw(path: Path, body: Body, instant: Instant, quantity: str, title: str = "
     ]
     sheet = Image.fromarray(np.concatenate(panels, axis=1))
     sheet = sheet.resize((2 * _PANEL + _BAR, _PANEL), Image.Resampling.LANCZOS)
-    part = path.with_name(path.name + ".part")
-    sheet.save(part, format="PNG")
-    part.replace(path)
+    with whole_file(path) as part:
+        sheet.save(part, format="PNG")
 
 
 def _panel(

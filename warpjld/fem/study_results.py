@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import csv
-import io
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -13,6 +12,7 @@ from numpy.typing import NDArray
 
 from warpjld.fem.study import Reached, Study
 from warpjld.fem.vtk import Series
+from warpjld.whole_file import whole_file
 
 __all__ = ["Reaction", "StudyResults"]
 
@@ -100,11 +100,7 @@ class StudyResults:
             self.files.append(path)
 
     def _write_reactions(self) -> None:
-        text = io.StringIO()
-        writer = csv.writer(text)
-        writer.writerow(["step", "load", "where", "rx_newton", "ry_newton", "rz_newton"])
-        writer.writerows([row.step, row.load, row.where, *row.force] for row in self.reactions)
-        path = self.folder / "reactions.csv"
-        part = path.with_name(path.name + ".part")
-        part.write_text(text.getvalue())
-        part.replace(path)
+        with whole_file(self.folder / "reactions.csv") as part, part.open("w", encoding="utf-8", newline="") as file:
+            writer = csv.writer(file)
+            writer.writerow(["step", "load", "where", "rx_newton", "ry_newton", "rz_newton"])
+            writer.writerows([row.step, row.load, row.where, *row.force] for row in self.reactions)

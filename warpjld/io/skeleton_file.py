@@ -31,6 +31,7 @@ from warpjld.skeleton.recognise.tree import SourceTree
 from warpjld.skeleton.tree import CHANNELS, Skeleton
 from warpjld.suggest import did_you_mean
 from warpjld.text_file import read_json
+from warpjld.whole_file import whole_file
 
 __all__ = ["read_skeleton_file", "write_skeleton_file"]
 
@@ -152,11 +153,9 @@ def write_skeleton_file(path: str | Path, skeleton: Skeleton) -> None:
                 },
             }
         )
-    path = Path(path)
-    part = path.with_name(path.name + ".part")
     lines = ",\n".join("    " + json.dumps(joint) for joint in joints)
     try:
-        part.write_text(f'{{\n  "joints": [\n{lines}\n  ]\n}}\n', "utf-8")
-        part.replace(path)
+        with whole_file(Path(path)) as part:
+            part.write_text(f'{{\n  "joints": [\n{lines}\n  ]\n}}\n', "utf-8")
     except OSError as error:
         raise InputError(f"cannot be written: {error.strerror}", path=path) from None
