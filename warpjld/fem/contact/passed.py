@@ -21,6 +21,9 @@ __all__ = ["counted"]
 _TIMES, _SLACK = 3.0, 0.25
 """Overlap along the normal that counts for nothing: over how deep facets are inside each other, and that of facets that
 only touch, in edges. Half of it counts fully."""
+_OWN_SLACK = 1.0
+"""The latter for parts that belong together, whose depth in each other is not known: they are inside one another where
+they are joined."""
 
 
 def counted(
@@ -58,15 +61,15 @@ def counted(
     between = np.einsum("pk,pki->pi", far, x[surface.quads[pairs[:, 1]]])
     between -= np.einsum("pk,pki->pi", own, x[surface.quads[pairs[:, 0]]])
     overlap = -np.einsum("pki,pi->pk", facing, between).min(axis=1)
-    slack = _SLACK * surface.edge[surface.corners[pairs[:, 0]]].mean(axis=1)
-    some = np.flatnonzero((overlap > 0.5 * slack) & ~joined)
+    slack = np.where(joined, _OWN_SLACK, _SLACK) * surface.edge[surface.corners[pairs[:, 0]]].mean(axis=1)
+    some = np.flatnonzero(overlap > 0.5 * slack)
     if not len(some):
         return out
     asked, rows = np.unique(pairs[some], return_inverse=True)
     depth = _depths(surface, exclusion, asked.astype(np.int32), x, reach, threads)[rows.reshape(-1, 2)]
     inside = np.maximum((own[some] * depth[:, 0]).sum(axis=1), (far[some] * depth[:, 1]).sum(axis=1))
     t = np.clip(2.0 - 2.0 * overlap[some] / (_TIMES * inside + slack[some]), 0.0, 1.0)
-    out[some] = t * t * (3.0 - 2.0 * t)
+    out[some] *= t * t * (3.0 - 2.0 * t)
     return out
 
 
