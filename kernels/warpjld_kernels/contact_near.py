@@ -1,4 +1,4 @@
-"""How deep corners of facets are inside other parts of a surface."""
+"""How deep corners of facets are inside other facets' bodies."""
 
 import warp as wp
 
@@ -50,7 +50,9 @@ def depths(
     first: int,
     bvh: wp.uint64,
     origin: wp.vec3d,
-    facets: wp.array2d(dtype=wp.int32),
+    mine: wp.array2d(dtype=wp.int32),
+    my_label: wp.array(dtype=wp.int32),
+    others: wp.array2d(dtype=wp.int32),
     label: wp.array(dtype=wp.int32),
     joined: wp.array2d(dtype=wp.uint8),
     x: wp.array(dtype=wp.vec3d),
@@ -59,22 +61,22 @@ def depths(
     # out
     depth: wp.array2d(dtype=wp.float64),
 ):
-    """Of each corner of the facets that are asked for, below the nearest of the facets whose labels are not joined."""
+    """Of each corner of ``mine`` that are asked for, below the nearest of the others whose labels are not joined."""
     i = first + wp.tid()
-    mine = asked[i]
+    facet = asked[i]
     margin = wp.vec3(float(reach), float(reach), float(reach))
     for k in range(4):
-        p = x[facets[mine, k]]
+        p = x[mine[facet, k]]
         here = wp.vec3(p - origin)
         query = wp.bvh_query_aabb(bvh, here - margin, here + margin)
         other = wp.int32(0)
         nearest = reach
         while wp.bvh_query_next(query, other):
-            if joined[label[mine], label[other]] == wp.uint8(0):
-                a = x[facets[other, 0]]
-                c = x[facets[other, 2]]
-                one = signed(p, a, x[facets[other, 1]], c)
-                two = signed(p, a, c, x[facets[other, 3]])
+            if joined[my_label[facet], label[other]] == wp.uint8(0):
+                a = x[others[other, 0]]
+                c = x[others[other, 2]]
+                one = signed(p, a, x[others[other, 1]], c)
+                two = signed(p, a, c, x[others[other, 3]])
                 if wp.abs(one) < wp.abs(nearest):
                     nearest = one
                 if wp.abs(two) < wp.abs(nearest):

@@ -13,8 +13,8 @@ from warpjld.fem import Body
 from warpjld.fem.contact import ContactSolution, Pair, press
 from warpjld.fem.hand import FleshHand, hand_laws
 from warpjld.hand import build_hand
-from warpjld.press.bodies import HandBody
 from warpjld.press.drive import Drive
+from warpjld.press.hand_body import HandBody
 from warpjld.press.rest import part_of, posed
 from warpjld.skeleton import CHANNELS, Poses, Skeleton, poses_from_angles
 
