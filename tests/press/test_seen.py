@@ -51,5 +51,5 @@ def test_digits_that_meet_skin_without_flesh_are_named(run: Callable[[str], Scen
     report = run_press(scene, tmp_path)
     assert report.verdict.status == "CONVERGED"
     (note,) = (note for note in report.notes if "overlap" in note)
-    assert note.startswith("LEFT thumb and LEFT index are seen to overlap by ")
+    assert note.startswith("LEFT index and LEFT thumb are seen to overlap by ")
     assert note.endswith("at frame 1: FLESH LEFT … INDEX makes them press on each other")

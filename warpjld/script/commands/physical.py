@@ -62,7 +62,7 @@ def physical(scene: Scene, arguments: Arguments) -> None:
         "FLESH <actor> [THUMB/INDEX/MIDDLE/RING/PINKY/PALM …] [ELEMENT <metres>] [YOUNG <pascals>] [SKIN <pascals>] "
         "[POISSON <ratio>] [STIFFENING <exponent>] [ITSELF <ON/OFF>]"
     ),
-    help="An actor's flesh deforms, only of digits or the palm if named; ITSELF: whether skin touches skin.",
+    help="An actor's flesh deforms, of some digits or the palm only if named; ITSELF: whether skin touches skin.",
     group="Contact",
 )
 def flesh(scene: Scene, arguments: Arguments) -> None:
