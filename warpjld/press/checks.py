@@ -13,7 +13,6 @@ from warpjld.fem.contact.facets import Facets
 from warpjld.fem.contact.surface import surface_of
 from warpjld.press.bodies import Bodies
 from warpjld.press.hand_body import HandBody
-from warpjld.press.passing import LOOKS_AHEAD
 from warpjld.press.where import placed
 from warpjld.press.wishes import ContactWishes
 
@@ -61,7 +60,7 @@ def _refuse_deep(bodies: Bodies, hand: HandBody, surfaces: Mapping[str, Facets])
     """
     flesh = hand.part.hand
     skin = surface_of(flesh.mesh, flesh.name, hand.name)
-    x, most = flesh.mesh.nodes[skin.nodes], LOOKS_AHEAD * float(skin.edge.max())
+    x, most = flesh.mesh.nodes[skin.nodes], skin.reach
     depths = {name: -surface.project(x).distance for name, surface in surfaces.items()}
     depths |= {name: -obstacle.project(x, 0.0).distance for name, obstacle in bodies.obstacles.items()}
     for name, depth in depths.items():

@@ -1,6 +1,6 @@
 """How far skin goes past other things in a step, and how many steps that asks for: nothing is to be stepped over.
 
-Contact looks ahead, and behind, by two edges of elements, and takes a point in an obstacle to have come in by the
+Contact looks ahead, and behind, by about two edges of elements, and takes a point in an obstacle to have come in by the
 nearest side. A step in which skin goes farther may begin before something and end behind it, and no force says so.
 """
 
@@ -18,10 +18,8 @@ from warpjld.press.bodies import Bodies
 from warpjld.press.hand_body import HandBody
 from warpjld.press.object_body import ObjectBody
 
-__all__ = ["LOOKS_AHEAD", "Passing", "half_thickness", "way_past"]
+__all__ = ["Passing", "half_thickness", "way_past"]
 
-LOOKS_AHEAD = 2.0
-"""How far contact looks, ahead and behind, in edges (``warpjld.fem.contact.points.Interface``)."""
 _LOOKS = 4
 """Moments of a step at which its way is looked at."""
 _MOST = 40
@@ -87,11 +85,11 @@ class Passing:
         paths = {one.name: self._path(one, times, displacement) for one in movers}
         worst = 0.0
         for name, path in paths.items():
-            reach = LOOKS_AHEAD * float(self._surfaces[name].edge.max())
+            reach = self._surfaces[name].reach
             for solid, obstacle in bodies.obstacles.items():
                 worst = max(worst, way_past(obstacle, times, path) / min(reach, self._thickness[solid]))
         for hand in bodies.hands:
-            reach = LOOKS_AHEAD * float(self._surfaces[hand.name].edge.max())
+            reach = self._surfaces[hand.name].reach
             for other in movers:
                 if other is hand:
                     way = self._past_itself(hand, paths[hand.name]) if hand.itself else 0.0

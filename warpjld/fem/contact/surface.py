@@ -13,6 +13,9 @@ from warpjld.rotations import unit
 
 __all__ = ["ContactSurface", "surface_of"]
 
+_LARGE = 1.5
+"""Edges longer than this times the middle one do not make points look farther ahead: a hand is thin."""
+
 
 @dataclass(frozen=True, eq=False)
 class ContactSurface:
@@ -29,6 +32,11 @@ class ContactSurface:
     nodes: NDArray[np.int32]
     corners: NDArray[np.int32]
     edge: NDArray[np.float64]
+
+    @property
+    def reach(self) -> float:
+        """How far ahead its points look [m]."""
+        return 2.0 * min(float(self.edge.max()), _LARGE * float(np.median(self.edge)))
 
     def area_vectors(self, x: NDArray[np.float64]) -> NDArray[np.float64]:
         """Area times outward normal of each face at positions x (N, 3) [m²], shape (F, 3)."""
