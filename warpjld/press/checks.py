@@ -20,8 +20,12 @@ _DEEP = 5e-4
 """Depth of a bone in a rigid object that the flesh between cannot bear [m]."""
 
 
+_ON = 2e-4
+"""Gap from which on an object stands on what is below it [m]."""
+
+
 def refuse_hopeless(bodies: Bodies, wishes: ContactWishes) -> None:
-    """Refuse bonds between bodies that do not meet, and objects inside flesh.
+    """Refuse bonds between bodies that do not meet, objects inside flesh, and lifting what stands on something else.
 
     Raises:
         InputError: Names the command's line.
@@ -36,6 +40,15 @@ def refuse_hopeless(bodies: Bodies, wishes: ContactWishes) -> None:
                 InputError(f"a bond to nothing: {bonded.one} and {bonded.other} are {1e3 * gap:.3g} mm apart"),
                 bonded.where,
             )
+    for wish in wishes.grips:
+        if wish.lift and (below := _below(bodies, surfaces, wish.object)):
+            raise placed(
+                InputError(
+                    f"LIFT {wish.object}: it stands on {below}, which bears it however the hand grips: "
+                    f"move {below} away, or {wish.object} higher; LIFT has a support of its own"
+                ),
+                wish.where,
+            )
     for hand in bodies.hands:
         flesh = Facets(hand.part.skin, hand.part.hand.surface.faces)
         shapes = {one.name: one.volume.surface for one in bodies.objects}
@@ -43,6 +56,18 @@ def refuse_hopeless(bodies: Bodies, wishes: ContactWishes) -> None:
         for name, vertices in shapes.items():
             if (flesh.project(np.asarray(vertices)).distance < 0.0).all():
                 raise InputError(f"{name} lies inside {hand.name}: nothing can press it out; move it out of the flesh")
+
+
+def _below(bodies: Bodies, surfaces: dict[str, Facets], name: str) -> str:
+    """What an object stands on at time 0, or nothing."""
+    up = -np.array(bodies.loads.gravity) / np.linalg.norm(bodies.loads.gravity)
+    points = surfaces[name].vertices
+    found = {other: obstacle.project(points, 0.0) for other, obstacle in bodies.obstacles.items()}
+    found |= {other: surface.project(points) for other, surface in surfaces.items() if other != name}
+    for other, touching in found.items():
+        if ((touching.distance < _ON) & (touching.normal @ up > 0.5)).any():
+            return other
+    return ""
 
 
 def why_not(bodies: Bodies, time: float) -> str:
