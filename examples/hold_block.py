@@ -81,7 +81,7 @@ def main(folder: Path, weight: float, friction: float) -> Grip:
     """Write the results into a folder; the gentlest grip."""
     started = time.perf_counter()
     holding = pads_and_block(weight, friction)
-    found = gentlest_grip(holding, 2e-5, 1e-3, weight=weight, friction=friction, start=5e-5, tolerance=0.01)
+    found = gentlest_grip(holding, 2e-5, 1e-3, weight=weight, friction=friction, start=5e-5, tolerance=0.004)
     print(found.text)
     if found.status is not GripStatus.HELD:
         return found

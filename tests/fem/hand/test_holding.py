@@ -76,7 +76,7 @@ def test_a_block_that_stands_is_not_held(holding: Holding) -> None:
 
 @pytest.mark.slow
 def test_pads_press_with_half_the_weight_over_friction(holding: Holding) -> None:
-    found = gentlest_grip(holding, 2e-5, 1e-3, weight=WEIGHT, friction=FRICTION, start=5e-5, tolerance=0.01)
+    found = gentlest_grip(holding, 2e-5, 1e-3, weight=WEIGHT, friction=FRICTION, start=5e-5, tolerance=0.004)
     assert found.status is GripStatus.HELD
     needed = WEIGHT / (2.0 * FRICTION)
     assert 0.5 * found.trial.force == pytest.approx(needed, rel=0.02)

@@ -30,8 +30,9 @@ _PART, _FORESEEN = 0.5, (_FIRST, 0.06)
 _SHORTER, _TRIES = 1.0 / 3.0, 4
 """What becomes of a step that finds no equilibrium, and how many are tried."""
 _LEFT, _LITTLE = 0.01, 0.001
-"""Share of the weight that may be left on the handle when it lets go; and the same where all slides by then, or where
-the other was too much."""
+"""Share of the weight that may be left on the handle when it lets go; and the same where that was too much."""
+_SPARE = 0.002
+"""Share of the weight that is to be borne beyond all of it where all slides: nothing may be left then."""
 _LESS = 0.02
 """Share of the weight that the hand may bear less than it did before the object is said to slip out."""
 _TOO_FAR = 0.1
@@ -137,7 +138,7 @@ def descend(
         outcome = _seen(weighed, places, far)
         if outcome is not None:
             return ended(outcome)
-        if here.left <= (_LITTLE if here.slides else enough):
+        if here.left <= (0.0 if here.slides else enough):
             free = released(here.solution)
             if free.converged:
                 return ended(Outcome.HELD, free)
@@ -157,7 +158,7 @@ def _seen(weighed: Weighed, places: list[_Place], far: float) -> Outcome | None:
     here = places[-1]
     if here.elsewhere > _LEFT:
         return Outcome.STANDS
-    if here.left <= _LEFT:
+    if here.left <= (0.0 if here.slides else _LEFT):
         return None
     if not weighed.force(here.solution.last) > 0.0:
         return Outcome.APART
@@ -176,7 +177,7 @@ def _step(places: list[_Place], step: float, far: float) -> float:
     if here.slides and not places[-2].slides:
         return _PROBE * far
     longest, slope = min(_LONGER * step, _LONGEST * far), _slope(places)
-    return min(here.left / slope, longest) if slope > 0.0 else longest
+    return min((here.left + _SPARE * here.slides) / slope, longest) if slope > 0.0 else longest
 
 
 def _slope(places: list[_Place]) -> float:

@@ -24,7 +24,7 @@ from warpjld.fem.prescribed import Prescribed
 __all__ = ["Holding"]
 
 _HALVINGS = 2
-"""Of the steps between the grip and the descent."""
+"""Of the step in which the weight comes on; steps down are not halved: shorter ones are tried then."""
 
 
 @dataclass(eq=False)
@@ -94,7 +94,7 @@ class Holding:
         most = self.weighed.most(closed.last)
         if most < 1.0:
             return self._trial(Outcome.WEAK, closed.last, most)
-        bare = self._lowered(grip, closed, self.weighed.height(closed.last))
+        bare = self._lowered(grip, closed, self.weighed.height(closed.last), halvings=_HALVINGS)
         if not bare.converged:
             return self._trial(Outcome.UNSOLVED, closed.last, float("nan"))
         descent = descend(
@@ -116,7 +116,9 @@ class Holding:
         ways = [self.opened + share * (grip - self.opened) for share in (before, time)]
         return self.guess(ways[0], ways[1], u)
 
-    def _lowered(self, grip: float, after: ContactSolution, height: float | None) -> ContactSolution:
+    def _lowered(
+        self, grip: float, after: ContactSolution, height: float | None, *, halvings: int = 0
+    ) -> ContactSolution:
         """The handle at another height under the whole weight, or without a handle."""
         begin, since = after.last.time, self.weighed.height(after.last)
 
@@ -125,7 +127,7 @@ class Holding:
             return held if height is None else held + self.weighed.at(since + (time - begin) * (height - since))
 
         heavy = replace(self.loads, gravity=self.gravity)
-        return self._press(known, lambda time: heavy, [begin + 1.0], after=after)
+        return self._press(known, lambda time: heavy, [begin + 1.0], after=after, halvings=halvings)
 
     def _press(
         self,
@@ -135,6 +137,7 @@ class Holding:
         *,
         after: ContactSolution | None = None,
         guess: Callable[[float, float, NDArray[np.float64]], NDArray[np.float64]] | None = None,
+        halvings: int | None = None,
     ) -> ContactSolution:
         return press(
             self.body,
@@ -144,7 +147,7 @@ class Holding:
             times=times,
             after=after,
             guess=guess,
-            halvings=None if after is None else _HALVINGS,
+            halvings=halvings,
             check=False,
         )
 
