@@ -54,7 +54,13 @@ def test_pressing(name: str, tmp_path) -> None:
     scene = Scene(folder=tmp_path, say=lambda text: None)
     Interpreter(scene).run_file(EXAMPLES / name)
     scene.size = (120, 90)
-    last = {"press_ball.jld": 34, "press_ball_on_table.jld": 14, "press_plate.jld": 18, "press_pinch.jld": 32}[name]
+    last = {
+        "press_ball.jld": 34,
+        "press_ball_on_table.jld": 14,
+        "press_fist.jld": 34,
+        "press_pinch.jld": 32,
+        "press_plate.jld": 18,
+    }[name]
     scene.first, scene.last = last - 2, last
     scene.contact.pressing = replace(scene.contact.pressing, last=last)
     Interpreter(scene).run_text("EXPORT 'seen.npz'")
