@@ -26,7 +26,7 @@ PAD = (0.004, 0.024, 0.024)  # [m]
 GRAVITY = 9.81
 
 
-def pads_and_block(weight: float, friction: float, weighing: int = 2) -> Holding:
+def pads_and_block(weight: float, friction: float) -> Holding:
     """Two soft pads on rigid backs touch a block from both sides; a grip is the way [m] by which each back closes."""
     half = 0.5 * EDGE
     block = box((EDGE, EDGE, EDGE), (3, 3, 3), origin=(-half, -half, -half), name="block")
@@ -46,7 +46,7 @@ def pads_and_block(weight: float, friction: float, weighing: int = 2) -> Holding
         Pair("pad.left", "block.x-", friction=friction, name="pad.left"),
         Pair("pad.right", "block.x+", friction=friction, name="pad.right"),
     ]
-    return Holding(body, closed, pads, (0.0, 0.0, -GRAVITY), weighing=weighing)
+    return Holding(body, closed, pads, "block", (0.0, 0.0, -GRAVITY))
 
 
 def draw(path: Path, holding: Holding, grip: float, title: str) -> None:
@@ -81,23 +81,21 @@ def main(folder: Path, weight: float, friction: float) -> Grip:
     """Write the results into a folder; the gentlest grip."""
     started = time.perf_counter()
     holding = pads_and_block(weight, friction)
-    found = gentlest_grip(holding, 2e-5, 1e-3, weight=weight, friction=friction, start=5e-5)
+    found = gentlest_grip(holding, 2e-5, 1e-3, weight=weight, friction=friction, start=5e-5, tolerance=0.004)
     print(found.text)
-    if found.status is not GripStatus.HELD or found.trial is None:
+    if found.status is not GripStatus.HELD:
         return found
     each = 0.5 * found.trial.force
     print(
         f"each pad presses with {each:.3f} N; {0.5 * weight / friction:.3f} N are needed; "
         f"backs closed by {1e3 * found.grip:.3f} mm; "
-        f"{len(found.trials)} grips tried in {time.perf_counter() - started:.0f} s"
+        f"{found.ended}, in {time.perf_counter() - started:.0f} s"
     )
-    finer = pads_and_block(weight, friction, weighing=10)
-    finer(found.grip)
-    instants = finer.found[found.grip].instants
+    instants = holding.found[found.grip].instants
     felt = tactile_of_pairs(instants)
     draw_tactile(folder / "pads.png", felt, "What the pads feel")
     write_tactile(folder / "pads.csv", felt)
-    draw(folder / "block.png", finer, found.grip, f"{weight:g} N held by {each:.2f} N from each side")
+    draw(folder / "block.png", holding, found.grip, f"{weight:g} N held by {each:.2f} N from each side")
     return found
 
 

@@ -162,7 +162,15 @@ def test_what_is_too_heavy_is_said(
             "POINTS BALL top UPPER Y 0.1\nVECTOR BALL top AT 0 0 0 0\nLIFT 15 19 LEFT BALL\nPRESS 0 19",
             r"nothing but HOLD",
         ),
-        ("GRAVITY 1 -9.81 0\nLIFT 15 19 LEFT BALL\nPRESS 0 19", r"a GRAVITY along one axis"),
+        (
+            "GRAVITY 1 -9.81 0\nLIFT 15 19 LEFT BALL\nPRESS 0 19",
+            r"a GRAVITY along one axis of the stage, got 1 -9.81 0",
+        ),
+        (
+            "OBJECT RING BALL 0.02 AT 0.0411 -0.0348 -0.088\nPHYSICAL RING\nBOND BALL RING 1000 1000\n"
+            "LIFT 15 19 LEFT BALL\nPRESS 0 19",
+            r"takes the weight of one object, and BALL is bonded to RING",
+        ),
         ("PHYSICAL BALL DENSITY 0\nLIFT 15 19 LEFT BALL\nPRESS 0 19", r"BALL weighs nothing"),
         ("LIFT 15 19 LEFT BALL\nPRESS 15 19", r"after 15 and up to 19, got 15 to 19"),
     ],

@@ -24,10 +24,13 @@ _APART = 0.3
 _DEEP = 5e-4
 """Depth of a bone in a rigid object that the flesh between cannot bear [m]."""
 
+_ON = 2e-4
+"""Gap from which on an object stands on what is below it [m]."""
+
 
 def refuse_hopeless(bodies: Bodies, wishes: ContactWishes) -> None:
-    """Refuse bonds between bodies that do not meet, objects inside flesh, and skin that begins deeper in something than
-    contact looks (R112).
+    """Refuse bonds between bodies that do not meet, objects inside flesh, lifting what stands on something else, and
+    skin that begins deeper in something than contact looks (R112).
 
     Raises:
         InputError: Names the command's line.
@@ -41,6 +44,15 @@ def refuse_hopeless(bodies: Bodies, wishes: ContactWishes) -> None:
             raise placed(
                 InputError(f"a bond to nothing: {bonded.one} and {bonded.other} are {1e3 * gap:.3g} mm apart"),
                 bonded.where,
+            )
+    for wish in wishes.grips:
+        if wish.lift and (below := _below(bodies, surfaces, wish.object)):
+            raise placed(
+                InputError(
+                    f"LIFT {wish.object}: it stands on {below}, which bears it however the hand grips: "
+                    f"move {below} away, or {wish.object} higher; LIFT has a support of its own"
+                ),
+                wish.where,
             )
     for hand in bodies.hands:
         flesh = Facets(hand.part.skin, hand.part.hand.surface.faces)
@@ -72,6 +84,18 @@ def _refuse_deep(bodies: Bodies, hand: HandBody, surfaces: Mapping[str, Facets])
                 f"{hand.name} {digits}: {where}; with these elements it parts {1e3 * most:.2g} mm at most: begin "
                 "farther out, or take a larger ELEMENT"
             )
+
+
+def _below(bodies: Bodies, surfaces: dict[str, Facets], name: str) -> str:
+    """What an object stands on at time 0, or nothing."""
+    up = -np.array(bodies.loads.gravity) / np.linalg.norm(bodies.loads.gravity)
+    points = surfaces[name].vertices
+    found = {other: obstacle.project(points, 0.0) for other, obstacle in bodies.obstacles.items()}
+    found |= {other: surface.project(points) for other, surface in surfaces.items() if other != name}
+    for other, touching in found.items():
+        if ((touching.distance < _ON) & (touching.normal @ up > 0.5)).any():
+            return other
+    return ""
 
 
 def why_not(bodies: Bodies, time: float) -> str:

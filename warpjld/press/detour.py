@@ -13,7 +13,7 @@ from typing import TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from warpjld.fem import Loads, Prescribed, Status
+from warpjld.fem import Loads, Prescribed
 from warpjld.fem.contact import ContactSolution, press
 from warpjld.fem.hand.blend import Moves
 from warpjld.press.bodies import Bodies
@@ -38,7 +38,7 @@ def detour(
     known: tuple[str, Callable[[float], Prescribed]] | None = None,
     nodal: Callable[[float], NDArray[np.float64]] | None = None,
     duration: float | None = None,
-    patience: int | None = None,
+    halvings: int | None = None,
 ) -> ContactSolution:
     """Equilibria along a way; functions of it are given the share of it that is done, 0 … 1.
 
@@ -50,8 +50,8 @@ def detour(
         known: An object's name and what is prescribed for its nodes instead of its states and support.
         nodal: Forces on all nodes beside the loads [N], shape (N, 3).
         duration: Time it takes [frames].
-        patience: Steps that may be halved before it ends with ``Status.MAX_ITERATIONS``: whether something holds is
-            known much sooner than it is known that nothing does.
+        halvings: How often a step may be halved: whether something holds is known much sooner than it is known that
+            nothing does.
     """
     begin = after.last.time
     length = steps * _MOMENT if duration is None else duration
@@ -78,36 +78,18 @@ def detour(
             return here
         return replace(here, nodal=nodal(share(time)) + (0.0 if here.nodal is None else here.nodal))
 
-    halved = 0
-
-    def told(line: str) -> None:
-        nonlocal halved
-        halved += "halving" in line
-        if patience is not None and halved > patience:
-            raise _ImpatientError
-
-    def solved() -> ContactSolution:
-        return press(
-            aside.body,
-            aside.prescribed,
-            aside.pairs,
-            loads,
-            times=[begin + length * (k + 1) / steps for k in range(steps)],
-            after=after,
-            tolerance=TOLERANCE,
-            guess=aside.guess,
-            check=False,
-            progress=told,
-        )
-
-    try:
-        return solved()
-    except _ImpatientError:
-        return replace(after, status=Status.MAX_ITERATIONS, message=Status.MAX_ITERATIONS.value)
-
-
-class _ImpatientError(Exception):
-    """No equilibrium as soon as was hoped."""
+    return press(
+        aside.body,
+        aside.prescribed,
+        aside.pairs,
+        loads,
+        times=[begin + length * (k + 1) / steps for k in range(steps)],
+        after=after,
+        tolerance=TOLERANCE,
+        guess=aside.guess,
+        halvings=halvings,
+        check=False,
+    )
 
 
 def _after(function: Callable[[float], _T], inner: Callable[[float], float]) -> Callable[[float], _T]:

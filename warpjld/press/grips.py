@@ -9,13 +9,10 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
 from warpjld.fem.contact import ContactInstant, ContactSolution
 from warpjld.fem.hand.firmness import Firmness, FirmStatus, grip_of_force
 from warpjld.fem.hand.grip import GripStatus, gentlest_grip
 from warpjld.fem.hand.muscles import Effort
-from warpjld.fem.loads import volumes
 from warpjld.press.bodies import Bodies
 from warpjld.press.lift import Lift
 from warpjld.press.tighten import Tightening
@@ -32,7 +29,10 @@ _PRESSES = 0.01
 """A digit presses with more than this share of the strongest: flesh between two digits hands a little on to both."""
 
 _HELD = (GripStatus.HELD, GripStatus.HELD_AT_ONCE)
-_COLUMNS = ("actor", "object", "frame", "grip_deg", "held", "force_n", "sliding", "share", "digit", "chosen", "status")
+_COLUMNS = (
+    *("actor", "object", "frame", "grip_deg", "outcome", "held", "borne", "force_n", "sliding", "share", "digit"),
+    *("chosen", "status"),
+)
 
 
 @dataclass(frozen=True, eq=False)
@@ -91,41 +91,29 @@ def find_grip(bodies: Bodies, wish: GripWish, after: ContactSolution, limits: Ma
 
 def _gentlest(bodies: Bodies, wish: GripWish, grips: Tightening, most: float) -> FoundGrip:
     one = next(body for body in bodies.objects if body.name == wish.object)
-    mass = float((volumes(one.volume.mesh).sum(axis=1) * one.volume.physical.density).sum())
-    weight = mass * np.array(bodies.loads.gravity)
     friction = max(
         pair.friction
         for pair, owner in zip(bodies.pairs, bodies.owners, strict=True)
         if {owner.slave, owner.master} == {wish.actor, wish.object}
     )
-    lift = Lift(grips, one, weight)
-    heavy = float(np.linalg.norm(weight))
-    found = gentlest_grip(
-        lift, 0.0, max(most, 1e-6), weight=heavy, friction=friction, start=min(_START, max(most, 1e-6)), tolerance=_NEAR
-    )
-    held = found.status in _HELD
-    taken = lift.taken.get(found.grip) if held else None
-    instant = taken.solution.last if taken is not None else grips.closed(found.grip).last
+    lift = Lift(grips, one)
+    heavy, room = lift.weighed.weight, max(most, 1e-6)
+    found = gentlest_grip(lift, 0.0, room, weight=heavy, friction=friction, start=min(_START, room), tolerance=_NEAR)
+    taken = lift.taken(found.grip) if found.status in _HELD else None
+    instant = grips.closed(found.grip).last if taken is None else taken[1]
     text = f"{heavy:.3g} N of {wish.object}: {found.text}"
-    if held:
+    if taken is not None:
         text += f"; the digits close on by {math.degrees(found.grip):.2f}°"
+    text += f"; {found.ended}"
     effort = grips.effort(found.grip, instant) if instant.touches else None
     rows = [
         _row(wish, grip, trial.force, trial.share, trial.who, grip == found.grip, found.status.name)
-        | {"held": int(trial.held), "sliding": trial.sliding}
+        | {"outcome": trial.outcome.name, "held": int(trial.held), "sliding": trial.sliding, "borne": trial.borne}
         for grip, trial in found.trials
     ]
-    force = found.trial.force if found.trial is not None else 0.0
-    return FoundGrip(
-        wish,
-        found.status.name,
-        text,
-        found.grip if held else 0.0,
-        taken.lowered if taken is not None else None,
-        force,
-        _digits(effort, wish),
-        tuple(rows),
-    )
+    grip, lowered = (0.0, None) if taken is None else (found.grip, taken[0])
+    digits = _digits(effort, wish)
+    return FoundGrip(wish, found.status.name, text, grip, lowered, found.trial.force, digits, tuple(rows))
 
 
 def _firm(wish: GripWish, grips: Tightening, most: float) -> FoundGrip:

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from warpjld.fem.prescribed import Prescribed
 
-__all__ = ["Support", "handle_of"]
+__all__ = ["Support"]
 
 _NOTHING = Prescribed(np.empty(0, np.int64), np.empty(0))
 
@@ -71,8 +71,3 @@ class Support:
         if abs(time - self.begins) < 1e-9:
             self.forces = reactions.copy()
             self.height = float(displacement[self.handle, self.axis])
-
-
-def handle_of(nodes: NDArray[np.float64]) -> int:
-    """The node nearest to the middle of all (N, 3): the weight acts there."""
-    return int(np.argmin(np.linalg.norm(nodes - nodes.mean(axis=0), axis=1)))

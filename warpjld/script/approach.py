@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -17,6 +17,7 @@ from warpjld.script.staging import stage
 
 if TYPE_CHECKING:
     from warpjld.fem.contact import Obstacle
+    from warpjld.fem.contact.facets import Facets
     from warpjld.grasp import Places
     from warpjld.script.scene import Actor, Scene
 
@@ -24,6 +25,9 @@ __all__ = ["Approach", "approach"]
 
 _CLEAR = 2e-4
 """Skin deeper than this inside an object that cannot get out of the way presses on it [m]."""
+
+_FAR = 2e-3
+"""Way of a free object that is worth a note [m]."""
 
 _PARTED = 0.01
 """Skin of two digits that is nearer than this at rest belongs to where they part [m]."""
@@ -41,27 +45,44 @@ class Approach:
     Attributes:
         start: That frame: the one before anything is held; the first one where something is held there already.
         moved: Places of free objects that hands push before they hold them, by name: frames and placements.
+        began: Where these were at first [m], shape (3,), by name.
     """
 
     start: float
     moved: dict[str, tuple[list[float], list[Places]]]
+    began: dict[str, NDArray[np.float64]] = field(default_factory=dict)
 
     def place(self, name: str) -> Places | None:
         """Where a free object is at the start, if not where the script has it."""
         return self.moved[name][1][-1] if name in self.moved else None
 
+    def notes(self) -> list[str]:
+        """Where free objects were pushed before anything held them."""
+        out = []
+        for name, (frames, places) in self.moved.items():
+            way = places[-1].position[0] - self.began[name]
+            far = float(np.linalg.norm(way))
+            if far > _FAR:
+                toward = " ".join(f"{axis}{part / far:+.2f}" for axis, part in zip("xyz", way, strict=True))
+                out.append(
+                    f"{name} is pushed by {1e3 * far:.1f} mm towards {toward} from frame {frames[0]:g} to "
+                    f"{frames[-1]:g} by digits that cannot hold it: close others against them, or HOLD it until they do"
+                )
+        return out
+
 
 def approach(scene: Scene, pressing: Pressing) -> Approach:
     """Look for the first moment that needs solving (R91, R112).
 
-    Before it nothing touches, or what is touched gives way: a free object that is pushed from one side only goes where
-    nothing pushes it any more.
+    Before it nothing touches, or what is touched gives way: a free object that is pushed, and that friction could not
+    hold where it is, goes where nothing pushes it any more.
     """
     wishes = scene.contact
     stands = {o for o, _ in wishes.prescribed} | {wish.object for wish in wishes.grips if wish.lift}
     free = [name for name in wishes.physical if name not in stands]
     keyed = any(state.tracks for state in wishes.prescribed.values())
     moved: dict[str, tuple[list[float], list[Places]]] = {}
+    began: dict[str, NDArray[np.float64]] = {}
     # what stands on its points gives way to its weight by so little that it may do so in the first step
     if keyed or (any(wishes.gravity) and (free or not wishes.grips)):
         return Approach(float(pressing.first), moved)
@@ -71,12 +92,13 @@ def approach(scene: Scene, pressing: Pressing) -> Approach:
         for moment in [float(frame)] if frame == pressing.first else _moments(scene, frame, moved):
             held, places = _held(scene, moment, free, moved)
             if held:
-                return Approach(float(max(pressing.first, frame - 1)), moved)
+                return Approach(float(max(pressing.first, frame - 1)), moved, began)
             for name, place in places.items():
+                began.setdefault(name, scene.whereabouts(scene.prop(name), np.array([moment])).position[0])
                 frames, sequence = moved.setdefault(name, ([], []))
                 frames.append(moment)
                 sequence.append(place)
-    return Approach(latest, moved)
+    return Approach(latest, moved, began)
 
 
 def _moments(scene: Scene, frame: int, moved: dict[str, tuple[list[float], list[Places]]]) -> list[float]:
@@ -144,12 +166,25 @@ def _held(
                 return True, {}
             continue
         found = settle(vertices, prop.thing.faces, skin, [], 0.0)
-        if found.overlap > _CLEAR:
+        if found.overlap > _CLEAR or _pinched(scene, name, Facets(vertices, prop.thing.faces), skins):
             return True, {}
         if name in moved or np.linalg.norm(found.of(vertices) - vertices, axis=1).max() > 1e-6:
             turn = found.turn * Rotation.from_quat(place.rotation[0])
             places[name] = type(place)(found.of(place.position), turn.as_quat()[None])
     return False, places
+
+
+def _pinched(scene: Scene, name: str, shape: Facets, skins: dict[str, NDArray[np.float64]]) -> bool:
+    """Whether hands that reach into a free object could hold it by friction."""
+    from warpjld.press.pinched import pinched
+
+    points = np.concatenate([*skins.values(), np.empty((0, 3))])
+    if not len(points):
+        return False
+    found = shape.project(points)
+    inside = found.distance < -_CLEAR
+    friction = min(scene.contact.coefficient(name, actor) for actor in skins)
+    return pinched(points[inside], -found.normal[inside], -found.distance[inside], friction)
 
 
 def _meets_itself(actor: Actor, wish: FleshWish, skin: NDArray[np.float64]) -> bool:

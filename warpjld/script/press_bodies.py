@@ -131,8 +131,9 @@ def object_body(scene: Scene, prop: Prop, start: float, place: Places | None = N
 
 def _lifted(scene: Scene, wish: GripWish, volume: ObjectVolume) -> tuple[ObjectVolume, Support]:
     """The object with its weight, and what it stands on."""
+    from warpjld.fem.hand.weighed import handle_of
     from warpjld.fem.loads import volumes
-    from warpjld.press.support import Support, handle_of
+    from warpjld.press.support import Support
 
     pull = np.array(scene.contact.pull)
     axis = int(np.argmax(np.abs(pull)))

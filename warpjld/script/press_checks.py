@@ -52,7 +52,12 @@ def _check_grip(wishes: ContactWishes, wish: GripWish, pressing: Pressing) -> No
     if not wish.lift:
         return
     if np.count_nonzero(wishes.pull) != 1:
-        raise InputError("LIFT wants a GRAVITY along one axis of the stage")
+        x, y, z = wishes.pull
+        raise InputError(f"LIFT wants a GRAVITY along one axis of the stage, got {x:g} {y:g} {z:g}")
+    bonded = next((b for b in wishes.bonds if wish.object in (b.one, b.other)), None)
+    if bonded is not None:
+        other = bonded.other if bonded.one == wish.object else bonded.one
+        raise InputError(f"LIFT takes the weight of one object, and {wish.object} is bonded to {other}")
     if any(state.tracks for (name, _), state in wishes.prescribed.items() if name == wish.object):
         raise InputError("LIFT wants an object that nothing but HOLD keeps in its place: no VECTOR and no PARTIAL")
     if wish.weight is None and not wishes.physical[wish.object].density > 0.0:

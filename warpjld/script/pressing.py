@@ -99,7 +99,7 @@ def _run(scene: Scene, pressing: Pressing, folder: Path, progress: Report) -> Pr
     progress("looking for the first touch", 0, 1)
     before = approach(scene, pressing)
     start = before.start
-    notes: list[str] = []
+    notes = before.notes()
     progress("meshing", 0, 1)
     hands = [hand_body(scene, scene.actor(name), wish, start, notes) for name, wish in wishes.flesh.items()]
     objects = [object_body(scene, scene.prop(name), start, before.place(name)) for name in wishes.physical]
@@ -136,6 +136,7 @@ def _run(scene: Scene, pressing: Pressing, folder: Path, progress: Report) -> Pr
     verdict = verdict_of(solved, table.rows, table.suggestions(), missed(pressed))
     verdict = replace(
         verdict,
+        text="; ".join([verdict.text, *before.notes()]),
         grips=tuple(f"{one.wish.actor} at frame {one.wish.first:g}: {one.text}" for one in grips),
         corrections=(*(one.text for one in mending.worst), *mending.failed),
     )

@@ -34,6 +34,17 @@ def test_a_hundredth_less_slides(block: Body) -> None:
     assert "slope" in found.message
 
 
+@pytest.mark.parametrize(("halvings", "told"), [(None, 3), (1, 1), (0, 0)])
+def test_steps_are_halved_as_often_as_asked(block: Body, halvings: int | None, told: int) -> None:
+    pair = Pair("z-", Plane((0, 0, 0), (0, 0, 1)), friction=0.9 * np.tan(SLOPE))
+    lines: list[str] = []
+    found = press(
+        block, FREE, [pair], Loads(gravity=tuple(GRAVITY)), halvings=halvings, check=False, progress=lines.append
+    )
+    assert found.status is Status.SLIDING
+    assert sum("halving" in line for line in lines) == told
+
+
 def test_a_moving_plane_carries_a_block_along(block: Body) -> None:
     """By friction alone, through ten steps of half a block: nothing creeps."""
     way = np.array([0.5, 0.1, 0.0])

@@ -65,6 +65,11 @@ def test_tolerances(body: Body, name: str, value: float) -> None:
         press(body, symmetric(body.mesh), [Pair("outer", lid(0.1))], **{name: value})  # type: ignore[arg-type]
 
 
+def test_halvings(body: Body) -> None:
+    with pytest.raises(InputError, match="halvings: want 0 or more, got -1"):
+        press(body, symmetric(body.mesh), [Pair("outer", lid(0.1))], halvings=-1)
+
+
 def test_labels() -> None:
     law = LinearElastic(1.0, 0.3)
     parts = {name: (named(box(counts=(2, 2, 1)), name, (0, 0, z)), law) for name, z in (("a", 0.0), ("b", 1.0))}

@@ -84,9 +84,12 @@ class Equilibrium:
         u: NDArray[np.float64],
         memory: list[Memory],
         step: Step,
-        first: NDArray[np.float64] | None = None,
+        *guesses: NDArray[np.float64],
     ) -> tuple[Status, Reached | None]:
-        """Equilibrium from displacement u (3N,) at ``step.before``; ``first`` is where to begin to look."""
+        """Equilibrium from displacement u (3N,) at ``step.before``.
+
+        It is looked for from the first of the guesses that turns no element inside out, or from u.
+        """
         loose = self._unheld(step.prescribed)
         self._solver.begin()
         self._damping.begin()
@@ -97,7 +100,7 @@ class Equilibrium:
             step,
             u,
             memory,
-            first,
+            guesses,
             tolerance=self._tolerance,
             penetration=self._penetration,
         )
@@ -179,5 +182,5 @@ def _length(search: LineSearch, walk: Walk, move: NDArray[np.float64], loose: Lo
     watched = walk.free if walk.arrived and careful else walk.free & np.repeat(loose.falling(contact), 3)
     length = search.by_work(walk.u, move, length, contact, memory, walk.residual, watched, patient=careful)
     if careful and contact.beside is not None and walk.arrived:
-        length = search.by_balance(walk.u, move, length, memory, walk.residual, walk.free)
+        length = search.by_balance(walk.u, move, length, memory, walk.residual, walk.free, coupled=contact.coupled)
     return length

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from warpjld.fem.contact.law import Memory, Response, remember, respond
 from warpjld.fem.contact.points import ContactPoints, Interface
-from warpjld.fem.contact.slopes import slopes_of
+from warpjld.fem.contact.slopes import coupling, slopes_of
 
 __all__ = ["Contact", "Interplay", "alike", "shifted"]
 
@@ -27,6 +27,7 @@ class Contact:
     """Every interface's points, slips [m] and responses, and their nodal forces together [N], shape (3N,).
 
     Attributes:
+        coupled: Whether friction follows the pressure as it is, and not the multipliers'.
         beside: What a symmetric stiffness leaves out [N/m], ``csr_array`` (3N, 3N); None where nothing is or it was not
             asked for (``Interplay.sloped``).
     """
@@ -35,6 +36,7 @@ class Contact:
     slips: list[NDArray[np.float64]]
     responses: list[Response]
     forces: NDArray[np.float64]
+    coupled: bool = False
     beside: Any = None
 
 
@@ -109,15 +111,16 @@ class Interplay:
         *,
         keep: bool,
         allowed: float,
+        coupled: bool = False,
     ) -> Contact:
         """What points answer at displacement u (3N,)."""
         since = (u - start).reshape(-1, 3)
         slips = [p.relative(since) - p.carried for p in points]
         responses = [
-            respond(i.pair, p, m, slip, self._penalty(k, p, m), allowed, keep=keep, patient=not keep)
+            respond(i.pair, p, m, slip, self._penalty(k, p, m), allowed, keep=keep, patient=not keep, coupled=coupled)
             for k, (i, p, m, slip) in enumerate(zip(self.interfaces, points, memory, slips, strict=True))
         ]
-        return Contact(points, slips, responses, self.pushed(points, responses))
+        return Contact(points, slips, responses, self.pushed(points, responses), coupled)
 
     def sloped(self, contact: Contact, memory: list[Memory], pressed: list[Memory], u: NDArray[np.float64]) -> Contact:
         """With what a symmetric stiffness leaves out, where points are those of displacement u (3N,).
@@ -127,13 +130,17 @@ class Interplay:
         x = self._rest + u.reshape(-1, 3)
         points, beside = list(contact.points), None
         for k, (interface, p, r) in enumerate(zip(self.interfaces, points, contact.responses, strict=True)):
-            if interface.mortar is None or not interface.slides:
-                continue
-            penalty = self._penalty(k, p, memory[k])
-            slopes = slopes_of(interface.mortar, p, r, pressed[k], penalty, x, interface.reach)
-            if slopes is not None:
-                points[k] = replace(p, steep=slopes.gap)
-                beside = slopes.forces if beside is None else beside + slopes.forces
+            penalty, left_out = self._penalty(k, p, memory[k]), []
+            if interface.mortar is not None and interface.slides:
+                slopes = slopes_of(interface.mortar, p, r, pressed[k], penalty, x, interface.reach)
+                if slopes is not None:
+                    points[k] = replace(p, steep=slopes.gap)
+                    left_out.append(slopes.forces)
+            if contact.coupled and interface.pair.friction > 0.0:
+                left_out.append(coupling(points[k], r, interface.pair.friction, penalty))
+            for part in left_out:
+                if part is not None:
+                    beside = part if beside is None else beside + part
         return replace(contact, points=points, beside=beside)
 
     def pushed(self, points: list[ContactPoints], responses: list[Response]) -> NDArray[np.float64]:
@@ -152,7 +159,8 @@ class Interplay:
             there = shifted(p, move.reshape(-1, 3))
             slip = slip + p.relative(move.reshape(-1, 3))
             penalty = self._penalty(k, p, m)
-            out.append(respond(self.interfaces[k].pair, there, m, slip, penalty, allowed, patient=patient))
+            pair, coupled = self.interfaces[k].pair, contact.coupled
+            out.append(respond(pair, there, m, slip, penalty, allowed, patient=patient, coupled=coupled))
         return out
 
     def remembered(

@@ -101,10 +101,12 @@ def respond(
     *,
     keep: bool = False,
     patient: bool = False,
+    coupled: bool = False,
 ) -> Response:
     """Tractions and stiffness at points, p = max(0, λ − ε g), friction returned to Coulomb's cone (R122).
 
-    The stiffness is symmetric: that the friction of a sliding point depends on its pressure is left to the iteration.
+    The stiffness is symmetric: that the friction of a sliding point depends on its pressure is left to the iteration,
+    or to ``slopes.coupling``.
 
     Args:
         pair: Friction and bond.
@@ -118,6 +120,7 @@ def respond(
             makes large (primal–dual active set).
         patient: Who sticks is read off the friction, λ − ε s, and not off the memory: tractions are then continuous,
             and with multipliers that stay the problem is convex, so that a search along a line settles it.
+        coupled: Friction is bounded by the pressure as it is, and not by the multiplier's.
     """
     at = points.sites
     normal = points.normal
@@ -142,7 +145,7 @@ def respond(
         slip = np.einsum("mij,mj->mi", across, slip - memory.anchor[at])
         carried = np.einsum("mij,mj->mi", across, memory.friction[at])
         # the pressure of the iterate before bounds the friction of this one: each iterate is then a convex problem
-        bound = np.maximum(memory.pressure[at] if keep or patient else pressure, 0.0)
+        bound = np.maximum(memory.pressure[at] if (keep or patient) and not coupled else pressure, 0.0)
         grips = active & ((memory.gripping[at] >= _GRIPS) | bonded)
         limit = np.where(grips, pair.friction * bound, 0.0)
         held = carried - penalty[:, None] * slip

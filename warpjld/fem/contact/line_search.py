@@ -89,6 +89,8 @@ class LineSearch:
         memory: list[Memory],
         residual: NDArray[np.float64],
         free: NDArray[np.bool_],
+        *,
+        coupled: bool,
     ) -> float:
         """How far to go, ``most`` at most, for forces to balance better than here: where points come and go in turn, or
         K is indefinite, the work along the way does not tell.
@@ -98,7 +100,10 @@ class LineSearch:
         for _ in range(_TRIALS):
             there = u + length * move
             points = self.play.points(there, self.step.before, self.step.time, self.play.normals(there))
-            contact = self.play.answered(points, there, self.start, memory, keep=False, allowed=self.step.allowed)
+            allowed = self.step.allowed
+            contact = self.play.answered(
+                points, there, self.start, memory, keep=False, allowed=allowed, coupled=coupled
+            )
             pulls = self.elastic.external(self.step.loads, there) - self.elastic.forces(there).forces
             left = norm(np.where(free, pulls + contact.forces, 0.0))
             if left < (1.0 - 1e-4 * length) * now:

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from warpjld.fem.contact.mortar import Mortar
     from warpjld.fem.contact.points import ContactPoints
 
-__all__ = ["Slopes", "slopes_of"]
+__all__ = ["Slopes", "coupling", "slopes_of"]
 
 _STEP = 1e-6
 """Of the differences, over an edge."""
@@ -88,6 +88,34 @@ def slopes_of(
         tractions = tractions + _inner(points.normal).T @ (diags_array(stiff) @ of_gap)
     spreading = _blocks(points.weights.T @ diags_array(points.area))
     return Slopes(of_gap, csr_array(-(spreading @ tractions + of_weights)))
+
+
+def coupling(points: ContactPoints, response: Response, friction: float, penalty: NDArray[np.float64]) -> Any:
+    """How the friction of points that slide follows their pressure, to be added to the stiffness [N/m], ``csr_array``
+    (3N, 3N); None where none slides.
+
+    Where all points slide, what they press and what they rub is decided together: an object that is about to slip out
+    of a hand moves a long way for a small force, and taking pressure and friction in turns creeps there.
+
+    Args:
+        points: The points, with their ``steep`` if it is known.
+        response: Their tractions, friction bounded by these pressures.
+        friction: Coulomb's μ.
+        penalty: ε [Pa/m], shape (m,).
+    """
+    from scipy.sparse import csr_array, diags_array
+
+    size = np.linalg.norm(response.friction, axis=1)
+    slides = response.active & ~response.sticking & (size > 0.0)
+    if not slides.any():
+        return None
+    along = np.where(slides[:, None], response.friction / np.maximum(size, 1e-300)[:, None], 0.0)
+    weights = _blocks(points.weights)
+    of_gap = -_inner(points.normal) @ weights
+    if points.steep is not None:
+        of_gap = of_gap + points.steep
+    rubs = weights.T @ _inner(points.area[:, None] * along).T
+    return csr_array(rubs @ (diags_array(friction * penalty) @ of_gap))
 
 
 class _Pairs:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -53,7 +54,7 @@ class Walk:
         step: The load step.
         start: Displacement at its start [m], shape (3N,).
         memory: What points remember there.
-        first: Where to begin to look [m], shape (3N,).
+        guesses: Where to begin to look, best first [m], shape (3N,): the first that turns no element inside out is.
         tolerance: Residual over the forces that balance.
         penetration: Overlap left, as a share of an edge.
 
@@ -80,7 +81,7 @@ class Walk:
         step: Step,
         start: NDArray[np.float64],
         memory: list[Memory],
-        first: NDArray[np.float64] | None,
+        guesses: Sequence[NDArray[np.float64]],
         *,
         tolerance: float,
         penetration: float,
@@ -92,8 +93,8 @@ class Walk:
         self.jump = np.zeros_like(start)
         self._pressures: NDArray[np.float64] | None = None
         self._iteration, self._since, self._settled = -1, 0, False
-        guess = None if first is None else self._held(first)
-        if guess is not None and elastic.upright(guess):
+        guess = next((held for held in map(self._held, guesses) if elastic.upright(held)), None)
+        if guess is not None:
             self.u = guess
             # a guess squeezes elements here and there: their false pressures would make K indefinite, those of the
             # equilibrium before do not
@@ -182,10 +183,12 @@ class Walk:
             self.u = self._held(self.u)
             self.jump = np.zeros_like(self.u)
         foreseen = play.foreseen(self.contact, self.memory, move, self._step.allowed, patient=careful)
-        if not careful or alike(self.contact.responses, foreseen):
+        same = alike(self.contact.responses, foreseen)
+        if not careful or same:
             self.memory = play.remembered(self.memory, self.contact, foreseen, move, patient=careful)
-        points = self._points(foreseen)
-        self._answer(points, keep=self.turn + 1 < _CARELESS)
+        points, keep = self._points(foreseen), self.turn + 1 < _CARELESS
+        coupled = not keep and same and not any((r.active & r.sticking).any() for r in foreseen)
+        self._answer(points, keep=keep, coupled=coupled)
 
     def _points(self, foreseen: list[Response]) -> list[ContactPoints]:
         """Points after a move: seen afresh until that no longer changes the gaps."""
@@ -200,9 +203,10 @@ class Walk:
                 self._seen, points = (fresh, self.u), fresh
         return play.refreshed(points, self.u, step.before, step.time) if self._settled else points
 
-    def _answer(self, points: list[ContactPoints], *, keep: bool) -> None:
-        allowed = self._step.allowed
-        self.contact = self._play.answered(points, self.u, self._start, self.memory, keep=keep, allowed=allowed)
+    def _answer(self, points: list[ContactPoints], *, keep: bool, coupled: bool = False) -> None:
+        self.contact = self._play.answered(
+            points, self.u, self._start, self.memory, keep=keep, allowed=self._step.allowed, coupled=coupled
+        )
 
     def _held(self, u: NDArray[np.float64]) -> NDArray[np.float64]:
         """With the prescribed values where there are such."""

@@ -1,13 +1,15 @@
 """The gentlest grip that holds: force raised until nothing slides, or a reason why none holds (R123, R124).
 
-A trial holds or it does not; the least grip is bracketed by growing and found by halving. Friction can carry no more
-than μ times the sum of the normal forces. While that is below a few times the weight, sliding may mean that the grip is
-too gentle; above it, sliding by a share that a doubled force does not change means that the forces pull out of their
-friction cones, and no grip at these places will hold.
+A trial holds or it does not; the least grip is bracketed by growing, and then looked for where the share of the weight
+that trials could bear, in proportion, is all of it. Friction can carry no more than μ times the sum of the normal
+forces. While that is below a few times the weight, sliding may mean that the grip is too gentle; above it, sliding by a
+share that a doubled force does not change means that the forces pull out of their friction cones, and no grip at these
+places will hold.
 """
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Callable
 from dataclasses import dataclass
 from enum import Enum
@@ -16,11 +18,29 @@ import numpy as np
 
 from warpjld.errors import InputError
 
-__all__ = ["Grip", "GripStatus", "Trial", "gentlest_grip"]
+__all__ = ["Grip", "GripStatus", "Outcome", "Trial", "gentlest_grip"]
 
 _SAME = 0.02
 _AMPLE = 4.0
 """Friction this many times the weight is not what is missing."""
+_INNER = 0.1
+"""Part of a bracket, at either end, within which no grip is tried."""
+
+
+class Outcome(Enum):
+    """How a trial ended; the value is what is said of one or several."""
+
+    HELD = "held"
+    APART = "pressed on nothing"
+    WEAK = "pressed too little for friction to bear the weight"
+    SLIDES = "slid at every point"
+    GIVES = "slipped out: less was borne the deeper it sank"
+    SANK = "sank away"
+    STANDS = "left it standing on something else"
+    UNSOLVED = "could not be solved"
+
+
+_NO_MATTER_OF_FORCE = (Outcome.STANDS, Outcome.UNSOLVED)
 
 
 class GripStatus(Enum):
@@ -31,6 +51,7 @@ class GripStatus(Enum):
     NO_CONTACT = "nothing is touched however far the hand closes"
     TOO_WEAK = "more force would be needed than the muscles have"
     SLIDES = "slides at any force: the contact forces cannot lie inside their friction cones"
+    STANDS = "it stands on something else, and the hand does not hold it"
     LIMIT = "does not hold at the firmest grip that was allowed"
     NO_SOLUTION = "contact could not be solved"
 
@@ -40,18 +61,27 @@ class Trial:
     """What one grip does.
 
     Attributes:
-        held: Whether the weight is held without sliding.
+        outcome: How it ended.
         sliding: Share of the contact that slides, 0 … 1; NaN where nothing touches.
         force: Sum of the normal forces on the object [N].
+        borne: Share of the weight that the hand bore at most, or could have; NaN where it is not known.
         share: Largest share of the muscles' limits, 0 where it is not measured.
         who: Digit that has this share.
+        note: More for people, as what the object stands on.
     """
 
-    held: bool
+    outcome: Outcome
     sliding: float
     force: float
+    borne: float = float("nan")
     share: float = 0.0
     who: str = ""
+    note: str = ""
+
+    @property
+    def held(self) -> bool:
+        """Whether the hand, and nothing else, holds the weight."""
+        return self.outcome is Outcome.HELD
 
 
 @dataclass(frozen=True)
@@ -61,20 +91,27 @@ class Grip:
     Attributes:
         status: How the search ended.
         grip: Its measure, as handed to ``hold`` (an angle, a force, a share of closing).
-        trial: What it does, None where contact was not solved.
+        trial: What it does.
         trials: Every grip tried, in order.
         text: For people.
     """
 
     status: GripStatus
     grip: float
-    trial: Trial | None
+    trial: Trial
     trials: tuple[tuple[float, Trial], ...]
     text: str
 
+    @property
+    def ended(self) -> str:
+        """How the trials ended, with the number of each: "5 grips were tried: 2 held, 3 slid at every point"."""
+        count = Counter(trial.outcome for _, trial in self.trials)
+        parts = ", ".join(f"{count[outcome]} {outcome.value}" for outcome in Outcome if count[outcome])
+        return f"{len(self.trials)} grip{'s were' if len(self.trials) > 1 else ' was'} tried: {parts}"
+
 
 def gentlest_grip(
-    hold: Callable[[float], Trial | None],
+    hold: Callable[[float], Trial],
     low: float,
     high: float,
     *,
@@ -85,8 +122,10 @@ def gentlest_grip(
 ) -> Grip:
     """The smallest grip in low … high that holds.
 
+    A trial that could not be solved says nothing; the search goes on beside it, and counts it.
+
     Args:
-        hold: What a grip does; None where contact could not be solved.
+        hold: What a grip does.
         low: Gentlest grip allowed, below which nothing is tried.
         high: Firmest grip allowed.
         weight: What is to be held [N].
@@ -106,55 +145,63 @@ def gentlest_grip(
         raise InputError(f"grip: want a first step above 0 within the range, got {step}")
     trials: list[tuple[float, Trial]] = []
 
-    def ended(status: GripStatus, grip: float, trial: Trial | None) -> Grip:
+    def attempt(grip: float) -> Trial:
+        trials.append((grip, hold(grip)))
+        return trials[-1][1]
+
+    def ended(status: GripStatus, grip: float, trial: Trial) -> Grip:
         return Grip(status, grip, trial, tuple(trials), _text(status, trial))
 
-    def attempt(grip: float) -> Trial | None:
-        trial = hold(grip)
-        if trial is not None:
-            trials.append((grip, trial))
-        return trial
-
-    grip = low
-    trial = attempt(grip)
-    if trial is None:
-        return ended(GripStatus.NO_SOLUTION, grip, None)
+    grip, trial = low, attempt(low)
     if trial.held and trial.share <= 1.0:
         return ended(GripStatus.HELD_AT_ONCE, grip, trial)
-    failed = low
+    failed = (low, trial)
     while not trial.held:
         if trial.share > 1.0:
             return ended(GripStatus.TOO_WEAK, grip, trial)
         if _slides_for_ever(trials, weight / friction if friction else np.inf):
             return ended(GripStatus.SLIDES, grip, trial)
         if grip >= high:
-            return ended(GripStatus.NO_CONTACT if not trial.force > 0.0 else GripStatus.LIMIT, grip, trial)
-        failed = grip
+            return ended(_at_last(trial), grip, trial)
+        failed = (grip, trial)
         grip = min(high, low + step)
         step *= 2.0
         trial = attempt(grip)
-        if trial is None:
-            return ended(GripStatus.NO_SOLUTION, grip, None)
-    held, at_held = grip, trial
-    while held - failed > tolerance * (held - low):
-        middle = 0.5 * (failed + held)
-        trial = attempt(middle)
-        if trial is None:
-            return ended(GripStatus.NO_SOLUTION, middle, None)
-        if trial.held:
-            held, at_held = middle, trial
-        else:
-            failed = middle
-    if at_held.share > 1.0:
-        return ended(GripStatus.TOO_WEAK, held, at_held)
-    return ended(GripStatus.HELD, held, at_held)
+    held, shrank = (grip, trial), True
+    while (room := held[0] - failed[0]) > tolerance * (held[0] - low):
+        middle = 0.5 * (failed[0] + held[0])
+        between = _between(failed, held, tolerance * (held[0] - low)) if shrank else middle
+        one = (between, attempt(between))
+        failed, held = (failed, one) if one[1].held else (one, held)
+        shrank = held[0] - failed[0] <= 0.5 * room
+    return ended(GripStatus.TOO_WEAK if held[1].share > 1.0 else GripStatus.HELD, *held)
+
+
+def _between(failed: tuple[float, Trial], held: tuple[float, Trial], width: float) -> float:
+    """The grip to try next: beside the one at which all of the weight would be borne, so that the bracket closes."""
+    (low, gentle), (high, firm) = failed, held
+    lacks, spares = 1.0 - gentle.borne, firm.borne - 1.0
+    room = high - low
+    if room <= 2.0 * width or not (lacks > 0.0 and spares >= 0.0):  # NaN included
+        return 0.5 * (low + high)
+    there = low + room * lacks / (lacks + spares)
+    beside = there + 0.5 * width if high - there > there - low else there - 0.5 * width
+    return float(np.clip(beside, low + _INNER * room, high - _INNER * room))
+
+
+def _at_last(trial: Trial) -> GripStatus:
+    """Why the firmest grip does not hold."""
+    known = {Outcome.UNSOLVED: GripStatus.NO_SOLUTION, Outcome.STANDS: GripStatus.STANDS}
+    if trial.outcome in known:
+        return known[trial.outcome]
+    return GripStatus.LIMIT if trial.force > 0.0 else GripStatus.NO_CONTACT
 
 
 def _slides_for_ever(trials: list[tuple[float, Trial]], needed: float) -> bool:
     """Whether ample force was doubled and slid by the same share."""
     if needed == np.inf:
         return len([t for _, t in trials if t.force > 0.0]) >= 3
-    ample = [t for _, t in trials if t.force > _AMPLE * needed]
+    ample = [t for _, t in trials if t.force > _AMPLE * needed and t.outcome not in _NO_MATTER_OF_FORCE]
     if len(ample) < 2 or ample[-1].held:
         return False
     for earlier in reversed(ample[:-1]):
@@ -163,12 +210,14 @@ def _slides_for_ever(trials: list[tuple[float, Trial]], needed: float) -> bool:
     return False
 
 
-def _text(status: GripStatus, trial: Trial | None) -> str:
-    if trial is None or not trial.force > 0.0:
+def _text(status: GripStatus, trial: Trial) -> str:
+    if not trial.force > 0.0:
         return status.value
     out = f"{status.value}; {trial.force:.3g} N on the object"
     if trial.who:
         out += f", {trial.who} at {100.0 * trial.share:.0f} % of its limit"
-    if not trial.held:
+    if trial.note:
+        out += f", {trial.note}"
+    if not trial.held and np.isfinite(trial.sliding):
         out += f", {100.0 * trial.sliding:.0f} % of the contact slides"
     return out

@@ -1,0 +1,128 @@
+"""A block that two pads take from its support: what is held, what slides, and what stands on something else."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from warpjld.fem import Body, LinearElastic, Prescribed, box, merge, prescribe
+from warpjld.fem.contact import ContactSolution, Pair, press
+from warpjld.fem.contact.solids import Plane
+from warpjld.fem.hand.grip import GripStatus, Outcome, gentlest_grip
+from warpjld.fem.hexmesh import HexMesh
+from warpjld.fem.loads import Loads
+from warpjld.press.bodies import Bodies, PairOf
+from warpjld.press.lift import Lift
+from warpjld.press.wishes import GripWish
+from warpjld.script import Interpreter, Scene
+from warpjld.script.press_bodies import object_body
+
+WEIGHT, FRICTION = 0.6, 0.5
+EDGE, PAD = 0.03, (0.004, 0.024, 0.024)
+
+
+@dataclass(frozen=True, eq=False)
+class Pads:
+    """In place of a hand: two soft pads whose backs close by a way [m]."""
+
+    mesh: HexMesh
+    moves: Callable[[float], float]
+    name: str = "PADS"
+
+    def prescribed(self, time: float) -> Prescribed:
+        way = self.moves(time)
+        left = prescribe(self.mesh, "left.back", x=way, y=0.0, z=0.0)
+        return left + prescribe(self.mesh, "right.back", x=-way, y=0.0, z=0.0)
+
+    def guess(self, before: float, time: float, displacement: NDArray[np.float64]) -> NDArray[np.float64]:
+        return displacement
+
+
+class Squeeze:
+    """In place of a hand's joints: grips are ways of the pads' backs."""
+
+    def __init__(self, bodies: Bodies) -> None:
+        self.bodies, self.hand = bodies, bodies.hands[0]
+        self._closed: dict[float, ContactSolution] = {}
+
+    def closed(self, grip: float) -> ContactSolution:
+        if grip not in self._closed:
+            hand = replace(self.hand, moves=lambda time: min(time, 1.0) * grip)  # type: ignore[arg-type,return-value]
+            here = replace(self.bodies, hands=(hand,))
+            found = press(here.body, here.prescribed, here.pairs, here.loads_at, times=(1.0,), check=False)
+            self._closed[grip] = found
+        return self._closed[grip]
+
+    def stays(self, grip: float) -> tuple[str, Callable[[float], float]]:
+        return self.hand.name, lambda share: grip
+
+    def effort(self, grip: float, instant: object) -> SimpleNamespace:
+        return SimpleNamespace(digits=[SimpleNamespace(share=0.1, digit="pad")])
+
+
+def pads() -> HexMesh:
+    parts = []
+    for name, start, skin, back in (("left", -0.5 * EDGE - PAD[0], "x+", "x-"), ("right", 0.5 * EDGE, "x-", "x+")):
+        pad = box(PAD, (1, 2, 2), origin=(start, -0.5 * PAD[1], -0.5 * PAD[2]), name=f"{name}.flesh")
+        parts.append(replace(pad, faces={f"pad.{name}": pad.faces[skin], f"{name}.back": pad.faces[back]}))
+    return merge(*parts)
+
+
+@pytest.fixture
+def lift() -> Lift:
+    """A block of 0.6 N on a foot between the pads; gravity along -z."""
+    scene = Scene(say=lambda line: None)
+    Interpreter(scene).run_text(
+        f"OBJECT BLOCK BOX {EDGE} {EDGE} {EDGE} AT 0 0 0\nGRAVITY 0 0 -9.81\n"
+        f"PHYSICAL BLOCK LAW LINEAR YOUNG 1000000 POISSON 0.3 DENSITY {WEIGHT / 9.81 / EDGE**3} ELEMENT 0.01\n"
+    )
+    scene.contact.grips.append(GripWish("PADS", "BLOCK", 1.0, 5.0, (), 0.1, lift=True))
+    block = object_body(scene, scene.prop("BLOCK"), 0.0)
+    hand = Pads(pads(), lambda time: 0.0)
+    mesh = merge(hand.mesh, block.volume.mesh)
+    count = len(hand.mesh.nodes)
+    laws = {name: LinearElastic(6e4, 0.3) for name in ("left.flesh", "right.flesh")}
+    body = Body(mesh, {**laws, "BLOCK": block.volume.physical.material()})
+    pairs = tuple(Pair(f"pad.{side}", block.volume.name, FRICTION) for side in ("left", "right"))
+    owner = PairOf("PADS", "BLOCK")
+    spans = {"PADS": slice(0, count), "BLOCK": slice(count, len(mesh.nodes))}
+    loads = Loads(gravity=(0.0, 0.0, -9.81))
+    bodies = Bodies((hand,), (block,), {}, body, spans, pairs, (owner, owner), loads)  # type: ignore[arg-type]
+    return Lift(Squeeze(bodies), block)  # type: ignore[arg-type]
+
+
+def test_the_gentlest_grip_takes_the_block_from_its_foot(lift: Lift) -> None:
+    assert lift.weighed.weight == pytest.approx(WEIGHT, rel=1e-6)
+    found = gentlest_grip(lift, 2e-5, 1e-3, weight=WEIGHT, friction=FRICTION, start=1e-4, tolerance=0.05)
+    assert found.status is GripStatus.HELD, found.ended
+    assert 0.98 * WEIGHT / (2.0 * FRICTION) <= 0.5 * found.trial.force <= 1.08 * WEIGHT / (2.0 * FRICTION)
+    gentler = [trial for grip, trial in found.trials if grip < found.grip]
+    assert gentler
+    assert all(trial.outcome in (Outcome.WEAK, Outcome.SLIDES) for trial in gentler)
+    taken = lift.taken(found.grip)
+    assert taken is not None
+    lowered, instant = taken
+    assert -2e-3 < lowered < 0.0
+    force = sum(touch.force for touch in instant.touches)
+    np.testing.assert_allclose(force, [0.0, 0.0, -WEIGHT], atol=1e-3 * WEIGHT)
+    assert not instant.reactions[lift.weighed.handle].any()
+
+
+def test_a_block_with_a_floor_below_stands_on_it(lift: Lift) -> None:
+    grips = lift._grips
+    bodies = grips.bodies
+    floor = Plane((0.0, 0.0, -0.5 * EDGE - 5e-5), (0.0, 0.0, 1.0))
+    bodies.pairs += (Pair(bodies.objects[0].volume.name, floor, FRICTION),)
+    bodies.owners += (PairOf("BLOCK", "FLOOR"),)
+    standing = Lift(grips, bodies.objects[0])
+    trial = standing(1.5e-4)
+    assert trial.outcome is Outcome.STANDS
+    assert trial.note.startswith("FLOOR bears ")
+    assert standing.taken(1.5e-4) is None
+    assert not math.isnan(trial.sliding)
