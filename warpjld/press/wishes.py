@@ -99,7 +99,7 @@ class FleshWish:
         digits: Those whose flesh is meshed, as ``index``, or ``palm``; empty for the whole hand.
         element: Edge length of the elements [m].
         flesh: Young's modulus of what lies between skin and bone [Pa].
-        skin: Young's modulus of the outermost layer of elements [Pa].
+        skin: Young's modulus of the skin [Pa].
         poisson: Poisson's ratio of both.
         stiffening: Exponent of Fung's law; 0 is neo-Hookean.
         itself: Whether the skin may touch itself (R126).
