@@ -7,7 +7,7 @@ between bone and flesh are moved to the bone's surface, as those of the skin are
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -18,8 +18,11 @@ from warpjld.fem.untangle import improve
 
 __all__ = ["Bone", "claimed", "fitted"]
 
-_PULLS = (2.0, 10.0, 30.0, 30.0)
-"""Weights of distances from the bones' surfaces, in spacings squared, one round after the other."""
+_PULLS = (10.0, 30.0)
+"""Weights of distances from the bones' surfaces, in spacings squared, one after the other."""
+_ROUNDS = 40
+_LEAST = 0.2
+"""Least scaled Jacobian: nodes stay off the bones where they ask for worse, or for worse than it was where it was."""
 _SLIDE = 0.02
 _END = 0.7
 """Least cosine between a face's normal and the bone's direction at an end of the bone."""
@@ -83,11 +86,16 @@ class Bone:
         return np.unique(chosen[found[near]])
 
 
-def claimed(mesh: HexMesh, bones: Sequence[Bone]) -> NDArray[np.int64]:
+def claimed(mesh: HexMesh, bones: Sequence[Bone], bare: Collection[int] = ()) -> NDArray[np.int64]:
     """Bone that each element's middle lies in, the nearest of several, -1 in flesh, shape (E,).
 
     Elements of the outermost layer are flesh: there is skin over every bone. Where those below are so large that none
     has its middle in a bone, it takes those nearest to its axis.
+
+    Args:
+        mesh: The mesh.
+        bones: Their shapes.
+        bare: Bones that may take elements of the outermost layer, too.
     """
     middles = mesh.nodes[mesh.elements].mean(axis=1)
     below = np.ones(len(middles), dtype=bool)
@@ -95,12 +103,9 @@ def claimed(mesh: HexMesh, bones: Sequence[Bone]) -> NDArray[np.int64]:
     core = np.flatnonzero(below)
     nearest = np.full(len(middles), np.inf)
     owner = np.full(len(middles), -1)
-    if not len(core):
-        return owner
     for number, bone in enumerate(bones):
-        depth = np.full(len(middles), np.inf)
-        depth[core] = bone.depth(middles[core])
-        depth[depth >= 1.0] = np.inf
+        depth = bone.depth(middles)
+        depth[(depth >= 1.0) | ~(below | (number in bare))] = np.inf
         depth[bone.threaded(mesh, core)] = 0.0
         mine = depth < nearest
         nearest[mine], owner[mine] = depth[mine], number
@@ -112,7 +117,6 @@ def fitted(
     elements: Mapping[int, NDArray[np.int32]],
     bones: Mapping[int, Bone],
     spacing: float,
-    least: float,
 ) -> HexMesh:
     """The mesh with the nodes between bones and flesh on the bones' surfaces, as far as elements stay well shaped.
 
@@ -124,7 +128,6 @@ def fitted(
         elements: Corners of each bone's elements, shape (n, 8).
         bones: Their shapes, by the same numbers.
         spacing: Edge length of the elements [m].
-        least: Least scaled Jacobian.
     """
     still = np.zeros(len(mesh.nodes), dtype=bool)
     still[mesh.quads(mesh.boundary())] = True
@@ -143,11 +146,13 @@ def fitted(
             pull=np.full(len(number), pull),
             slide=slides,
             softness=0.03,
+            rounds=_ROUNDS,
             still=still,
         )
     goal = nodes.copy()
     goal[number] = np.concatenate([hull.wanted(nodes)[0] for hull in hulls])
-    return _towards(mesh, nodes, goal, least)
+    least = np.minimum(_LEAST, mesh.scaled_jacobian())
+    return _towards(mesh, mesh.nodes, _towards(mesh, nodes, goal, least).nodes, least)
 
 
 @dataclass(frozen=True, eq=False)
@@ -231,10 +236,12 @@ class _Hull:
 _GAUSS = (0.5 - np.sqrt(0.15), 0.5, 0.5 + np.sqrt(0.15))
 
 
-def _towards(mesh: HexMesh, start: NDArray[np.float64], goal: NDArray[np.float64], least: float) -> HexMesh:
-    """Nodes from a start towards a goal, less far where an element would become worse than ``least``."""
+def _towards(
+    mesh: HexMesh, start: NDArray[np.float64], goal: NDArray[np.float64], least: NDArray[np.float64]
+) -> HexMesh:
+    """Nodes from a start towards a goal, less far where an element would become worse than its ``least`` (E,)."""
     share = np.ones((len(start), 1))
-    for _ in range(12):
+    for _ in range(16):
         moved = replace(mesh, nodes=start + share * (goal - start))
         bad = moved.scaled_jacobian() < least
         if not bad.any():

@@ -97,15 +97,11 @@ def flesh_of(
     mesh = fit.mesh
     skeleton = rig.skeleton
     shafts = _shafts(rig, envelope, bone, flush, gap, far)
-    ends = np.array(list(shafts))
-    owner = claimed(mesh, list(shafts.values()))
-    owner = _apart(mesh, np.where(owner >= 0, ends[owner], -1))
-    if head is not None:
-        owner = _jointed(mesh, owner, skeleton.parents)
+    owner = _owner(mesh, shafts, skeleton.parents, jointed=head is not None)
     joints = [int(j) for j in np.unique(owner[owner >= 0])]
     if not joints:
         raise InputError(f"spacing: at {spacing:g} m no element fits inside a bone")
-    mesh = fitted(mesh, {j: mesh.elements[owner == j] for j in joints}, shafts, spacing, least)
+    mesh = fitted(mesh, {j: mesh.elements[owner == j] for j in joints}, shafts, spacing)
     quality = mesh.scaled_jacobian()
     names = tuple(f"bone.{skeleton.names[j]}" for j in joints)
     sets = {n: np.unique(mesh.elements[owner == j]).astype(np.int32) for n, j in zip(names, joints, strict=True)}
@@ -171,6 +167,25 @@ def _backwards(rig: Rig, envelope: Envelope, root: int) -> NDArray[np.float64]:
     reach = steps[int(np.argmin(inside))] if not inside.all() else 0.0
     out: NDArray[np.float64] = away * (reach / size)
     return out
+
+
+def _owner(mesh: HexMesh, shafts: dict[int, Bone], parents: NDArray[np.int32], *, jointed: bool) -> NDArray[np.int64]:
+    """Bone of every element by the joint at its far end, -1 in flesh.
+
+    In thin fingers of large elements a bone that is covered by flesh may have no element left: it may then reach the
+    skin.
+    """
+    ends = np.array(list(shafts))
+    bare: list[int] = []
+    for _ in range(2):
+        owner = claimed(mesh, list(shafts.values()), bare)
+        owner = _apart(mesh, np.where(owner >= 0, ends[owner], -1))
+        if jointed:
+            owner = _jointed(mesh, owner, parents)
+        bare = np.flatnonzero(~np.isin(ends, owner)).tolist()
+        if not bare:
+            break
+    return owner
 
 
 def _jointed(mesh: HexMesh, owner: NDArray[np.int64], parents: NDArray[np.int32]) -> NDArray[np.int64]:
