@@ -42,6 +42,7 @@ def hand_body(scene: Scene, actor: Actor, wish: FleshWish, start: float, notes: 
     Raises:
         InputError: It cannot be meshed in that pose.
     """
+    from warpjld.fem.hand.cushion import coarse_note
     from warpjld.fem.hand.flesh_hand import build_flesh_hand
     from warpjld.fem.hand.laws import hand_laws
     from warpjld.press.bodies import HandBody
@@ -51,6 +52,9 @@ def hand_body(scene: Scene, actor: Actor, wish: FleshWish, start: float, notes: 
     skin = cover(actor).deform(poses)[0].astype(np.float64)
     rig = replace(actor.rig, skeleton=actor.skeleton)
     built = build_flesh_hand(rig, wish.element, name=actor.name.lower())
+    coarse = coarse_note(built, wish.element, wish.digits)
+    if coarse is not None:
+        notes.append(f"{actor.name}: {coarse}")
     hand, gap = posed(built, poses, skin)
     if gap > 0.5 * wish.element:
         notes.append(f"{actor.name}: the volume stays up to {1e3 * gap:.1f} mm off the skin where it folds")
