@@ -79,3 +79,13 @@ def test_a_body_that_nothing_touches_is_named(block: Body) -> None:
     found = press(block, FREE, [away], Loads(gravity=(9.81, 0.0, 0.0)), check=False)
     assert found.status is Status.UNHELD
     assert found.message.endswith("nothing holds 'body'")
+
+
+def test_a_body_that_swings_on_one_held_point_is_told_so(block: Body) -> None:
+    from warpjld.fem import prescribe
+
+    away = Pair("z-", Plane((0, 0, -9.0), (0, 0, 1)), friction=0.5)
+    corner = prescribe(block.mesh, np.array([0]), x=0.0, y=0.0, z=0.0)
+    found = press(block, corner, [away], Loads(gravity=(9.81, 0.0, 0.0)), check=False)
+    assert found.status is Status.UNHELD
+    assert found.message.endswith("the one prescribed point of 'body' cannot hold it")

@@ -33,6 +33,8 @@ class Loose:
         self._mesh = body.mesh
         self._stiff = stiffness
         self._bodies = [nodes for nodes, _ in free_motions(body, prescribed)]
+        points = np.unique(prescribed.degrees // 3)
+        self._held = [int(np.isin(points, nodes).sum()) for nodes in self._bodies]
 
     def __bool__(self) -> bool:
         return bool(self._bodies)
@@ -50,7 +52,7 @@ class Loose:
 
     def trouble(self, interfaces: list[Interface], contact: Contact) -> tuple[Status, str]:
         """Why no equilibrium was found: a loose body that nothing touches, or that slides wherever it is touched."""
-        for nodes in self._bodies:
+        for nodes, held in zip(self._bodies, self._held, strict=True):
             mine = np.zeros(len(self._mesh.nodes), dtype=bool)
             mine[nodes] = True
             element = int(np.flatnonzero(mine[self._mesh.elements[:, 0]])[0])
@@ -61,10 +63,12 @@ class Loose:
                 rows = rows[(p.weights[rows] @ mine.astype(float) != 0.0)] if len(rows) else rows
                 if len(rows):
                     touching.append((interface.pair.title, bool(r.sticking[rows].any())))
+            points = f"the {held} prescribed points" if held > 1 else "the one prescribed point"
             if not touching:
-                return Status.UNHELD, f"nothing holds {what}"
+                return Status.UNHELD, f"{points} of {what} cannot hold it" if held else f"nothing holds {what}"
             if not any(sticks for _, sticks in touching):
-                return Status.SLIDING, f"{what} slides at {touching[0][0]}: friction is not enough to hold it"
+                more = f", and {points} cannot" if held else ""
+                return Status.SLIDING, f"{what} slides at {touching[0][0]}: friction is not enough to hold it{more}"
         return Status.MAX_ITERATIONS, ""
 
     def leash(self, move: NDArray[np.float64], reach: float) -> float:

@@ -13,13 +13,14 @@ from warpjld.fem.body import Body
 from warpjld.fem.conjugate import Status
 from warpjld.fem.contact.blocked import blocked
 from warpjld.fem.contact.border import contact_modulus
-from warpjld.fem.contact.equilibrium import Equilibrium, Reached
+from warpjld.fem.contact.equilibrium import Equilibrium
 from warpjld.fem.contact.law import Memory, start_memory
 from warpjld.fem.contact.pairs import Pair
 from warpjld.fem.contact.points import Interface, interfaces_of
 from warpjld.fem.contact.solution import ContactError, ContactInstant, ContactSolution
 from warpjld.fem.contact.step import Step
 from warpjld.fem.contact.touches import touch_of
+from warpjld.fem.contact.walk import Reached
 from warpjld.fem.loads import Loads
 from warpjld.fem.prescribed import Prescribed
 
