@@ -185,3 +185,11 @@ def test_methods_are_compared(data: Path, tmp_path: Path) -> None:
     for pose in {row[0] for row in rows}:
         assert folded[pose, "JLD default"] <= min(folded[pose, "LBS"], folded[pose, "DQS"])
     assert (tmp_path / "table.md").read_text(encoding="utf-8").strip() == text
+
+
+@pytest.mark.slow
+def test_forces_do_not_depend_on_the_size_of_elements() -> None:
+    rows = np.array(runpy.run_path(str(EXAMPLES / "flesh_sizes.py"))["main"]([2.2, 3.0, 4.0]))
+    assert (np.diff(rows[:, 1]) < 0.0).all()
+    forces = rows[:, 5]
+    assert np.abs(forces / forces[0] - 1.0).max() < 0.15

@@ -23,6 +23,8 @@ _PULLS = (10.0, 30.0)
 _ROUNDS = 40
 _LEAST = 0.2
 """Least scaled Jacobian: nodes stay off the bones where they ask for worse, or for worse than it was where it was."""
+_ALONG = 100
+"""Points of a bone's axis from which the nearest elements are asked for."""
 _SLIDE = 0.02
 _END = 0.7
 """Least cosine between a face's normal and the bone's direction at an end of the bone."""
@@ -78,7 +80,7 @@ class Bone:
         chosen, middles = chosen[inside], middles[inside]
         if not len(chosen):
             return chosen
-        share = np.linspace(self.near, self.far, 4 * len(self.radius))
+        share = np.linspace(self.near, self.far, _ALONG)
         t = np.linspace(0.0, 1.0, len(self.radius))
         shift = np.stack([np.interp(share, t, column) for column in self.shift.T], axis=1)
         away, found = cKDTree(middles).query(self.start + share[:, None] * self.along + shift)
@@ -149,6 +151,7 @@ def fitted(
             rounds=_ROUNDS,
             still=still,
         )
+    nodes[still] = mesh.nodes[still]  # but for rounding they are there
     goal = nodes.copy()
     goal[number] = np.concatenate([hull.wanted(nodes)[0] for hull in hulls])
     least = np.minimum(_LEAST, mesh.scaled_jacobian())
