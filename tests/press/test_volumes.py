@@ -51,6 +51,14 @@ def test_hollow_objects_have_a_wall(thing: GraspObject) -> None:
     assert len(found.mesh.boundary()) == len(found.mesh.faces["X"]) + len(found.mesh.faces["X.inside"])
 
 
+def test_the_wall_of_a_box_is_as_thick_at_its_edges() -> None:
+    thing, wall = box(0.036, 0.02, 0.03), 0.002
+    found = made(thing, element=0.004, wall=wall)
+    inside = thing.size - 2.0 * wall
+    assert volumes(found.mesh).sum() == pytest.approx(thing.size.prod() - inside.prod(), rel=1e-9)
+    np.testing.assert_allclose(found.worn(np.zeros_like(found.mesh.nodes)), PLACE.apply(thing.vertices)[0], atol=1e-12)
+
+
 def test_a_pressurised_ball_keeps_its_shape() -> None:
     thing = ball(0.065)
     found = made(thing, wall=0.003, pressure=2e4, young=1e6, element=0.006)

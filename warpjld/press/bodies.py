@@ -11,60 +11,19 @@ from scipy.spatial.transform import Rotation
 
 from warpjld.errors import InputError
 from warpjld.fem import Body, Loads, Material, Prescribed, merge
-from warpjld.fem.contact import Bond, Exclusion, Obstacle, Pair
-from warpjld.fem.hand.blend import Moves
+from warpjld.fem.contact import Bond, Obstacle, Pair
 from warpjld.grasp import Places
-from warpjld.press.drive import Drive
+from warpjld.press.hand_body import HandBody
 from warpjld.press.outside import outside, outside_of_nodes
-from warpjld.press.rest import Part
 from warpjld.press.settle import settle
 from warpjld.press.support import Support
 from warpjld.press.volumes import ObjectVolume
 from warpjld.press.wishes import ContactWishes, Prescribing, placed
 
-__all__ = ["Bodies", "HandBody", "ObjectBody", "PairOf", "assemble"]
+__all__ = ["Bodies", "ObjectBody", "PairOf", "assemble"]
 
 _ON = 2e-4
 """An object nearer to an obstacle than this lies on it [m]."""
-
-
-@dataclass(frozen=True, eq=False)
-class HandBody:
-    """A hand that is driven by its bones.
-
-    Attributes:
-        name: Of the actor.
-        part: Its flesh at time 0.
-        laws: By region.
-        moves: Motions of its bones from the rig's rest at a time.
-        softness: Young's modulus of its skin [Pa].
-        itself: Whether its skin may touch itself.
-        drive: What moves them, for searches that bend its joints otherwise.
-    """
-
-    name: str
-    part: Part
-    laws: Mapping[str, Material]
-    moves: Callable[[float], Moves]
-    softness: float
-    itself: bool
-    drive: Drive
-
-    def prescribed(self, time: float) -> Prescribed:
-        """Displacements of the bones' nodes and of those where the flesh was cut off."""
-        hand, cut = self.part.hand, self.part.cut
-        moves = self.part.start.to(self.moves(time))
-        known = hand.prescribed_by(moves)
-        cut = np.setdiff1d(cut, known.degrees[::3] // 3)
-        if not len(cut):
-            return known
-        x = hand.mesh.nodes[cut]
-        return known + _whole(cut, moves.blended(hand.weights[cut], x) - x)
-
-    def guess(self, before: float, time: float, displacement: NDArray[np.float64]) -> NDArray[np.float64]:
-        """First guess of a displacement (N, 3) from that at an earlier time."""
-        start = self.part.start
-        return self.part.hand.guess(start.to(self.moves(before)), start.to(self.moves(time)), displacement)
 
 
 @dataclass(frozen=True, eq=False)
@@ -336,9 +295,8 @@ def _pairs(
     for hand in hands:
         if hand.itself and not paper:
             flesh = hand.part.hand
-            exclusion = Exclusion(flesh.skin_labels, flesh.skin_labels, flesh.excluded)
             friction = wishes.coefficient(hand.name, hand.name)
-            pairs.append(Pair(flesh.name, flesh.name, friction, f"{hand.name}–{hand.name}", exclusion))
+            pairs.append(Pair(flesh.name, flesh.name, friction, f"{hand.name}–{hand.name}", flesh.self_contact()))
             owners.append(PairOf(hand.name, hand.name))
     known = {o.name for o in objects}
     for bonded in wishes.bonds:
@@ -346,13 +304,6 @@ def _pairs(
             if name not in known:
                 raise placed(InputError(f"a bond to nothing: {name} does not deform here"), bonded.where)
     return pairs, owners
-
-
-def _whole(nodes: NDArray[np.int64], moved: NDArray[np.float64]) -> Prescribed:
-    """All three displacements of nodes."""
-    order = np.argsort(nodes)
-    degrees = (3 * nodes[order][:, None] + np.arange(3)).ravel()
-    return Prescribed(degrees, moved[order].ravel())
 
 
 def _along_with(known: Prescribed, displacement: NDArray[np.float64]) -> NDArray[np.float64]:

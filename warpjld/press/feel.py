@@ -9,8 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from warpjld.fem.hand.tactile import Tactile, tactile_of
-from warpjld.press.bodies import Bodies, HandBody
+from warpjld.press.bodies import Bodies
 from warpjld.press.frames import SolvedFrame
+from warpjld.press.hand_body import HandBody
 
 __all__ = ["felt"]
 

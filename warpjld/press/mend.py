@@ -12,9 +12,10 @@ from numpy.typing import NDArray
 from warpjld.fem.contact import ContactSolution
 from warpjld.fem.hand.correct import Corrected, Correction, correct_angles
 from warpjld.fem.hand.muscles import JOINT_WORDS, DigitEffort, Effort
-from warpjld.press.bodies import Bodies, HandBody
+from warpjld.press.bodies import Bodies
 from warpjld.press.detour import detour
 from warpjld.press.efforts import effort_at
+from warpjld.press.hand_body import HandBody
 from warpjld.skeleton.tree import CHANNELS
 
 __all__ = ["Mended", "Mending"]
@@ -166,6 +167,4 @@ class Mending:
     def _effort(self, hand: HandBody, angles: NDArray[np.float64], solution: ContactSolution) -> Effort:
         assert hand.drive.posed is not None
         poses = hand.drive.posed(angles, solution.last.time)
-        nodal = np.stack([touch.nodal for touch in solution.last.touches])
-        limits = self._limits.get(hand.name)
-        return effort_at(self._bodies, hand, poses, solution.last.displacement, nodal, limits)
+        return effort_at(self._bodies, hand, poses, solution.last, self._limits.get(hand.name))

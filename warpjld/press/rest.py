@@ -240,7 +240,12 @@ def part_of(hand: FleshHand, poses: Poses, skin: NDArray[np.float64], digits: Se
     blend = np.where(whole, t * t * (3.0 - 2.0 * t), 0.0)
     flesh = replace(hand.flesh, mesh=sub, skin=replace(embedding, corners=np.where(whole[:, None], corners, 0)))
     smaller = replace(
-        hand, flesh=flesh, weights=hand.weights[used], skin_faces=skin_faces, skin_labels=hand.skin_labels[faces]
+        hand,
+        flesh=flesh,
+        weights=hand.weights[used],
+        skin_faces=skin_faces,
+        skin_labels=hand.skin_labels[faces],
+        skin_fringes=hand.skin_fringes[faces],
     )
     return Part(smaller, start, cut, blend, skin)
 

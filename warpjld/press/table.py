@@ -10,8 +10,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from warpjld.fem.hand.muscles import Effort
-from warpjld.press.bodies import Bodies, HandBody
+from warpjld.press.bodies import Bodies
 from warpjld.press.frames import SolvedFrame
+from warpjld.press.hand_body import HandBody
 
 __all__ = ["Row", "rows_of", "write_table"]
 
@@ -29,9 +30,14 @@ class Row:
         fx_n, fy_n, fz_n: That sum [N].
         area_mm2: Area under pressure [mm²].
         peak_kpa: Highest pressure [kPa].
-        bone_n: Length of what its bones bear [N]; NaN for the palm.
+        bone_n: Length of the sum of the reactions that hold its bones, less those of the same hand in the same pose
+            when nothing touches it [N]. Where flesh is cut off, the cut bears with the bones that move it.
+        flesh_n: Length of the latter [N]: of the weight of its flesh, and of the strain in it since time 0 where joints
+            bend; NaN for the palm, and where the flesh alone finds no equilibrium: ``bone_n`` is then what contact
+            hands on to the bones by nearness.
         limit_n: Largest force its muscles can bear [N]; NaN for the palm.
-        share: Largest share of the limits of its force and its joints' torques; NaN for the palm.
+        share: Largest share of the limits of ``bone_n`` and of the torques it makes about the digit's joints; NaN for
+            the palm.
         sliding: Share of the area under pressure that slides; NaN where nothing touches.
         state: ``free``, ``sticking``, ``sliding``, or ``partly sliding``.
     """
@@ -47,6 +53,7 @@ class Row:
     area_mm2: float
     peak_kpa: float
     bone_n: float
+    flesh_n: float
     limit_n: float
     share: float
     sliding: float
@@ -101,7 +108,8 @@ def rows_of(bodies: Bodies, hand: HandBody, solved: SolvedFrame, effort: Effort)
                 float(force[2]),
                 1e6 * area,
                 1e-3 * float(touching.pressure[here].max(initial=0.0)),
-                float("nan") if work is None else work.force,
+                float(np.linalg.norm(effort.palm)) if work is None else work.force,
+                float("nan") if work is None else work.flesh,
                 float("nan") if work is None else work.limit,
                 float("nan") if work is None else work.share,
                 sliding,

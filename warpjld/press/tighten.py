@@ -10,9 +10,10 @@ from numpy.typing import NDArray
 from warpjld.fem.contact import ContactInstant, ContactSolution
 from warpjld.fem.hand.blend import Moves
 from warpjld.fem.hand.muscles import Effort
-from warpjld.press.bodies import Bodies, HandBody
+from warpjld.press.bodies import Bodies
 from warpjld.press.detour import detour
 from warpjld.press.efforts import effort_at
+from warpjld.press.hand_body import HandBody
 from warpjld.skeleton.tree import CHANNELS
 
 __all__ = ["Tightening"]
@@ -98,5 +99,4 @@ class Tightening:
         drive = self.hand.drive
         assert drive.posed is not None
         poses = drive.posed(self.angles(grip), self._time)
-        nodal = np.stack([touch.nodal for touch in instant.touches])
-        return effort_at(self.bodies, self.hand, poses, instant.displacement, nodal, self._limits)
+        return effort_at(self.bodies, self.hand, poses, instant, self._limits)

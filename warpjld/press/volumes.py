@@ -15,6 +15,7 @@ from warpjld.fem.fit import fit_mesh
 from warpjld.fem.stress import cauchy
 from warpjld.grasp.objects import GraspObject, Places
 from warpjld.press.wishes import Physical
+from warpjld.rotations import unit
 
 __all__ = ["ObjectVolume", "object_volume"]
 
@@ -23,6 +24,15 @@ _ACROSS = 12
 
 _WALL = 2
 """Elements through a wall."""
+
+_FLAT = 0.03
+"""Mean square by which the faces at a node turn from their mean normal, from which on they are an edge."""
+
+_UPRIGHT = 0.02
+"""Scaled Jacobian of a wall's elements."""
+
+_REACH = 3.0
+"""How far a visible surface may lie outside its mesh, in elements."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -77,15 +87,15 @@ def object_volume(name: str, thing: GraspObject, physical: Physical, place: Plac
     size = physical.element or float(thing.size.min()) / _ACROSS
     if thing.origin == "ball":
         mesh = _ball(thing, physical.wall, size)
-    elif thing.origin == "box" and not physical.wall:
-        counts = np.maximum(1, np.round(thing.size / size)).astype(int)
-        mesh = box(thing.size, tuple(counts), origin=-0.5 * thing.size)
-        mesh = replace(mesh, faces={"outer": mesh.boundary()})
-    elif thing.origin == "cylinder" and not physical.wall:
-        mesh = _cylinder(thing, size)
     else:
-        fitted = fit_mesh(Envelope(thing.vertices, thing.faces), size).mesh
-        mesh = _shell(fitted, physical.wall) if physical.wall else replace(fitted, faces={"outer": fitted.boundary()})
+        if thing.origin == "box":
+            counts = np.maximum(1, np.round(thing.size / size)).astype(int)
+            mesh = box(thing.size, tuple(counts), origin=-0.5 * thing.size)
+        elif thing.origin == "cylinder" and not physical.wall:  # its faces are narrow at the rims
+            mesh = _cylinder(thing, size)
+        else:
+            mesh = fit_mesh(Envelope(thing.vertices, thing.faces), size).mesh
+        mesh = _shell(mesh, physical.wall) if physical.wall else replace(mesh, faces={"outer": mesh.boundary()})
     faces = {name: mesh.faces["outer"]}
     if physical.wall:
         faces[f"{name}.inside"] = mesh.faces["inner"]
@@ -94,7 +104,8 @@ def object_volume(name: str, thing: GraspObject, physical: Physical, place: Plac
     )
     stress = _holding(mesh, f"{name}.inside", physical) if physical.pressure else np.zeros((len(mesh.elements), 6))
     try:
-        visible = embed(mesh, thing.vertices, reach=3.0)
+        thin = min(1.0, physical.wall / (_WALL * size)) if physical.wall else 1.0
+        visible = embed(mesh, thing.vertices, reach=_REACH / thin)
     except InputError as error:
         raise InputError(f"elements of {size:g} m are too large, thin parts are left out ({error.message})") from error
     turn = place.apply(np.eye(3))[0] - place.apply(np.zeros((1, 3)))[0]
@@ -123,11 +134,11 @@ def _cylinder(thing: GraspObject, size: float) -> HexMesh:
     mesh = cylinder(radius, length, n=count, along=max(2, round(length / size)))
     x, y, z = mesh.nodes.T
     upright = np.stack([x, z - 0.5 * length, -y], axis=1)
-    return replace(mesh, nodes=upright, faces={"outer": mesh.boundary()})
+    return replace(mesh, nodes=upright)
 
 
 def _shell(solid: HexMesh, wall: float) -> HexMesh:
-    """Elements through a wall under the surface of a fitted mesh.
+    """Elements through a wall under the surface of a mesh; as thick at edges as elsewhere, where faces are wide enough.
 
     Raises:
         InputError: The wall folds.
@@ -136,12 +147,12 @@ def _shell(solid: HexMesh, wall: float) -> HexMesh:
     used, corners = np.unique(quads, return_inverse=True)
     corners = corners.reshape(-1, 4)
     x = solid.nodes[used]
-    normal = np.zeros_like(x)
-    facing = np.cross(x[corners[:, 2]] - x[corners[:, 0]], x[corners[:, 3]] - x[corners[:, 1]])
-    np.add.at(normal, corners, facing[:, None, :].repeat(4, axis=1))
-    normal /= np.linalg.norm(normal, axis=1, keepdims=True)
-    depths = np.linspace(wall, 0.0, _WALL + 1)
-    nodes = np.concatenate([x - depth * normal for depth in depths])
+    facing = unit(np.cross(x[corners[:, 2]] - x[corners[:, 0]], x[corners[:, 3]] - x[corners[:, 1]]))
+    number = np.bincount(corners.ravel())[:, None]
+    normal, planes = np.zeros_like(x), np.zeros((len(x), 3, 3))
+    np.add.at(normal, corners, facing[:, None])
+    np.add.at(planes, corners, (facing[:, :, None] * facing[:, None, :])[:, None])
+    even = np.einsum("nij,nj->ni", np.linalg.pinv(planes / number[:, :, None], rcond=_FLAT), normal / number)
     layers = [
         np.concatenate([corners + k * len(x), corners + (k + 1) * len(x)], axis=1).astype(np.int32)
         for k in range(_WALL)
@@ -150,10 +161,12 @@ def _shell(solid: HexMesh, wall: float) -> HexMesh:
     count = len(corners)
     outer = np.stack([(_WALL - 1) * count + np.arange(count), np.full(count, 5)], axis=1).astype(np.int32)
     inner = np.stack([np.arange(count), np.full(count, 4)], axis=1).astype(np.int32)
-    mesh = HexMesh(nodes, elements, np.zeros(len(elements), np.int32), ("body",), {"outer": outer, "inner": inner})
-    if mesh.scaled_jacobian().min() <= 0.02:
-        raise InputError(f"wall: {wall:g} m is too thick, the wall would fold; take a thinner one")
-    return mesh
+    for inwards in (even, 0.5 * (even + unit(normal)), unit(normal)):
+        nodes = np.concatenate([x - depth * inwards for depth in np.linspace(wall, 0.0, _WALL + 1)])
+        mesh = HexMesh(nodes, elements, np.zeros(len(elements), np.int32), ("body",), {"outer": outer, "inner": inner})
+        if mesh.scaled_jacobian().min() > _UPRIGHT:
+            return mesh
+    raise InputError(f"wall: {wall:g} m is too thick, the wall would fold; take a thinner one")
 
 
 def _holding(mesh: HexMesh, inside: str, physical: Physical) -> NDArray[np.float64]:

@@ -19,8 +19,9 @@ if TYPE_CHECKING:
     from warpjld.fem.contact import Obstacle
     from warpjld.fem.hand.flesh_hand import FleshHand
     from warpjld.grasp import Places
-    from warpjld.press.bodies import HandBody, ObjectBody
+    from warpjld.press.bodies import ObjectBody
     from warpjld.press.drive import Drive
+    from warpjld.press.hand_body import HandBody
     from warpjld.press.support import Support
     from warpjld.press.volumes import ObjectVolume
     from warpjld.script.props import Prop
@@ -45,7 +46,7 @@ def hand_body(scene: Scene, actor: Actor, wish: FleshWish, start: float, notes: 
     from warpjld.fem.hand.cushion import coarse_note
     from warpjld.fem.hand.flesh_hand import build_flesh_hand
     from warpjld.fem.hand.laws import hand_laws
-    from warpjld.press.bodies import HandBody
+    from warpjld.press.hand_body import HandBody
     from warpjld.press.rest import part_of, posed
 
     poses = stage(actor, np.array([start]), scene.rate)

@@ -44,11 +44,25 @@ class PressRows:
         for hand in self._bodies.hands:
             poses = stage(self._scene.actor(hand.name), np.array([solved.frame]), self._scene.rate)
             limits = self._scene.contact.strength.get(hand.name)
-            effort = effort_at(self._bodies, hand, poses, solved.displacement, solved.nodal, limits)
+            effort = effort_at(self._bodies, hand, poses, solved, limits)
             self._efforts.append((hand.name, solved.frame, effort))
             self.rows += rows_of(self._bodies, hand, solved, effort)
             reason = reason or effort.stop()
         return None if reason is None else f"stopped at frame {solved.frame:g}: {reason}"
+
+    def notes(self) -> list[str]:
+        """Frames at which bones' forces are estimates."""
+        out = []
+        for hand in self._bodies.hands:
+            unsure = [
+                frame for name, frame, effort in self._efforts if name == hand.name and np.isnan(effort.digits[0].flesh)
+            ]
+            if unsure:
+                out.append(
+                    f"{hand.name}: flesh alone finds no equilibrium in the pose of frame "
+                    f"{', '.join(f'{frame:g}' for frame in unsure)}: what bones bear is estimated from contact"
+                )
+        return out
 
     def suggestions(self) -> list[str]:
         """What to open, at the frame that strains an actor most."""

@@ -120,6 +120,7 @@ def _run(scene: Scene, pressing: Pressing, folder: Path, progress: Report) -> Pr
         state=None if pressing.state is None else folder / pressing.state,
         progress=progress,
     )
+    notes += table.notes()
     if solved.resumed:
         notes.append(f"{solved.resumed} of {len(solved.frames)} frames were in {pressing.state} already")
     verdict = verdict_of(solved, table.rows, table.suggestions())

@@ -59,9 +59,10 @@ class PressedFinger:
         )
         if not solution.converged:
             return None
-        nodal = solution.last.touches[0].nodal
+        # its one bone moves as a whole: the flesh alone takes nothing
+        held = -solution.last.reactions
         x = self.body.mesh.nodes + solution.last.displacement
-        loads = BoneLoads((self.far,), nodal.sum(axis=0)[None], np.cross(x, nodal).sum(axis=0)[None])
+        loads = BoneLoads((self.far,), held.sum(axis=0)[None], np.cross(x, held).sum(axis=0)[None])
         return effort_of(self.skeleton, poses_from_angles(self.skeleton, angles[None]), loads, 0, LIMITS)
 
 

@@ -101,7 +101,9 @@ def test_labels_and_what_never_touches(hand: FleshHand) -> None:
         return bool(hand.excluded[names.index(f"left.{a}"), names.index(f"left.{b}")])
 
     assert never("index.distal", "index.middle")
-    assert never("index.distal", "index.proximal")
+    assert never("index.middle", "index.proximal")
+    assert not never("index.distal", "index.proximal")  # a fingertip comes down on its own first phalanx
+    assert never("thumb.distal", "thumb.proximal")
     assert never("palm.index", "index.proximal")
     assert never("index.proximal.web", "middle.proximal.web")
     assert not never("index.distal", "palm.index")

@@ -13,7 +13,8 @@ from warpjld.fem import ball as ball_mesh
 from warpjld.fem.contact import ContactInstant, Pair, press
 from warpjld.fem.contact.solids import Sphere
 from warpjld.fem.hand import FleshHand, HandMotion, build_flesh_hand, hand_laws, motion_of
-from warpjld.fem.hand.bone_loads import loads_from_contact, loads_from_reactions
+from warpjld.fem.hand.alone import FleshAlone
+from warpjld.fem.hand.bone_loads import BoneLoads, loads_from_contact, loads_from_reactions
 from warpjld.fem.hand.muscles import Effort, effort_of
 from warpjld.fem.hand.tactile import tactile_of
 from warpjld.grasp import ObjectSet, Places
@@ -52,10 +53,18 @@ def closing() -> HandMotion:
     return motion_of(hand, poses_from_angles(skeleton, angles))
 
 
-def effort(motion: HandMotion, instant: ContactInstant) -> Effort:
-    nodal = np.sum([t.nodal for t in instant.touches], axis=0)
-    loads = loads_from_contact(motion.hand, instant.displacement, nodal)
-    return effort_of(motion.hand.skeleton, motion.pose(instant.time), loads)
+def loads_at(motion: HandMotion, alone: FleshAlone, instant: ContactInstant) -> BoneLoads:
+    hand, count = motion.hand, len(motion.hand.mesh.nodes)
+    nodal = np.sum([t.nodal for t in instant.touches], axis=0)[:count]
+    u, reactions = instant.displacement[:count], instant.reactions[:count]
+    untouched = alone.at(motion.pose(instant.time), u, reactions, nodal)
+    assert untouched is not None
+    own = loads_from_reactions(hand, untouched.displacement, untouched.reactions)
+    return loads_from_reactions(hand, u, reactions) - own
+
+
+def effort(motion: HandMotion, loads: BoneLoads, time: float) -> Effort:
+    return effort_of(motion.hand.skeleton, motion.pose(time), loads)
 
 
 def balanced(hand: FleshHand, instant: ContactInstant) -> None:
@@ -67,14 +76,21 @@ def balanced(hand: FleshHand, instant: ContactInstant) -> None:
 
 
 def test_rigid_ball(closing: HandMotion) -> None:
+    """Flesh at rest in the open hand is strained when it closes, by newtons at the thumb: they do not count."""
     hand = closing.hand
+    body = Body(hand.mesh, hand_laws(hand.mesh.region_names))
+    alone = FleshAlone(hand, body, closing.prescribed(0.0).degrees, closing.pose(0.0))
+
+    def watch(instant: ContactInstant) -> str | None:
+        return effort(closing, loads_at(closing, alone, instant), instant.time).stop()
+
     found = press(
-        Body(hand.mesh, hand_laws(hand.mesh.region_names)),
+        body,
         closing.prescribed,
         [Pair("hand", Sphere(CENTRE, RADIUS), name="ball")],
         times=[1.0, 2.0, 3.0, 3.1, 3.2, 3.3, 3.4],
         guess=closing.guess,
-        watch=lambda instant: effort(closing, instant).stop(),
+        watch=watch,
         check=False,
     )
     assert found.status in (Status.CONVERGED, Status.STOPPED)
@@ -82,6 +98,14 @@ def test_rigid_ball(closing: HandMotion) -> None:
     for instant in found.instants:
         assert instant.touches[0].penetration < 1e-3 * 0.003
         balanced(hand, instant)
+        touch = instant.touches[0]
+        loads = loads_at(closing, alone, instant)
+        np.testing.assert_allclose(loads.force.sum(axis=0), touch.nodal.sum(axis=0), atol=1e-3 * touch.normal_force)
+        handed = effort(closing, loads_from_contact(hand, instant.displacement, touch.nodal), instant.time)
+        for digit in effort(closing, loads, instant.time).digits:
+            there = handed[digit.digit]
+            assert there.force == pytest.approx(digit.force, rel=0.01, abs=1e-6)
+            np.testing.assert_allclose(there.torques[:2], digit.torques[:2], rtol=0.03, atol=1e-7)
     read = tactile_of(hand, found.instants)
     assert not read.touching[:2].any()
     for digit in ("pinky", "ring", "middle", "index", "thumb"):

@@ -10,10 +10,11 @@ from numpy.typing import NDArray
 
 from warpjld.covering import bind
 from warpjld.fem import Body
-from warpjld.fem.contact import ContactSolution, Exclusion, Pair, press
+from warpjld.fem.contact import ContactSolution, Pair, press
 from warpjld.fem.hand import FleshHand, hand_laws
 from warpjld.hand import build_hand
-from warpjld.press.bodies import HandBody
+from warpjld.press.drive import Drive
+from warpjld.press.hand_body import HandBody
 from warpjld.press.rest import part_of, posed
 from warpjld.skeleton import CHANNELS, Poses, Skeleton, poses_from_angles
 
@@ -56,11 +57,11 @@ class Hand:
         part = part_of(hand, poses(0.0), skin, digits)
         self.hand = part.hand
         self.laws = hand_laws(self.hand.mesh.region_names)
-        self.driven = HandBody("hand", part, self.laws, lambda share: hand.moves(poses(share)), 80e3, True)
+        drive = Drive(hand, whole.skeleton, poses)
+        self.driven = HandBody("hand", part, self.laws, drive.moves, 80e3, True, drive)
 
     def pressed(self, times: Sequence[float], friction: float = 0.0) -> ContactSolution:
-        exclusion = Exclusion(*self.hand.self_contact())
-        pair = Pair("hand", "hand", friction, exclusion=exclusion, name="itself")
+        pair = Pair("hand", "hand", friction, exclusion=self.hand.self_contact(), name="itself")
         body = Body(self.hand.mesh, self.laws)
         return press(body, self.driven.prescribed, [pair], times=times, guess=self.driven.guess, tolerance=1e-4)
 

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from warpjld.errors import InputError
 from warpjld.fem.contact.pairs import Pair
+from warpjld.fem.contact.passed import counted
 from warpjld.fem.contact.surface import ContactSurface
 from warpjld.fem.rows import on_rows, shared
 
@@ -37,19 +38,26 @@ class Mortar:
         pair: Exclusions.
         count: Nodes of the body, N.
         threads: Threads.
+
+    Attributes:
+        slave, master, threads: As given.
+        offset: How far what is seen lies outside the nodes [m], shape (N,), where it does.
+        labels: Of the slave's and the master's facets, shapes (F,) and (G,).
+        joined, fringe: See ``Exclusion``.
     """
 
     def __init__(self, slave: ContactSurface, master: ContactSurface, pair: Pair, count: int, threads: int) -> None:
         self.slave, self.master = slave, master
         self.offset = pair.offset
-        self._count, self._threads = count, threads
+        self._count, self.threads = count, threads
         exclusion = pair.exclusion
         if exclusion is None:
             mine, other = np.zeros(len(slave.quads), np.int32), np.zeros(len(master.quads), np.int32)
-            never = np.zeros((1, 1), np.uint8)
+            never = joined = np.zeros((1, 1), np.uint8)
         else:
             mine, other = (np.asarray(a, dtype=np.int32) for a in (exclusion.slave, exclusion.master))
             never = np.array(exclusion.never, dtype=np.uint8)
+            joined = never.copy() if exclusion.joined is None else np.array(exclusion.joined, dtype=np.uint8)
             if mine.shape != (len(slave.quads),) or other.shape != (len(master.quads),):
                 raise InputError(
                     f"{pair.title}: want one label for each of {len(slave.quads)} slave and {len(master.quads)} "
@@ -64,7 +72,10 @@ class Mortar:
             if exclusion is None:
                 raise InputError(f"{pair.title}: a surface against itself wants an exclusion, to know its parts")
             never |= np.tril(np.ones_like(never))
-        self._labels = [np.ascontiguousarray(a) for a in (mine, other, never)]
+        self.labels = np.ascontiguousarray(mine), np.ascontiguousarray(other)
+        self.joined = joined
+        self.fringe = None if exclusion is None else exclusion.fringe
+        self._never = never
 
     def points(self, x: NDArray[np.float64], reach: float, normals: NDArray[np.float64]) -> ContactPoints:
         """Points at positions x (N, 3) with slave normals (m, 3).
@@ -80,6 +91,10 @@ class Mortar:
         found = self.integrals(pairs, slave.quads, master.quads, x, reach)
         some = found[:, 32] > 0.0
         pairs, found = pairs[some], found[some]
+        share = counted(self, pairs, found, normals, x, reach)
+        some = share > 0.0
+        pairs, share = pairs[some], share[some]
+        found = share[:, None] * found[some]
         corner = slave.corners[pairs[:, 0]]
         rows = np.repeat(corner, 4, axis=1)
         own = np.tile(slave.quads[pairs[:, 0]], 4)
@@ -95,7 +110,7 @@ class Mortar:
         normal = normals[nodes]
         gap = np.asarray(-np.einsum("mi,mi->m", normal, table @ x), np.float64)
         gap += self.aside(nodes, area[nodes])[0]
-        return ContactPoints(nodes, table, normal, area[nodes], gap, np.zeros((len(nodes), 3)), facets=pairs)
+        return ContactPoints(nodes, table, normal, area[nodes], gap, np.zeros((len(nodes), 3)), pairs, share)
 
     def aside(
         self, sites: NDArray[np.int64], area: NDArray[np.float64]
@@ -119,7 +134,7 @@ class Mortar:
         bvh = wp.Bvh(*(wp.array(b, dtype=wp.vec3, device="cpu") for b in (low, high)))
         count = len(self.slave.quads)
         lower, upper = (wp.array(b.astype(np.float32), dtype=wp.vec3, device="cpu") for b in boxes[0])
-        mine, other, never = (shared(a) for a in self._labels)
+        mine, other, never = (shared(a) for a in (*self.labels, self._never))
         starts, counts = np.zeros(count + 1, np.int32), np.zeros(count, np.int32)
         inputs: list[Any] = [bvh.id, lower, upper, mine, other, never]
         out = np.empty(1, np.int32)
@@ -147,5 +162,5 @@ class Mortar:
         if len(pairs):
             tables = [np.ascontiguousarray(a).reshape(-1) for a in (pairs, slave, master, x)]
             arguments = [*(shared(t) for t in tables), _FACING, _TURN, reach, shared(out.reshape(-1))]
-            on_rows(contact_mortar.integrate, len(pairs), arguments, threads=self._threads, least=200)
+            on_rows(contact_mortar.integrate, len(pairs), arguments, threads=self.threads, least=200)
         return out

@@ -39,11 +39,17 @@ class Exclusion:
         slave: Label of each slave face, shape (F,).
         master: Label of each master face, shape (G,).
         never: Pairs of labels that are left out, shape (L, L).
+        joined: Pairs of labels that belong together, shape (L, L): facets of the two overlap in a bent joint, and are
+            not parted; ``never`` if left out.
+        fringe: Share with which faces meet those that they belong together with, 0 beside what they are both next to,
+            shape (F,).
     """
 
     slave: NDArray[np.int32]
     master: NDArray[np.int32]
     never: NDArray[np.bool_]
+    joined: NDArray[np.bool_] | None = None
+    fringe: NDArray[np.float64] | None = None
 
 
 @dataclass(frozen=True, eq=False)

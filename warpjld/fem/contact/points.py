@@ -43,6 +43,7 @@ class ContactPoints:
         gap: Distance to the other side along ``normal``, negative where they overlap [m], shape (m,).
         carried: What the other side, if an obstacle, moved at the point since the start of the step [m], shape (m, 3).
         facets: Slave and master facets that face each other, if the master deforms too, shape (P, 2).
+        share: Share of each two that counts, shape (P,).
         steep: How gaps change with the displacement (3N,), beyond what they do with weights and normals that stay,
             where that is known, ``csr_array`` (m, 3N).
     """
@@ -54,6 +55,7 @@ class ContactPoints:
     gap: NDArray[np.float64]
     carried: NDArray[np.float64]
     facets: NDArray[np.int32] | None = None
+    share: NDArray[np.float64] | None = None
     steep: Any = None
 
     def forces(self, traction: NDArray[np.float64]) -> NDArray[np.float64]:

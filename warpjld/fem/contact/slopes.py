@@ -105,16 +105,19 @@ class _Pairs:
         self, mortar: Mortar, points: ContactPoints, rows: NDArray[np.int64], x: NDArray[np.float64], reach: float
     ) -> None:
         assert points.facets is not None
+        assert points.share is not None
         slave = mortar.slave
         number = np.full(len(slave.nodes), -1)
         number[points.sites[rows]] = rows
-        facets = points.facets[(number[slave.corners[points.facets[:, 0]]] >= 0).any(axis=1)]
+        some = (number[slave.corners[points.facets[:, 0]]] >= 0).any(axis=1)
+        facets, share = points.facets[some], points.share[some]
         nodes = np.concatenate([slave.quads[facets[:, 0]], mortar.master.quads[facets[:, 1]]], axis=1)
         self.rows = rows
         self.corner = number[slave.corners[facets[:, 0]]]
         self.column = (3 * nodes[:, :, None] + np.arange(3)).reshape(-1, 24)
         self._mortar, self._points, self._at, self._size = mortar, points, x[nodes], x.size
         change = _differences(mortar, self._at, reach, _STEP * float(np.median(slave.edge)))
+        change *= share[:, None, None]
         self.own, self.far = (change[:, :, k : k + 16].reshape(-1, 24, 4, 4) for k in (0, 16))
 
     def gaps(self) -> Any:

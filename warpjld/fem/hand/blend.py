@@ -53,9 +53,7 @@ class Moves:
             weights: Share of the bones in the points, rows summing to one, shape (n, B).
             points: [m], shape (n, 3).
         """
-        real = self.turns.copy()
-        # one half of the sphere for all, that of the bone which turns least: motions of a step are far from opposite
-        real *= np.where(real @ real[int(np.argmax(np.abs(real[:, 3])))] < 0.0, -1.0, 1.0)[:, None]
+        real = self.turns * _halves(self.turns, weights)[:, None]
         vector, scalar = real[:, :3], real[:, 3:]
         dual = 0.5 * np.concatenate(
             [
@@ -87,3 +85,22 @@ def moves_of(poses: Poses, frame: int, parents: Sequence[int], rest: NDArray[np.
     joints = list(parents)
     turn = Rotation.from_quat(poses.rotations[frame, joints])
     return Moves(turn.as_quat(), poses.positions[frame, joints] - turn.apply(rest[joints]))
+
+
+def _halves(turns: NDArray[np.float64], weights: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Sign of each bone's quaternion, shape (B,): bones that share points turn the short way into one another.
+
+    In a fist a fingertip turns by more than half a circle, but from bone to bone it is far less: signs go from each to
+    the one that it shares most with.
+    """
+    from scipy.sparse.csgraph import breadth_first_order, minimum_spanning_tree
+
+    shared = weights.T @ weights
+    # whoever shares nothing is tied last, by the least of weights: the tree reaches all
+    links = minimum_spanning_tree(-(shared + 1e-12 * (1.0 + shared.max())))
+    order, before = breadth_first_order(links, 0, directed=False)
+    signs = np.ones(len(turns))
+    for bone in order[1:]:
+        near = before[bone]
+        signs[bone] = signs[near] if turns[bone] @ turns[near] >= 0.0 else -signs[near]
+    return signs

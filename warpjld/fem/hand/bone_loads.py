@@ -1,4 +1,14 @@
-"""What flesh does to each bone: from the reactions that hold it, or from what touches the skin (B eq. 8, R118)."""
+"""Forces and moments on each bone of a hand: from what holds its nodes, or from what touches the skin (B eq. 8, R118).
+
+A force on a node goes to the bones that move it. A bone's own nodes are moved by it alone; nodes where flesh was cut
+off follow several bones by their weights (``Part.cut``), and hand what they bear on to them by the same weights, so the
+sum over all bones is the sum of all reactions.
+
+**Which of the two.** Reactions are exact: they are in equilibrium with contact, whatever the flesh does. They hold the
+flesh of bent joints in shape, too, so those of the same pose without contact are taken off (``FleshAlone``).
+Contact forces handed on by nearness (``loads_from_contact``) need no second equilibrium. They differ where they act
+near a joint, whose bones share them otherwise than by nearness: ``warpjld.press.efforts`` says by how much.
+"""
 
 from __future__ import annotations
 
@@ -34,46 +44,41 @@ class BoneLoads:
 def loads_from_reactions(
     hand: FleshHand, displacement: NDArray[np.float64], reactions: NDArray[np.float64]
 ) -> BoneLoads:
-    """Minus the reactions on each bone's nodes: what its muscles have to balance.
-
-    They hold the flesh of flexed joints in shape, too. Where that matters, subtract the loads of the same pose without
-    contact.
+    """Minus the reactions that hold bones and cut nodes: what flesh and contact put on every bone.
 
     Args:
         hand: The hand.
         displacement: Of all nodes [m], shape (N, 3) or longer (bodies merged after the hand).
         reactions: Forces that hold the prescribed nodes [N], of the same shape.
+
+    Raises:
+        InputError: Other shapes.
     """
-    _check(hand, displacement, reactions)
-    force, moment = [], []
-    for nodes in hand.bone_nodes:
-        pushes = -reactions[nodes]
-        force.append(pushes.sum(axis=0))
-        moment.append(np.cross(hand.mesh.nodes[nodes] + displacement[nodes], pushes).sum(axis=0))
-    return BoneLoads(hand.flesh.bones, np.array(force), np.array(moment))
+    return _handed_on(hand, displacement, -reactions)
 
 
 def loads_from_contact(hand: FleshHand, displacement: NDArray[np.float64], nodal: NDArray[np.float64]) -> BoneLoads:
-    """Contact forces on the skin handed on to the bones, each force to the bones that carry its node.
-
-    Flesh in equilibrium hands all of a force on. The weights say to which bones it goes, by nearness: contact alone is
-    counted, not the flesh that is stretched in flexed joints.
+    """Contact forces on the skin handed on to the bones by nearness: an estimate that needs no equilibrium.
 
     Args:
         hand: The hand.
         displacement: Of all nodes [m], shape (N, 3) or longer.
         nodal: Contact force on every node [N], of the same shape.
+
+    Raises:
+        InputError: Other shapes.
     """
-    _check(hand, displacement, nodal)
-    own = nodal[: len(hand.mesh.nodes)]
-    pushed = np.flatnonzero(own.any(axis=1))
-    share = hand.weights[pushed]
-    turning = np.cross(hand.mesh.nodes[pushed] + displacement[pushed], own[pushed])
-    return BoneLoads(hand.flesh.bones, share.T @ own[pushed], share.T @ turning)
+    return _handed_on(hand, displacement, nodal)
 
 
-def _check(hand: FleshHand, displacement: NDArray[np.float64], forces: NDArray[np.float64]) -> None:
+def _handed_on(hand: FleshHand, displacement: NDArray[np.float64], forces: NDArray[np.float64]) -> BoneLoads:
+    """Forces on nodes, each given to the bones by its node's weights."""
     count = len(hand.mesh.nodes)
     for name, array in (("displacement", displacement), ("forces", forces)):
         if array.ndim != 2 or array.shape[1] != 3 or len(array) < count:
             raise InputError(f"{name}: want shape ({count}, 3) or more rows, got {array.shape}")
+    own = forces[:count]
+    pushed = np.flatnonzero(own.any(axis=1))
+    share = hand.weights[pushed]
+    turning = np.cross(hand.mesh.nodes[pushed] + displacement[pushed], own[pushed])
+    return BoneLoads(hand.flesh.bones, share.T @ own[pushed], share.T @ turning)

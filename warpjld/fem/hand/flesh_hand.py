@@ -9,9 +9,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from warpjld.errors import InputError
+from warpjld.fem.contact.pairs import Exclusion
 from warpjld.fem.flesh import Flesh, flesh_of
 from warpjld.fem.hand.blend import Moves, moves_of
-from warpjld.fem.hand.labels import WEB, excluded_pairs, segment_name, skin_labels
+from warpjld.fem.hand.labels import WEB, excluded_pairs, fringes, joined_pairs, segment_name, skin_labels
 from warpjld.fem.hand.regions import hand_regions
 from warpjld.fem.hand.weights import bone_weights
 from warpjld.fem.hexmesh import HexMesh
@@ -39,6 +40,7 @@ class FleshHand:
         skin_labels: Label of each of them, shape (F,).
         label_names: ``left.index.distal``, ``left.palm.index``, ``left.wrist``, …; ``….web`` near another digit.
         excluded: Pairs of labels that never touch, shape (L, L) (R127).
+        skin_fringes: Share with which skin faces touch others of their own finger, shape (F,).
     """
 
     name: str
@@ -51,6 +53,7 @@ class FleshHand:
     skin_labels: NDArray[np.int32]
     label_names: tuple[str, ...]
     excluded: NDArray[np.bool_]
+    skin_fringes: NDArray[np.float64]
 
     @property
     def mesh(self) -> HexMesh:
@@ -76,9 +79,10 @@ class FleshHand:
         np.add.at(votes, (self.mesh.quads(self.skin_faces), plain[self.skin_labels][:, None]), 1)
         return np.where(votes.any(axis=1), votes.argmax(axis=1), -1).astype(np.int32)
 
-    def self_contact(self) -> tuple[NDArray[np.int32], NDArray[np.int32], NDArray[np.bool_]]:
-        """Labels of slave and master faces and the pairs never tested, for the skin against itself (R126)."""
-        return self.skin_labels, self.skin_labels, self.excluded
+    def self_contact(self) -> Exclusion:
+        """What of the skin never meets, for the skin against itself (R126, R127)."""
+        labels, joined = self.skin_labels, joined_pairs(self.label_names)
+        return Exclusion(labels, labels, self.excluded, joined, self.skin_fringes)
 
     def moves(self, poses: Poses, frame: int = 0) -> Moves:
         """Rigid motion of every bone from where it rests."""
@@ -198,4 +202,5 @@ def build_flesh_hand(
     labels, names = skin_labels(mesh, faces, weights, joints, apart * spacing)
     excluded = excluded_pairs(mesh, faces, labels, names, 0.5 * apart * spacing)
     place = Moves(np.tile([0.0, 0.0, 0.0, 1.0], (len(joints), 1)), np.zeros((len(joints), 3)))
-    return FleshHand(name, flesh, rig.skeleton, rig.surface, place, weights, faces, labels, names, excluded)
+    fringe = fringes(mesh, faces, labels, names, apart * spacing)
+    return FleshHand(name, flesh, rig.skeleton, rig.surface, place, weights, faces, labels, names, excluded, fringe)

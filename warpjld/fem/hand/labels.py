@@ -10,10 +10,12 @@ from numpy.typing import NDArray
 from warpjld.fem.hexmesh import HexMesh
 from warpjld.skeleton.hand import DIGITS
 
-__all__ = ["WEB", "excluded_pairs", "segment_name", "skin_labels"]
+__all__ = ["WEB", "excluded_pairs", "fringes", "joined_pairs", "segment_name", "skin_labels"]
 
 _ENDS = {"tip": "distal", "knuckle3": "middle", "knuckle2": "proximal", "base": "palm", "carpometacarpal": "wrist"}
 _THUMB = {"tip": "distal", "knuckle3": "proximal", "knuckle2": "palm", "base": "wrist"}
+_BETWEEN = "middle"
+"""Phalanx between a finger's first and last; thumbs have none."""
 WEB = ".web"
 """Ends the label of skin near another digit at rest: where fingers part, and sides that lie together."""
 
@@ -77,14 +79,56 @@ def skin_labels(
     return out, tuple(names)
 
 
+def joined_pairs(names: Sequence[str]) -> NDArray[np.bool_]:
+    """Pairs of labels that belong together, symmetric, shape (L, L).
+
+    They are: a label with itself; segments of one digit; a first phalanx and its metacarpal; parts of the palm and the
+    wrist.
+    """
+    count = len(names)
+    out = np.eye(count, dtype=bool)
+    for a in range(count):
+        for b in range(a):
+            joined = _base_of(names[a], names[b]) or _base_of(names[b], names[a])
+            out[a, b] = out[b, a] = _digit(names[a]) == _digit(names[b]) or joined
+    return out
+
+
+def fringes(
+    mesh: HexMesh, faces: NDArray[np.int32], label: NDArray[np.int32], names: Sequence[str], width: float
+) -> NDArray[np.float64]:
+    """Share with which faces of a finger's first and last phalanx meet each other, shape (F,).
+
+    Where they border on the phalanx between them, which never meets its neighbours, they do not; it grows from there.
+
+    Args:
+        mesh: At rest.
+        faces: Skin faces, shape (F, 2).
+        label: Their labels, shape (F,).
+        names: Names of the labels.
+        width: Distance from that phalanx at which they meet as others do [m].
+    """
+    from scipy.spatial import cKDTree
+
+    middle = mesh.nodes[mesh.quads(faces)].mean(axis=1)
+    digit = np.array([_digit(name) for name in names])[label]
+    between = np.array([_segment(name) == _BETWEEN for name in names])[label]
+    out = np.ones(len(faces))
+    for own in set(digit[between].tolist()):
+        mine = np.flatnonzero((digit == own) & ~between)
+        away, _ = cKDTree(middle[between & (digit == own)]).query(middle[mine])
+        t = np.clip(away / width - 0.5, 0.0, 1.0)
+        out[mine] = t * t * (3.0 - 2.0 * t)
+    return out
+
+
 def excluded_pairs(
     mesh: HexMesh, faces: NDArray[np.int32], label: NDArray[np.int32], names: Sequence[str], near: float
 ) -> NDArray[np.bool_]:
     """Pairs of labels that are never tested for contact, symmetric, shape (L, L) (R127).
 
-    They are: a label with itself; segments of one digit with one another (B: the third phalanx cannot interpenetrate
-    the second and first) and its first phalanx with its metacarpal; parts of the palm and the wrist; and whatever
-    lies within ``near`` of one another at rest (webs, and digits drawn side by side).
+    They are those that belong together (``joined_pairs``), but for the first phalanx of a finger and its last, which
+    meet in a tight fist; and whatever lies within ``near`` of one another at rest: webs, and digits drawn side by side.
 
     Args:
         mesh: At rest.
@@ -96,12 +140,7 @@ def excluded_pairs(
     from scipy.spatial import cKDTree
 
     count = len(names)
-    out = np.eye(count, dtype=bool)
-    digits = [_digit(name) for name in names]
-    for a in range(count):
-        for b in range(a):
-            joined = _base_of(names[a], names[b]) or _base_of(names[b], names[a])
-            out[a, b] = out[b, a] = digits[a] == digits[b] or joined
+    out = joined_pairs(names) & ~_ends(names)
     quads = mesh.quads(faces)
     points = np.concatenate([mesh.nodes[quads].reshape(-1, 3), mesh.nodes[quads].mean(axis=1)])
     kinds = np.concatenate([np.repeat(label, 4), label])
@@ -128,3 +167,18 @@ def _base_of(palm: str, phalanx: str) -> bool:
     """Whether a part of the palm lies over the metacarpal that carries this first phalanx."""
     *side, kind, digit = palm.removesuffix(WEB).rsplit(".", 2)
     return kind == "palm" and phalanx.removesuffix(WEB) == ".".join([*side, digit, "proximal"])
+
+
+def _segment(name: str) -> str:
+    """``distal`` of ``left.index.distal``."""
+    return name.removesuffix(WEB).rpartition(".")[2]
+
+
+def _ends(names: Sequence[str]) -> NDArray[np.bool_]:
+    """Pairs of the first and last of a finger's three phalanges, shape (L, L)."""
+    digit = np.array([_digit(name) for name in names])
+    segment = np.array([_segment(name) for name in names])
+    long = np.isin(digit, digit[segment == _BETWEEN])
+    first, last = long & (segment == "proximal"), long & (segment == "distal")
+    pairs = (first[:, None] & last | last[:, None] & first) & (digit[:, None] == digit)
+    return np.asarray(pairs)

@@ -15,7 +15,7 @@ from warpjld.fem.hand.flesh_hand import FleshHand
 from warpjld.fem.prescribed import Prescribed
 from warpjld.skeleton.kinematics import Poses
 
-__all__ = ["HandMotion", "motion_of"]
+__all__ = ["HandMotion", "halfway", "motion_of"]
 
 
 @dataclass(frozen=True, eq=False)
@@ -111,3 +111,13 @@ def motion_of(hand: FleshHand, poses: Poses, times: Sequence[float] | None = Non
         ),
         np.concatenate([[0.0], at]),
     )
+
+
+def halfway(hand: FleshHand, before: Poses, after: Poses) -> Poses:
+    """The pose between two: joints turned half of the way, bones as long as they are."""
+    both = Poses(
+        np.concatenate([before.positions, after.positions]),
+        np.concatenate([before.rotations, after.rotations]),
+        np.concatenate([before.flexion, after.flexion]),
+    )
+    return HandMotion(hand, both, np.array([0.0, 1.0])).pose(0.5)

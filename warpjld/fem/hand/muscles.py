@@ -1,5 +1,6 @@
 """What muscles have to do, and whether they can (R118, R119).
 
+**Load of a bone**: minus the reactions that hold its nodes, less those of the hand's flesh alone in the same pose.
 **Force of a digit**: length of the sum of the forces on its phalanges, the bones beyond its base joint.
 **Torque of a joint**: moment about the joint of the forces on all bones beyond it, along its flexion axis as posed;
 positive where the load opens the digit and its flexors have to work.
@@ -40,6 +41,8 @@ class DigitEffort:
         torques: Of base, knuckle 2 and knuckle 3 [N m], positive where flexors work, shape (3,).
         limit: Largest force [N].
         torque_limits: [N m], shape (3,).
+        flesh: Length of the sum of what flesh alone, its weight and the strain of bent joints, puts on its phalanges in
+            that pose [N]: not in ``load``; NaN where it is not known.
     """
 
     digit: str
@@ -47,6 +50,7 @@ class DigitEffort:
     torques: NDArray[np.float64]
     limit: float
     torque_limits: NDArray[np.float64]
+    flesh: float = float("nan")
 
     @property
     def force(self) -> float:
@@ -85,9 +89,15 @@ class DigitEffort:
 
 @dataclass(frozen=True, eq=False)
 class Effort:
-    """What every digit's muscles have to do at one instant."""
+    """What every digit's muscles have to do at one instant.
+
+    Attributes:
+        digits: Those of the skeleton.
+        palm: Sum of the forces on all other bones [N], shape (3,).
+    """
 
     digits: tuple[DigitEffort, ...]
+    palm: NDArray[np.float64]
 
     def __getitem__(self, digit: str) -> DigitEffort:
         matches = [d for d in self.digits if digit in (d.digit, d.digit.rpartition(".")[2])]
@@ -125,6 +135,7 @@ def effort_of(
     loads: BoneLoads,
     frame: int = 0,
     limits: Mapping[str, float] | None = None,
+    flesh: BoneLoads | None = None,
 ) -> Effort:
     """Compare the loads on bones with what muscles can do.
 
@@ -134,6 +145,7 @@ def effort_of(
         loads: Force and moment on each bone.
         frame: Frame of the poses.
         limits: Digit → largest force [N], where it is not the default.
+        flesh: What the flesh alone puts on each bone: reported, not counted.
 
     Raises:
         InputError: A skeleton without digits, or wrong limits.
@@ -145,6 +157,7 @@ def effort_of(
     if not chains:
         raise InputError("muscles: this skeleton has no digits")
     out = []
+    palm = loads.force.sum(axis=0)
     for digit, (joints, tip) in chains.items():
         limit = allowed[digit.rpartition(".")[2]]
         pad = 0.5 * (skeleton.rest[joints[-1]] + skeleton.rest[tip])
@@ -161,8 +174,12 @@ def effort_of(
             axis = Rotation.from_quat(poses.rotations[frame, max(before, 0)]).apply(skeleton.axes[joint])
             torques[k] = -float(about @ axis)
             bounds[k] = limit * float(np.linalg.norm(pad - skeleton.rest[joint]))
-        out.append(DigitEffort(digit, load, torques, limit, bounds))
-    return Effort(tuple(out))
+        palm = palm - load
+        own = float("nan")
+        if flesh is not None:
+            own = float(np.linalg.norm(flesh.force[np.isin(flesh.bones, [*joints[1:], tip])].sum(axis=0)))
+        out.append(DigitEffort(digit, load, torques, limit, bounds, own))
+    return Effort(tuple(out), palm)
 
 
 def _chains(skeleton: Skeleton) -> dict[str, tuple[tuple[int, int, int], int]]:

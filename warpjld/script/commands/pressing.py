@@ -48,7 +48,8 @@ def press(scene: Scene, arguments: Arguments) -> None:
 @command(
     "TABLE",
     syntax=f'TABLE "<name>{"/".join(TABLES)}"',
-    help="A table by frame and digit: force, area, peak pressure, bone reaction, share of the muscles' limit, sliding.",
+    help="A table by frame and digit: contact force, area, peak pressure, reaction of the bones, share of the muscles' "
+    "limit, sliding.",
     group="Output",
 )
 def table(scene: Scene, arguments: Arguments) -> None:

@@ -1,0 +1,197 @@
+"""A hand's flesh in some pose without what touches it: what bent joints strain on their own (R118).
+
+Reactions that hold the bones of a pressed hand balance two things: contact, and flesh that is strained because joints
+are bent. Muscles' work is the former. The latter is found by an equilibrium of the hand's own mesh, without contact.
+
+It is gone to as a hand that nothing touches goes there: from the nearest pose that is known, the flesh carried along by
+its bones, by way of poses between where that is too far. From one frame to the next Newton's method takes two or three
+steps; and where skin could fold either way, it folds as it would without contact. The pressed shape is no place to
+start from: with the forces that press it, but without what presses, hard pressed flesh is unstable.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from warpjld.errors import InputError
+from warpjld.fem.body import Body, Tangent
+from warpjld.fem.conjugate import Status
+from warpjld.fem.contact.damping import Damping
+from warpjld.fem.contact.elastic import Elastic
+from warpjld.fem.contact.step_solver import StepSolver
+from warpjld.fem.dots import norm
+from warpjld.fem.hand.blend import Moves
+from warpjld.fem.hand.flesh_hand import FleshHand
+from warpjld.fem.hand.motion import halfway
+from warpjld.fem.loads import Loads
+from warpjld.fem.multigrid import IndefiniteError
+from warpjld.fem.prescribed import Prescribed
+from warpjld.skeleton.kinematics import Poses
+
+__all__ = ["FleshAlone", "Untouched"]
+
+_STEPS = 12
+"""Newton steps; where more are needed the pose between is a better start."""
+_SHORTEST = 0.05
+_HALVINGS = 6
+"""Times a way to another pose may be cut in two."""
+_TOLERANCE = 1e-4
+"""Residual over the forces that hold the bones, or over the contact forces that are missing where those are less."""
+_ROUNDING = 1e-7
+"""Residual over the latter that is not worth a step."""
+_KEPT = 16
+
+
+@dataclass(frozen=True, eq=False)
+class Untouched:
+    """Equilibrium of a hand that nothing touches.
+
+    Attributes:
+        poses: One pose.
+        displacement: [m], shape (N, 3).
+        reactions: Forces that hold the prescribed nodes [N], zero elsewhere, shape (N, 3).
+    """
+
+    poses: Poses
+    displacement: NDArray[np.float64]
+    reactions: NDArray[np.float64]
+
+
+class FleshAlone:
+    """Equilibria without contact, each pose's found once.
+
+    Args:
+        hand: At rest.
+        body: Its own mesh and laws.
+        degrees: Prescribed degrees of freedom, shape (n,): those of bones, and of nodes where flesh was cut off.
+        rest: The pose in which nothing is displaced.
+    """
+
+    def __init__(self, hand: FleshHand, body: Body, degrees: NDArray[np.int64], rest: Poses) -> None:
+        self.body = body
+        self._hand = hand
+        self._start = hand.moves(rest)
+        self._degrees = degrees
+        self._free = Prescribed(degrees, np.zeros(len(degrees))).free(body.degrees)
+        self._elastic = Elastic(body)
+        self._solver = StepSolver(body, "float64")
+        self._damping = Damping(body)
+        nothing = np.zeros_like(body.mesh.nodes)
+        self._known = [Untouched(rest, nothing, nothing)]
+
+    def at(
+        self,
+        poses: Poses,
+        displacement: NDArray[np.float64],
+        reactions: NDArray[np.float64],
+        contact: NDArray[np.float64],
+        loads: Loads | None = None,
+    ) -> Untouched | None:
+        """The hand with its bones as they are and nothing that touches it; None where no equilibrium is found.
+
+        Args:
+            poses: One pose.
+            displacement: Of an equilibrium with contact in that pose [m], shape (N, 3).
+            reactions: Forces that hold its prescribed nodes [N], shape (N, 3).
+            contact: Contact forces on its nodes [N], shape (N, 3).
+            loads: What else pulls, and stays.
+
+        Raises:
+            InputError: Other shapes.
+        """
+        for name, array in (("displacement", displacement), ("reactions", reactions), ("contact", contact)):
+            if array.shape != self.body.mesh.nodes.shape:
+                raise InputError(f"{name}: want shape {self.body.mesh.nodes.shape}, got {array.shape}")
+        bones = displacement.reshape(-1)[self._degrees]
+        away = [float(np.abs(one.displacement.reshape(-1)[self._degrees] - bones).max()) for one in self._known]
+        nearest = int(np.argmin(away))
+        if away[nearest] == 0.0 and nearest > 0:
+            return self._known[nearest]
+        if contact.any():
+            pushed = norm(contact.reshape(-1))
+            found = self._from(self._known[nearest], poses, bones, pushed, loads or Loads(), _HALVINGS)
+        else:
+            found = Untouched(poses, displacement, reactions)
+        if found is not None:
+            if len(self._known) > _KEPT:
+                self._known.pop(1)  # rest stays
+            self._known.append(found)
+        return found
+
+    def _from(
+        self,
+        before: Untouched,
+        poses: Poses,
+        bones: NDArray[np.float64],
+        pushed: float,
+        loads: Loads,
+        halvings: int,
+    ) -> Untouched | None:
+        """From another pose, by way of the one between where that is too far."""
+        found = self._newton(before, poses, bones, pushed, loads)
+        if found is None and halvings > 0:
+            between = halfway(self._hand, before.poses, poses)
+            half = self._from(before, between, self._bones(between), pushed, loads, halvings - 1)
+            if half is not None:
+                found = self._from(half, poses, bones, pushed, loads, halvings - 1)
+        return found
+
+    def _moves(self, poses: Poses) -> Moves:
+        """Motions of the bones from rest."""
+        return self._start.to(self._hand.moves(poses))
+
+    def _bones(self, poses: Poses) -> NDArray[np.float64]:
+        """Where that takes the prescribed degrees of freedom, shape (n,)."""
+        nodes = self._degrees[::3] // 3
+        x = self.body.mesh.nodes[nodes]
+        return (self._moves(poses).blended(self._hand.weights[nodes], x) - x).reshape(-1)
+
+    def _newton(
+        self, before: Untouched, poses: Poses, bones: NDArray[np.float64], pushed: float, loads: Loads
+    ) -> Untouched | None:
+        """Another pose by Newton's method, if that is near enough."""
+        elastic, free, damping = self._elastic, self._free, self._damping
+        u = self._hand.guess(self._moves(before.poses), self._moves(poses), before.displacement).reshape(-1)
+        u[self._degrees] = bones
+        if not elastic.upright(u):
+            return None
+        # a guess squeezes elements here and there, an equilibrium does not
+        pressures = elastic.pressures(before.displacement.reshape(-1))
+        self._solver.begin()
+        damping.begin()
+        for _ in range(_STEPS):
+            forces, external = elastic.forces(u).forces, elastic.external(loads, u)
+            residual = np.where(free, external - forces, 0.0)
+            balance = np.where(free, 0.0, forces - external)
+            if norm(residual) <= max(_TOLERANCE * min(pushed, norm(balance)), _ROUNDING * pushed):
+                return Untouched(poses, u.reshape(-1, 3), balance.reshape(-1, 3))
+            move = self._move(elastic.at(u, pressures, loads), residual)
+            if move is None:
+                return None
+            length = 1.0
+            while not elastic.upright(u + length * move):
+                length *= 0.5
+                if length < _SHORTEST:
+                    return None
+            damping.judge(length)
+            pressures = elastic.pressures(u, length * move)
+            u = u + length * move
+        return None
+
+    def _move(self, tangent: Tangent, residual: NDArray[np.float64]) -> NDArray[np.float64] | None:
+        """A Newton step (3N,), damped as far as its matrix asks for it; None where that is no help."""
+        assert tangent.stiffness is not None
+        while True:
+            try:
+                done = self._solver.solve(self._damping.lend(tangent.stiffness), self._free, residual)
+                if done.status is Status.CONVERGED:
+                    return done.x
+                if done.status is not Status.INDEFINITE:
+                    return None
+            except IndefiniteError:
+                pass
+            if not self._damping.more():
+                return None
