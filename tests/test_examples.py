@@ -188,8 +188,8 @@ def test_methods_are_compared(data: Path, tmp_path: Path) -> None:
 
 
 @pytest.mark.slow
-def test_forces_do_not_depend_on_the_size_of_elements() -> None:
-    rows = np.array(runpy.run_path(str(EXAMPLES / "flesh_sizes.py"))["main"]([2.2, 3.0, 4.0]))
+def test_forces_depend_little_on_the_size_of_elements() -> None:
+    rows = np.array(runpy.run_path(str(EXAMPLES / "flesh_sizes.py"))["main"]([1.8, 2.2, 2.6, 3.0]))
     assert (np.diff(rows[:, 1]) < 0.0).all()
     forces = rows[:, 5]
     assert np.abs(forces / forces[0] - 1.0).max() < 0.15

@@ -176,9 +176,9 @@ def build_flesh_hand(
 
     Args:
         rig: Surface and skeleton.
-        spacing: Edge length of the elements [m]. An index finger pressed 2.7 mm onto a plate answers with 2.7, 2.6,
-            2.5 and 2.4 N at 1.5, 2.2, 3 and 4 mm, but at 5 mm with 0.6 N: fingers need two elements between bone and
-            skin, see ``coarse_note``. At 4 mm light touches are a third too weak (``examples/flesh_sizes.py``).
+        spacing: Edge length of the elements [m]. An index finger pressed 2.7 mm onto a plate answers with 2.66, 2.57,
+            2.34, 2.47, 3.24, 2.39 and 0.62 N at 1.5, 2.2, 2.6, 3, 3.5, 4 and 5 mm (``examples/flesh_sizes.py``):
+            above 3 mm for a first look only, see ``coarse_note``.
         name: Begins the names of regions, and names the face set of the skin.
         skin: Depth of the skin [m]: elements that it fills in part are partly as stiff as it.
         bone: Radius of a bone over the depth of its segment under the skin.
