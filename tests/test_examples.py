@@ -54,7 +54,13 @@ def test_pressing(name: str, tmp_path) -> None:
     scene = Scene(folder=tmp_path, say=lambda text: None)
     Interpreter(scene).run_file(EXAMPLES / name)
     scene.size = (120, 90)
-    last = {"press_ball.jld": 34, "press_ball_on_table.jld": 14, "press_plate.jld": 18, "press_pinch.jld": 32}[name]
+    last = {
+        "press_ball.jld": 34,
+        "press_ball_on_table.jld": 14,
+        "press_fist.jld": 34,
+        "press_pinch.jld": 32,
+        "press_plate.jld": 18,
+    }[name]
     scene.first, scene.last = last - 2, last
     scene.contact.pressing = replace(scene.contact.pressing, last=last)
     Interpreter(scene).run_text("EXPORT 'seen.npz'")
@@ -63,7 +69,10 @@ def test_pressing(name: str, tmp_path) -> None:
     assert summary["press"]["status"] == "CONVERGED"
     assert summary["press"]["verdict"].startswith("realistic")
     assert summary["press"]["digits"]
-    assert all("skin that FLESH leaves out" in note for note in summary["notes"])  # the ball of the thumb
+    expected = ["skin that FLESH leaves out"]  # the ball of the thumb
+    if name == "press_fist.jld":
+        expected.append("elements of 4 mm are too large")  # a first look, in minutes
+    assert all(any(one in note for one in expected) for note in summary["notes"])
     rows = list(csv.DictReader((tmp_path / "contact.csv").open(encoding="utf-8")))
     total = [
         sum(float(r["force_n"]) for r in rows if r["frame"] == frame)

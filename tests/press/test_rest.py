@@ -56,6 +56,17 @@ def test_skin_nodes_lie_on_the_covered_skin_and_bones_stay_rigid(
         )
 
 
+def test_a_finger_curled_into_the_palm_is_upright(hand: FleshHand, covering: Covering, rig: Rig) -> None:
+    """Its last phalanx has turned by 240° in all."""
+    angles = np.zeros((1, len(rig.skeleton), 4))
+    for joint, degrees in (("base", 88), ("knuckle2", 98), ("knuckle3", 54)):
+        angles[0, rig.skeleton.index(f"left.middle.{joint}"), 0] = np.radians(degrees)
+    poses = poses_from_angles(rig.skeleton, angles)
+    there, gap = posed(hand, poses, covering.deform(poses)[0].astype(np.float64))
+    assert there.mesh.scaled_jacobian().min() > 0.05
+    assert gap < 3.5e-3
+
+
 def test_a_part_is_one_digit_and_blends_into_the_covering(hand: FleshHand, covering: Covering, bent: Poses) -> None:
     skin = covering.deform(bent)[0].astype(np.float64)
     there, _ = posed(hand, bent, skin)

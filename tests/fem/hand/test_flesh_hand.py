@@ -10,6 +10,7 @@ from warpjld.errors import InputError
 from warpjld.fem import Body, solve
 from warpjld.fem.hand import FleshHand, build_flesh_hand, hand_laws, motion_of
 from warpjld.skeleton import Poses, poses_from_angles
+from warpjld.skeleton.hand import DIGITS
 
 
 def curled(hand: FleshHand, degrees: float, frames: int = 1, **root) -> Poses:  # type: ignore[no-untyped-def]
@@ -111,6 +112,10 @@ def test_labels_and_what_never_touches(hand: FleshHand) -> None:
     assert not never("index.middle", "middle.middle")
     assert not never("ring.distal", "palm.thumb")
     assert (hand.excluded == hand.excluded.T).all()
+    # a fingertip on the border of two labels of the palm is master to both; so are webs of a digit on one side
+    digits = [next((part for part in name.split(".")[:-1] if part in DIGITS), "") for name in names]
+    assert digits[0] == ""
+    assert digits == sorted(digits, key=digits.index)
     labelled = hand.node_labels >= 0
     assert set(np.flatnonzero(labelled)) == set(np.unique(hand.mesh.quads(hand.skin_faces)))
     assert not any(names[k].endswith(".web") for k in np.unique(hand.node_labels[labelled]))

@@ -26,6 +26,9 @@ __all__ = ["counted"]
 _TIMES, _SLACK = 3.0, 0.25
 """Overlap along the normal that counts for nothing: over how deep facets are inside each other, and that of facets that
 only touch, in edges. Half of it counts fully."""
+_OWN_SLACK = 1.0
+"""The latter for parts that belong together, whose depth in each other is not known: they are inside one another where
+they are joined."""
 
 
 def counted(
@@ -62,8 +65,8 @@ def counted(
     between = np.einsum("pk,pki->pi", far, x[master.quads[pairs[:, 1]]])
     between -= np.einsum("pk,pki->pi", own, x[slave.quads[pairs[:, 0]]])
     overlap = -np.einsum("pki,pi->pk", facing, between).min(axis=1)
-    slack = _SLACK * slave.edge[corners].mean(axis=1)
-    some = np.flatnonzero((overlap > 0.5 * slack) & ~joined)
+    slack = np.where(joined, _OWN_SLACK, _SLACK) * slave.edge[corners].mean(axis=1)
+    some = np.flatnonzero(overlap > 0.5 * slack)
     if not len(some):
         return out
     inside = np.zeros(len(some))
@@ -73,7 +76,7 @@ def counted(
         depth = _depths(asked, sides[side], sides[1 - side], mortar.joined, x, reach, mortar.threads)[rows]
         inside = np.maximum(inside, (shares[some] * depth).sum(axis=1))
     t = np.clip(2.0 - 2.0 * overlap[some] / (_TIMES * inside + slack[some]), 0.0, 1.0)
-    out[some] = t * t * (3.0 - 2.0 * t)
+    out[some] *= t * t * (3.0 - 2.0 * t)
     return out
 
 

@@ -43,7 +43,9 @@ def skin_labels(
     """Label of each skin face, and the names of the labels.
 
     A face belongs to the segment whose bone carries most of it. Parts of the digits that lie within ``near`` of another
-    digit at rest are webs: they get labels of their own, so that excluding them leaves the rest of the digit.
+    digit at rest are webs: they get labels of their own, so that excluding them leaves the rest of the digit. Labels of
+    the palm come first, then digit by digit: of two labels one is the slave of the other, and along the border of two
+    labels of the palm, or of a web, a fingertip must not change sides.
 
     Args:
         mesh: At rest.
@@ -76,7 +78,16 @@ def skin_labels(
                 webs[kind] = len(names)
                 names.append(names[kind] + WEB)
             out[face] = webs[kind]
-    return out, tuple(names)
+    return _grouped(out, names)
+
+
+def _grouped(label: NDArray[np.int32], names: Sequence[str]) -> tuple[NDArray[np.int32], tuple[str, ...]]:
+    """Labels and their names in another order, those of the palm first and those of a digit together."""
+    digits = list(dict.fromkeys(["", *map(_digit, names)]))
+    order = sorted(range(len(names)), key=lambda k: digits.index(_digit(names[k])))
+    rank = np.empty(len(names), np.int32)
+    rank[order] = np.arange(len(names))
+    return rank[label], tuple(names[k] for k in order)
 
 
 def joined_pairs(names: Sequence[str]) -> NDArray[np.bool_]:
