@@ -71,7 +71,10 @@ def test_pressing(name: str, tmp_path) -> None:
     assert summary["press"]["status"] == "CONVERGED"
     assert summary["press"]["verdict"].startswith("realistic")
     assert summary["press"]["digits"]
-    assert all("that has no flesh is pushed aside" in note for note in summary["notes"])  # beside the thumb's ball
+    expected = ["that has no flesh is pushed aside"]  # beside the thumb's ball
+    if name == "press_fist.jld":
+        expected.append("elements of 4 mm are too large")  # a first look, in minutes
+    assert all(any(one in note for one in expected) for note in summary["notes"])
     rows = list(csv.DictReader((tmp_path / "contact.csv").open(encoding="utf-8")))
     total = [
         sum(float(r["force_n"]) for r in rows if r["frame"] == frame)
@@ -193,3 +196,11 @@ def test_methods_are_compared(data: Path, tmp_path: Path) -> None:
     for pose in {row[0] for row in rows}:
         assert folded[pose, "JLD default"] <= min(folded[pose, "LBS"], folded[pose, "DQS"])
     assert (tmp_path / "table.md").read_text(encoding="utf-8").strip() == text
+
+
+@pytest.mark.slow
+def test_forces_depend_little_on_the_size_of_elements() -> None:
+    rows = np.array(runpy.run_path(str(EXAMPLES / "flesh_sizes.py"))["main"]([1.8, 2.2, 2.6, 3.0]))
+    assert (np.diff(rows[:, 1]) < 0.0).all()
+    forces = rows[:, 5]
+    assert np.abs(forces / forces[0] - 1.0).max() < 0.15

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 import trimesh
@@ -13,7 +15,7 @@ from warpjld.fem.contact.facets import Facets
 from warpjld.fem.contact.solids import Plane
 from warpjld.fem.embedding import embed
 from warpjld.press.clear import Shown, clear
-from warpjld.press.outside import outside
+from warpjld.press.outside import outside, outside_of_nodes
 
 RADIUS = 0.01
 
@@ -86,3 +88,17 @@ def test_a_visible_ball_lies_on_the_plate_its_coarse_elements_are_pressed_on() -
     found = clear({"ball": shown}, {"lid": lid(0.2, height=1.0)}, 1.0)
     assert found.vertices["ball"][:, 2].max() < 0.8 + 1e-9
     assert found.moved["ball"] < 0.05
+
+
+def test_nodes_on_the_visible_surface_are_not_outside_of_it_though_faces_are() -> None:
+    mesh = ball(1.0, n=4)
+    visible = trimesh.creation.icosphere(4)
+    vertices, faces = np.asarray(visible.vertices), np.asarray(visible.faces, np.int32)
+    outer = np.unique(mesh.quads(mesh.face_set("outer")))
+    height = outside_of_nodes(mesh, "outer", vertices, faces)
+    assert np.abs(height).max() < 2e-3
+    sunk = mesh.nodes.copy()
+    sunk[outer] *= 0.97
+    height = outside_of_nodes(replace(mesh, nodes=sunk), "outer", vertices, faces)
+    np.testing.assert_allclose(height[outer], 0.03, atol=2e-3)
+    assert not np.delete(height, outer).any()

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from warpjld.errors import InputError
+from warpjld.fem.bones import Bone, claimed, fitted
 from warpjld.fem.embedding import Embedding, embed
 from warpjld.fem.envelope import Envelope
 from warpjld.fem.fit import Fit, fit_mesh
@@ -28,6 +29,7 @@ class Flesh:
         bones: Far joint of each bone, in the skeleton's numbering.
         parents: Near joint of each bone, itself for the piece behind a root.
         names: Name of each bone's node set.
+        shafts: Their shapes.
         skin: The rig's own surface, carried by the mesh.
         fit: Quality of the mesh.
         rest: Rest positions of the joints [m], shape (J, 3).
@@ -37,6 +39,7 @@ class Flesh:
     bones: tuple[int, ...]
     parents: tuple[int, ...]
     names: tuple[str, ...]
+    shafts: tuple[Bone, ...]
     skin: Embedding
     fit: Fit
     rest: NDArray[np.float64]
@@ -93,39 +96,13 @@ def flesh_of(
     fit = fit_mesh(envelope, spacing, least=least, name="flesh")
     mesh = fit.mesh
     skeleton = rig.skeleton
-    centres = mesh.nodes[mesh.elements].mean(axis=1)
-    nearest = np.full(len(centres), np.inf)
-    owner = np.full(len(centres), -1)
-    for joint, parent in enumerate(skeleton.parents):
-        if parent < 0:
-            # what lies behind the root (the forearm's stump) is held with it
-            parent, start = joint, skeleton.rest[joint]
-            along = _backwards(rig, envelope, joint)
-        else:
-            start = skeleton.rest[parent]
-            along = skeleton.rest[joint] - start
-        length = float(np.linalg.norm(along))
-        if length == 0.0:
-            continue
-        t = np.linspace(0.0, 1.0, 24)
-        depth = np.maximum(-envelope.ask(start + t[:, None] * along).distance, 0.0)
-        back = np.cross(along / length, skeleton.axes[parent])
-        size = float(np.linalg.norm(back))
-        back = back / size if size > 1e-9 else np.zeros(3)
-        share = np.clip((centres - start) @ along / length**2, 0.0, 1.0)
-        end = 1.0 if parent == joint else 1.0 - (far if skeleton.children[joint] else gap)
-        inside = (share > gap) & (share < end)
-        here = np.interp(share, t, depth)
-        axis = start + share[:, None] * along + (flush * here)[:, None] * back
-        away = np.linalg.norm(centres - axis, axis=1) / np.maximum(bone * here, 1e-12)
-        mine = inside & (away < 1.0) & (away < nearest)
-        nearest[mine], owner[mine] = away[mine], joint
-    owner = _apart(mesh, owner)
-    if head is not None:
-        owner = _jointed(mesh, owner, skeleton.parents)
+    shafts = _shafts(rig, envelope, bone, flush, gap, far)
+    owner = _owner(mesh, shafts, skeleton.parents, jointed=head is not None)
     joints = [int(j) for j in np.unique(owner[owner >= 0])]
     if not joints:
         raise InputError(f"spacing: at {spacing:g} m no element fits inside a bone")
+    mesh = fitted(mesh, {j: mesh.elements[owner == j] for j in joints}, shafts, spacing)
+    quality = mesh.scaled_jacobian()
     names = tuple(f"bone.{skeleton.names[j]}" for j in joints)
     sets = {n: np.unique(mesh.elements[owner == j]).astype(np.int32) for n, j in zip(names, joints, strict=True)}
     mesh = replace(
@@ -145,10 +122,36 @@ def flesh_of(
         tuple(joints),
         tuple(int(skeleton.parents[j]) if skeleton.parents[j] >= 0 else j for j in joints),
         names,
+        tuple(shafts[j] for j in joints),
         skin,
-        fit,
+        replace(fit, mesh=mesh, least=float(quality.min()), mean=float(quality.mean())),
         skeleton.rest.copy(),
     )
+
+
+def _shafts(rig: Rig, envelope: Envelope, bone: float, flush: float, gap: float, head: float) -> dict[int, Bone]:
+    """The shape of every bone by the joint at its far end; shares as in ``flesh_of``."""
+    skeleton = rig.skeleton
+    shafts: dict[int, Bone] = {}
+    for joint, parent in enumerate(skeleton.parents):
+        if parent < 0:
+            # what lies behind the root (the forearm's stump) is held with it
+            parent, start = joint, skeleton.rest[joint]
+            along = _backwards(rig, envelope, joint)
+        else:
+            start = skeleton.rest[parent]
+            along = skeleton.rest[joint] - start
+        length = float(np.linalg.norm(along))
+        if length == 0.0:
+            continue
+        t = np.linspace(0.0, 1.0, 24)
+        depth = np.maximum(-envelope.ask(start + t[:, None] * along).distance, 0.0)
+        back = np.cross(along / length, skeleton.axes[parent])
+        size = float(np.linalg.norm(back))
+        back = back / size if size > 1e-9 else np.zeros(3)
+        end = 1.0 if parent == joint else 1.0 - (head if skeleton.children[joint] else gap)
+        shafts[joint] = Bone(start, along, flush * depth[:, None] * back, bone * depth, gap, end)
+    return shafts
 
 
 def _backwards(rig: Rig, envelope: Envelope, root: int) -> NDArray[np.float64]:
@@ -164,6 +167,25 @@ def _backwards(rig: Rig, envelope: Envelope, root: int) -> NDArray[np.float64]:
     reach = steps[int(np.argmin(inside))] if not inside.all() else 0.0
     out: NDArray[np.float64] = away * (reach / size)
     return out
+
+
+def _owner(mesh: HexMesh, shafts: dict[int, Bone], parents: NDArray[np.int32], *, jointed: bool) -> NDArray[np.int64]:
+    """Bone of every element by the joint at its far end, -1 in flesh.
+
+    In thin fingers of large elements a bone that is covered by flesh may have no element left: it may then reach the
+    skin.
+    """
+    ends = np.array(list(shafts))
+    bare: list[int] = []
+    for _ in range(2):
+        owner = claimed(mesh, list(shafts.values()), bare)
+        owner = _apart(mesh, np.where(owner >= 0, ends[owner], -1))
+        if jointed:
+            owner = _jointed(mesh, owner, parents)
+        bare = np.flatnonzero(~np.isin(ends, owner)).tolist()
+        if not bare:
+            break
+    return owner
 
 
 def _jointed(mesh: HexMesh, owner: NDArray[np.int64], parents: NDArray[np.int32]) -> NDArray[np.int64]:

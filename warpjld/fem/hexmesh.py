@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from warpjld.errors import InputError
 from warpjld.suggest import one_of
 
-__all__ = ["FACES", "HexMesh", "elements_of", "merge"]
+__all__ = ["EDGES", "FACES", "HexMesh", "elements_of", "merge"]
 
 FACES = np.array(
     [[0, 4, 7, 3], [1, 2, 6, 5], [0, 1, 5, 4], [3, 7, 6, 2], [0, 3, 2, 1], [4, 5, 6, 7]],
@@ -18,7 +18,12 @@ FACES = np.array(
 )
 """Corners of the faces −x, +x, −y, +y, −z, +z of an element, anticlockwise seen from outside, shape (6, 4)."""
 
-_EDGES = np.array(  # corner, and its three neighbours in right-handed order
+EDGES = np.array(
+    [[0, 1], [1, 2], [2, 3], [3, 0], [4, 5], [5, 6], [6, 7], [7, 4], [0, 4], [1, 5], [2, 6], [3, 7]], dtype=np.int32
+)
+"""Corners at the ends of an element's edges, shape (12, 2)."""
+
+_CORNERS = np.array(  # corner, and its three neighbours in right-handed order
     [[1, 3, 4], [2, 0, 5], [3, 1, 6], [0, 2, 7], [7, 5, 0], [4, 6, 1], [5, 7, 2], [6, 4, 3]],
     dtype=np.int32,
 )
@@ -137,7 +142,7 @@ class HexMesh:
         x = self.nodes[self.elements]
         out = np.full(len(x), np.inf)
         for corner in range(8):
-            edges = x[:, _EDGES[corner]] - x[:, corner, None]
+            edges = x[:, _CORNERS[corner]] - x[:, corner, None]
             length = np.linalg.norm(edges, axis=2).prod(axis=1)
             volume = np.einsum("ei,ei->e", edges[:, 0], np.cross(edges[:, 1], edges[:, 2]))
             solid = length > 0

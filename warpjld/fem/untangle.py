@@ -25,9 +25,10 @@ def improve(
     normals: NDArray[np.float64],
     *,
     pull: NDArray[np.float64],
-    slide: float = 0.02,
+    slide: float | NDArray[np.float64] = 0.02,
     softness: float = 0.1,
     rounds: int = 60,
+    still: NDArray[np.bool_] | None = None,
 ) -> NDArray[np.float64]:
     """Better positions of the nodes.
 
@@ -39,14 +40,16 @@ def improve(
         targets: Their closest points on it [m], shape (B, 3).
         normals: Its normals there, shape (B, 3).
         pull: Weight of each one's distance along the normal, shape (B,); across it a node slides almost freely.
-        slide: Weight of the distance across the normal, relative to ``pull``.
+        slide: Weight of the distance across the normal, relative to ``pull``: one for all, or each one's, shape (B,).
         softness: Regularisation of the determinant; the smaller, the more worst corners count.
         rounds: Iterations.
+        still: Nodes that stay where they are, shape (N,).
     """
     import warp as wp
     from warpjld_kernels import fem_shape_measure
 
     count = len(nodes)
+    sliding = np.broadcast_to(np.asarray(slide, dtype=np.float64), (len(boundary),))
     flat = elements.ravel()
     x = np.ascontiguousarray(nodes / spacing)
     costs = np.empty(len(elements))
@@ -73,8 +76,10 @@ def improve(
         away = x[boundary] - targets
         along = np.einsum("bi,bi->b", away, normals)
         squared = np.einsum("bi,bi->b", away, away)
-        value = float(costs.sum()) + float((pull * (along * along + slide * squared)).sum())
-        gradient[boundary] += 2.0 * pull[:, None] * (along[:, None] * normals + slide * away)
+        value = float(costs.sum()) + float((pull * (along * along + sliding * squared)).sum())
+        gradient[boundary] += 2.0 * pull[:, None] * (along[:, None] * normals + sliding[:, None] * away)
+        if still is not None:
+            gradient[still] = 0.0
         return value, np.asarray(gradient, dtype=np.float64).reshape(-1)
 
     targets = targets / spacing

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -15,7 +15,7 @@ from warpjld.fem.contact import Bond, Obstacle, Pair
 from warpjld.grasp import Places
 from warpjld.press.hand_body import HandBody
 from warpjld.press.object_body import ObjectBody
-from warpjld.press.outside import outside
+from warpjld.press.outside import outside, outside_of_nodes
 from warpjld.press.settle import settle
 from warpjld.press.where import placed
 from warpjld.press.wishes import ContactWishes
@@ -196,20 +196,22 @@ def assemble(
     body = Body(mesh, {name: laws[name] for name in mesh.region_names}, initial_stress=stress)
     pressure = {o.volume.inside: o.volume.physical.pressure for o in objects if o.volume.physical.pressure}
     paper = wishes.pressing is not None and wishes.pressing.method == "paper"  # knows nodes only
-    offset = None if paper else np.concatenate([*map(_outside, hands), *map(_outside, objects)])
     pairs, owners = _pairs(hands, objects, obstacles, wishes)
-    pairs = [replace(pair, offset=offset) for pair in pairs]
+    if not paper:
+        everything: list[HandBody | ObjectBody] = [*hands, *objects]
+        mean, own = (np.concatenate([_outside(one, how) for one in everything]) for how in (outside, outside_of_nodes))
+        pairs = [replace(pair, offset=own if isinstance(pair.master, Obstacle) else mean) for pair in pairs]
     loads = Loads(gravity=wishes.pull, pressure=pressure)
     return Bodies(tuple(hands), tuple(objects), obstacles, body, spans, tuple(pairs), tuple(owners), loads, start)
 
 
-def _outside(one: HandBody | ObjectBody) -> NDArray[np.float64]:
-    """How far what is seen lies outside a body's nodes [m], shape (N,)."""
+def _outside(one: HandBody | ObjectBody, how: Callable[..., NDArray[np.float64]]) -> NDArray[np.float64]:
+    """How far what is seen lies outside a body's faces or nodes [m], shape (N,)."""
     if isinstance(one, ObjectBody):
         volume = one.volume
-        return outside(volume.mesh, volume.name, volume.surface, volume.faces)
+        return how(volume.mesh, volume.name, volume.surface, volume.faces)
     flesh = one.part.hand
-    return outside(flesh.mesh, flesh.name, one.part.skin, one.part.faces)
+    return how(flesh.mesh, flesh.name, one.part.skin, one.part.faces)
 
 
 def _pairs(

@@ -1,8 +1,11 @@
 """How far a visible surface lies outside the elements that carry it: contact is between what is seen.
 
 Faces of elements are flat; the skin between their nodes bulges beyond them, by edge² / 8 over the radius of a
-fingertip, and folds that elements cannot follow keep them off it farther. Averaged with the shape functions of the
-nodes, as gaps are, that is what contact adds.
+fingertip, and folds that elements cannot follow keep them off it farther. Gaps between surfaces that both deform are
+averages over the faces around a node, so what is averaged with the same shape functions is added to them. Gaps to
+obstacles are those of the nodes themselves: there only what the nodes stay off the surface counts. With the bulge of
+the faces added, round flesh on a plate would touch with all nodes around a first one, and forces be too great by 8 %
+for eight elements across a finger's half circumference, and by 40 % for five.
 """
 
 from __future__ import annotations
@@ -13,7 +16,7 @@ from numpy.typing import NDArray
 from warpjld.fem.contact.facets import Facets
 from warpjld.fem.hexmesh import HexMesh
 
-__all__ = ["outer_triangles", "outside"]
+__all__ = ["outer_triangles", "outside", "outside_of_nodes"]
 
 _FINE = 0.4
 """Distance between the points where the surface is looked at, in edges of elements."""
@@ -57,6 +60,37 @@ def outside(
     total = np.bincount(corner.ravel(), weight.ravel(), len(out))
     summed = np.bincount(corner.ravel(), (weight * height[:, None]).ravel(), len(out))
     np.divide(summed, total, out=out, where=total > 0.0)
+    return out
+
+
+def outside_of_nodes(
+    mesh: HexMesh, faces: str, vertices: NDArray[np.float64], triangles: NDArray[np.integer]
+) -> NDArray[np.float64]:
+    """Height of a visible surface over every node of a face set [m], negative where it lies within, shape (N,).
+
+    Where the nearest facet lies across a fold, the mean over the faces around stands in.
+
+    Args:
+        mesh: The volume, as it rests.
+        faces: Its face set.
+        vertices: The surface it carries, at the same moment [m], shape (V, 3).
+        triangles: Of the surface, as far as the volume carries it, shape (T, 3).
+    """
+    out = outside(mesh, faces, vertices, triangles)
+    if not len(triangles):
+        return out
+    quads = mesh.quads(mesh.face_set(faces))
+    x = mesh.nodes[quads]
+    facing = np.cross(x[:, 2] - x[:, 0], x[:, 3] - x[:, 1])
+    nodes = np.unique(quads)
+    normal = np.zeros_like(mesh.nodes)
+    np.add.at(normal, quads, facing[:, None, :].repeat(4, axis=1))
+    normal = normal[nodes] / np.linalg.norm(normal[nodes], axis=1, keepdims=True)
+    found = Facets(vertices, triangles).project(mesh.nodes[nodes])
+    edge = float(np.sqrt(0.5 * np.median(np.linalg.norm(facing, axis=1))))
+    height = np.einsum("ni,ni->n", found.closest - mesh.nodes[nodes], found.normal)
+    sure = (np.einsum("ni,ni->n", normal, found.normal) > _FACING) & (np.abs(height) < edge)
+    out[nodes[sure]] = height[sure]
     return out
 
 

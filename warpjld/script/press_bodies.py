@@ -46,6 +46,7 @@ def hand_body(scene: Scene, actor: Actor, wish: FleshWish, start: float, notes: 
     Raises:
         InputError: It cannot be meshed in that pose; names the line of its FLESH.
     """
+    from warpjld.fem.hand.cushion import coarse_note
     from warpjld.fem.hand.flesh_hand import build_flesh_hand
     from warpjld.fem.hand.laws import hand_laws
     from warpjld.press.hand_body import HandBody
@@ -60,6 +61,9 @@ def hand_body(scene: Scene, actor: Actor, wish: FleshWish, start: float, notes: 
     except InputError as error:
         what = error.message.replace("spacing:", "ELEMENT:")
         raise placed(InputError(f"FLESH {actor.name}: {what}"), wish.where) from error
+    coarse = coarse_note(built, wish.element, wish.digits)
+    if coarse is not None:
+        notes.append(f"{actor.name}: {coarse}")
     hand, gap = posed(built, poses, skin)
     if gap > 0.5 * wish.element:
         notes.append(f"{actor.name}: the volume stays up to {1e3 * gap:.1f} mm off the skin where it folds")

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -14,20 +13,16 @@ from warpjld.fem.contact.pairs import Exclusion
 from warpjld.fem.flesh import Flesh, flesh_of
 from warpjld.fem.hand.blend import Moves, moves_of
 from warpjld.fem.hand.labels import WEB, excluded_pairs, fringes, joined_pairs, segment_name, skin_labels
+from warpjld.fem.hand.regions import hand_regions
 from warpjld.fem.hand.weights import bone_weights
 from warpjld.fem.hexmesh import HexMesh
 from warpjld.fem.prescribed import Prescribed
 from warpjld.rig import Rig
-from warpjld.skeleton.hand import DIGITS
 from warpjld.skeleton.kinematics import Poses, rest_poses
 from warpjld.skeleton.tree import Skeleton
 from warpjld.surface import Surface
 
 __all__ = ["FleshHand", "build_flesh_hand"]
-
-_CARPAL = ("wrist", "forearm")
-_SHARED = 0.1
-"""Share of both bones from which on flesh between them has to stretch with their joint."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -35,8 +30,7 @@ class FleshHand:
     """The volume of a hand, driven by the poses of its skeleton.
 
     Attributes:
-        name: Begins the names of its regions: ``hand.flesh``, ``hand.skin``, ``hand.joint`` (flesh and skin between
-            the bones of a joint, and where digits part), ``hand.bone``; its skin is the face set of this name.
+        name: Begins the names of its regions (see ``hand_regions``); its skin is the face set of this name.
         flesh: The mesh with its bones, and the rig's own surface carried by it.
         skeleton: The rest skeleton, as in the rig.
         surface: The rig's surface at rest, as in the rig.
@@ -170,6 +164,7 @@ def build_flesh_hand(
     spacing: float = 0.003,
     *,
     name: str = "hand",
+    skin: float = 1.5e-3,
     bone: float = 0.45,
     flush: float = 0.4,
     gap: float = 0.2,
@@ -181,9 +176,11 @@ def build_flesh_hand(
 
     Args:
         rig: Surface and skeleton.
-        spacing: Edge length of the elements [m]; above 3 mm fingers are but three elements thick, and
-            stiffer than they should be: for a first look.
+        spacing: Edge length of the elements [m]. An index finger pressed 2.7 mm onto a plate answers with 2.66, 2.57,
+            2.34, 2.47, 3.24, 2.39 and 0.62 N at 1.5, 2.2, 2.6, 3, 3.5, 4 and 5 mm (``examples/flesh_sizes.py``):
+            above 3 mm for a first look only, see ``coarse_note``.
         name: Begins the names of regions, and names the face set of the skin.
+        skin: Depth of the skin [m]: elements that it fills in part are partly as stiff as it.
         bone: Radius of a bone over the depth of its segment under the skin.
         flush: Shift of the bone towards the back over that depth.
         gap: Part of a segment that is left soft at its near end and at fingertips: the flesh in a flexed joint has to
@@ -200,39 +197,11 @@ def build_flesh_hand(
     faces = mesh.boundary()
     joints = [rig.skeleton.names[j] for j in flesh.bones]
     weights = bone_weights(mesh, [mesh.node_sets[n] for n in flesh.names])
-    layer = np.zeros(len(mesh.elements), dtype=bool)
-    layer[faces[:, 0]] = True
-    soft = np.where(_between(mesh, weights, flesh, joints), 2, np.where(layer, 1, 0))
-    mesh = replace(
-        mesh,
-        regions=np.where(mesh.regions == 1, 3, soft).astype(np.int32),
-        region_names=(f"{name}.flesh", f"{name}.skin", f"{name}.joint", f"{name}.bone"),
-        faces={name: faces},
-    )
+    regions, region_names = hand_regions(mesh, name, rig.surface, skin, weights, joints, flesh.bones, flesh.parents)
+    mesh = replace(mesh, regions=regions, region_names=region_names, faces={name: faces})
     flesh = replace(flesh, mesh=mesh)
     labels, names = skin_labels(mesh, faces, weights, joints, apart * spacing)
     excluded = excluded_pairs(mesh, faces, labels, names, 0.5 * apart * spacing)
     place = Moves(np.tile([0.0, 0.0, 0.0, 1.0], (len(joints), 1)), np.zeros((len(joints), 3)))
     fringe = fringes(mesh, faces, labels, names, apart * spacing)
     return FleshHand(name, flesh, rig.skeleton, rig.surface, place, weights, faces, labels, names, excluded, fringe)
-
-
-def _between(mesh: HexMesh, weights: NDArray[np.float64], flesh: Flesh, joints: Sequence[str]) -> NDArray[np.bool_]:
-    """Elements of flesh shared by two bones that meet at a joint, or by two digits where they part.
-
-    The wrist's own joints hardly move but for the thumb's: the palm keeps its flesh.
-    """
-    share = weights[mesh.elements].mean(axis=1)
-    out = np.zeros(len(mesh.elements), dtype=bool)
-    names = [segment_name(joint).split(".") for joint in joints]
-    for bone, near in enumerate(flesh.parents):
-        for before, far in enumerate(flesh.bones):
-            one, other = names[bone], names[before]
-            fingers = "palm" in one and "palm" in other and "thumb" not in (one[-1], other[-1])
-            digits = [name[-1] if "palm" in name else name[-2] if len(name) > 1 else "" for name in (one, other)]
-            parted = not fingers and digits[0] != digits[1] and digits[0] in DIGITS and digits[1] in DIGITS
-            carpal = one[-1] in _CARPAL or other[-1] in _CARPAL
-            meet = near == far and (not carpal or "thumb" in (one[-1], other[-1]))
-            if bone != before and (meet or parted):
-                out |= np.minimum(share[:, bone], share[:, before]) > _SHARED
-    return out

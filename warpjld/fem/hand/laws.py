@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+from fractions import Fraction
+
 from warpjld.errors import InputError
 from warpjld.fem.materials import Fung, Material, NeoHooke
 
@@ -31,8 +34,9 @@ def hand_laws(
 
     Args:
         mesh_regions: Region names, e.g. ``hand.flesh``, ``hand.skin``, ``hand.bone``; others are left out.
+            ``hand.skin:3/8`` is skin in three eighths of its volume, and flesh in the rest.
         flesh: Young's modulus at small strain of what lies between skin and bone [Pa].
-        skin: The same of the outermost layer [Pa].
+        skin: The same of skin [Pa].
         joint: Young's modulus of what lies between the bones of a joint [Pa]: soft, since there it stands for
             cartilage that slides and skin that unfolds.
         bone: Young's modulus of bone [Pa].
@@ -59,4 +63,18 @@ def hand_laws(
         "joint": NeoHooke(joint, poisson, 1050.0) if stiffening == 0.0 else Fung(joint, _CREASE, poisson, 1050.0),
         "bone": NeoHooke(bone, 0.3, 1900.0),
     }
-    return {name: made[kind] for name in mesh_regions if (kind := name.rpartition(".")[2]) in made}
+    out: dict[str, Material] = {}
+    for name in mesh_regions:
+        kind, mixed, share = name.rpartition(".")[2].partition(":")
+        if kind in made:
+            out[name] = _mixed(flesh_law, made[kind], float(Fraction(share))) if mixed else made[kind]
+    return out
+
+
+def _mixed(one: Material, other: Material, share: float) -> Material:
+    """Two laws of a kind side by side, the second over a share of the volume: both are strained alike."""
+    constants = {
+        key: (1.0 - share) * getattr(one, key) + share * getattr(other, key)
+        for key in ("c10", "c01", "bulk", "density", "stiffening")
+    }
+    return replace(other, **constants)

@@ -7,13 +7,9 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from warpjld.fem.hexmesh import HexMesh
+from warpjld.fem.hexmesh import EDGES, HexMesh
 
 __all__ = ["bone_weights"]
-
-_LOCAL_EDGES = np.array(
-    [[0, 1], [1, 2], [2, 3], [3, 0], [4, 5], [5, 6], [6, 7], [7, 4], [0, 4], [1, 5], [2, 6], [3, 7]], dtype=np.int32
-)
 
 
 def bone_weights(mesh: HexMesh, bones: Sequence[NDArray[np.int32]]) -> NDArray[np.float64]:
@@ -30,7 +26,7 @@ def bone_weights(mesh: HexMesh, bones: Sequence[NDArray[np.int32]]) -> NDArray[n
     from scipy.sparse.linalg import splu
 
     count = len(mesh.nodes)
-    edges = np.unique(np.sort(mesh.elements[:, _LOCAL_EDGES].reshape(-1, 2), axis=1), axis=0)
+    edges = np.unique(np.sort(mesh.elements[:, EDGES].reshape(-1, 2), axis=1), axis=0)
     edges = edges[edges[:, 0] != edges[:, 1]]
     stiff = 1.0 / np.linalg.norm(mesh.nodes[edges[:, 1]] - mesh.nodes[edges[:, 0]], axis=1)
     rows, columns = np.concatenate([edges, edges[:, ::-1]]).T
