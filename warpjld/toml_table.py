@@ -11,6 +11,7 @@ from typing import Any, NoReturn
 
 from warpjld.errors import InputError
 from warpjld.suggest import did_you_mean
+from warpjld.text_file import read_text
 
 __all__ = ["TomlTable", "read_toml"]
 
@@ -21,12 +22,7 @@ def read_toml(path: str | Path) -> TomlTable:
     Raises:
         InputError: Unreadable, or not TOML.
     """
-    try:
-        text = Path(path).read_text(encoding="utf-8")
-    except OSError as error:
-        raise InputError(f"cannot read it: {error.strerror}", path=path) from error
-    except UnicodeDecodeError as error:
-        raise InputError(f"not UTF-8 text: byte {error.start}", path=path) from error
+    text = read_text(path)
     try:
         return TomlTable(tomllib.loads(text), "", Path(path), text.splitlines())
     except tomllib.TOMLDecodeError as error:

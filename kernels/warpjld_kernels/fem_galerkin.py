@@ -1,7 +1,8 @@
 """Coarse operator Pᵀ K P of a block matrix, P holding one scalar weight for the three values of a node.
 
-Row by row (Gustavson): a marker of one integer a coarse node tells where its block of the current row is. Each range
-of rows has its own marker, so ranges may run side by side; sums are in the same order whatever the ranges.
+Row by row into a pattern that is known (see ``fem_pattern``): a marker of one integer a coarse node tells where its
+block of the current row is. Each range of rows has its own marker, so ranges may run side by side; sums are in the same
+order whatever the ranges.
 """
 
 import warp as wp
@@ -27,67 +28,6 @@ class Weights:
     rows: wp.array(dtype=wp.int32)
     columns: wp.array(dtype=wp.int32)
     weights: wp.array(dtype=wp.float64)
-
-
-@wp.func_native(
-    """
-    int* mark = marker.data + size_t(range) * marker.shape[1];
-    for (int row = ranges.data[range]; row < ranges.data[range + 1]; ++row) {
-        int count = 0;
-        int* found = fill ? coarse.columns.data + coarse.rows.data[row] : mark;
-        for (int k = down.rows.data[row]; k < down.rows.data[row + 1]; ++k) {
-            const int node = down.columns.data[k];
-            for (int m = fine.rows.data[node]; m < fine.rows.data[node + 1]; ++m) {
-                const int other = fine.columns.data[m];
-                for (int n = up.rows.data[other]; n < up.rows.data[other + 1]; ++n) {
-                    const int column = up.columns.data[n];
-                    if (mark[column] == row) continue;
-                    mark[column] = row;
-                    if (fill) {
-                        int place = count;
-                        while (place > 0 && found[place - 1] > column) {
-                            found[place] = found[place - 1];
-                            --place;
-                        }
-                        found[place] = column;
-                    }
-                    ++count;
-                }
-            }
-        }
-        if (!fill) coarse.rows.data[row + 1] = count;
-    }
-"""
-)
-def coarse_rows(
-    range: int,
-    ranges: wp.array(dtype=wp.int32),
-    fill: wp.bool,
-    fine: Blocks,
-    up: Weights,
-    down: Weights,
-    marker: wp.array2d(dtype=wp.int32),
-    coarse: Blocks,
-): ...
-
-
-@wp.kernel
-def coarse_pattern(
-    # ranges of coarse rows
-    first: int,
-    ranges: wp.array(dtype=wp.int32),
-    fill: wp.bool,
-    # fine matrix, P and its transpose
-    fine: Blocks,
-    up: Weights,
-    down: Weights,
-    # scratch
-    marker: wp.array2d(dtype=wp.int32),
-    # out
-    coarse_out: Blocks,
-):
-    """Without ``fill``: blocks in each coarse row; with it: their columns, ascending. ``marker`` must hold −1."""
-    coarse_rows(first + wp.tid(), ranges, fill, fine, up, down, marker, coarse_out)
 
 
 @wp.func_native(

@@ -1,68 +1,81 @@
-"""Sparsity pattern of a mesh of 8-node elements: which nodes share an element, in ascending order."""
+"""Sparsity patterns: which columns a product of sparse matrices fills, and which block an element adds to.
+
+Row by row (Gustavson): a marker of one integer a column tells whether the current row has it. Each range of rows has
+its own marker, so ranges may run side by side.
+"""
 
 import warp as wp
 
 wp.set_module_options({"enable_backward": False})
 
-MOST_NEIGHBOURS = 512
-"""Neighbours a node may have; a regular inner node has 27. More are reported, never dropped silently."""
+
+@wp.struct
+class Rows:
+    """A pattern: where each row begins, and its columns."""
+
+    rows: wp.array(dtype=wp.int32)
+    columns: wp.array(dtype=wp.int32)
 
 
 @wp.func_native(
-    f"""
-    int found[{MOST_NEIGHBOURS}];
-    int count = 0;
-    bool full = false;
-    for (int k = starts.data[node]; k < starts.data[node + 1]; ++k) {{
-        const int* corner = elements.data + 8 * incident.data[k];
-        for (int b = 0; b < 8; ++b) {{
-            const int other = corner[b];
-            int place = count;
-            while (place > 0 && found[place - 1] > other) --place;
-            if (place > 0 && found[place - 1] == other) continue;
-            if (count == {MOST_NEIGHBOURS}) {{
-                full = true;
-                continue;
-            }}
-            for (int m = count; m > place; --m) found[m] = found[m - 1];
-            found[place] = other;
-            ++count;
-        }}
-    }}
-    if (fill) {{
-        int* out = columns.data + rows.data[node];
-        for (int m = 0; m < count; ++m) out[m] = found[m];
-    }} else {{
-        rows.data[node + 1] = full ? -1 : count;
-    }}
+    """
+    int* mark = marker.data + size_t(range) * marker.shape[1];
+    for (int row = ranges.data[range]; row < ranges.data[range + 1]; ++row) {
+        int count = 0;
+        int* found = fill ? product.columns.data + product.rows.data[row] : mark;
+        for (int k = first.rows.data[row]; k < first.rows.data[row + 1]; ++k) {
+            const int node = first.columns.data[k];
+            for (int m = second.rows.data[node]; m < second.rows.data[node + 1]; ++m) {
+                const int other = second.columns.data[m];
+                for (int n = third.rows.data[other]; n < third.rows.data[other + 1]; ++n) {
+                    const int column = third.columns.data[n];
+                    if (mark[column] == row) continue;
+                    mark[column] = row;
+                    if (fill) {
+                        int place = count;
+                        while (place > 0 && found[place - 1] > column) {
+                            found[place] = found[place - 1];
+                            --place;
+                        }
+                        found[place] = column;
+                    }
+                    ++count;
+                }
+            }
+        }
+        if (!fill) product.rows.data[row + 1] = count;
+    }
 """
 )
-def neighbours_of(
-    node: int,
-    starts: wp.array(dtype=wp.int32),
-    incident: wp.array(dtype=wp.int32),
-    elements: wp.array2d(dtype=wp.int32),
+def product_rows(
+    range: int,
+    ranges: wp.array(dtype=wp.int32),
     fill: wp.bool,
-    rows: wp.array(dtype=wp.int32),
-    columns: wp.array(dtype=wp.int32),
+    first: Rows,
+    second: Rows,
+    third: Rows,
+    marker: wp.array2d(dtype=wp.int32),
+    product: Rows,
 ): ...
 
 
 @wp.kernel
-def node_neighbours(
-    # mesh
-    first: int,
-    starts: wp.array(dtype=wp.int32),
-    incident: wp.array(dtype=wp.int32),
-    elements: wp.array2d(dtype=wp.int32),
+def product_pattern(
+    # ranges of rows
+    begin: int,
+    ranges: wp.array(dtype=wp.int32),
     fill: wp.bool,
+    # factors
+    first: Rows,
+    second: Rows,
+    third: Rows,
+    # scratch
+    marker: wp.array2d(dtype=wp.int32),
     # out
-    rows_out: wp.array(dtype=wp.int32),
-    columns_out: wp.array(dtype=wp.int32),
+    product_out: Rows,
 ):
-    """Without ``fill``: how many neighbours each node has; with it: which."""
-    node = first + wp.tid()
-    neighbours_of(node, starts, incident, elements, fill, rows_out, columns_out)
+    """Without ``fill``: how many columns each row has; with it: which, ascending. ``marker`` must hold −1."""
+    product_rows(begin + wp.tid(), ranges, fill, first, second, third, marker, product_out)
 
 
 @wp.kernel

@@ -19,10 +19,10 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import NDArray
 
-from warpjld.cli.progress import silence_warp
 from warpjld.fem import Body, HexMesh, LinearElastic, Prescribed, ball, prescribe
 from warpjld.fem.contact import Pair, press
 from warpjld.fem.contact.solids import Plane
+from warpjld.quiet import silence_warp
 
 TRAVEL, POISSON = 0.2, 0.3
 CALCULIX, REFERENCE = 9.6, (0.0544, 0.1706)

@@ -20,10 +20,10 @@ from typing import Any
 
 import numpy as np
 
-from warpjld.cli.progress import silence_warp
 from warpjld.fem import Body, HexMesh, LinearElastic, box, finger, prescribe
 from warpjld.fem.linear import LinearSolver
 from warpjld.fem.prescribed import rigid_modes
+from warpjld.quiet import silence_warp
 
 CASES: dict[str, tuple[Callable[[], HexMesh], float, str]] = {
     "cube45": (lambda: box(counts=(24, 24, 24)), 0.3, "x-"),

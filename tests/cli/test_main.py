@@ -3,12 +3,16 @@
 from __future__ import annotations
 
 import errno
+import json
+import math
 from pathlib import Path
 
 import click
+import numpy as np
 import pytest
 
 from warpjld.cli import main
+from warpjld.cli.answer import answer
 
 COMMANDS = ["run", "shell", "inspect", "calibrate", "deform", "study", "fem"]
 
@@ -34,6 +38,19 @@ def test_every_command_has_help_and_one_name_for_its_output(name: str, capsys: p
     assert "-o, --out " in said
 
 
+@pytest.mark.parametrize("name", [name for name in COMMANDS if name != "shell"])
+def test_every_command_that_ends_by_itself_answers_in_json(name: str, capsys: pytest.CaptureFixture[str]) -> None:
+    assert run(name, "--help") == 0
+    assert "  --json " in capsys.readouterr().out
+
+
+def test_an_answer_is_ascii_and_without_nan(capsys: pytest.CaptureFixture[str]) -> None:
+    answer({"a": [1.5, math.nan, {"b": -math.inf}], "c": ("µ", np.float64(2.0)), "d": True})
+    said = capsys.readouterr().out
+    assert said.isascii()
+    assert json.loads(said) == {"a": [1.5, None, {"b": None}], "c": ["µ", 2.0], "d": True}
+
+
 @pytest.mark.parametrize(
     ("name", "says"),
     [("runn", "there is no command 'runn'; did you mean run?"), ("xyz", "no command 'xyz'; want one of run, shell, ")],
@@ -47,7 +64,17 @@ def test_a_folder_that_is_a_file(tmp_path: Path, capsys: pytest.CaptureFixture[s
     (tmp_path / "out").touch()
     example = Path(__file__).resolve().parents[2] / "examples" / "inflate_ball.toml"
     assert run("fem", str(example), "-o", str(tmp_path / "out"), "-q") == 1
-    assert f"error: {tmp_path / 'out'}: cannot write into this folder" in capsys.readouterr().err
+    assert capsys.readouterr().err == f"error: {tmp_path / 'out'}: is a file; want a folder to write into\n"
+
+
+def test_too_little_memory_is_one_line(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
+    @click.command()
+    def greedy() -> None:
+        np.empty(10**17)
+
+    monkeypatch.setattr("warpjld.cli.study.command", greedy)
+    assert run("study") == 1
+    assert capsys.readouterr().err.startswith("error: not enough memory: Unable to allocate")
 
 
 def test_a_full_disk_is_one_line(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:

@@ -78,7 +78,7 @@ def test_errors_are_one_line_and_leave_nothing(script, tmp_path, capfd, text: st
 
 def test_a_missing_script_and_a_wrong_option(tmp_path, capfd) -> None:
     assert run(tmp_path / "none.jld") == 1
-    assert "none.jld: cannot read the script: No such file" in capfd.readouterr().err
+    assert "none.jld: cannot be read: No such file" in capfd.readouterr().err
     assert run(tmp_path / "none.jld", "--colour") == 2
 
 

@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 
 from tests.covering.tube import AROUND, RADIUS, bend, tube, tube_skeleton
 from warpjld.covering import bind
-from warpjld.covering.parameters import default_parameters
+from warpjld.covering.parameters import default_parameters, load_parameters
 from warpjld.covering.quality import Stretch, edge_stretch, enclosed_volume, reversed_edges, unique_edges
+from warpjld.errors import InputError
 from warpjld.rig import Rig
 
 SURFACE = tube()
@@ -55,3 +58,24 @@ def test_a_small_joint_inflates_little(built: Rig) -> None:
 
 def test_defaults_are_in_range(built: Rig) -> None:
     default_parameters(built.skeleton).check(built.skeleton)
+
+
+@pytest.mark.parametrize(
+    ("content", "says"),
+    [
+        ('{"joints": []}', "want a JSON object with a 'joints' object"),
+        ('{"joints": {"index.base": 3}}', "want a JSON object with a 'joints' object"),
+        ('{"joints": {"indx.base": {}}}', "did you mean index.base?"),
+        ('{"joints": {"index.base": {"peek": 0.5}}}', "unknown parameter 'peek'; did you mean peak?"),
+        ('{"joints": {"index.base": {"peak": "high"}}}', "'peak' wants a number, got 'high'"),
+        ('{"joints": {"index.base": {"proximity": [0.9, 0.9]}}}', "at most 1"),
+        ("\x89PNG", "is not UTF-8 text"),
+    ],
+)
+def test_wrong_files_are_named(built: Rig, tmp_path: Path, content: str, says: str) -> None:
+    path = tmp_path / "p.json"
+    path.write_bytes(content.encode("latin-1"))
+    with pytest.raises(InputError) as caught:
+        load_parameters(path, built.skeleton)
+    assert caught.value.path == path
+    assert says in str(caught.value)

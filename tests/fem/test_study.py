@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+import json
 from pathlib import Path
 
 import numpy as np
@@ -130,6 +131,29 @@ def test_missing_face_and_free_body_are_one_line(tmp_path: Path, capsys: pytest.
     assert "is not held: free in moving along x" in capsys.readouterr().err
 
 
+def test_json_is_alone_on_stdout_and_holds_the_reactions(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    (tmp_path / "pull.toml").write_text(SMALL)
+    out = tmp_path / "out"
+    assert run(["fem", str(tmp_path / "pull.toml"), "-o", str(out), "--no-pictures", "--json"]) == 0
+    said = capsys.readouterr()
+    told = json.loads(said.out)
+    assert "16 elements" in said.err
+    assert (told["elements"], told["degrees_of_freedom"], told["converged"]) == (16, 135, True)
+    rows = list(csv.DictReader((out / "reactions.csv").open()))
+    assert [float(row["rz_newton"]) for row in rows] == [row["newton"][2] for row in told["reactions"]]
+    assert {Path(file) for file in told["files"]} == set(out.iterdir())
+
+
+def test_what_was_reached_is_told_before_a_step_fails(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    one_element = SMALL.replace("counts = [2, 2, 4]", "counts = [1, 1, 1]")
+    (tmp_path / "crush.toml").write_text(one_element.replace("onto = { z = 2.4 }", "x = 0, y = 0, z = -3"))
+    assert run(["fem", str(tmp_path / "crush.toml"), "-o", str(tmp_path / "out"), "--no-pictures", "--json"]) == 1
+    said = capsys.readouterr()
+    told = json.loads(said.out)
+    assert not told["converged"]
+    assert told["message"] in said.err
+
+
 def test_body_from_an_open_surface(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     surface = trimesh.creation.icosphere(3)
     surface.update_faces(surface.triangles_center[:, 2] < 0.93)
@@ -149,7 +173,7 @@ prescribed = [{ where = "foot", x = 0, y = 0, z = 0 }]
     )
     (tmp_path / "cup.toml").write_text(text)
     assert run(["fem", str(tmp_path / "cup.toml"), "-o", str(tmp_path / "out"), "--no-pictures"]) == 0
-    printed = capsys.readouterr().out.replace("\n", " ")
+    printed = capsys.readouterr().out
     assert "the surface is not watertight" in printed
     assert "least scaled Jacobian" in printed
 

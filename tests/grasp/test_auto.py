@@ -6,8 +6,10 @@ import pytest
 from warpjld.errors import InputError
 from warpjld.grasp import ObjectSet
 from warpjld.grasp.auto import find_grasp
+from warpjld.grasp.draws import WAY
 from warpjld.grasp.judge import Judge
-from warpjld.grasp.placements import palm_frame, sample_wrists
+from warpjld.grasp.obstacles import COLLIDES, Obstacles
+from warpjld.grasp.placements import sample_wrists
 from warpjld.grasp.postures import POSTURES, posture_angles, posture_for
 from warpjld.grasp.quality import penetration
 from warpjld.grasp.shapes import ball, box, cylinder, glass, plate
@@ -26,13 +28,6 @@ def test_postures_are_within_the_limits(rig, name: str) -> None:
     low, high = np.moveaxis(rig.skeleton.limits, -1, 0)
     assert ((angles >= low - 1e-12) & (angles <= high + 1e-12) | (angles == 0)).all()
     assert angles[rig.skeleton.index("thumb.base")].any()
-
-
-def test_the_palm_looks_down_at_rest(rig) -> None:
-    _, frame = palm_frame(rig.skeleton, "left")
-    np.testing.assert_allclose(frame @ frame.T, np.eye(3), atol=1e-12)
-    assert frame[0, 1] < -0.9
-    assert frame[1, 2] < -0.9
 
 
 def test_sampled_hands_are_next_to_the_object_and_not_in_it(covering) -> None:
@@ -76,6 +71,32 @@ def test_a_verdict_knows_which_contacts_press(covering) -> None:
     lying = ball(0.06).placed([knuckle[0], top + 0.0301, knuckle[2]])
     verdict = Judge(covering, lying, "left", 0.6).judge(poses, skin)
     assert (verdict.closed, verdict.digits, verdict.palm, verdict.score) == (False, (), False, 0.0)
+
+
+def test_a_hand_does_not_reach_through_the_table(covering) -> None:
+    """A ball on a table is taken from above; without the table it may be taken from anywhere."""
+    thing, table = ball(0.06, subdivisions=3), box(0.4, 0.02, 0.4, name="table").placed((0.0, -0.04, 0.0))
+    obstacle = Obstacles(covering, [table])
+    depths = []
+    for obstacles in ([], [table]):
+        found = find_grasp(covering, thing, obstacles=obstacles, count=16, seed=1)
+        assert found.verdict.closed
+        poses = found.poses(covering.skeleton)
+        depths.append(obstacle.depth(covering.deform(poses)[0]))
+    assert depths[0] > 5e-3
+    assert depths[1] <= COLLIDES
+    assert found.approach[1] < 0.0
+    # it came there without the table in its way
+    ways = np.linspace(0.0, WAY, 5)[:, None] * found.approach
+    turns, angles = np.repeat(found.rotation[None], 5, axis=0), np.repeat(found.start[None], 5, axis=0)
+    poses = poses_from_angles(covering.skeleton, angles, root_position=found.position - ways, root_rotation=turns)
+    assert max(obstacle.depth(skin) for skin in covering.deform(poses)) <= COLLIDES
+
+
+def test_what_is_walled_in_is_told(covering) -> None:
+    walls = box(0.2, 0.2, 0.2, name="crate")
+    with pytest.raises(InputError, match="or out of reach: crate blocked 64 more"):
+        find_grasp(covering, ball(0.06, subdivisions=2), obstacles=[walls], count=8)
 
 
 @pytest.mark.parametrize(

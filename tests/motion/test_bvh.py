@@ -99,7 +99,7 @@ def test_mistakes_are_named_with_their_line(tmp_path: Path, old: str, new: str, 
 def test_empty_and_missing_files(tmp_path: Path) -> None:
     with pytest.raises(InputError, match="the file ends here"):
         read_bvh(write(tmp_path, ""))
-    with pytest.raises(InputError, match="cannot read motion"):
+    with pytest.raises(InputError, match="cannot be read"):
         read_bvh(tmp_path / "none.bvh")
 
 

@@ -240,7 +240,7 @@ def test_mistakes_in_recordings_are_named(tmp_path: Path) -> None:
         with pytest.raises(InputError, match=message):
             read_hand_track(save(tmp_path, content))
     (tmp_path / "hand.json").write_text('{"a": 1,\n oops}')
-    with pytest.raises(InputError, match=r"hand.json:2:2: not JSON"):
+    with pytest.raises(InputError, match=r"hand.json:2:2: is not JSON"):
         read_hand_track(tmp_path / "hand.json")
 
 

@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 
 from warpjld.errors import InputError
-from warpjld.render import ColorScale
+from warpjld.render import ColorScale, Solid
+from warpjld.render.colors import as_hex
 
 
 def test_ends_and_beyond() -> None:
@@ -49,3 +50,19 @@ def test_ticks_are_round_as_written(low: float, high: float, factor: float, text
     assert [f"{tick * factor:.3g}" for tick in ticks] == texts
     assert low <= ticks[0]
     assert ticks[-1] <= high
+
+
+@pytest.mark.parametrize("name", ["LightBlue", "light blue", "#ADD8E6", "#add8e6"])
+def test_colours_by_name_and_number(name: str) -> None:
+    assert as_hex(name) == "#add8e6"
+
+
+@pytest.mark.parametrize(
+    ("name", "says"),
+    [("gren", "did you mean green"), ("0.5", "no colour"), ("#12", "want a name"), ("", "no")],
+)
+def test_no_colours(name: str, says: str) -> None:
+    with pytest.raises(InputError, match=says):
+        as_hex(name)
+    with pytest.raises(InputError, match=says):
+        Solid(np.zeros((3, 3)), [[0, 1, 2]], color=name)

@@ -69,6 +69,12 @@ def test_refusals(run, line: str, place: str, says: str) -> None:
     assert says in str(caught.value)
 
 
+@pytest.mark.parametrize("lines", ["FRAMES 0 1e12", "WRIST LEFT FLEXION AT 0 0\nWRIST LEFT FLEXION AT 1e13 10"])
+def test_more_frames_than_can_be_made(run, lines: str) -> None:
+    with pytest.raises(InputError, match="at most 1,000,000 can be made at once"):
+        frame_numbers(run(lines))
+
+
 def test_axis_and_parameters(run, tmp_path, monkeypatch) -> None:
     scene = run("AXIS index.base 0 2 0\nPARAMETER LEFT index.knuckle2 PROXIMITY 0.1 0.15\nPARAMETER ALL MUSCLE 0.5")
     actor = scene.actor()

@@ -41,7 +41,7 @@ def test_objects_are_placed_turned_and_scaled(run, tmp_path: Path) -> None:
     np.testing.assert_allclose(np.ptp(on_stage, axis=0), [0.6, 0.4, 0.2], atol=1e-12)
     np.testing.assert_allclose(on_stage.mean(axis=0), [1, 2, 3], atol=1e-3)
     assert scene.props["B"].thing.size.max() == pytest.approx(0.02)
-    assert scene.props["B"].color == "red"
+    assert scene.props["B"].color == "#ff0000"
     assert scene.props["A"].color != scene.props["C"].color
 
 
@@ -143,6 +143,8 @@ def test_the_summary_tells_objects_searches_and_contacts(run, tmp_path: Path) ->
         ("OBJECT a BALL 0.1 UNIT CM", "for surfaces from files"),
         ("OBJECT a BALL 0.1 9 9 9", "too many sizes|subdivisions"),
         ("OBJECT a 'nowhere.obj'", "there is no file"),
+        ("OBJECT a '.'", "is a folder; want a file"),
+        ("OBJECT a BALL COLOR 'gren'", r"there is no colour 'gren'; did you mean green\?"),
         ("OBJECT left BALL", "there is an object or actor LEFT already"),
         ("OBJECT apple BALL\nOBJECT apple BOX", "there is an object or actor APPLE already"),
         ("OBJECTS apple INDEX LEFT KNUCKLES2 5 10", "no object apple; bring one on"),
@@ -174,6 +176,18 @@ def test_grasp_auto(run) -> None:
     assert np.linalg.norm(away - there) == pytest.approx(0.12, abs=1e-6)
     with pytest.raises(InputError, match="did you mean PLATE"):
         run("GRASP 35 45 LEFT apple AUTO POSTURE PLATES")
+
+
+def test_grasp_auto_keeps_out_of_other_objects(run) -> None:
+    scene = run(
+        "OBJECT apple BALL 0.06\nOBJECT table BOX 0.4 0.02 0.4\nMOVE table 0 0 -0.5 0\nMOVE table 15 0 -0.04 0\n"
+        "GRASP 5 15 LEFT apple AUTO TRIES 12"
+    )
+    attempt = scene.attempts[0]
+    assert "left.thumb" in attempt.values["digits"]
+    skin = cover(scene.actor()).deform(stage(scene.actor(), np.array([15.0]), 30))[0]
+    assert skin[:, 1].min() > -0.0301
+    assert attempt.values["collisions"] == []
 
 
 def test_what_else_a_closing_hand_runs_into_is_told(run) -> None:

@@ -105,7 +105,7 @@ def test_files_are_utf8_with_or_without_a_mark(tmp_path) -> None:
     script.write_bytes(b"PRINT \xff")
     with pytest.raises(InputError, match="not UTF-8"):
         parse_file(script)
-    with pytest.raises(InputError, match=r"none\.jld: cannot read the script"):
+    with pytest.raises(InputError, match=r"none\.jld: cannot be read"):
         parse_file(tmp_path / "none.jld")
 
 

@@ -133,9 +133,9 @@ def test_a_run_that_fails_leaves_the_folder_as_it_was(run, tmp_path, monkeypatch
 
 def test_a_folder_that_cannot_be_written_is_named(run, tmp_path) -> None:
     (tmp_path / "file").write_text("")
-    with pytest.raises(InputError, match=r"file: cannot write into this folder"):
+    with pytest.raises(InputError, match=r"file: is a file; want a folder"):
         run_scene(run(BENT), tmp_path / "file")
-    with pytest.raises(InputError, match=r"file/out: cannot write into this folder"):
+    with pytest.raises(InputError, match=r"file: is a file; want a folder"):
         run_scene(run(BENT), tmp_path / "file" / "out")
     (tmp_path / "out" / "surface.npz").mkdir(parents=True)
     with pytest.raises(InputError, match=r"surface\.npz: a folder stands where this file should go"):

@@ -179,5 +179,5 @@ def test_bad_arguments_are_named(tmp_path: Path) -> None:
     with pytest.raises(InputError, match="holds no study"):
         rerun_trial(Dice(trials=1), tmp_path, 0)
     (tmp_path / "file").touch()
-    with pytest.raises(InputError, match="cannot be used"):
+    with pytest.raises(InputError, match="is a file; want a folder"):
         run_study(Dice(trials=1), tmp_path / "file", table="csv")

@@ -78,4 +78,7 @@ def main(arguments: list[str] | None = None) -> None:
     except OSError as error:  # a full disk, a folder that went away: nothing a traceback would tell more of
         click.echo(f"error: {error.filename or 'a file'}: {error.strerror or error}", err=True)
         sys.exit(1)
+    except MemoryError as error:
+        click.echo(f"error: not enough memory{f': {error}' if str(error) else ''}", err=True)
+        sys.exit(1)
     sys.exit(code if isinstance(code, int) else 0)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
@@ -10,6 +9,7 @@ from typing import TYPE_CHECKING, Any, Literal
 import click
 
 from warpjld.cli import options
+from warpjld.cli.answer import answer
 
 if TYPE_CHECKING:
     from warpjld.covering.calibrate import Calibration, PoseQuality
@@ -56,13 +56,14 @@ def command(
 
     RIG is a rig file (.glb, .gltf), a surface with --skeleton, or builtin:left, builtin:right. Scripts load the file
     written with PARAMETERS. The result is never worse than the start."""
-    from warpjld.cli.progress import progress, silence_warp
+    from warpjld.cli.progress import progress
     from warpjld.cli.rig_argument import open_rig
     from warpjld.covering import bind
     from warpjld.covering.calibrate import calibrate
     from warpjld.covering.parameters import load_parameters, save_parameters
     from warpjld.covering.pose_sets import calibration_poses
     from warpjld.errors import InputError
+    from warpjld.quiet import silence_warp
 
     silence_warp()
     if not out.absolute().parent.is_dir():
@@ -75,7 +76,7 @@ def command(
         found = calibrate(covering, chosen, iterations=iterations, progress=report)
     save_parameters(out, opened.skeleton, found.parameters)
     if as_json:
-        click.echo(json.dumps(_summary(rig, out, found), indent=1))
+        answer(_summary(rig, out, found))
     elif not quiet:
         _table(found)
         click.echo(f"{found.status.value}; {out} written")

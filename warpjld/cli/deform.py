@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import time
 from pathlib import Path
 from typing import Any
@@ -10,6 +9,7 @@ from typing import Any
 import click
 
 from warpjld.cli import options
+from warpjld.cli.answer import answer
 from warpjld.errors import InputError
 from warpjld.io.caches import FORMATS
 
@@ -74,11 +74,12 @@ def command(
 
     RIG is a rig file, or builtin:left or builtin:right for the built-in hand.
     """
-    from warpjld.cli.progress import progress, silence_warp
+    from warpjld.cli.progress import progress
     from warpjld.cli.rig_argument import open_rig
     from warpjld.covering import bind, load_parameters
     from warpjld.io.caches import open_cache
     from warpjld.motion import open_motion
+    from warpjld.quiet import silence_warp
 
     silence_warp()
     began = time.perf_counter()
@@ -116,7 +117,7 @@ def command(
         "notes": [*moved.notes, *([cache.note] if cache.note else [])],
     }
     if as_json:
-        click.echo(json.dumps(summary, indent=1, ensure_ascii=False))
+        answer(summary)
     elif not quiet:
         _tell(summary)
 

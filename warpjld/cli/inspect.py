@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from pathlib import Path
 from typing import Any
 
@@ -11,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from warpjld.cli import options
+from warpjld.cli.answer import answer
 from warpjld.rig import Rig
 from warpjld.skeleton.tree import CHANNELS
 
@@ -42,8 +42,8 @@ def command(
     RIG is a rig file (.glb, .gltf), a surface with --skeleton, or builtin:left, builtin:right. A picture of the
     surface's wire-frame with the named skeleton in it is written beside, unless --no-picture.
     """
-    from warpjld.cli.progress import silence_warp
     from warpjld.cli.rig_argument import open_rig
+    from warpjld.quiet import silence_warp
 
     silence_warp()
     opened = open_rig(rig, skeleton=skeleton, side=side, unit=unit, up=up)
@@ -59,7 +59,7 @@ def command(
         draw_rig(opened, picture, suspicious={finding["joint"] for finding in report["placing"]})
         report["picture"] = str(picture)
     if as_json:
-        click.echo(json.dumps(report, indent=1, ensure_ascii=False))
+        answer(report)
     else:
         _print(report, quiet)
 

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from warpjld.errors import InputError
 from warpjld.rig import Rig
+from warpjld.whole_file import whole_file
 
 __all__ = ["draw_rig"]
 
@@ -67,10 +68,9 @@ def draw_rig(rig: Rig, path: Path, *, suspicious: Set[str] = frozenset()) -> Non
             margin=1,
         )
         _aim(plotter, surface.vertices, towards, up)
-    part = path.with_name(path.stem + ".part.png")
-    plotter.screenshot(str(part))
+    with whole_file(path) as part:
+        plotter.screenshot(str(part))
     plotter.close()
-    part.replace(path)
 
 
 def _views(rig: Rig) -> list[tuple[NDArray[np.float64], NDArray[np.float64]]]:

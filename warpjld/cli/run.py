@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-import json
 from pathlib import Path
 
 import click
 
 from warpjld.cli import options
+from warpjld.cli.answer import answer
 
 __all__ = ["command"]
 
@@ -33,7 +33,8 @@ def command(
 ) -> None:
     """Run SCRIPT and make the pictures, films and exports it asks for; if it asks for none, an animated surface (NPZ),
     a film and a contact sheet. A summary goes to summary.json in the output folder."""
-    from warpjld.cli.progress import progress, silence_warp
+    from warpjld.cli.progress import progress
+    from warpjld.quiet import silence_warp
     from warpjld.script import Interpreter, Scene
     from warpjld.script.plugin import load_commands
     from warpjld.script.runner import run_scene
@@ -52,6 +53,6 @@ def command(
     with progress(quiet) as report:
         summary = run_scene(scene, out, script=script, device=device, threads=threads, dry=check, progress=report)
     if as_json:
-        click.echo(json.dumps(summary, indent=1))
+        answer(summary)
     elif not quiet:
         table(summary, click.echo)

@@ -2,16 +2,17 @@
 
 from __future__ import annotations
 
-import json
 from pathlib import Path
 from typing import TYPE_CHECKING, Literal
 
 import click
 
 from warpjld.cli import options
+from warpjld.cli.answer import answer
 
 if TYPE_CHECKING:
     from warpjld.study import Rerun, StudyResult
+    from warpjld.study.grasping import GraspPlan
 
 __all__ = ["command"]
 
@@ -47,8 +48,9 @@ def command(
 
     Leaves a table, the poses, a manifest and a summary in the output folder. The table is the same, byte for byte,
     whatever the number of processes and however often the study was stopped."""
-    from warpjld.cli.progress import progress, silence_warp
+    from warpjld.cli.progress import progress
     from warpjld.errors import InputError
+    from warpjld.quiet import silence_warp
     from warpjld.study import rerun_trial, run_study
     from warpjld.study.grasping import GraspExperiment, load_plan
 
@@ -74,21 +76,22 @@ def command(
                 click.echo(f"stopped; the same command goes on from what is in {out}", err=True)
                 raise
     if check:
-        if not quiet:
-            for note in notes:
-                click.echo(f"note: {note}")
-            click.echo(f"{plan}: {settings.trials} trials of {_combinations(settings.trials, experiment)}")
+        _tell_checked(plan, settings, notes, as_json, quiet)
         return
     _tell(result, notes, as_json, quiet)
 
 
-def _combinations(trials: int, experiment: object) -> str:
-    from warpjld.study.grasping import GraspExperiment
-
-    assert isinstance(experiment, GraspExperiment)
-    plan = experiment.settings
-    count = len(plan.hands) * len(plan.objects) * len(plan.scales) * len(plan.frictions)
-    return f"{min(count, trials)} of {count} combinations of hand, object, scale and friction"
+def _tell_checked(path: Path, plan: GraspPlan, notes: list[str], as_json: bool, quiet: bool) -> None:
+    combinations = len(plan.hands) * len(plan.objects) * len(plan.scales) * len(plan.frictions)
+    tried = min(combinations, plan.trials)
+    if as_json:
+        counts = {"trials": plan.trials, "combinations": combinations, "combinations_tried": tried}
+        answer({"plan": str(path), **counts, "notes": notes})
+    elif not quiet:
+        for note in notes:
+            click.echo(f"note: {note}")
+        of = f"{tried} of {combinations} combinations of hand, object, scale and friction"
+        click.echo(f"{path}: {plan.trials} trials of {of}")
 
 
 def _tell(result: StudyResult, notes: list[str], as_json: bool, quiet: bool) -> None:
@@ -102,7 +105,7 @@ def _tell(result: StudyResult, notes: list[str], as_json: bool, quiet: bool) -> 
             "seconds": round(result.seconds, 3),
             "notes": notes,
         }
-        click.echo(json.dumps(summary, indent=1, ensure_ascii=False))
+        answer(summary)
         return
     if quiet:
         return
@@ -121,10 +124,11 @@ def _tell_rerun(again: Rerun, as_json: bool, quiet: bool) -> None:
     if as_json:
         files = [str(file) for file in again.files]
         content = {"row": again.row, "differences": again.differences, "files": files}
-        click.echo(json.dumps(content, indent=1, ensure_ascii=False))
+        answer(content)
     elif not quiet:
         for name, value in again.row.items():
-            click.echo(f"{name:16} {'' if value is None else value}")
+            shown = f"{value:.6g}" if isinstance(value, float) else value
+            click.echo(f"{name:16} {'' if value is None else shown}")
         click.echo("the same as in the study, bit for bit" if same else f"differs in: {', '.join(again.differences)}")
         click.echo(", ".join(str(file) for file in again.files))
     if not same:

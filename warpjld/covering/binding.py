@@ -88,7 +88,7 @@ def anchor(
         parameters: Their proximities set how wide the palm's in-between areas are (A Fig. 7).
         chunk: Vertices placed at a time, which bounds memory.
     """
-    ends = segment_ends(skeleton, groups)
+    ends = segment_ends(groups)
     table = SegmentTable.build(skeleton, ends)
     pairs, pair_of_fan = _neighbour_pairs(groups)
     rows = [

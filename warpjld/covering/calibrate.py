@@ -157,7 +157,7 @@ def calibrate(
 
         first = done
 
-        def step(_: NDArray[np.float64], first: int = first) -> None:
+        def step(_: NDArray[np.float64]) -> None:
             nonlocal done
             done = min(done + 1, iterations)
             if progress:

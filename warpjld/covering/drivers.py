@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from warpjld.covering.binding import STATIONS, Anchors
+from warpjld.rotations import unit
 from warpjld.skeleton.kinematics import Poses
 from warpjld.skeleton.tree import CHANNELS, Skeleton
 
@@ -47,8 +48,7 @@ def drive(skeleton: Skeleton, anchors: Anchors, poses: Poses) -> Drivers:
 def halfway_rotations(skeleton: Skeleton, rotations: NDArray[np.float64]) -> NDArray[np.float64]:
     """normalise(q_parent + q_joint): the bisector both segments share (C22, C23). Signs are aligned in the poses."""
     before = np.where(skeleton.parents < 0, np.arange(len(skeleton)), skeleton.parents)
-    total = rotations[:, before] + rotations
-    return total / np.linalg.norm(total, axis=-1, keepdims=True)
+    return unit(rotations[:, before] + rotations)
 
 
 def flexion_ratio(skeleton: Skeleton, flexion: NDArray[np.float64]) -> NDArray[np.float64]:

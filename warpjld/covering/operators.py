@@ -48,7 +48,7 @@ def fans(skeleton: Skeleton) -> tuple[Fan, ...]:
     return tuple(groups)
 
 
-def segment_ends(skeleton: Skeleton, groups: tuple[Fan, ...]) -> NDArray[np.int32]:
+def segment_ends(groups: tuple[Fan, ...]) -> NDArray[np.int32]:
     """Proximal and distal joint of every segment of the fans in order, shape (S, 2)."""
     return np.array([(s.proximal, s.distal) for fan in groups for s in fan.segments], dtype=np.int32)
 

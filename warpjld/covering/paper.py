@@ -15,6 +15,7 @@ from warpjld.covering.device import array_on, checked_device, parameters_on
 from warpjld.covering.drivers import flexion_ratio
 from warpjld.covering.paper_places import PaperPlaces, paper_places
 from warpjld.covering.segment_table import SegmentTable
+from warpjld.rotations import unit
 from warpjld.skeleton.kinematics import Poses
 from warpjld.skeleton.tree import Skeleton
 from warpjld.surface import Surface
@@ -56,9 +57,9 @@ def paper_normals(skeleton: Skeleton, ends: NDArray[np.int32], rotations: NDArra
     before[ends[:, 1]] = table.normals[:, 1]
     after = np.where(clear[:, None], after, before)
     parents = np.where(skeleton.parents < 0, np.arange(len(skeleton)), skeleton.parents)
-    total = np.einsum("fjik,jk->fji", matrices[:, parents], _unit(before))
-    total += np.einsum("fjik,jk->fji", matrices, _unit(after))
-    return Normals(original, _unit(total))
+    total = np.einsum("fjik,jk->fji", matrices[:, parents], unit(before))
+    total += np.einsum("fjik,jk->fji", matrices, unit(after))
+    return Normals(original, unit(total))
 
 
 class PaperCovering(Covering):
@@ -162,8 +163,3 @@ class PaperPose:
 
         vectors = (self.positions, self.original, self.modified)
         return [*(array_on(device, a, wp.vec3) for a in vectors), array_on(device, self.flexion_ratio, float)]
-
-
-def _unit(vectors: NDArray[np.float64]) -> NDArray[np.float64]:
-    out: NDArray[np.float64] = vectors / np.maximum(np.linalg.norm(vectors, axis=-1, keepdims=True), 1e-12)
-    return out

@@ -58,7 +58,7 @@ def paper_places(
         domains: Weight of every fan, shape (V, fans).
         parameters: Their proximities bound the areas.
     """
-    ends = segment_ends(skeleton, groups)
+    ends = segment_ends(groups)
     table = SegmentTable.build(skeleton, ends)
     count = len(vertices)
     ratio = table.project(vertices)

@@ -5,12 +5,16 @@ from __future__ import annotations
 import json
 from dataclasses import dataclass, fields
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from warpjld.errors import InputError
 from warpjld.skeleton.tree import CHANNELS, Skeleton
+from warpjld.suggest import one_of
+from warpjld.text_file import read_json
+from warpjld.whole_file import whole_file
 
 __all__ = ["Parameters", "default_parameters", "load_parameters", "save_parameters"]
 
@@ -111,12 +115,10 @@ def save_parameters(path: str | Path, skeleton: Skeleton, parameters: Parameters
         name: {f.name: np.round(getattr(parameters, f.name)[j], 6).tolist() for f in fields(parameters)}
         for j, name in enumerate(skeleton.names)
     }
-    target = Path(path)
-    beside = target.with_name(target.name + ".part")
     content = json.dumps({"warpjld": "parameters", "version": 1, "joints": joints}, indent=1)
     try:
-        beside.write_text(content + "\n", encoding="utf-8")
-        beside.replace(target)
+        with whole_file(Path(path)) as part:
+            part.write_text(content + "\n", encoding="utf-8")
     except OSError as error:
         raise InputError(f"cannot write parameters: {error.strerror}", path=path) from error
 
@@ -127,27 +129,29 @@ def load_parameters(path: str | Path, skeleton: Skeleton) -> Parameters:
     Raises:
         InputError: Unreadable file, unknown joint or field, or a value of the wrong shape or range.
     """
+    content = read_json(path)
     try:
-        content = json.loads(Path(path).read_text(encoding="utf-8"))
-        joints = content["joints"]
-    except OSError as error:
-        raise InputError(f"cannot read parameters: {error.strerror}", path=path) from error
-    except json.JSONDecodeError as error:
-        raise InputError(f"not JSON: {error.msg}", path=path, line=error.lineno, column=error.colno) from error
-    except (KeyError, TypeError) as error:
-        raise InputError("want a JSON object with a 'joints' object", path=path) from error
+        return _parameters(content, skeleton)
+    except InputError as error:
+        raise InputError(error.message, path=path) from None
+
+
+def _parameters(content: Any, skeleton: Skeleton) -> Parameters:
+    joints = content.get("joints") if isinstance(content, dict) else None
+    if not isinstance(joints, dict) or not all(isinstance(values, dict) for values in joints.values()):
+        raise InputError("want a JSON object with a 'joints' object that holds values by joint")
     defaults = default_parameters(skeleton)
     known = {f.name: getattr(defaults, f.name) for f in fields(defaults)}
     for name, values in joints.items():
         joint = skeleton.index(name)
         for key, value in values.items():
             if key not in known:
-                raise InputError(f"joint '{name}': unknown parameter '{key}'; known: {', '.join(known)}", path=path)
+                raise InputError(f"joint '{name}': unknown parameter '{key}'{one_of(key, known)}")
             try:
                 known[key][joint] = value
-            except (TypeError, ValueError) as error:
+            except (TypeError, ValueError):
                 want = "two numbers" if known[key].ndim == 2 else "a number"
-                raise InputError(f"joint '{name}': '{key}' wants {want}, got {value!r}", path=path) from error
+                raise InputError(f"joint '{name}': '{key}' wants {want}, got {value!r}") from None
     parameters = Parameters(**known)
     parameters.check(skeleton)
     return parameters

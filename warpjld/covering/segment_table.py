@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from warpjld.rotations import unit
 from warpjld.skeleton.tree import Skeleton
 
 __all__ = ["SegmentTable"]
@@ -37,7 +38,7 @@ class SegmentTable:
         """Of segments between these joints, shape (S, 2)."""
         start = skeleton.rest[ends[:, 0]]
         along = skeleton.rest[ends[:, 1]] - start
-        direction = along / np.linalg.norm(along, axis=1, keepdims=True)
+        direction = unit(along)
         normals = np.stack([np.cross(direction, skeleton.axes[ends[:, k]]) for k in (0, 1)], axis=1)
         lengths = np.linalg.norm(normals, axis=2, keepdims=True)
         # an axis along the segment says nothing of its sides: take the other end's, or any normal

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from warpjld.errors import InputError
+from warpjld.rotations import unit
 
 __all__ = ["Envelope"]
 
@@ -57,8 +58,7 @@ class Envelope:
         self.volume = abs(volume)
         self.vertices = points
         self.faces = triangles
-        cross = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-        self.normals = cross / np.maximum(np.linalg.norm(cross, axis=1), 1e-300)[:, None]
+        self.normals = unit(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]))
         wp.init()
         self._origin = points.mean(axis=0)
         local = ((points - self._origin) / self.size).astype(np.float32)

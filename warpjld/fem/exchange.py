@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from warpjld.errors import InputError, MissingExtraError
 from warpjld.fem.hexmesh import HexMesh
+from warpjld.whole_file import whole_file
 
 __all__ = ["read_mesh", "write_mesh"]
 
@@ -78,12 +79,8 @@ def write_mesh(path: Path, mesh: HexMesh, point_data: dict[str, NDArray[Any]] | 
     out = meshio.Mesh(
         mesh.nodes, [("hexahedron", mesh.elements)], point_data=point_data or {}, cell_data={"region": [mesh.regions]}
     )
-    part = path.with_name(f".{path.stem}.part{path.suffix}")
-    try:
+    with whole_file(path) as part:
         meshio.write(part, out)
-        part.replace(path)
-    finally:
-        part.unlink(missing_ok=True)
 
 
 def _meshio() -> Any:

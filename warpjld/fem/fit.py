@@ -14,6 +14,7 @@ from warpjld.fem.core import core_of
 from warpjld.fem.envelope import Envelope
 from warpjld.fem.hexmesh import HexMesh, elements_of
 from warpjld.fem.untangle import improve
+from warpjld.rotations import unit
 
 __all__ = ["Fit", "fit_mesh", "mesh_surface_file"]
 
@@ -123,7 +124,7 @@ def _grown(
     x = nodes[quads]
     normal = np.zeros_like(nodes)
     np.add.at(normal, quads, np.cross(x[:, 2] - x[:, 0], x[:, 3] - x[:, 1])[:, None, :].repeat(4, axis=1))
-    outwards = normal[skin] / np.linalg.norm(normal[skin], axis=1)[:, None]
+    outwards = unit(normal[skin])
     layer = np.concatenate([quads, outer[quads]], axis=1)
     all_elements = np.concatenate([elements, layer]).astype(np.int32)
     faces = np.stack([len(elements) + np.arange(len(layer)), np.full(len(layer), 5)], axis=1).astype(np.int32)

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from warpjld.fem.blockmatrix import BlockMatrix
+from warpjld.fem.product import product_pattern
 from warpjld.fem.rows import grouped, on_rows, shared
 
 __all__ = ["coarse_matrix", "restriction"]
@@ -27,31 +28,22 @@ def coarse_matrix(
     """
     from warpjld_kernels import fem_galerkin
 
-    count = weights.shape[1]
-    work = np.concatenate([[0], np.cumsum(np.diff(transposed.indptr))])
-    parts = threads if count >= 64 else 1
-    edges = np.searchsorted(work, np.linspace(0, work[-1], parts + 1)).astype(np.int32)
-    edges[0], edges[-1] = 0, count
-    rows = np.zeros(count + 1, np.int32)
-    ranges, mask = shared(edges), shared(free.astype(np.float64))
-    model = grouped(fem_galerkin.Blocks, rows=fine.rows, columns=fine.columns, values=fine.values.reshape(-1))
-    up, down = (
-        grouped(fem_galerkin.Weights, rows=w.indptr, columns=w.indices, weights=w.data) for w in (weights, transposed)
-    )
-    marker = np.full((parts, count), -1, np.int32)
-    table = shared(marker)
-    coarse = grouped(fem_galerkin.Blocks, rows=rows, columns=np.zeros(1, np.int32), values=np.zeros(1))
-    arguments = [ranges, False, model, up, down, table, coarse]
-    on_rows(fem_galerkin.coarse_pattern, parts, arguments, threads=threads, least=2)
-    np.cumsum(rows, out=rows)
-    columns, values = np.empty(rows[-1], np.int32), np.zeros((rows[-1], 3, 3))
-    coarse = grouped(fem_galerkin.Blocks, rows=rows, columns=columns, values=values.reshape(-1))
-    marker.fill(-1)
-    arguments = [ranges, True, model, up, down, table, coarse]
-    on_rows(fem_galerkin.coarse_pattern, parts, arguments, threads=threads, least=2)
-    arguments = [ranges, model, mask, up, down, table, coarse]
-    on_rows(fem_galerkin.coarse_values, parts, arguments, threads=threads, least=2)
-    return BlockMatrix(rows, columns, values)
+    down, up = (transposed.indptr, transposed.indices), (weights.indptr, weights.indices)
+    product = product_pattern(down, (fine.rows, fine.columns), up, weights.shape[1], threads=threads)
+    values = np.zeros((len(product.columns), 3, 3))
+    arguments = [
+        shared(product.ranges),
+        grouped(fem_galerkin.Blocks, rows=fine.rows, columns=fine.columns, values=fine.values.reshape(-1)),
+        shared(free.astype(np.float64)),
+        *(
+            grouped(fem_galerkin.Weights, rows=w.indptr, columns=w.indices, weights=w.data)
+            for w in (weights, transposed)
+        ),
+        shared(product.marker),
+        grouped(fem_galerkin.Blocks, rows=product.rows, columns=product.columns, values=values.reshape(-1)),
+    ]
+    on_rows(fem_galerkin.coarse_values, len(product.ranges) - 1, arguments, threads=threads, least=2)
+    return BlockMatrix(product.rows, product.columns, values)
 
 
 def restriction(weights: Any) -> Any:

@@ -10,13 +10,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from warpjld.errors import InputError
+from warpjld.fem.block_diagonal import block_inverse
 from warpjld.fem.blockmatrix import BlockMatrix, padded
 from warpjld.fem.conjugate import Iteration, Status, conjugate_gradients
 from warpjld.fem.dots import norm
 from warpjld.fem.hexmesh import HexMesh
 from warpjld.fem.hierarchy import hierarchy_of
+from warpjld.fem.indefinite import IndefiniteError
 from warpjld.fem.minimal import minimal_residuals
-from warpjld.fem.multigrid import IndefiniteError, Multigrid, block_inverse
+from warpjld.fem.multigrid import Multigrid
 from warpjld.fem.rows import Launch, shared, threads_of
 
 __all__ = ["METHODS", "LinearSolver"]

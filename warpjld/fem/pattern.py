@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from warpjld.errors import InputError
 from warpjld.fem.hexmesh import HexMesh
+from warpjld.fem.product import product_pattern
 from warpjld.fem.rows import on_rows, shared, threads_of
 
 __all__ = ["Batches", "Pattern", "batches_of", "pattern_of"]
@@ -56,33 +57,25 @@ def pattern_of(mesh: HexMesh, *, threads: int | None = None) -> Pattern:
     from warpjld_kernels import fem_pattern
 
     workers = threads_of(threads)
-    count = len(mesh.nodes)
-    flat = mesh.elements.ravel()
+    count, elements = len(mesh.nodes), np.ascontiguousarray(mesh.elements)
+    flat = elements.ravel()
     used = np.bincount(flat, minlength=count)
     if (used == 0).any():
         raise InputError(f"mesh: node {int(np.argmin(used))} belongs to no element")
     starts = np.zeros(count + 1, np.int32)
     np.cumsum(used, out=starts[1:])
     incident = (np.argsort(flat, kind="stable") // 8).astype(np.int32)
-    rows = np.zeros(count + 1, np.int32)
-    elements = np.ascontiguousarray(mesh.elements)
-    tables = [shared(starts), shared(incident), shared(elements)]
-    nothing = np.zeros(1, np.int32)
-    on_rows(fem_pattern.node_neighbours, count, [*tables, False, shared(rows), shared(nothing)], threads=workers)
-    if (rows < 0).any():
-        crowded = int(np.argmin(rows)) - 1
-        raise InputError(f"mesh: node {crowded} shares elements with more than {fem_pattern.MOST_NEIGHBOURS} nodes")
-    np.cumsum(rows, out=rows)
-    columns = np.empty(rows[-1], np.int32)
-    on_rows(fem_pattern.node_neighbours, count, [*tables, True, shared(rows), shared(columns)], threads=workers)
+    numbers = np.arange(len(elements) + 1, dtype=np.int32)
+    # node → its elements → themselves → their nodes
+    product = product_pattern((starts, incident), (numbers, numbers[:-1]), (8 * numbers, flat), count, threads=workers)
     slots = np.empty((len(elements), 64), np.int32)
     on_rows(
         fem_pattern.element_slots,
         len(elements),
-        [tables[2], shared(rows), shared(columns), shared(slots)],
+        [shared(elements), shared(product.rows), shared(product.columns), shared(slots)],
         threads=workers,
     )
-    return Pattern(rows, columns, slots, starts, incident)
+    return Pattern(product.rows, product.columns, slots, starts, incident)
 
 
 def batches_of(pattern: Pattern, kinds: NDArray[np.int32], parts: int) -> Batches:

@@ -12,6 +12,8 @@ from warpjld.fem.body import Body
 from warpjld.fem.solution import Instant
 from warpjld.fem.stress import at_nodes, cauchy, mises
 from warpjld.fem.vtk import grid_of
+from warpjld.rotations import unit
+from warpjld.whole_file import whole_file
 
 __all__ = ["QUANTITIES", "draw"]
 
@@ -50,9 +52,8 @@ def draw(path: Path, body: Body, instant: Instant, quantity: str, title: str = "
     ]
     sheet = Image.fromarray(np.concatenate(panels, axis=1))
     sheet = sheet.resize((2 * _PANEL + _BAR, _PANEL), Image.Resampling.LANCZOS)
-    part = path.with_name(path.name + ".part")
-    sheet.save(part, format="PNG")
-    part.replace(path)
+    with whole_file(path) as part:
+        sheet.save(part, format="PNG")
 
 
 def _panel(
@@ -79,8 +80,8 @@ def _panel(
         )
     plotter.camera_position = [tuple(centre + 3 * reach * eye), tuple(centre), tuple(up)]
     plotter.enable_parallel_projection()
-    right = np.cross(up, eye) / np.linalg.norm(np.cross(up, eye))
-    above = np.cross(eye, right) / np.linalg.norm(eye)
+    right = unit(np.cross(up, eye))
+    above = unit(np.cross(eye, right))
     spread = (np.asarray(whole.points) - centre) @ np.stack([right, above], axis=1)
     plotter.camera.parallel_scale = 1.12 * float(np.abs(spread).max())
     plotter.camera.clipping_range = (0.1 * reach, 10 * reach)

@@ -12,6 +12,7 @@ from warpjld.fem.body import Body
 from warpjld.fem.hexmesh import HexMesh
 from warpjld.fem.solution import Instant
 from warpjld.fem.stress import at_nodes, cauchy, mises
+from warpjld.whole_file import whole_file
 
 __all__ = ["Series", "grid_of", "write_vtu"]
 
@@ -37,12 +38,8 @@ def write_vtu(path: Path, body: Body, instant: Instant) -> None:
     point["mises"] = at_nodes(body, mises(stress))
     cell["stress"] = stress
     cell["mises"] = mises(stress)
-    part = path.with_name(f".{path.stem}.part.vtu")
-    try:
+    with whole_file(path) as part:
         grid.save(part)
-        part.replace(path)
-    finally:
-        part.unlink(missing_ok=True)
 
 
 class Series:
@@ -66,7 +63,6 @@ class Series:
             '<?xml version="1.0"?>\n<VTKFile type="Collection" version="0.1" byte_order="LittleEndian">\n'
             f"  <Collection>\n{lines}\n  </Collection>\n</VTKFile>\n"
         )
-        part = self.path.with_name(self.path.name + ".part")
-        part.write_text(text)
-        part.replace(self.path)
+        with whole_file(self.path) as part:
+            part.write_text(text)
         return self.path.with_name(name)

@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -14,24 +14,22 @@ from warpjld.errors import InputError
 from warpjld.grasp.close import Closed, close_hand
 from warpjld.grasp.digits import digit_chains
 from warpjld.grasp.distance import ObjectSet
+from warpjld.grasp.draws import Draws
 from warpjld.grasp.judge import Judge, Verdict
 from warpjld.grasp.objects import GraspObject
-from warpjld.grasp.opening import Opening, closing_in_air
-from warpjld.grasp.placements import Candidates, across_widths, sample_wrists
-from warpjld.grasp.postures import AHEAD, CLOSING, posture_angles, posture_for
-from warpjld.grasp.widths import Widths, sample_widths
-from warpjld.skeleton import CHANNELS, DIGITS, Poses, Skeleton
+from warpjld.grasp.obstacles import COLLIDES, Obstacles
+from warpjld.grasp.placements import Candidates
+from warpjld.grasp.postures import CLOSING, posture_angles, posture_for
+from warpjld.skeleton import DIGITS, Poses, Skeleton
 
 __all__ = ["AutoGrasp", "find_grasp"]
 
-_LINES = 400  # through the object, to find where it is narrow
-_PALM_FIRST = 0.25  # share of the placements that are made palm first
-_VARIANTS = 6  # of a posture
 _ROUND = 32  # placements looked at together
 _FINALISTS = 6  # of a round, closed and judged in full
 _DEEPEST = 1e-3  # of hand and object in one another, above which a grasp is refused [m]
 _PRESSED = 3e-4  # depth from which an open hand goes back [m]
 _GOOD = 0.12  # score that ends the search early [N]
+_CLOSES = (0.0, 0.25, 0.5, 0.75, 1.0)  # parts of the digits' way at which the hand must not be in an obstacle
 
 
 @dataclass(frozen=True, eq=False)
@@ -81,6 +79,7 @@ def find_grasp(
     covering: Covering,
     thing: GraspObject,
     *,
+    obstacles: Sequence[GraspObject] = (),
     side: str | None = None,
     count: int = 96,
     posture: str | None = None,
@@ -97,9 +96,13 @@ def find_grasp(
     grasp that is not force closed, or in which hand and object are more than 1 mm in one another, is refused; of the
     others the best score is kept. One with a score of 0.12 N and all digits but one (of a pinch all) ends the search.
 
+    Obstacles are stayed clear of by 0.1 mm of depth: by the open hand on the last 12 cm of its way, and by its digits
+    while they close. Placements that they are in the way of are drawn again.
+
     Args:
         covering: The hand.
         thing: The object where it stands.
+        obstacles: Other objects where they stand.
         side: ``left`` or ``right``; may be left out for a single hand.
         count: Placements at most.
         posture: One of ``POSTURES``; by the object's shape if left out.
@@ -122,13 +125,16 @@ def find_grasp(
     start = posture_angles(covering.skeleton, side, chosen)
     closing = [digit for digit in CLOSING.get(chosen, DIGITS) if f"{side}.{digit}" in digit_chains(covering.skeleton)]
     digits = [f"{side}.{digit}" for digit in closing]
-    objects, rng = ObjectSet(thing), np.random.default_rng(seed)
+    objects, around = ObjectSet(thing), Obstacles(covering, obstacles)
     judge = Judge(covering, thing, side, friction)
+    draws = Draws(covering, objects, around, side, chosen, start, closing, np.random.default_rng(seed))
     best: AutoGrasp | None = None
+    tried = 0
     for first in range(0, count, _ROUND):
-        hands = _placements(covering, objects, side, chosen, start, closing, min(_ROUND, count - first), rng)
-        for hand in _promising(judge, side, hands, objects, digits, coupling):
-            found = _closed(judge, hand, objects, digits, coupling, best.score if best else 0.0)
+        hands = draws.draw(min(_ROUND, count - first))
+        tried += len(hands)
+        for hand in _promising(judge, side, hands, objects, around, digits, coupling):
+            found = _closed(judge, hand, objects, around, digits, coupling, best.score if best else 0.0)
             if found is None:
                 continue
             closed, verdict = found
@@ -142,15 +148,17 @@ def find_grasp(
                 closed.angles[0],
                 verdict,
                 touching,
-                first + len(hands),
+                tried,
             )
             if verdict.score >= _GOOD and len(touching) >= len(digits) - (len(digits) > 3):
                 return best
     if best is None:
+        blocked = f", or out of reach: {', '.join(around.names)} blocked {draws.turned_down} more" if around else ""
         raise InputError(
-            f"object {thing.name}: none of {count} placements ends in a grasp; it may be too large, too small or thin"
+            f"object {thing.name}: none of {tried} placements ends in a grasp; it may be too large, too small or thin"
+            f"{blocked}"
         )
-    return replace(best, tried=count)
+    return replace(best, tried=tried)
 
 
 def _promising(
@@ -158,15 +166,19 @@ def _promising(
     side: str,
     hands: Candidates,
     objects: ObjectSet,
+    obstacles: Obstacles,
     digits: list[str],
     coupling: tuple[float, float] | None,
 ) -> Iterator[Candidates]:
     """Open hands that do best when closed roughly, best first, moved out of what they would press into."""
+    if not len(hands):
+        return
     covering = judge.covering
     open_hands = hands.poses(covering.skeleton)
     quick = close_hand(covering, open_hands, hands.angles, objects, digits=digits, coupling=coupling, quick=True)
     poses = hands.poses(covering.skeleton, quick.angles)
-    ranks = judge.first_look(poses, covering.deform(poses))
+    skins = covering.deform(poses)
+    ranks = np.where(obstacles.missed(skins), judge.first_look(poses, skins), 0.0)
     for row in np.argsort(-ranks, kind="stable")[:_FINALISTS].tolist():
         if ranks[row] > 0.0:
             one = slice(row, row + 1)
@@ -177,6 +189,7 @@ def _closed(
     judge: Judge,
     hand: Candidates,
     objects: ObjectSet,
+    obstacles: Obstacles,
     digits: list[str],
     coupling: tuple[float, float] | None,
     least: float,
@@ -197,71 +210,17 @@ def _closed(
         verdict = judge.judge(there, covering.deform(there)[0])
         if verdict.depth > _DEEPEST or verdict.score <= least:
             return None
+    if obstacles and _runs_into(covering, hand, closed.angles, obstacles):
+        return None
     assert verdict is not None
     return closed, verdict
 
 
-def _placements(
-    covering: Covering,
-    objects: ObjectSet,
-    side: str,
-    posture: str,
-    start: NDArray[np.float64],
-    closing: list[str],
-    count: int,
-    rng: np.random.Generator,
-) -> Candidates:
-    """Placements of both kinds, ``count`` in all."""
-    (thing,) = objects.objects
-    openings = _variants(covering, side, start, closing, rng)
-    most = max(one.width[0] for one in openings)
-    widths = sample_widths(objects, _LINES, rng, widest=float(most))
-    across = count - int(_PALM_FIRST * count) if len(widths) else 0
-    some = []
-    if across:
-        chosen = rng.choice(len(widths), size=across, p=_preference(widths, thing))
-        turned = rng.random(across) < 0.5
-        picked = widths[chosen]
-        ends = (
-            np.where(turned[:, None], picked.second, picked.first),
-            np.where(turned[:, None], picked.first, picked.second),
-        )
-        into = 0.3 if posture == "pinch" else 1.0
-        some.append(across_widths(covering, openings, objects, Widths(*ends, picked.slant), side, rng, into=into))
-    if count > across:
-        ahead = AHEAD.get(posture, 0.0)
-        some.append(sample_wrists(covering, start, thing, side, count - across, rng, ahead=ahead))
-    return Candidates.joined(some)
-
-
-def _variants(
-    covering: Covering, side: str, start: NDArray[np.float64], closing: list[str], rng: np.random.Generator
-) -> list[Opening]:
-    """A posture as it is, and with thumb and fingers a little elsewhere."""
-    skeleton, found = covering.skeleton, []
-    for variant in range(_VARIANTS):
-        angles = start.copy()
-        if variant:
-            bend = rng.uniform(0.0, 20.0)
-            shifts = {"thumb.base": {"pivot": rng.uniform(-15, 10), "abduction": rng.uniform(-20, 15)}}
-            shifts |= {f"{digit}.base": {"flexion": bend} for digit in closing if digit != "thumb"}
-            for name, channels in shifts.items():
-                row = skeleton.index(f"{side}.{name}")
-                for channel, degrees in channels.items():
-                    column = CHANNELS.index(channel)
-                    turned = angles[row, column] + np.radians(degrees)
-                    angles[row, column] = np.clip(turned, *skeleton.limits[row, column])
-        found.append(closing_in_air(covering, side, angles, closing))
-    return found
-
-
-def _preference(widths: Widths, thing: GraspObject) -> NDArray[np.float64]:
-    """How likely a width is taken: straight through, and near the centre of mass."""
-    centre = thing.place.apply(thing.centroid[None])[0, 0]
-    off = np.linalg.norm(0.5 * (widths.first + widths.second) - centre, axis=1)
-    radius = np.linalg.norm(thing.vertices - thing.centroid, axis=1).max()
-    weight = widths.slant**4 * np.exp(-((off / (0.4 * radius)) ** 2)) + 1e-6
-    return np.asarray(weight / weight.sum())
+def _runs_into(covering: Covering, hand: Candidates, closed: NDArray[np.float64], obstacles: Obstacles) -> bool:
+    """Whether a hand enters an obstacle while its digits close."""
+    angles = hand.angles + np.array(_CLOSES)[:, None, None] * (closed - hand.angles)
+    skins = covering.deform(hand[np.zeros(len(angles), dtype=int)].poses(covering.skeleton, angles))
+    return any(obstacles.depth(skin) > COLLIDES for skin in skins)
 
 
 def _clear_of(judge: Judge, side: str, hand: Candidates, closed: NDArray[np.float64]) -> Candidates:

@@ -5,13 +5,14 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from warpjld.rotations import unit
+
 __all__ = ["face_normals", "feature_normals"]
 
 
 def face_normals(corners: NDArray[np.float64]) -> NDArray[np.float64]:
     """Unit normals of triangles with corners (t, 3, 3), shape (t, 3); zero where there is no area."""
-    normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-    return np.asarray(normal / np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), 1e-300))
+    return unit(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]))
 
 
 def feature_normals(vertices: NDArray[np.float64], faces: NDArray[np.int32]) -> NDArray[np.float64]:

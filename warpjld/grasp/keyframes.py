@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from dataclasses import dataclass
 from pathlib import Path
+from zipfile import BadZipFile
 
 import numpy as np
 from numpy.typing import NDArray
@@ -73,8 +74,8 @@ def _archive(path: Path) -> tuple[NDArray[np.float64], NDArray[np.float64], NDAr
             if missing:
                 raise InputError(f"no animated surface: '{sorted(missing)[0]}' is missing", path=path)
             found = file["frames"].astype(float), file["vertices"].astype(float), file["faces"].astype(np.int32)
-    except (OSError, ValueError) as error:
-        raise InputError(f"not an archive of arrays: {error}", path=path) from error
+    except (OSError, EOFError, ValueError, BadZipFile) as error:
+        raise InputError("is no archive of NumPy arrays (.npz), or a damaged one", path=path) from error
     frames, vertices, _ = found
     if vertices.ndim != 3 or vertices.shape[2] != 3 or frames.shape != vertices.shape[:1] or not len(frames):
         raise InputError(f"vertices: want shape (frames, n, 3), got {vertices.shape}", path=path)

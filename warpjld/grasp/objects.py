@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.spatial.transform import Rotation
 
 from warpjld.errors import InputError
+from warpjld.grasp.feature_normals import face_normals
 from warpjld.grasp.validation import MeshReport, mend
 from warpjld.surface import Part, weld_surface
 
@@ -109,10 +110,8 @@ class GraspObject:
 
     @cached_property
     def normals(self) -> NDArray[np.float64]:
-        """Unit normals of the facets, shape (t, 3)."""
-        a, b, c = (self.vertices[self.faces[:, k]] for k in range(3))
-        normal = np.cross(b - a, c - a)
-        return np.asarray(normal / np.linalg.norm(normal, axis=1, keepdims=True))
+        """Unit normals of the facets, shape (t, 3); zero where there is no area."""
+        return face_normals(self.vertices[self.faces])
 
     @cached_property
     def volume(self) -> float:

@@ -12,10 +12,12 @@ from warpjld.covering import Covering
 from warpjld.grasp.distance import ObjectSet
 from warpjld.grasp.objects import GraspObject
 from warpjld.grasp.opening import Opening
+from warpjld.grasp.palm import palm_of
 from warpjld.grasp.widths import Widths
+from warpjld.rotations import unit
 from warpjld.skeleton import Poses, Skeleton, poses_from_angles
 
-__all__ = ["Candidates", "across_widths", "palm_frame", "sample_wrists"]
+__all__ = ["Candidates", "across_widths", "sample_wrists"]
 
 _CLEARANCE = 3e-4  # between the open hand and the object [m]
 _SPARE = 0.02  # by which a hand opens wider than what it takes [m]
@@ -65,20 +67,6 @@ class Candidates:
         return Candidates(*(np.concatenate([getattr(one, name) for one in some]) for name in names))
 
 
-def palm_frame(skeleton: Skeleton, side: str) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Middle of the palm at rest [m], shape (3,), and rows: where it looks, where the fingers point, their cross
-    product, shape (3, 3)."""
-    knuckle = skeleton.index(f"{side}.middle.base")
-    wrist = skeleton.index(f"{side}.wrist")
-    fingers = skeleton.rest[knuckle] - skeleton.rest[wrist]
-    fingers = fingers / np.linalg.norm(fingers)
-    look = -np.cross(skeleton.directions[knuckle], skeleton.axes[knuckle])
-    look = look - fingers * (look @ fingers)
-    look /= np.linalg.norm(look)
-    middle = 0.75 * skeleton.rest[knuckle] + 0.25 * skeleton.rest[wrist]
-    return middle, np.stack([look, fingers, np.cross(look, fingers)])
-
-
 def sample_wrists(
     covering: Covering,
     angles: NDArray[np.float64],
@@ -96,17 +84,16 @@ def sample_wrists(
     then comes as near as it can without touching: its skin's distance bounds each step. With ``ahead`` [m] the object
     is met up to that far before the palm's middle towards the fingers, and the palm stays as far away from it.
     """
-    middle, frame = palm_frame(covering.skeleton, side)
+    palm = palm_of(covering.skeleton, side)
     part = rng.uniform(0.0, 1.0, size=(count, 1)) if ahead else np.zeros((count, 1))
-    middle = middle + ahead * part * frame[1]
+    middle = palm.middle + ahead * part * palm.fingers
     golden = np.pi * (3.0 - 5.0**0.5)
     k = np.arange(count) + 0.5
     high = 1.0 - 2.0 * k / count
     out = np.stack([np.sqrt(1 - high**2) * np.cos(golden * k), high, np.sqrt(1 - high**2) * np.sin(golden * k)], axis=1)
     look = -(Rotation.random(rng=rng).apply(out))
     fingers = _around(look, rng)
-    target = np.stack([look, fingers, np.cross(look, fingers)], axis=1)
-    rotation = Rotation.from_matrix(np.einsum("gki,kj->gij", target, frame))
+    rotation = Rotation.from_matrix(palm.turned_to(look, fingers))
     centre = thing.place.apply(thing.centroid[None])[0, 0]
     aim = centre + rng.uniform(-0.2, 0.2, size=(count, 3)) * thing.size
     root = covering.skeleton.rest[0]
@@ -147,7 +134,7 @@ def across_widths(
         into: Largest part of the way to the palm.
     """
     count, skeleton = len(widths), covering.skeleton
-    middle, _ = palm_frame(skeleton, side)
+    middle = palm_of(skeleton, side).middle
     chosen = rng.integers(len(openings), size=count)
     rows = [openings[k] for k in chosen]
     fit = [one.step_for(width) for one, width in zip(rows, widths.width, strict=True)]
@@ -156,8 +143,7 @@ def across_widths(
     fingers = np.stack([one.fingers[k] for one, k in zip(rows, fit, strict=True)])
     between = 0.5 * (thumb + fingers)
     own = _frame(fingers - thumb, between - middle)
-    line = widths.second - widths.first
-    line /= np.linalg.norm(line, axis=1, keepdims=True)
+    line = unit(widths.second - widths.first)
     wanted = _frame(line, _around(line, rng))
     rotation = Rotation.from_matrix(np.einsum("gki,gkj->gij", wanted, own))
     root = skeleton.rest[0]
@@ -193,15 +179,13 @@ def _come(covering: Covering, hands: Candidates, objects: ObjectSet, reach: NDAr
 
 def _around(axis: NDArray[np.float64], rng: np.random.Generator) -> NDArray[np.float64]:
     """Unit vectors normal to others (G, 3), the angle about them even."""
-    aside = np.cross(axis, np.eye(3)[np.abs(axis).argmin(axis=1)])
-    aside /= np.linalg.norm(aside, axis=1, keepdims=True)
+    aside = unit(np.cross(axis, np.eye(3)[np.abs(axis).argmin(axis=1)]))
     roll = rng.uniform(0.0, 2.0 * np.pi, size=(len(axis), 1))
     return np.asarray(np.cos(roll) * aside + np.sin(roll) * np.cross(axis, aside))
 
 
 def _frame(first: NDArray[np.float64], second: NDArray[np.float64]) -> NDArray[np.float64]:
     """Right-handed frames as rows: along the first vectors, along the second as far as square to them, (G, 3, 3)."""
-    x = first / np.linalg.norm(first, axis=1, keepdims=True)
-    y = second - x * (x * second).sum(axis=1, keepdims=True)
-    y /= np.linalg.norm(y, axis=1, keepdims=True)
+    x = unit(first)
+    y = unit(second - x * (x * second).sum(axis=1, keepdims=True))
     return np.stack([x, y, np.cross(x, y)], axis=1)

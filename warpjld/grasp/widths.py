@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from warpjld.grasp.distance import ObjectSet
+from warpjld.rotations import unit
 
 __all__ = ["Widths", "sample_widths"]
 
@@ -56,7 +57,7 @@ def sample_widths(objects: ObjectSet, count: int, rng: np.random.Generator, *, w
     turn = Rotation.from_quat(thing.place.rotation[0])
     start, outward = thing.place.apply(local)[0], turn.apply(thing.normals[face])
     line = -outward + rng.uniform(-_LEAN, _LEAN, size=(count, 3)) * rng.uniform(size=(count, 1))
-    line /= np.linalg.norm(line, axis=1, keepdims=True)
+    line = unit(line)
     along = np.full(count, 20.0 * _SURFACE)
     left, normal = np.zeros(count, dtype=bool), np.zeros((count, 3))
     for _ in range(64):

@@ -13,6 +13,7 @@ from warpjld.hand.flesh import Flesh
 from warpjld.hand.plan import Plan
 from warpjld.hand.triangulate import triangulate
 from warpjld.rig import Rig
+from warpjld.rotations import unit
 from warpjld.skeleton import DIGITS, PALM_SEGMENTS, Skeleton, default_limits, hand_joint_names
 from warpjld.skeleton.hand import FINGER_JOINTS, HAND_PARENTS
 from warpjld.suggest import one_of
@@ -108,13 +109,13 @@ def _skeleton(plan: Plan) -> Skeleton:
         j = place[f"left.{digit}.carpometacarpal"]
         rest[j] = point
         along = plan.digits[digit].joints[0] - point
-        axes[j] = _unit(np.cross(plan.digits[digit].dorsal[0], along))
+        axes[j] = unit(np.cross(plan.digits[digit].dorsal[0], along))
     for digit, parts in plan.digits.items():
         for k, joint in enumerate(FINGER_JOINTS):
             j = place[f"left.{digit}.{joint}"]
             rest[j] = parts.joints[k]
             bone = parts.joints[min(k + 1, 3)] - parts.joints[min(k, 2)]
-            axes[j] = _unit(np.cross(parts.dorsal[k], bone))
+            axes[j] = unit(np.cross(parts.dorsal[k], bone))
     palms = tuple((place[f"left.{a}"], place[f"left.{b}"]) for a, b in PALM_SEGMENTS)
     return Skeleton(names, np.array(parents, dtype=np.int32), rest * _MILLIMETRE, axes, default_limits(names), (palms,))
 
@@ -124,7 +125,3 @@ def _mirrored(left: Skeleton) -> Skeleton:
     flip = np.array([-1.0, 1.0, 1.0])
     axes = -left.axes * flip  # an axis of rotation mirrors with the opposite sign
     return Skeleton(names, left.parents, left.rest * flip, axes, default_limits(names), left.palms)
-
-
-def _unit(vector: Array) -> Array:
-    return vector / np.linalg.norm(vector)

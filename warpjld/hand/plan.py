@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from warpjld.hand import design
 from warpjld.hand.sweep import Sweep
+from warpjld.rotations import unit
 
 __all__ = ["Digit", "Plan", "plan_hand"]
 
@@ -72,7 +73,7 @@ def plan_hand(along: float, across: float, proportions: Mapping[str, tuple[float
     long, thick = proportions.get("thumb", (1.0, 1.0))
     side, down = np.radians(design.THUMB_ABDUCTION), np.radians(design.THUMB_DEPTH)
     steps = np.column_stack([np.sin(side) * np.cos(down), -np.sin(down), -np.cos(side) * np.cos(down)])
-    mean = steps.sum(axis=0) / np.linalg.norm(steps.sum(axis=0))
+    mean = unit(steps.sum(axis=0))
     up = _square(np.array([0.0, 1.0, 0.0]), mean)
     roll = np.radians(design.THUMB_ROLL)
     up = np.cos(roll) * up + np.sin(roll) * np.cross(up, mean) * np.sign(np.cross(up, mean)[0])
@@ -97,7 +98,7 @@ def _digit(
     joints = base + np.vstack([np.zeros(3), np.cumsum(steps * lengths[:, None], axis=0)])
     skin = joints[3].copy()
     joints[3] = skin - steps[2] * _TIP * half  # the extremity's centre lies inside the skin
-    axis = (skin - base) / np.linalg.norm(skin - base)
+    axis = unit(skin - base)
     dorsal = _square(up, axis)
     frame = np.vstack([np.cross(dorsal, axis), dorsal, axis])
     local = (np.vstack([joints[:3], skin]) - base) @ frame.T
@@ -140,5 +141,4 @@ def _spindle(start: Array, end: Array, profile: tuple[tuple[float, ...], ...], a
 
 def _square(vector: Array, axis: Array) -> Array:
     """The part of a vector square to an axis, of length one."""
-    out = vector - axis * (vector @ axis) / (axis @ axis)
-    return out / np.linalg.norm(out)
+    return unit(vector - axis * (vector @ axis) / (axis @ axis))

@@ -11,6 +11,7 @@ from warpjld.hand.contour import contour
 from warpjld.hand.flesh import Flesh
 from warpjld.hand.mesh import Array, Edges, Faces, face_normals, mean_over_neighbours, subdivide
 from warpjld.hand.remesh import remesh, settle
+from warpjld.rotations import unit
 
 __all__ = ["triangulate"]
 
@@ -59,8 +60,7 @@ def _closed_contour(flesh: Flesh, base: int) -> tuple[Array, Faces]:
 
 def _relative_size(flesh: Flesh, vertices: Array, faces: Faces) -> Array:
     """Wanted edge lengths up to a factor: shorter where the surface bends more, shape (V,)."""
-    normal = flesh.slope(vertices)[1]
-    normal /= np.linalg.norm(normal, axis=1, keepdims=True)
+    normal = unit(flesh.slope(vertices)[1])
     edges = Edges.of(faces, len(vertices))
     a, b = edges.ends.T
     lengths = np.linalg.norm(vertices[a] - vertices[b], axis=1)

@@ -30,6 +30,8 @@ from warpjld.io.source import SourceRig
 from warpjld.skeleton.recognise.tree import SourceTree
 from warpjld.skeleton.tree import CHANNELS, Skeleton
 from warpjld.suggest import did_you_mean
+from warpjld.text_file import read_json
+from warpjld.whole_file import whole_file
 
 __all__ = ["read_skeleton_file", "write_skeleton_file"]
 
@@ -43,14 +45,7 @@ def read_skeleton_file(path: str | Path, mesh: MeshFile) -> SourceRig:
         InputError: Unreadable, or an entry that is not as described above.
     """
     path = Path(path)
-    try:
-        content = json.loads(path.read_text("utf-8"))
-    except OSError as error:
-        raise InputError(f"cannot be read: {error.strerror}", path=path) from None
-    except UnicodeDecodeError:
-        raise InputError("is not a text file: a skeleton file is JSON", path=path) from None
-    except json.JSONDecodeError as error:
-        raise InputError(f"is not JSON: {error.msg}", path=path, line=error.lineno, column=error.colno) from None
+    content = read_json(path)
     try:
         return _rig(path, content, mesh)
     except InputError as error:
@@ -158,11 +153,9 @@ def write_skeleton_file(path: str | Path, skeleton: Skeleton) -> None:
                 },
             }
         )
-    path = Path(path)
-    part = path.with_name(path.name + ".part")
     lines = ",\n".join("    " + json.dumps(joint) for joint in joints)
     try:
-        part.write_text(f'{{\n  "joints": [\n{lines}\n  ]\n}}\n', "utf-8")
-        part.replace(path)
+        with whole_file(Path(path)) as part:
+            part.write_text(f'{{\n  "joints": [\n{lines}\n  ]\n}}\n', "utf-8")
     except OSError as error:
         raise InputError(f"cannot be written: {error.strerror}", path=path) from None

@@ -51,7 +51,7 @@ class _Lines:
         try:
             text = Path(path).read_text(encoding="utf-8", errors="replace")
         except OSError as error:
-            raise InputError(f"cannot read motion: {error.strerror}", path=path) from error
+            raise InputError(f"cannot be read: {error.strerror}", path=path) from error
         words = ((number, line.split()) for number, line in enumerate(text.splitlines(), start=1))
         self._rest: Iterator[tuple[int, list[str]]] = ((n, w) for n, w in words if w)
         self.number = 0

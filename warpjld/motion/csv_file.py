@@ -13,6 +13,8 @@ from warpjld.errors import InputError
 from warpjld.motion.channels import ROOT_CHANNELS, canonical_channels, resolve_channel
 from warpjld.motion.tracks import Motion
 from warpjld.skeleton import Skeleton
+from warpjld.text_file import read_text
+from warpjld.whole_file import whole_file
 
 __all__ = ["read_csv", "write_csv"]
 
@@ -29,13 +31,7 @@ def read_csv(path: str | Path, *, skeleton: Skeleton | None = None, rate: float 
         InputError: Unreadable, no or a wrong header, an unknown joint, a cell that is not a number, frames that
             are missing or do not increase; with its line and column.
     """
-    try:
-        text = Path(path).read_text(encoding="utf-8-sig")
-    except OSError as error:
-        raise InputError(f"cannot read motion: {error.strerror}", path=path) from error
-    except UnicodeDecodeError as error:
-        raise InputError("not a text file in UTF-8", path=path) from error
-    reader = csv.reader(text.splitlines())
+    reader = csv.reader(read_text(path).splitlines())
     motion = Motion(rate=rate)
     header: list[str] | None = None
     last = -math.inf
@@ -88,14 +84,11 @@ def write_csv(path: str | Path, motion: Motion, *, frames: ArrayLike | None = No
     else:
         at = np.atleast_1d(np.asarray(frames, dtype=np.float64)).tolist()
         rows = [list(row) for row in zip(*(motion.value(c, at).tolist() for c in channels), strict=True)]
-    target = Path(path)
-    beside = target.with_name(target.name + ".part")
-    with beside.open("w", encoding="utf-8", newline="") as file:
+    with whole_file(Path(path)) as part, part.open("w", encoding="utf-8", newline="") as file:
         writer = csv.writer(file, lineterminator="\n")
         writer.writerow(["frame", *channels])
         for frame, row in zip(at, rows, strict=True):
             writer.writerow([f"{frame:.12g}", *(_cell(c, value) for c, value in zip(channels, row, strict=True))])
-    beside.replace(target)
 
 
 def _read_header(cells: list[str], skeleton: Skeleton | None, path: str | Path, line: int) -> list[str]:

@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import json
 from pathlib import Path
-from typing import Any
 
 from warpjld.errors import InputError
 from warpjld.motion.hand_track import HandTrack
 from warpjld.motion.leap import leap_track
 from warpjld.motion.webxr import webxr_track
+from warpjld.text_file import read_json
 
 __all__ = ["read_hand_track"]
 
@@ -23,14 +22,7 @@ def read_hand_track(path: str | Path) -> tuple[HandTrack, float]:
     Raises:
         InputError: Unreadable, not JSON, or neither of the two.
     """
-    try:
-        content: Any = json.loads(Path(path).read_text(encoding="utf-8-sig"))
-    except OSError as error:
-        raise InputError(f"cannot read motion: {error.strerror}", path=path) from error
-    except UnicodeDecodeError as error:
-        raise InputError("not a text file in UTF-8", path=path) from error
-    except json.JSONDecodeError as error:
-        raise InputError(f"not JSON: {error.msg}", path=path, line=error.lineno, column=error.colno) from error
+    content = read_json(path)
     try:
         if isinstance(content, dict) and isinstance(content.get("frames"), list):
             return leap_track(content)

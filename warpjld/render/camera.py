@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from warpjld.errors import InputError
+from warpjld.rotations import unit
 from warpjld.suggest import one_of
 
 __all__ = ["VIEWS", "Camera"]
@@ -104,9 +105,8 @@ class Camera:
             raise InputError("camera points: want at least one point, all finite")
         axes = _axes(forward, up, None if name in _BODY else side)
         eye, above = (np.asarray(direction, float) @ axes for direction in VIEWS[name])
-        back = eye / np.linalg.norm(eye)
-        right = np.cross(above, back)
-        right /= np.linalg.norm(right)
+        back = unit(eye)
+        right = unit(np.cross(above, back))
         frame = np.stack([right, np.cross(back, right), back])
 
         local = cloud @ frame.T
@@ -125,7 +125,7 @@ class Camera:
 
     def turned(self, angle: float) -> Self:
         """The camera carried round its target about ``up`` [rad], for turntables."""
-        axis = np.asarray(self.up) / np.linalg.norm(self.up)
+        axis = unit(self.up)
         arm = np.subtract(self.position, self.target)
         arm = (
             arm * math.cos(angle) + np.cross(axis, arm) * math.sin(angle) + axis * (axis @ arm) * (1 - math.cos(angle))
@@ -140,7 +140,7 @@ def _axes(forward: ArrayLike, up: ArrayLike, side: str | None) -> NDArray[np.flo
     above = above - (above @ front) * front
     if not np.linalg.norm(above) > 1e-9:
         raise InputError("camera: forward and up must be two different directions")
-    above /= np.linalg.norm(above)
+    above = unit(above)
     # seen palm first with its fingers up, a left hand has its thumb on the left
     thumb = np.cross(above, front) * (-1 if side == "left" else 1)
     return np.stack([thumb, above, front])

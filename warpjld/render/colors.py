@@ -11,7 +11,24 @@ from numpy.typing import ArrayLike, NDArray
 from warpjld.errors import InputError
 from warpjld.suggest import did_you_mean
 
-__all__ = ["ColorScale"]
+__all__ = ["ColorScale", "as_hex"]
+
+
+def as_hex(color: str) -> str:
+    """A colour as ``#rrggbb``: from a name as the web has them, in any case, or ``#rgb``, ``#rrggbb``.
+
+    Raises:
+        InputError: There is no such colour.
+    """
+    from matplotlib.colors import CSS4_COLORS, to_hex
+
+    plain = color.replace(" ", "").lower()
+    if plain not in CSS4_COLORS and not plain.startswith("#"):
+        raise InputError(f"there is no colour '{color}'{did_you_mean(plain, CSS4_COLORS)}")
+    try:
+        return str(to_hex(plain))
+    except ValueError:
+        raise InputError(f"colour '{color}': want a name, or #rrggbb") from None
 
 
 @dataclass(frozen=True)

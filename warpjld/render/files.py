@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from warpjld.errors import InputError
+from warpjld.whole_file import whole_file
 
 __all__ = ["save_picture"]
 
@@ -26,15 +27,11 @@ def save_picture(path: str | Path, picture: NDArray[np.uint8]) -> Path:
     kind = _FORMATS.get(path.suffix.lower())
     if kind is None:
         raise InputError(f"unknown kind of picture '{path.suffix}': want one of {', '.join(_FORMATS)}", path=path)
-    part = path.with_name(f"{path.name}.part")
     options = {"quality": 95} if kind in ("JPEG", "WEBP") else {}
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
-        try:
+        with whole_file(path) as part:
             Image.fromarray(picture).save(part, format=kind, **options)
-            part.replace(path)
-        finally:
-            part.unlink(missing_ok=True)
     except OSError as error:
         raise InputError(f"cannot write: {error.strerror or error}", path=path) from error
     return path

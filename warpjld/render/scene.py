@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 from warpjld.errors import InputError
 from warpjld.render.body import MATTE, SKIN, Body
 from warpjld.render.camera import Camera
-from warpjld.render.colors import ColorScale
+from warpjld.render.colors import ColorScale, as_hex
 from warpjld.render.lights import add_lights
 from warpjld.render.occlusion import occlusion, shade
 from warpjld.render.skeleton import bone_faces, bone_vertices, joint_faces, joint_vertices
@@ -40,7 +40,7 @@ class Solid:
     Attributes:
         vertices: Positions [m], shape (n, 3); for a moving object give others to `Scene.draw`.
         faces: Triangles, shape (t, 3).
-        color: Name or ``#rrggbb``.
+        color: Name or ``#rrggbb``, see `as_hex`.
         opacity: 0…1.
     """
 
@@ -48,6 +48,9 @@ class Solid:
     faces: ArrayLike
     color: str = "#7fa3b8"
     opacity: float = 1.0
+
+    def __post_init__(self) -> None:
+        as_hex(self.color)
 
 
 class Scene:

@@ -215,6 +215,8 @@ class Arguments:
         folder = Path() if self.last.path.startswith("<") else script.parent
         path = folder / Path(name).expanduser()
         if not path.is_file():
+            if path.is_dir():
+                raise self.error(f"'{path}' is a folder; want a file")
             there = [p.name for p in path.parent.iterdir()] if path.parent.is_dir() else []
             raise self.error(f"there is no file '{path}'{did_you_mean(path.name, there)}")
         return path

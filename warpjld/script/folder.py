@@ -9,6 +9,7 @@ from types import TracebackType
 from typing import Self
 
 from warpjld.errors import InputError
+from warpjld.folders import make_folder
 
 __all__ = ["OutputFolder"]
 
@@ -34,7 +35,7 @@ class OutputFolder:
     def __enter__(self) -> Self:
         missing = [p for p in (self.path, *self.path.parents) if not p.exists()]
         try:
-            self.path.mkdir(parents=True, exist_ok=True)
+            make_folder(self.path)
             self._made = missing
             self.work = Path(tempfile.mkdtemp(prefix=".making-", dir=self.path))
         except OSError as error:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass, replace
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -20,11 +20,10 @@ if TYPE_CHECKING:
     from warpjld.script.props import Prop
     from warpjld.script.scene import Actor, Scene
 
-__all__ = ["Attempt", "close_digits", "contact_reports", "grasp_by_itself", "placed_at", "posture", "search_flexion"]
+__all__ = ["Attempt", "close_digits", "collisions", "contact_reports", "placed_at", "posture", "search_flexion"]
 
 
 _LOOKS = 6  # frames of a closing hand at which it is looked whether it enters other objects
-_COLLIDES = 1e-4  # deeper than this [m]
 
 
 @dataclass(frozen=True)
@@ -138,71 +137,18 @@ def close_digits(
     if begun:
         message += f"; in the object before closing: {', '.join(begun)}"
     message += f"; {inside}"
-    collisions = _collisions(scene, actor, prop, first, last)
-    message += "".join(f"; {told}" for told in collisions)
+    others = collisions(scene, actor, prop, first, last)
+    message += "".join(f"; {told}" for told in others)
     status = "INSIDE" if begun else ("CONVERGED" if touching.any() else "NO_CONTACT")
     depth = round(1e3 * float(closed.penetration[0]), 4)
-    values = {"digits": rows, "penetration_mm": depth, "collisions": collisions}
+    values = {"digits": rows, "penetration_mm": depth, "collisions": others}
     return Attempt(f"GRASP {prop.name}", last, actor.name, prop.name, status, message, values)
 
 
-def grasp_by_itself(
-    scene: Scene, actor: Actor, prop: Prop, side: str, first: float, last: float, tries: int, posture_name: str | None
-) -> Attempt:
-    """Find a grasp, and set keys: the open hand away from the object at ``first``, on it half-way, closed at ``last``.
-
-    Raises:
-        InputError: Nothing was found; another object is in the way is not looked at.
-    """
-    from scipy.spatial.transform import Rotation
-
-    from warpjld.grasp.auto import find_grasp
-    from warpjld.grasp.intersection import intersection
-    from warpjld.motion import Key
-    from warpjld.skeleton import CHANNELS
-
-    if actor.recorded is not None:
-        raise InputError(f"actor {actor.name} is driven by a MOTION file: no angle can be searched")
-    covering = cover(actor)
-    thing = placed_at(scene, prop, last)
-    found = find_grasp(covering, thing, side=side, count=tries, posture=posture_name)
-    middle, away = (first + last) / 2.0, found.position - 0.12 * found.approach
-    turn = Rotation.from_quat(found.rotation).as_euler("xyz")
-    spline = asdict(scene.spline)
-    for k, axis in enumerate("xyz"):
-        for key, value in ((first, away[k]), (middle, found.position[k]), (last, found.position[k])):
-            actor.placement.set_key(f"move.{axis}", Key(key, float(value), **spline))
-        for key in (first, middle, last):
-            actor.placement.set_key(f"turn.{axis}", Key(key, float(turn[k]), **spline))
-    grip = {}
-    changed = np.argwhere((found.start != 0.0) | (found.angles != 0.0))
-    for joint, column in changed.tolist():
-        channel = f"{actor.skeleton.names[joint]}.{CHANNELS[column]}"
-        start, closed = float(found.start[joint, column]), float(found.angles[joint, column])
-        grip[channel] = start
-        actor.set_keys(channel, [first, middle], start, scene.spline)
-        actor.set_keys(channel, [last], closed, scene.spline)
-    scene.grips[actor.name] = scene.grips.get(actor.name, {}) | grip
-    inside = intersection(covering, covering.deform(stage(actor, np.array([last]), scene.rate))[0], thing)
-    message = (
-        f"the best of {found.tried} placements, posture {found.posture}: {len(found.touching)} digits touch; {inside}"
-    )
-    collisions = _collisions(scene, actor, prop, first, last)
-    message += "".join(f"; {told}" for told in collisions)
-    values = {
-        "posture": found.posture,
-        "score": round(found.score, 4),
-        "epsilon": round(found.verdict.epsilon, 4),
-        "digits": list(found.touching),
-        "penetration_mm": round(1e3 * found.penetration, 4),
-        "collisions": collisions,
-    }
-    return Attempt(f"GRASP {prop.name} AUTO", last, actor.name, prop.name, "CONVERGED", message, values)
-
-
-def _collisions(scene: Scene, actor: Actor, held: Prop, first: float, last: float) -> list[str]:
+def collisions(scene: Scene, actor: Actor, held: Prop, first: float, last: float) -> list[str]:
     """Objects other than the held one that the hand enters while it closes, in words (R77)."""
     from warpjld.grasp.both_ways import BothWays
+    from warpjld.grasp.obstacles import COLLIDES
 
     covering, told = cover(actor), []
     frames = np.linspace(first, last, _LOOKS)
@@ -211,11 +157,14 @@ def _collisions(scene: Scene, actor: Actor, held: Prop, first: float, last: floa
         if prop is held:
             continue
         both = BothWays(covering, prop.thing)
-        depths = np.stack(
-            [both.depths(skin, scene.whereabouts(prop, frames[k : k + 1])) for k, skin in enumerate(skins)]
-        )
+        if prop.deforms:
+            shapes = [BothWays(covering, placed_at(scene, prop, frame)) for frame in frames.tolist()]
+            depths = np.stack([shape.depths(skin) for shape, skin in zip(shapes, skins, strict=True)])
+        else:
+            places = scene.whereabouts(prop, frames)
+            depths = np.stack([both.depths(skin, places[k : k + 1]) for k, skin in enumerate(skins)])
         frame, part = np.unravel_index(depths.argmax(), depths.shape)
-        if depths[frame, part] > _COLLIDES:
+        if depths[frame, part] > COLLIDES:
             depth = 1e3 * depths[frame, part]
             told.append(f"collides with {prop.name}: {both.parts[part]} {depth:.2f} mm deep at frame {frames[frame]:g}")
     return told

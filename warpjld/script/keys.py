@@ -13,7 +13,7 @@ from warpjld.script.scene import Actor, Scene, SplineConstants
 from warpjld.skeleton import CHANNELS, PAPER_NUMBERS, Skeleton
 from warpjld.suggest import did_you_mean
 
-__all__ = ["joint_numbers", "read_joint", "set_keys"]
+__all__ = ["joint_numbers", "named_joint", "read_joint", "set_keys"]
 
 _SLACK = 1e-6  # degrees: limits come out of radians
 
@@ -55,6 +55,18 @@ def read_joint(scene: Scene, arguments: Arguments, side: str | None = None) -> t
         first = name.partition(".")[0]
         actor = scene.actor_with(first) if first in ("left", "right") else scene.actor()
         return actor, actor.skeleton.index(name)
+    except InputError as error:
+        raise arguments.error(error.message) from None
+
+
+def named_joint(actor: Actor, name: str, arguments: Arguments) -> int:
+    """Number of an actor's joint.
+
+    Raises:
+        InputError: It has no such joint.
+    """
+    try:
+        return actor.skeleton.index(name.lower())
     except InputError as error:
         raise arguments.error(error.message) from None
 

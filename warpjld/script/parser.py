@@ -25,6 +25,7 @@ from warpjld.script.statements import (
 if TYPE_CHECKING:
     from lark import Lark
     from lark.exceptions import UnexpectedInput
+from warpjld.text_file import read_text
 
 __all__ = ["UnfinishedError", "parse", "parse_file"]
 
@@ -51,13 +52,7 @@ def parse_file(path: str | Path) -> tuple[Node, ...]:
     Raises:
         InputError: Unreadable, or not in the language: names line, column and what was expected.
     """
-    try:
-        text = Path(path).read_text(encoding="utf-8-sig")
-    except OSError as error:
-        raise InputError(f"cannot read the script: {error.strerror}", path=path) from error
-    except UnicodeDecodeError as error:
-        raise InputError(f"the script is not UTF-8 text (byte {error.start})", path=path) from error
-    return parse(text, str(path))
+    return parse(read_text(path), str(path))
 
 
 def parse(text: str, path: str = "<script>") -> tuple[Node, ...]:

@@ -34,7 +34,7 @@ class Prop:
     Attributes:
         name: Upper case.
         thing: The object at its initial place.
-        color: Name or ``#rrggbb``.
+        color: ``#rrggbb``.
         associations: Joints it follows.
         placement: Keys of the object as a whole: from where the joints leave it, about its own origin.
         shapes: Its shapes over time, where key frames deform it.

@@ -59,6 +59,7 @@ RESERVED = (
 _BUILT_IN = (
     "actors",
     "animation",
+    "objects",
     "grasping",
     "physical",
     "deforming",

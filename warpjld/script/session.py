@@ -11,6 +11,7 @@ from warpjld.script.parser import UnfinishedError, parse, parse_file
 from warpjld.script.scene import Scene
 from warpjld.script.statements import Node, Statement, Text
 from warpjld.skeleton import CHANNELS, DIGITS
+from warpjld.whole_file import whole_file
 
 __all__ = ["Session"]
 
@@ -138,10 +139,9 @@ class Session:
     def _save(self, name: Text) -> None:
         path = Path(name.text).expanduser()
         lines = [] if self._script is None else [f'INCLUDE "{self._script.resolve().as_posix()}"']
-        beside = path.with_name(path.name + ".part")
         try:
-            beside.write_text("\n".join([*lines, *self._kept]) + "\n", encoding="utf-8")
-            beside.replace(path)
+            with whole_file(path) as part:
+                part.write_text("\n".join([*lines, *self._kept]) + "\n", encoding="utf-8")
         except OSError as error:
             raise name.position.error(f"cannot write '{path}': {error.strerror}") from error
         self._say(str(path))

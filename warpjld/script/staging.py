@@ -5,16 +5,24 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from warpjld.errors import InputError
+from warpjld.rotations import unit
 from warpjld.script.scene import Actor, Scene
 from warpjld.skeleton import Poses
 
 __all__ = ["frame_numbers", "notes", "stage"]
 
+_MOST_FRAMES = 1_000_000
+
 
 def frame_numbers(scene: Scene) -> NDArray[np.float64]:
-    """The frames to make: FRAMES, or from the first to the last key of all actors and objects; shape (F,)."""
+    """The frames to make: FRAMES, or from the first to the last key of all actors and objects; shape (F,).
+
+    Raises:
+        InputError: More than a million.
+    """
     if scene.first is not None and scene.last is not None:
-        return np.arange(scene.first, scene.last + 1, dtype=np.float64)
+        return _range(scene.first, scene.last)
     spans = []
     for actor in scene.actors.values():
         if actor.span is not None:
@@ -26,7 +34,16 @@ def frame_numbers(scene: Scene) -> NDArray[np.float64]:
     if not spans:
         return np.zeros(1)
     first, last = min(s[0] for s in spans), max(s[1] for s in spans)
-    return np.arange(np.floor(first), np.floor(last + 1e-6) + 1)
+    return _range(np.floor(first), np.floor(last + 1e-6))
+
+
+def _range(first: float, last: float) -> NDArray[np.float64]:
+    if last - first >= _MOST_FRAMES:
+        raise InputError(
+            f"frames {first:.0f} to {last:.0f} are {last - first + 1:,.0f}; at most {_MOST_FRAMES:,} can be made at "
+            "once: FRAMES <first> <last> chooses which"
+        )
+    return np.arange(first, last + 1, dtype=np.float64)
 
 
 def stage(actor: Actor, frames: NDArray[np.float64], rate: float) -> Poses:
@@ -58,8 +75,7 @@ def _resample(poses: Poses, at: NDArray[np.float64]) -> Poses:
     first, second = poses.rotations[before], poses.rotations[after]
     # one sign for the whole frame: signs are aligned along the tree, and stay so
     flip = np.where((first * second).sum((1, 2)) < 0, -1.0, 1.0)[:, None, None]
-    rotations = (1 - part) * first + part * flip * second
-    rotations /= np.linalg.norm(rotations, axis=-1, keepdims=True)
+    rotations = unit((1 - part) * first + part * flip * second)
     positions = (1 - part) * poses.positions[before] + part * poses.positions[after]
     flexion = (1 - part[..., 0]) * poses.flexion[before] + part[..., 0] * poses.flexion[after]
     return Poses(positions, rotations, flexion)

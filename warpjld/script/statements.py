@@ -43,7 +43,8 @@ class Number:
     position: Position
 
     def __str__(self) -> str:
-        return f"{self.value:g}"
+        whole = self.value.is_integer() and abs(self.value) < 1e15
+        return f"{self.value:.0f}" if whole else f"{self.value:g}"
 
 
 @dataclass(frozen=True)

@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from warpjld.errors import InputError
+from warpjld.rotations import unit
 from warpjld.skeleton.hand import hand_joint_names
 from warpjld.skeleton.recognise.axes import perpendicular
 from warpjld.skeleton.recognise.extremity import find_extremity
@@ -143,8 +144,7 @@ def _legs(joints: Joints) -> Placed:
 def _facing(joints: Joints) -> tuple[NDArray[np.float64] | None, NDArray[np.float64] | None]:
     if not {"head", "left.hip", "right.hip"} <= set(joints):
         return None, None
-    up = joints["head"] - joints["pelvis"]
-    up /= np.linalg.norm(up)
+    up = unit(joints["head"] - joints["pelvis"])
     return up, perpendicular(np.cross(joints["left.hip"] - joints["right.hip"], up), up)
 
 
@@ -181,8 +181,7 @@ def _heels(
         shin = ankle - joints[f"{side}.knee"]
         length = float(np.linalg.norm(shin))
         # the heel lies behind and below the ankle
-        direction = shin / length - forward
-        direction /= np.linalg.norm(direction)
+        direction = unit(shin / length - forward)
         near = nearby(vertices, faces, ankle, 0.5 * length)
         heel = find_extremity(vertices, near, ankle, direction, 0.2 * length)
         if heel is not None:

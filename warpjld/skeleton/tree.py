@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from warpjld.errors import InputError
+from warpjld.rotations import unit
 from warpjld.suggest import did_you_mean
 
 __all__ = ["CHANNELS", "Segment", "Skeleton"]
@@ -138,7 +139,7 @@ class Skeleton:
 
     def with_axes(self, axes: NDArray[np.float64]) -> Skeleton:
         """The same skeleton with other flexion axes (R21)."""
-        return replace(self, axes=axes / np.linalg.norm(axes, axis=1, keepdims=True))
+        return replace(self, axes=unit(axes))
 
 
 _SIDED = ("left.", "right")

@@ -11,6 +11,8 @@ from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any
 
+from warpjld.whole_file import whole_file
+
 __all__ = ["file_hash", "fingerprint", "versions", "write_json"]
 
 _PACKAGES = ("warpjld", "numpy", "scipy", "warp-lang", "trimesh", "pyarrow")
@@ -44,6 +46,5 @@ def versions(packages: Iterable[str] = _PACKAGES) -> dict[str, str | None]:
 
 def write_json(path: Path, content: dict[str, Any]) -> None:
     """Write a JSON file, whole or not at all."""
-    beside = path.with_name(path.name + ".part")
-    beside.write_text(json.dumps(content, indent=1, ensure_ascii=False) + "\n", encoding="utf-8")
-    beside.replace(path)
+    with whole_file(path) as part:
+        part.write_text(json.dumps(content, indent=1, ensure_ascii=False) + "\n", encoding="utf-8")

@@ -13,6 +13,7 @@ from pathlib import Path
 from typing import Any, Literal
 
 from warpjld.errors import InputError
+from warpjld.folders import make_folder
 from warpjld.study.columns import COMMON_COLUMNS, Column
 from warpjld.study.experiment import Experiment
 from warpjld.study.manifest import file_hash, fingerprint, versions, write_json
@@ -142,6 +143,7 @@ def opened(experiment: Experiment, folder: Path, *, fresh: bool = False) -> Shar
     """
     identity = experiment.identity()
     known = folder / _IDENTITY
+    make_folder(folder)
     try:
         if fresh and (folder / _TRIALS).exists():
             shutil.rmtree(folder / _TRIALS)

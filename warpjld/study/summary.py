@@ -12,6 +12,7 @@ import numpy as np
 
 from warpjld.study.columns import Column
 from warpjld.study.rates import Rate
+from warpjld.whole_file import whole_file
 
 __all__ = ["write_summary"]
 
@@ -39,9 +40,8 @@ def write_summary(
     picture, page = folder / "summary.png", folder / "summary.html"
     _draw(picture, title, rates, rows, shown)
     encoded = base64.b64encode(picture.read_bytes()).decode()
-    beside = page.with_name(page.name + ".part")
-    beside.write_text(_page(title, rates, encoded), encoding="utf-8")
-    beside.replace(page)
+    with whole_file(page) as part:
+        part.write_text(_page(title, rates, encoded), encoding="utf-8")
     return [picture, page]
 
 
@@ -68,9 +68,8 @@ def _draw(
             _histogram(axis, rows, column)
         for axis in axes[len(measured) :]:
             axis.set_axis_off()
-    beside = path.with_name(path.stem + ".part.png")
-    figure.savefig(beside, metadata={"Software": None})
-    beside.replace(path)
+    with whole_file(path) as part:
+        figure.savefig(part, metadata={"Software": None})
 
 
 def _rate_bars(axis: Any, rates: Sequence[Rate]) -> None:

@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from warpjld.errors import MissingExtraError, WarpjldError
 from warpjld.study.columns import Column
 from warpjld.study.shards import Shard
+from warpjld.whole_file import whole_file
 
 __all__ = ["gathered", "read_table", "require_parquet", "write_arrays", "write_csv", "write_parquet"]
 
@@ -69,33 +70,28 @@ def write_parquet(path: Path, rows: Sequence[dict[str, Any]], columns: Sequence[
     types = {"integer": pa.int64(), "number": pa.float64(), "truth": pa.bool_(), "text": pa.string()}
     fields = [pa.field(c.name, types[c.kind], metadata={"unit": c.unit, "description": c.about}) for c in columns]
     arrays = [pa.array([row[c.name] for row in rows], type=types[c.kind]) for c in columns]
-    beside = path.with_name(path.name + ".part")
-    pq.write_table(pa.Table.from_arrays(arrays, schema=pa.schema(fields)), beside, compression="zstd")
-    beside.replace(path)
+    with whole_file(path) as part:
+        pq.write_table(pa.Table.from_arrays(arrays, schema=pa.schema(fields)), part, compression="zstd")
 
 
 def write_csv(
     path: Path, rows: Sequence[dict[str, Any]], columns: Sequence[Column], *, described: str = "columns.json"
 ) -> None:
     """Write a CSV file (UTF-8, one header line, missing values empty), and a JSON file beside it that describes it."""
-    beside = path.with_name(path.name + ".part")
-    with beside.open("w", encoding="utf-8", newline="") as file:
+    with whole_file(path) as part, part.open("w", encoding="utf-8", newline="") as file:
         writer = csv.writer(file, lineterminator="\n")
         writer.writerow([c.name for c in columns])
         for row in rows:
             writer.writerow([_cell(row[c.name]) for c in columns])
-    beside.replace(path)
     about = [{"name": c.name, "type": c.kind, "unit": c.unit, "description": c.about} for c in columns]
     path.with_name(described).write_text(json.dumps(about, indent=1, ensure_ascii=False) + "\n", "utf-8")
 
 
 def write_arrays(path: Path, arrays: dict[str, NDArray[Any]]) -> None:
     """Write a NumPy archive (npz)."""
-    beside = path.with_name(path.name + ".part")
-    with beside.open("wb") as file:
+    with whole_file(path) as part, part.open("wb") as file:
         # numpy dates the archive's members 1980, so bytes do not depend on the clock
         np.savez_compressed(file, allow_pickle=False, **arrays)
-    beside.replace(path)
 
 
 def read_table(path: Path) -> list[dict[str, Any]]:

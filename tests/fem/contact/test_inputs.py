@@ -13,7 +13,7 @@ from warpjld.fem.contact import Bond, ContactError, Exclusion, Pair, press
 from warpjld.fem.contact.damping import Damping
 from warpjld.fem.contact.solids import Plane, Sphere
 from warpjld.fem.contact.step_solver import StepSolver
-from warpjld.fem.multigrid import IndefiniteError
+from warpjld.fem.indefinite import IndefiniteError
 
 
 @pytest.fixture(scope="module")

@@ -81,8 +81,8 @@ def test_the_good_one_is_read(tmp_path: Path) -> None:
 
 
 def test_unreadable_files_are_named(tmp_path: Path) -> None:
-    with pytest.raises(InputError, match=r"none.toml: cannot read it"):
+    with pytest.raises(InputError, match=r"none.toml: cannot be read"):
         load_plan(tmp_path / "none.toml")
     (tmp_path / "bytes.toml").write_bytes(b"seed = \xff")
-    with pytest.raises(InputError, match=r"bytes.toml: not UTF-8"):
+    with pytest.raises(InputError, match=r"bytes.toml: is not UTF-8"):
         load_plan(tmp_path / "bytes.toml")

@@ -137,6 +137,22 @@ def test_an_unusable_object_stops_the_study_before_it_begins(
     assert not (tmp_path / "out").exists()
 
 
+def test_a_checked_plan_is_told_in_words_and_in_json(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    path, out = plan(tmp_path, trials=1), tmp_path / "out"
+    said = []
+    for switch in ((), ("--json",), ("-q",)):
+        with pytest.raises(SystemExit) as stopped:
+            main(["study", str(path), "-o", str(out), "--check", *switch])
+        assert stopped.value.code == 0
+        said.append(capsys.readouterr().out)
+    told = json.loads(said[1])
+    assert (told["plan"], told["trials"], told["combinations_tried"]) == (str(path), 1, 1)
+    assert f"1 trials of 1 of {told['combinations']} combinations" in said[0]
+    assert all(note in said[0] for note in told["notes"])
+    assert said[2] == ""
+    assert not out.exists()
+
+
 def test_the_command_runs_and_repeats(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     pytest.importorskip("pyarrow")
     path, out = plan(tmp_path, trials=1), tmp_path / "out"

@@ -8,12 +8,12 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from warpjld.grasp import ObjectSet
+from warpjld.grasp.palm import Palm
 from warpjld.grasp.shapes import ball
-from warpjld.rig import Rig
 from warpjld.study.grasping.plan import WristRange
-from warpjld.study.grasping.wrist import Palm, draw_approach, find_palm, place_palm, touch_along
+from warpjld.study.grasping.wrist import draw_approach, place_palm, touch_along
 
-PALM = Palm(np.array([0.01, -0.02, -0.06]), np.array([0.0, -1.0, 0.0]), np.array([0.0, 0.0, -1.0]))
+PALM = Palm(np.array([0.01, -0.02, -0.06]), np.array([0.0, -1.0, 0.0]), np.array([0.0, 0.0, -1.0]), 0.08)
 
 
 @settings(max_examples=50, deadline=None)
@@ -24,7 +24,7 @@ def test_the_palm_comes_to_its_point_facing_the_object(seed: int) -> None:
     turn, shift = place_palm(PALM, approach, point)
     assert turn @ turn.T == pytest.approx(np.eye(3), abs=1e-12)
     assert np.linalg.det(turn) == pytest.approx(1.0)
-    assert turn @ PALM.point + shift == pytest.approx(point)
+    assert turn @ PALM.middle + shift == pytest.approx(point)
     # the palm's normal makes the angle drawn with the line of approach
     cosine = (turn @ PALM.normal) @ -approach.direction
     assert np.arccos(np.clip(cosine, -1.0, 1.0)) == pytest.approx(approach.tilt, abs=1e-6)
@@ -57,15 +57,3 @@ def test_tracing_meets_a_ball_where_it_is() -> None:
     way = touch_along(objects, np.array([0.3, 0.0, 0.0]), np.array([-1.0, 0.0, 0.0]), 1.0)
     assert way == pytest.approx(0.26, abs=1e-4)
     assert touch_along(objects, np.array([0.3, 0.1, 0.0]), np.array([-1.0, 0.0, 0.0]), 1.0) is None
-
-
-@pytest.mark.parametrize("side", ["left", "right"])
-def test_the_palm_of_the_built_in_hand(hands: dict[str, Rig], side: str) -> None:
-    """It lies palm down, fingers along −Z."""
-    rig = hands[side]
-    palm = find_palm(rig.skeleton, rig.surface.vertices)
-    assert palm.normal @ [0.0, -1.0, 0.0] > 0.95
-    assert palm.fingers @ [0.0, 0.0, -1.0] > 0.95
-    nearest = np.linalg.norm(rig.surface.vertices - palm.point, axis=1).min()
-    assert nearest < 0.006
-    assert palm.point[1] < rig.skeleton.rest[rig.skeleton.index("middle.base"), 1]

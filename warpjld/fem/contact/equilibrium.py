@@ -24,7 +24,7 @@ from warpjld.fem.contact.step import Step
 from warpjld.fem.contact.step_solver import StepSolver
 from warpjld.fem.contact.stiffness import with_contact
 from warpjld.fem.contact.walk import Reached, Walk
-from warpjld.fem.multigrid import IndefiniteError
+from warpjld.fem.indefinite import IndefiniteError
 from warpjld.fem.prescribed import Prescribed
 
 __all__ = ["Equilibrium"]

@@ -17,6 +17,8 @@ from warpjld.fem.hexmesh import HexMesh
 
 __all__ = ["ContactPoints", "Interface", "interfaces_of"]
 
+_LARGE = 1.5
+"""Edges longer than this times the middle one do not make points look farther ahead: a hand is thin."""
 _NEAR, _FAR = 0.5 * (1.0 + 1.0 / np.sqrt(3.0)), 0.5 * (1.0 - 1.0 / np.sqrt(3.0))
 _GAUSS = np.array(
     [
@@ -118,7 +120,8 @@ class Interface:
             rows = 4 * np.arange(4 * faces + 1)
             self.share = csr_array((*table, rows), shape=(4 * faces, len(self.slave.nodes)))
         farthest = 0.0 if pair.offset is None else 2.0 * float(np.abs(pair.offset).max(initial=0.0))
-        self.reach = 2.0 * float(self.slave.edge.max()) + farthest
+        edge = self.slave.edge
+        self.reach = 2.0 * min(float(edge.max()), _LARGE * float(np.median(edge))) + farthest
         """How far ahead a point looks [m]."""
 
     @property

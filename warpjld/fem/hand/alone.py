@@ -26,8 +26,8 @@ from warpjld.fem.dots import norm
 from warpjld.fem.hand.blend import Moves
 from warpjld.fem.hand.flesh_hand import FleshHand
 from warpjld.fem.hand.motion import halfway
+from warpjld.fem.indefinite import IndefiniteError
 from warpjld.fem.loads import Loads
-from warpjld.fem.multigrid import IndefiniteError
 from warpjld.fem.prescribed import Prescribed
 from warpjld.skeleton.kinematics import Poses
 

@@ -152,6 +152,8 @@ def open_document(path: str | Path) -> Document:
 
     if data[:4] == b"glTF":
         _check_glb(path, data)
+    elif data.lstrip()[:1] != b"{":
+        raise InputError("is not a glTF 2.0 file: neither binary nor JSON", path=path)
     try:
         gltf = GLTF2().load_from_bytes(data) if data[:4] == b"glTF" else GLTF2.gltf_from_json(data.decode("utf-8"))
     except Exception as error:  # pygltflib raises whatever its JSON layers raise

@@ -1,118 +1,20 @@
-"""Objects: bringing them on, letting them follow joints, and bending joints until skin touches them (A §7, §9)."""
+"""Bending joints until skin touches an object, closing hands on it, and letting go (A §7, §9)."""
 
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, Literal, cast
+from typing import cast
 
-import numpy as np
-
-from warpjld.errors import InputError
 from warpjld.script.arguments import Arguments
-from warpjld.script.commands.animation import FINGERS, SIDES
+from warpjld.script.commands.animation import FINGERS
 from warpjld.script.commands.physical import read_object
 from warpjld.script.grips import read_frames, read_side
-from warpjld.script.keys import read_joint
+from warpjld.script.keys import named_joint
 from warpjld.script.registry import command
 from warpjld.script.scene import Scene
 from warpjld.skeleton import CHANNELS
 
-if TYPE_CHECKING:
-    from warpjld.grasp import GraspObject
-    from warpjld.script.scene import Actor
-
-_SHAPES = ("BALL", "BOX", "CYLINDER", "PLATE", "GLASS")
 _AUTO = "<key> [LEFT/RIGHT] {}<hand vertex or PAD> <object> <facet or NEAREST> [DISTANCE <metres>]"
-
-
-@command(
-    "OBJECT",
-    syntax=(
-        'OBJECT <name> <BALL/BOX/CYLINDER/PLATE/GLASS> [<metres> …] or OBJECT <name> "<surface file>" '
-        "[UNIT <M/CM/MM/…>] [UP <X/Y/Z>] [CENTRE], then [SCALE <factor>] [AT <x> <y> <z>] [TURN <x> <y> <z>] "
-        '[COLOR "<colour>"]'
-    ),
-    help="Bring on an object: a built-in shape of given sizes, or a surface from a file; animated ones (.npz) deform.",
-    group="Grasping",
-)
-def object_(scene: Scene, arguments: Arguments) -> None:
-    """A §7: a list of objects."""
-    from scipy.spatial.transform import Rotation
-
-    from warpjld.grasp.keyframes import load_keyframes
-    from warpjld.grasp.object_file import UNITS
-    from warpjld.script.props import COLORS, Prop
-
-    name = arguments.name("the object's name").upper()
-    if name in scene.props or name in scene.actors:
-        raise arguments.error(f"there is an object or actor {name} already")
-    shape, sizes, path = None, [], None
-    if arguments.has_text():
-        path = arguments.input_file("a surface file")
-    else:
-        shape = arguments.choice("a shape, or a surface file in quotes", _SHAPES).lower()
-        while arguments.has_number():
-            sizes.append(arguments.number("a size in metres", above=0.0, maximum=100.0))
-    where = arguments.last
-    options = arguments.options(
-        unit=lambda: arguments.choice("the unit", [u.upper() for u in UNITS]).lower(),
-        up=lambda: arguments.choice("the axis that points up", ("X", "Y", "Z")).lower(),
-        centre=lambda: True,
-        scale=lambda: arguments.number("the scale", above=0.0),
-        at=lambda: arguments.vector("the place's"),
-        turn=lambda: arguments.vector("the rotation about"),
-        color=lambda: arguments.text("a colour"),
-    )
-    if path is None and {"unit", "up", "centre"} & set(options):
-        raise arguments.error("UNIT, UP and CENTRE are for surfaces from files", where)
-    shapes = None
-    try:
-        if path is not None and path.suffix.lower() == ".npz":
-            if {"unit", "up", "centre"} & set(options):
-                raise InputError("an animated surface is in metres with Y up: UNIT, UP and CENTRE are not for it")
-            shapes = load_keyframes(path, name=name.lower(), scale=float(cast(float, options.get("scale", 1.0))))
-            thing = shapes.thing
-        else:
-            thing = _made(name.lower(), shape, sizes, path, options)
-    except TypeError:
-        raise arguments.error(f"too many sizes for a {str(shape).upper()}", where) from None
-    except InputError as error:
-        raise arguments.error(str(error), where) from None
-    turn = Rotation.from_euler("xyz", np.radians(cast(tuple, options.get("turn", (0.0, 0.0, 0.0)))))
-    thing = thing.placed(cast(tuple, options.get("at", (0.0, 0.0, 0.0))), turn.as_quat())
-    color = str(options.get("color", COLORS[len(scene.props) % len(COLORS)]))
-    scene.props[name] = Prop(name, thing, color, shapes=shapes)
-
-
-@command(
-    "OBJECTS",
-    syntax=(
-        "OBJECTS <object> <THUMB/INDEX/MIDDLE/RING/PINKY> <LEFT/RIGHT> <KNUCKLES2/KNUCKLES3> <start> <stop> "
-        "or OBJECTS <object> JOINT <joint> <start> <stop>"
-    ),
-    help="An object follows a joint from one frame to another; before and after it stays where it is.",
-    group="Grasping",
-)
-def objects(scene: Scene, arguments: Arguments) -> None:
-    """R69–R72, R85, C14."""
-    from warpjld.grasp.attach import Association
-
-    prop = read_object(scene, arguments)
-    if arguments.keyword("JOINT"):
-        actor, joint = read_joint(scene, arguments)
-    else:
-        finger, side, knuckle = arguments.choices(FINGERS, SIDES, ("KNUCKLES2", "KNUCKLES3"))
-        actor = scene.actor_with(side)
-        joint = _joint(actor, f"{side}.{finger}.{knuckle.replace('KNUCKLES', 'knuckle')}", arguments)
-    start = arguments.number("the starting time (a frame)")
-    stop = arguments.number("the stopping time (a frame)")
-    if stop < start:
-        raise arguments.error(f"the stopping time must not come before the starting time ({start:g}), got {stop:g}")
-    for other in prop.associations:
-        if start < other.stop and other.start < stop:
-            taken = f"{other.start:g} to {other.stop:g}"
-            raise arguments.error(f"{prop.name} follows another joint from {taken} already")
-    prop.associations.append(Association(actor.name, joint, start, stop))
 
 
 @command(
@@ -164,7 +66,7 @@ def auto_f_2_3(scene: Scene, arguments: Arguments) -> None:
         "[COUPLING <second joint> <third joint>], or GRASP <key1> <key2> [LEFT/RIGHT] <object> AUTO "
         "[TRIES <placements>] [POSTURE <SPHERE/CYLINDER/PINCH/PLATE>]"
     ),
-    help="Digits close from key1 on and touch the object at key2; COUPLING bends their joints together at these rates.",
+    help="Digits close from key1 on and touch at key2; COUPLING bends joints together; AUTO finds a way to take it.",
     group="Grasping",
 )
 def grasp(scene: Scene, arguments: Arguments) -> None:
@@ -195,7 +97,7 @@ def _grasp_auto(  # type: ignore[no-untyped-def]
     scene: Scene, arguments: Arguments, side: str, prop, first: float, last: float
 ) -> None:
     from warpjld.grasp.postures import POSTURES
-    from warpjld.script.grasping import grasp_by_itself
+    from warpjld.script.grasp_auto import grasp_by_itself
 
     options = arguments.options(
         tries=lambda: arguments.integer("the number of placements to try", minimum=1, maximum=100_000),
@@ -233,7 +135,7 @@ def _search(scene: Scene, arguments: Arguments, name: str, key: float, side: str
     from warpjld.script.grasping import Attempt, search_flexion
 
     actor = scene.actor_with(side)
-    joint = _joint(actor, f"{side}.{joint_name}", arguments)
+    joint = named_joint(actor, f"{side}.{joint_name}", arguments)
     covering = cover(actor)
     if arguments.keyword("PAD"):
         vertex = pad_vertex(covering, f"{side}.{finger}".lower())
@@ -265,27 +167,3 @@ def _search(scene: Scene, arguments: Arguments, name: str, key: float, side: str
     }
     what = f"{name} {actor.skeleton.names[joint]} vertex {vertex} {prop.name}"
     scene.attempts.append(Attempt(what, key, actor.name, prop.name, status.name, message, values))
-
-
-def _made(name: str, shape: str | None, sizes: list[float], path: object, options: dict[str, object]) -> GraspObject:
-    from warpjld.grasp.object_file import load_object
-    from warpjld.grasp.shapes import SHAPES
-
-    scale = float(cast(float, options.get("scale", 1.0)))
-    if shape is not None:
-        return SHAPES[shape](*sizes, name=name).scaled(scale)
-    return load_object(
-        str(path),
-        name=name,
-        unit=str(options.get("unit", "m")),
-        up=cast(Literal["x", "y", "z"], options.get("up", "y")),
-        scale=scale,
-        centre="centre" in options,
-    )
-
-
-def _joint(actor: Actor, name: str, arguments: Arguments) -> int:
-    try:
-        return actor.skeleton.index(name.lower())
-    except InputError as error:
-        raise arguments.error(error.message) from None

@@ -11,6 +11,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from warpjld.rotations import unit
 from warpjld.skeleton.hand import FINGER_JOINTS
 from warpjld.skeleton.recognise.hand_frame import HandFrame, hand_frame
 
@@ -69,10 +70,8 @@ def _common_hinge(
 
     Minimises Σ (axis · bone)² + prior |axis − expected|².
     """
-    bones = np.diff(np.array(chain), axis=0)
-    bones /= np.linalg.norm(bones, axis=1, keepdims=True)
-    axis = np.linalg.solve(bones.T @ bones + prior * np.eye(3), prior * expected)
-    return np.asarray(axis / np.linalg.norm(axis), dtype=np.float64)
+    bones = unit(np.diff(np.array(chain), axis=0))
+    return unit(np.linalg.solve(bones.T @ bones + prior * np.eye(3), prior * expected))
 
 
 def _along(
@@ -131,7 +130,7 @@ def _hinge(dorsal: NDArray[np.float64], bone: NDArray[np.float64]) -> NDArray[np
 
 def perpendicular(axis: NDArray[np.float64], bone: NDArray[np.float64]) -> NDArray[np.float64]:
     """``axis`` without its part along ``bone``, of length one."""
-    direction = bone / np.linalg.norm(bone)
+    direction = unit(bone)
     for guess in (axis, *np.eye(3)):  # an axis along the bone says nothing: any perpendicular one does
         across = guess - direction * (direction @ guess)
         length = np.linalg.norm(across)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from warpjld.rotations import unit
 from warpjld.skeleton.recognise.tree import SourceTree
 
 __all__ = ["bone_axis", "bone_directions"]
@@ -25,8 +26,7 @@ def bone_axis(tree: SourceTree, pairs: list[tuple[int, int]]) -> NDArray[np.floa
     for joint, after in pairs:
         bone = tree.positions[after] - tree.positions[joint]
         if np.linalg.norm(bone) > 0 and abs(np.linalg.det(tree.frames[joint, :3, :3])) > 0:
-            local = np.linalg.solve(tree.frames[joint, :3, :3], bone)
-            locals_.append(local / np.linalg.norm(local))
+            locals_.append(unit(np.linalg.solve(tree.frames[joint, :3, :3], bone)))
     if len(locals_) < 3:
         return None
     mean = np.median(np.array(locals_), axis=0)

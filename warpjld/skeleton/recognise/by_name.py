@@ -41,7 +41,7 @@ def roles_by_name(tree: SourceTree) -> Roles:
             if kinds[side, "hand end"]:
                 roles.body[f"{side}.hand.tip"] = kinds[side, "hand end"][0]
             _toes(tree, kinds, side, roles)
-    _trunk(tree, kinds, roles)
+    _trunk(kinds, roles)
     return roles
 
 
@@ -119,7 +119,7 @@ def _toes(tree: SourceTree, kinds: dict[tuple[str | None, str], list[int]], side
             roles.body[f"{side}.toe{n}.{'tip' if read_name(tree.names[joint]).rank == 4 else name}"] = joint
 
 
-def _trunk(tree: SourceTree, kinds: dict[tuple[str | None, str], list[int]], roles: Roles) -> None:
+def _trunk(kinds: dict[tuple[str | None, str], list[int]], roles: Roles) -> None:
     if not (kinds[None, "spine"] or kinds[None, "pelvis"] or kinds[None, "head"]):
         return
     for name in ("spine", "neck"):

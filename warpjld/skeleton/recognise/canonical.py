@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from warpjld.errors import InputError
+from warpjld.rotations import unit
 from warpjld.skeleton.hand import FINGER_JOINTS, PALM_SEGMENTS
 from warpjld.skeleton.limits import default_limits
 from warpjld.skeleton.recognise.axes import body_axes, hand_axes, perpendicular
@@ -83,7 +84,7 @@ def canonical_skeleton(
         layout.positions[layout.names.index("pelvis")] = place
     if roles.body:
         _extremities(layout, vertices, faces)
-    skeleton = _skeleton(layout, roles, hand_points, axes or {}, limits or {})
+    skeleton = _skeleton(layout, hand_points, axes or {}, limits or {})
     return Canonical(skeleton, tuple(layout.sources), layout.owner, (*notes, *layout.notes))
 
 
@@ -138,7 +139,6 @@ def _last_bones(tree: SourceTree, hand: HandRoles) -> dict[str, NDArray[np.float
 
 def _skeleton(
     layout: Layout,
-    roles: Roles,
     hand_points: Mapping[str, Mapping[str, NDArray[np.float64]]],
     given_axes: Mapping[int, NDArray[np.float64]],
     given_limits: Mapping[int, Mapping[str, tuple[float, float]]],
@@ -164,7 +164,7 @@ def _skeleton(
     for j, name in enumerate(layout.names):
         source = layout.sources[j]
         if source in given_axes:
-            axes[j] = given_axes[source] / np.linalg.norm(given_axes[source])
+            axes[j] = unit(given_axes[source])
         else:
             axes[j] = perpendicular(found.get(name, _bend(blank, j)), blank.directions[j])
         for channel, pair in given_limits.get(source, {}).items():
@@ -191,8 +191,7 @@ def _facing(layout: Layout, number: Mapping[str, int]) -> tuple[NDArray[np.float
     """Up and forward of a body; Y and Z where it does not tell."""
     up, forward = np.array([0.0, 1.0, 0.0]), np.array([0.0, 0.0, 1.0])
     if "head" in number and "pelvis" in number:
-        up = layout.positions[number["head"]] - layout.positions[number["pelvis"]]
-        up /= np.linalg.norm(up)
+        up = unit(layout.positions[number["head"]] - layout.positions[number["pelvis"]])
     for part in ("hip", "shoulder"):
         if f"left.{part}" in number and f"right.{part}" in number:
             left = layout.positions[number[f"left.{part}"]] - layout.positions[number[f"right.{part}"]]

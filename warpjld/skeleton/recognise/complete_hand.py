@@ -7,6 +7,7 @@ from collections.abc import Mapping
 import numpy as np
 from numpy.typing import NDArray
 
+from warpjld.rotations import unit
 from warpjld.skeleton.hand import DIGITS, FINGER_JOINTS
 from warpjld.skeleton.recognise.extremity import find_extremity
 from warpjld.skeleton.recognise.section import nearby
@@ -123,7 +124,7 @@ def _tip(
     length = float(np.linalg.norm(bone))
     direction = directions.get(last, bone / length)
     if (had := points.get(f"{digit}.tip")) is not None:
-        direction = (had - points[last]) / np.linalg.norm(had - points[last])
+        direction = unit(had - points[last])
     found = find_extremity(vertices, faces, points[last], direction, length)
     return points[last] + 0.7 * length * direction if found is None else found
 

@@ -8,6 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from warpjld.rotations import unit
+
 __all__ = ["HandFrame", "chirality", "hand_frame"]
 
 Points = Mapping[str, NDArray[np.float64]]
@@ -57,12 +59,7 @@ def chirality(points: Points) -> float:
 
 def _palm(points: Points) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
     bases = [points[f"{d}.base"] for d in ("index", "middle", "ring", "pinky") if f"{d}.base" in points]
-    forward = _unit(np.mean(bases, axis=0) - points["wrist"])
+    forward = unit(np.mean(bases, axis=0) - points["wrist"])
     radial = bases[0] - bases[-1]
-    radial = _unit(radial - forward * (forward @ radial))
+    radial = unit(radial - forward * (forward @ radial))
     return forward, radial, np.cross(forward, radial)
-
-
-def _unit(vector: NDArray[np.float64]) -> NDArray[np.float64]:
-    length = np.linalg.norm(vector)
-    return vector / length if length > 0 else vector

@@ -87,10 +87,10 @@ def lay_out(tree: SourceTree, roles: Roles, hand_points: Mapping[str, Mapping[st
         for short, hand_parent in HAND_PARENTS.items():
             if short in points and hand_parent is not None:
                 above[f"{side}.{short}"] = f"{side}.{hand_parent}"
-    _one_root(above, roles, notes)
+    _one_root(above, notes)
     order = _parents_first(above)
     number = {name: i for i, name in enumerate(order)}
-    owner = np.array([_owner(tree, j, of_source, number, above) for j in range(len(tree))])
+    owner = np.array([_owner(tree, j, of_source, number) for j in range(len(tree))])
     return Layout(
         names=order,
         parents=[-1 if (parent := above[name]) is None else number[parent] for name in order],
@@ -154,7 +154,7 @@ def _fallback(name: str, named: Mapping[str, int]) -> str | None:
     return "pelvis" if "pelvis" in named and name != "pelvis" else None
 
 
-def _one_root(above: dict[str, str | None], roles: Roles, notes: list[str]) -> None:
+def _one_root(above: dict[str, str | None], notes: list[str]) -> None:
     roots = [name for name, parent in above.items() if parent is None]
     if len(roots) < 2 or all(name.endswith(".wrist") for name in roots):
         return  # two hands without a body move on their own
@@ -188,7 +188,6 @@ def _owner(
     joint: int,
     of_source: Mapping[int, str],
     number: Mapping[str, int],
-    above: Mapping[str, str | None],
 ) -> int:
     for j in (joint, *tree.ancestors(joint)):
         if j in of_source:

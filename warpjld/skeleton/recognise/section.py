@@ -7,6 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from warpjld.rotations import unit
+
 __all__ = ["CrossSection", "cross_section", "first_hits", "nearby"]
 
 _CHUNK = 2_000_000  # ray–triangle pairs at a time: about 200 MB of temporaries
@@ -89,8 +91,7 @@ def cross_section(
     rays: int = 24,
 ) -> CrossSection | None:
     """The first surface met around ``point`` in the plane normal to ``direction``; None where hardly any is."""
-    across = np.cross(direction, np.eye(3)[np.argmin(np.abs(direction))])
-    across /= np.linalg.norm(across)
+    across = unit(np.cross(direction, np.eye(3)[np.argmin(np.abs(direction))]))
     angle = np.arange(rays) * (2 * np.pi / rays)
     spokes = np.outer(np.cos(angle), across) + np.outer(np.sin(angle), np.cross(direction, across))
     reach = first_hits(vertices, faces, np.broadcast_to(point, spokes.shape), spokes)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from warpjld.rotations import unit
 from warpjld.skeleton.recognise.digits import assign_digit
 from warpjld.skeleton.recognise.tree import SourceTree
 
@@ -54,15 +55,13 @@ def hand_by_shape(tree: SourceTree, wrist: int) -> dict[str, int]:
     chains = digit_chains(tree, wrist)
     at = tree.positions
     counts = sorted(len(chain) for chain in chains)
-    headings = np.array([at[chain[-1]] - at[chain[0]] for chain in chains])
-    headings /= np.linalg.norm(headings, axis=1, keepdims=True)
+    headings = unit([at[chain[-1]] - at[chain[0]] for chain in chains])
     if counts[0] < counts[1]:
         thumb = min(range(5), key=lambda c: len(chains[c]))
     else:
         thumb = min(range(5), key=lambda c: float(headings[c] @ np.delete(headings, c, axis=0).sum(axis=0)))
     fingers = [c for c in range(5) if c != thumb]
-    forward = headings[fingers].mean(axis=0)
-    forward /= np.linalg.norm(forward)
+    forward = unit(headings[fingers].mean(axis=0))
     middles = {c: at[chains[c]].mean(axis=0) for c in range(5)}
     # across the palm, from where the fingers are spread
     spread = np.array([middles[c] for c in fingers]) - np.mean([middles[c] for c in fingers], axis=0)

@@ -13,13 +13,13 @@ from warpjld.covering import Covering, bind
 from warpjld.errors import InputError
 from warpjld.grasp import GraspObject, ObjectSet
 from warpjld.grasp.finer import FinerSkin
+from warpjld.grasp.palm import Palm, palm_of
 from warpjld.grasp.postures import posture_angles
 from warpjld.grasp.segments import vertex_segments
 from warpjld.rig import Rig
 from warpjld.skeleton import CHANNELS, Skeleton, poses_from_angles
 from warpjld.study.grasping.choices import HandChoice, ObjectChoice
 from warpjld.study.grasping.plan import Posture
-from warpjld.study.grasping.wrist import Palm, find_palm
 
 __all__ = ["Hand", "Opened", "Thing", "hand_of", "opened_hand", "thing_of"]
 
@@ -95,7 +95,7 @@ def hand_of(choice: HandChoice) -> Hand:
     covering = bind(rig.skeleton, rig.surface, skin=rig.skin)
     finer = FinerSkin(rig.surface.vertices, rig.surface.faces, _SPACING)
     parts = vertex_segments(covering)[finer.parents]
-    return Hand(rig, covering, sides[0], find_palm(rig.skeleton, rig.surface.vertices), finer, parts)
+    return Hand(rig, covering, sides[0], palm_of(rig.skeleton).on_skin(rig.surface.vertices), finer, parts)
 
 
 @lru_cache(maxsize=32)

@@ -93,10 +93,10 @@ class GraspExperiment:
         return notes
 
     def begin(self) -> None:
-        """Keep Warp's greeting off the output of a command that runs many workers."""
-        import warp
+        """Keep Warp's remarks off the output of a command that runs many workers."""
+        from warpjld.quiet import silence_warp
 
-        warp.config.log_level = warp.LOG_ERROR
+        silence_warp()
 
     def run(self, trial: int, rng: np.random.Generator) -> Outcome:
         """Place, close, measure."""

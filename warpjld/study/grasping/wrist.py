@@ -1,4 +1,4 @@
-"""Placing a hand beside an object: where the palm is, and how wrists are drawn at random."""
+"""Placing a hand beside an object: how wrists are drawn at random, and where that brings the hand."""
 
 from __future__ import annotations
 
@@ -8,29 +8,13 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
-from warpjld.errors import InputError
 from warpjld.grasp import ObjectSet
-from warpjld.skeleton import Skeleton
+from warpjld.grasp.palm import Palm
 from warpjld.study.grasping.plan import WristRange
 
-__all__ = ["Approach", "Palm", "draw_approach", "find_palm", "place_palm", "touch_along"]
+__all__ = ["Approach", "draw_approach", "place_palm", "touch_along"]
 
 Array = NDArray[np.float64]
-
-
-@dataclass(frozen=True, eq=False)
-class Palm:
-    """Frame of a hand's palm at rest.
-
-    Attributes:
-        point: On the skin in the middle of the palm [m], shape (3,).
-        normal: Unit normal out of the palm, shape (3,).
-        fingers: Unit direction towards the fingers, normal to it, shape (3,).
-    """
-
-    point: Array
-    normal: Array
-    fingers: Array
 
 
 @dataclass(frozen=True, eq=False)
@@ -52,32 +36,6 @@ class Approach:
     tilt: float
     about: float
     gap: float
-
-
-def find_palm(skeleton: Skeleton, vertices: NDArray[np.floating]) -> Palm:
-    """The palm of a hand: seven tenths along the middle finger's metacarpal, on the palmar side of the skin.
-
-    Args:
-        skeleton: With one hand.
-        vertices: Its skin at rest [m], shape (V, 3).
-
-    Raises:
-        InputError: The skeleton has no middle finger, or those of two hands.
-    """
-    wrist, base = (skeleton.rest[skeleton.index(name)] for name in ("wrist", "middle.base"))
-    axis = skeleton.axes[skeleton.index("middle.base")]
-    fingers = (base - wrist) / np.linalg.norm(base - wrist)
-    # segment × flexion axis points to the back of the hand (R20)
-    normal = -np.cross(fingers, axis - fingers * (fingers @ axis))
-    normal /= np.linalg.norm(normal)
-    inside = wrist + 0.7 * (base - wrist)
-    away = vertices - inside
-    height = away @ normal
-    beside = np.linalg.norm(away - height[:, None] * normal, axis=1)
-    near = (beside < 0.15 * np.linalg.norm(base - wrist)) & (height > 0.0)
-    if not near.any():
-        raise InputError("hand: found no skin on the palm's side of the middle metacarpal")
-    return Palm(inside + float(height[near].mean()) * normal, normal, fingers)
 
 
 def draw_approach(ranges: WristRange, rng: np.random.Generator, extent: Array) -> Approach:
@@ -121,9 +79,9 @@ def touch_along(objects: ObjectSet, start: Array, direction: Array, reach: float
 
 def place_palm(palm: Palm, approach: Approach, point: Array) -> tuple[Array, Array]:
     """Rotation (3, 3) and translation (3,) that bring a palm to a point, facing against the approach, tilted."""
-    facing = np.stack([palm.fingers, palm.normal, np.cross(palm.fingers, palm.normal)], axis=1)
-    wanted = np.stack([approach.fingers, -approach.direction, np.cross(approach.fingers, -approach.direction)], axis=1)
     across = np.cross(approach.direction, approach.fingers)
     axis = np.cos(approach.about) * approach.fingers + np.sin(approach.about) * across
-    turn = Rotation.from_rotvec(approach.tilt * axis).as_matrix() @ wanted @ facing.T
-    return turn, point - turn @ palm.point
+    turn = Rotation.from_rotvec(approach.tilt * axis).as_matrix() @ palm.turned_to(
+        -approach.direction, approach.fingers
+    )
+    return turn, point - turn @ palm.middle

@@ -1,0 +1,128 @@
+"""Placements of an open hand drawn at random: across what fits between thumb and fingers, or palm first."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from warpjld.covering import Covering
+from warpjld.grasp.distance import ObjectSet
+from warpjld.grasp.objects import GraspObject
+from warpjld.grasp.obstacles import Obstacles
+from warpjld.grasp.opening import Opening, closing_in_air
+from warpjld.grasp.placements import Candidates, across_widths, sample_wrists
+from warpjld.grasp.postures import AHEAD
+from warpjld.grasp.widths import Widths, sample_widths
+from warpjld.skeleton import CHANNELS
+
+__all__ = ["WAY", "Draws"]
+
+WAY = 0.12
+"""How far off a hand is before it comes straight to its placement [m]."""
+
+_LINES = 400  # through the object, to find where it is narrow
+_PALM_FIRST = 0.25  # share of the placements that are made palm first
+_VARIANTS = 6  # of a posture
+_MOST_DRAWS = 8  # where obstacles are in the way
+_COMES = (0.0, 0.1, 0.3, 0.6, 1.0)  # parts of the way at which a hand must not be in an obstacle
+
+
+@dataclass(eq=False)
+class Draws:
+    """Placements for one object, as many as asked for.
+
+    Attributes:
+        covering: The hand.
+        objects: The object.
+        obstacles: What no hand may enter on its way to its placement.
+        side: Which hand.
+        posture: Name of the posture.
+        start: Its angles [rad], shape (J, 4).
+        closing: Digits that close.
+        rng: Source of randomness.
+        turned_down: Placements that obstacles were in the way of, so far.
+    """
+
+    covering: Covering
+    objects: ObjectSet
+    obstacles: Obstacles
+    side: str
+    posture: str
+    start: NDArray[np.float64]
+    closing: list[str]
+    rng: np.random.Generator
+    turned_down: int = 0
+
+    def draw(self, count: int) -> Candidates:
+        """``count`` placements, or fewer where obstacles leave little room."""
+        some = [self._both_kinds(count)]
+        if not self.obstacles:
+            return some[0]
+        some[0] = self._reached(some[0])
+        while sum(map(len, some)) < count and len(some) < _MOST_DRAWS:
+            some.append(self._reached(self._both_kinds(count)))
+        return Candidates.joined(some)[:count]
+
+    def _reached(self, hands: Candidates) -> Candidates:
+        """Those that come to their placement without entering an obstacle."""
+        skins = self.covering.deform(hands.poses(self.covering.skeleton))
+        backs = WAY * np.array(_COMES, dtype=np.float32)[:, None, None]
+        shifts = -backs * hands.approach.astype(np.float32)
+        there = (skins + shifts[:, :, None]).reshape(-1, *skins.shape[1:])
+        clear = self.obstacles.missed(there).reshape(len(_COMES), -1).all(axis=0)
+        self.turned_down += int((~clear).sum())
+        return hands[np.flatnonzero(clear)]
+
+    def _both_kinds(self, count: int) -> Candidates:
+        (thing,) = self.objects.objects
+        openings = self._variants()
+        most = max(one.width[0] for one in openings)
+        widths = sample_widths(self.objects, _LINES, self.rng, widest=float(most))
+        across = count - int(_PALM_FIRST * count) if len(widths) else 0
+        some = []
+        if across:
+            chosen = self.rng.choice(len(widths), size=across, p=_preference(widths, thing))
+            turned = self.rng.random(across) < 0.5
+            picked = widths[chosen]
+            ends = (
+                np.where(turned[:, None], picked.second, picked.first),
+                np.where(turned[:, None], picked.first, picked.second),
+            )
+            into = 0.3 if self.posture == "pinch" else 1.0
+            these = Widths(*ends, picked.slant)
+            some.append(across_widths(self.covering, openings, self.objects, these, self.side, self.rng, into=into))
+        if count > across:
+            ahead = AHEAD.get(self.posture, 0.0)
+            some.append(
+                sample_wrists(self.covering, self.start, thing, self.side, count - across, self.rng, ahead=ahead)
+            )
+        return Candidates.joined(some)
+
+    def _variants(self) -> list[Opening]:
+        """The posture as it is, and with thumb and fingers a little elsewhere."""
+        skeleton, rng, found = self.covering.skeleton, self.rng, []
+        for variant in range(_VARIANTS):
+            angles = self.start.copy()
+            if variant:
+                bend = rng.uniform(0.0, 20.0)
+                shifts = {"thumb.base": {"pivot": rng.uniform(-15, 10), "abduction": rng.uniform(-20, 15)}}
+                shifts |= {f"{digit}.base": {"flexion": bend} for digit in self.closing if digit != "thumb"}
+                for name, channels in shifts.items():
+                    row = skeleton.index(f"{self.side}.{name}")
+                    for channel, degrees in channels.items():
+                        column = CHANNELS.index(channel)
+                        turned = angles[row, column] + np.radians(degrees)
+                        angles[row, column] = np.clip(turned, *skeleton.limits[row, column])
+            found.append(closing_in_air(self.covering, self.side, angles, self.closing))
+        return found
+
+
+def _preference(widths: Widths, thing: GraspObject) -> NDArray[np.float64]:
+    """How likely a width is taken: straight through, and near the centre of mass."""
+    centre = thing.place.apply(thing.centroid[None])[0, 0]
+    off = np.linalg.norm(0.5 * (widths.first + widths.second) - centre, axis=1)
+    radius = np.linalg.norm(thing.vertices - thing.centroid, axis=1).max()
+    weight = widths.slant**4 * np.exp(-((off / (0.4 * radius)) ** 2)) + 1e-6
+    return np.asarray(weight / weight.sum())

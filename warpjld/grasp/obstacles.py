@@ -1,0 +1,54 @@
+"""Objects beside the one that is grasped: no part of a hand is to enter them."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from warpjld.covering import Covering
+from warpjld.grasp.both_ways import BothWays
+from warpjld.grasp.distance import ObjectSet
+from warpjld.grasp.objects import GraspObject
+
+__all__ = ["COLLIDES", "Obstacles"]
+
+COLLIDES = 1e-4
+"""A hand that is deeper than this in an object has run into it [m]."""
+
+_COARSE = 4  # at a first look every fourth vertex
+
+
+class Obstacles:
+    """What is in a hand's way; false where there is nothing.
+
+    Args:
+        covering: The hand.
+        things: Objects where they stand.
+    """
+
+    def __init__(self, covering: Covering, things: Sequence[GraspObject]) -> None:
+        self.names = tuple(thing.name for thing in things)
+        self._objects = ObjectSet(things) if things else None
+        self._both = [BothWays(covering, thing) for thing in things]
+
+    def __bool__(self) -> bool:
+        return bool(self.names)
+
+    def missed(self, skins: NDArray[np.floating]) -> NDArray[np.bool_]:
+        """First look at deformed skins (S, V, 3) [m]: whether none of their vertices is in an obstacle, shape (S,)."""
+        if self._objects is None or not len(skins):
+            return np.ones(len(skins), dtype=bool)
+        sets, which = (rows.ravel() for rows in np.indices((len(skins), len(self.names))))
+        found = self._objects.distances(skins[:, ::_COARSE], which=which, sets=sets)
+        nearest = found.distance.min(axis=1).reshape(len(skins), -1)
+        return np.asarray(nearest.min(axis=1) > -COLLIDES)
+
+    def depth(self, skin: NDArray[np.floating]) -> float:
+        """Depth of the deepest point of hand and obstacles in one another [m], looked at from both sides, 0 for none.
+
+        Args:
+            skin: A deformed skin [m], shape (V, 3).
+        """
+        return max((float(both.depths(skin).max()) for both in self._both), default=0.0)
