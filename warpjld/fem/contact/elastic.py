@@ -62,6 +62,7 @@ class Elastic:
         """Pressure of each element [Pa], shape (E,), as foreseen after a move (3N,); None at small strain."""
         return None if self.linear else self.body.at(u, stiffness=False, increment=move).pressures
 
-    def upright(self, u: NDArray[np.float64]) -> bool:
-        """Whether no element is inside out at displacement u (3N,); at small strain none is."""
-        return self.linear or bool((self.forces(u).lowest > 0.0).all())
+    def upright(self, u: NDArray[np.float64], least: NDArray[np.float64] | float = 0.0) -> bool:
+        """Whether the elements' Jacobian determinants are above ``least`` (E,) at displacement u (3N,); at small strain
+        they are."""
+        return self.linear or bool((self.forces(u).lowest > least).all())

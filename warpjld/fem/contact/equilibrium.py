@@ -175,7 +175,7 @@ class Equilibrium:
 
 def _length(search: LineSearch, walk: Walk, move: NDArray[np.float64], loose: Loose) -> float:
     """How far to go along a move (3N,), 1 for all of it; 0 where elements turn inside out however short it is."""
-    length = search.upright(walk.u, move)
+    length = search.upright(walk.u, move, walk.tangent.lowest)
     if length == 0.0:
         return 0.0
     contact, memory, careful = walk.contact, walk.memory, walk.careful

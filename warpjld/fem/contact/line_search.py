@@ -22,6 +22,8 @@ _OVERSHOT = 0.5
 _BALANCED = 0.3
 """The same where the search ends."""
 _LEAST = 1e-6
+_FLATTEST = 0.2
+"""Part of their Jacobian determinants that elements keep in a step."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -40,11 +42,19 @@ class LineSearch:
     step: Step
     start: NDArray[np.float64]
 
-    def upright(self, u: NDArray[np.float64], move: NDArray[np.float64]) -> float:
-        """The longest of 1, ½, ¼ … that turns no element inside out, 0 where none does not."""
+    def upright(self, u: NDArray[np.float64], move: NDArray[np.float64], lowest: NDArray[np.float64]) -> float:
+        """The longest of 1, ½, ¼ … that flattens no element to less than a part of what it is, 0 where none does not.
+
+        Nearly inside out, flesh answers with forces that no later step finds its way back from.
+
+        Args:
+            u: Displacement [m], shape (3N,).
+            move: From there, shape (3N,).
+            lowest: Lowest Jacobian determinants of the elements there, shape (E,).
+        """
         length = 1.0
         for _ in range(_TRIALS):
-            if self.elastic.upright(u + length * move):
+            if self.elastic.upright(u + length * move, _FLATTEST * lowest):
                 return length
             length *= 0.5
         return 0.0

@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 
 __all__ = ["counted"]
 
-_TIMES, _SLACK = 3.0, 0.25
+_TIMES, _SLACK = 3.0, 0.5
 """Overlap along the normal that counts for nothing: over how deep facets are inside each other, and that of facets that
 only touch, in edges. Half of it counts fully."""
 _OWN_SLACK = 1.0

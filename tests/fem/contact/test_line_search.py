@@ -1,0 +1,29 @@
+"""How far steps go."""
+
+from __future__ import annotations
+
+from typing import Any, cast
+
+import numpy as np
+import pytest
+
+from warpjld.fem import Body, Loads, NeoHooke, Prescribed, box
+from warpjld.fem.contact.elastic import Elastic
+from warpjld.fem.contact.line_search import LineSearch
+from warpjld.fem.contact.step import Step
+
+
+@pytest.mark.parametrize(
+    ("squeezed", "length"),
+    [(0.7, 1.0), (0.9, 0.5), (1.5, 0.5), (2.0, 0.25)],
+)
+def test_no_step_flattens_elements_to_less_than_a_fifth(squeezed: float, length: float) -> None:
+    """A block of height 1 whose upper side comes down by so much."""
+    body = Body(box((1.0, 1.0, 1.0), (2, 2, 1)), NeoHooke(1e5, 0.4))
+    elastic = Elastic(body)
+    step = Step(0.0, 1.0, Prescribed(np.empty(0, np.int64), np.empty(0)), Loads(), 0.0)
+    start = np.zeros(body.degrees)
+    search = LineSearch(elastic, cast(Any, None), step, start)
+    move = np.zeros_like(body.mesh.nodes)
+    move[body.mesh.nodes[:, 2] > 0.5, 2] = -squeezed
+    assert search.upright(start, move.reshape(-1), elastic.forces(start).lowest) == length
