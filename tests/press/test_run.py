@@ -103,7 +103,9 @@ def test_a_finished_state_is_gone_on_from(pressed: tuple[Path, dict], rig, tmp_p
     with (out / "t.csv").open(encoding="utf-8") as file:
         force = [float(row["force_n"]) for row in csv.DictReader(file) if row["digit"] == "index"]
     np.testing.assert_allclose([r.force_n for r in again.rows if r.digit == "index"], force, rtol=1e-5)
-    Interpreter(scene).run_text("PRESS 0 7 EVERY 2 STATE 'state.npz'")
+    scene = Scene(say=lambda text: None)
+    scene.add("left", rig)
+    Interpreter(scene).run_text(PLATE + "PRESS 0 7 EVERY 2 STATE 'state.npz'")
     with pytest.raises(InputError, match=r"state.npz: this state belongs to another scene"):
         run_press(scene, tmp_path)
 
