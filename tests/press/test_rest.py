@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 
 from warpjld.covering import Covering, bind
 from warpjld.fem.contact.facets import Facets
 from warpjld.fem.hand.flesh_hand import FleshHand, build_flesh_hand
+from warpjld.io import load_rig
 from warpjld.press.rest import part_of, posed
 from warpjld.rig import Rig
 from warpjld.skeleton import Poses, poses_from_angles
@@ -103,3 +106,19 @@ def test_a_whole_hand_is_its_own_part(hand: FleshHand, rig: Rig) -> None:
     assert len(part.cut) == 0
     assert (part.blend == 1.0).all()
     assert part.hand is hand
+
+
+def test_bones_that_crush_flesh_between_them_let_it_go(data: Path) -> None:
+    """A pinky bent so far that an element has no room between its phalanges: two or three nodes there are flesh's."""
+    rig = load_rig(data / "hand_webxr_generic" / "left.glb")
+    built = build_flesh_hand(rig, 0.003)
+    angles = np.zeros((1, len(rig.skeleton), 4))
+    for joint, degrees in (("base", 86), ("knuckle2", 92), ("knuckle3", 75)):
+        angles[0, rig.skeleton.index(f"left.pinky.{joint}"), 0] = np.radians(degrees)
+    poses = poses_from_angles(rig.skeleton, angles)
+    skin = bind(rig.skeleton, rig.surface).deform(poses)[0].astype(np.float64)
+    hand, _ = posed(built, poses, skin)
+    assert hand.mesh.scaled_jacobian().min() > 0.0
+    let_go = [len(before) - len(after) for before, after in zip(built.bone_nodes, hand.bone_nodes, strict=True)]
+    assert 0 < sum(let_go) < 10
+    assert min(let_go) >= 0

@@ -35,6 +35,8 @@ _PULLS = (3.0, 10.0, 30.0, 30.0)
 """Weights of the distances of skin nodes from the skin, in edges squared, one after the other."""
 _SLIDE = 0.05
 _FIXED = 1e4
+_YIELDS = 3
+"""How often nodes at the ends of bones are let go where the bones of a bent joint crush an element between them."""
 _OWN = 0.5
 """Share of its digits' bones from which on flesh belongs to a part of a hand."""
 
@@ -46,6 +48,8 @@ def posed(hand: FleshHand, poses: Poses, skin: NDArray[np.float64]) -> tuple[Fle
         hand: As built, at the rig's rest.
         poses: One pose.
         skin: Its surface in that pose as the covering gives it [m], shape (V, 3).
+
+    Nodes at the ends of bones that crush an element between them are let go, so that they are flesh's.
 
     Returns:
         The hand, whose ``moves`` still count from the rig's rest, and the greatest distance of its mesh's skin nodes
@@ -71,14 +75,20 @@ def posed(hand: FleshHand, poses: Poses, skin: NDArray[np.float64]) -> tuple[Fle
     least = min(_LEAST, 0.5 * float(mesh.scaled_jacobian().min()))
     if moved.scaled_jacobian().min() < least:
         shape = Facets(skin, hand.surface.faces)
-        moved = _mended(replace(mesh, nodes=nodes), change, outer, bone, shape, least)
+        for _ in range(1 + _YIELDS):
+            moved = _mended(replace(mesh, nodes=nodes), change, outer, bone, shape, least)
+            crushed = np.unique(mesh.elements[moved.scaled_jacobian() <= 0.0])
+            if not len(crushed):
+                break
+            bone = np.setdiff1d(bone, crushed)
     if moved.scaled_jacobian().min() <= 0.0:
         raise InputError(
             f"flesh: {int((moved.scaled_jacobian() <= 0).sum())} elements are turned inside out where contact begins; "
             "joints are bent too far for elements of this size"
         )
     gap = float(np.abs(Facets(skin, hand.surface.faces).project(moved.nodes[outer]).distance).max())
-    return replace(hand, flesh=replace(hand.flesh, mesh=moved)), gap
+    sets = {name: np.intersect1d(own, bone) for name, own in zip(hand.flesh.names, hand.bone_nodes, strict=True)}
+    return replace(hand, flesh=replace(hand.flesh, mesh=replace(moved, node_sets=moved.node_sets | sets))), gap
 
 
 def _mended(
