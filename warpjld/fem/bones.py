@@ -8,13 +8,13 @@ between bone and flesh are moved to the bone's surface, as those of the skin are
 from __future__ import annotations
 
 from collections.abc import Collection, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from warpjld.fem.hexmesh import HexMesh
-from warpjld.fem.untangle import improve
+from warpjld.fem.untangle import as_far, improve
 
 __all__ = ["Bone", "claimed", "fitted"]
 
@@ -25,6 +25,8 @@ _LEAST = 0.2
 """Least scaled Jacobian: nodes stay off the bones where they ask for worse, or for worse than it was where it was."""
 _ALONG = 100
 """Points of a bone's axis from which the nearest elements are asked for."""
+_SHORTER = 0.5
+"""Share of their way that nodes of elements which become too bad go instead."""
 _SLIDE = 0.02
 _END = 0.7
 """Least cosine between a face's normal and the bone's direction at an end of the bone."""
@@ -155,7 +157,8 @@ def fitted(
     goal = nodes.copy()
     goal[number] = np.concatenate([hull.wanted(nodes)[0] for hull in hulls])
     least = np.minimum(_LEAST, mesh.scaled_jacobian())
-    return _towards(mesh, mesh.nodes, _towards(mesh, nodes, goal, least).nodes, least)
+    nearer = as_far(mesh, nodes, goal, least, _SHORTER).nodes
+    return as_far(mesh, mesh.nodes, nearer, least, _SHORTER)
 
 
 @dataclass(frozen=True, eq=False)
@@ -237,17 +240,3 @@ class _Hull:
 
 
 _GAUSS = (0.5 - np.sqrt(0.15), 0.5, 0.5 + np.sqrt(0.15))
-
-
-def _towards(
-    mesh: HexMesh, start: NDArray[np.float64], goal: NDArray[np.float64], least: NDArray[np.float64]
-) -> HexMesh:
-    """Nodes from a start towards a goal, less far where an element would become worse than its ``least`` (E,)."""
-    share = np.ones((len(start), 1))
-    for _ in range(16):
-        moved = replace(mesh, nodes=start + share * (goal - start))
-        bad = moved.scaled_jacobian() < least
-        if not bad.any():
-            break
-        share[np.unique(mesh.elements[bad])] *= 0.5
-    return moved

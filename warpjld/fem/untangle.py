@@ -7,13 +7,16 @@ doi:10.1016/S0045-7825(03)00299-8), and pulls boundary nodes to the tangent plan
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 from numpy.typing import NDArray
 
 from warpjld.fem.descent import minimise
+from warpjld.fem.hexmesh import HexMesh
 from warpjld.fem.rows import Launch, shared, threads_of
 
-__all__ = ["improve"]
+__all__ = ["as_far", "improve"]
 
 
 def improve(
@@ -86,3 +89,29 @@ def improve(
     start = (nodes / spacing).reshape(-1)
     improved: NDArray[np.float64] = minimise(cost, start, rounds=rounds, first_step=0.05).reshape(-1, 3) * spacing
     return improved
+
+
+def as_far(
+    mesh: HexMesh,
+    start: NDArray[np.float64],
+    goal: NDArray[np.float64],
+    least: float | NDArray[np.float64],
+    shorter: float,
+) -> HexMesh:
+    """The mesh with its nodes moved from a start towards a goal, less far where elements would become too bad.
+
+    Args:
+        mesh: Its elements.
+        start: [m], shape (N, 3).
+        goal: [m], shape (N, 3).
+        least: Scaled Jacobian that elements keep: one for all, or each one's, shape (E,).
+        shorter: Share of their way that the nodes of worse ones go instead, again and again.
+    """
+    share = np.ones((len(start), 1))
+    for _ in range(16):
+        moved = replace(mesh, nodes=start + share * (goal - start))
+        bad = moved.scaled_jacobian() < least
+        if not bad.any():
+            break
+        share[np.unique(mesh.elements[bad])] *= shorter
+    return moved

@@ -18,7 +18,7 @@ from warpjld.fem.contact.facets import Facets
 from warpjld.fem.hand.blend import Moves
 from warpjld.fem.hand.flesh_hand import FleshHand
 from warpjld.fem.hexmesh import HexMesh
-from warpjld.fem.untangle import improve
+from warpjld.fem.untangle import as_far, improve
 from warpjld.skeleton import Poses
 
 __all__ = ["Part", "part_of", "posed"]
@@ -35,6 +35,8 @@ _PULLS = (3.0, 10.0, 30.0, 30.0)
 """Weights of the distances of skin nodes from the skin, in edges squared, one after the other."""
 _SLIDE = 0.05
 _FIXED = 1e4
+_SHORTER = 0.6
+"""Share of their way that nodes of elements which become too bad go instead."""
 _YIELDS = 3
 """How often nodes at the ends of bones are let go where the bones of a bent joint crush an element between them."""
 _OWN = 0.5
@@ -103,7 +105,7 @@ def _mended(
 
     There skin nodes slide along the skin, and those inside go where elements are well shaped; all others stay.
     """
-    moved = _as_far(mesh, mesh.nodes, mesh.nodes + change, least)
+    moved = as_far(mesh, mesh.nodes, mesh.nodes + change, least, _SHORTER)
     edge = float(np.median(np.linalg.norm(np.diff(mesh.nodes[mesh.elements[:, :2]], axis=1), axis=2)))
     boundary, held = np.zeros(len(mesh.nodes), dtype=bool), np.zeros(len(mesh.nodes), dtype=bool)
     boundary[outer], held[bone] = True, True
@@ -149,19 +151,7 @@ def _mended(
             continue
         goal = nodes.copy()
         goal[free] = skin.project(nodes[free]).closest
-        moved = _as_far(mesh, nodes, goal, least)
-    return moved
-
-
-def _as_far(mesh: HexMesh, start: NDArray[np.float64], goal: NDArray[np.float64], least: float) -> HexMesh:
-    """Nodes from a start towards a goal, less far where an element would become worse than ``least``."""
-    share = np.ones((len(start), 1))
-    for _ in range(16):
-        moved = replace(mesh, nodes=start + share * (goal - start))
-        bad = moved.scaled_jacobian() < least
-        if not bad.any():
-            break
-        share[np.unique(mesh.elements[bad])] *= 0.6
+        moved = as_far(mesh, nodes, goal, least, _SHORTER)
     return moved
 
 
