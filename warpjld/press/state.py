@@ -15,6 +15,7 @@ from warpjld.fem.contact import ContactInstant, ContactSolution
 from warpjld.fem.contact.imprint import Imprint
 from warpjld.fem.contact.law import Memory
 from warpjld.press.frames import SolvedFrame
+from warpjld.whole_file import whole_file
 
 __all__ = ["State", "load_state", "save_state"]
 
@@ -53,15 +54,11 @@ def save_state(path: Path, state: State) -> None:
     for k, memory in enumerate(state.solution.memory):
         for one in fields(Memory):
             arrays[f"memory{k}.{one.name}"] = getattr(memory, one.name)
-    part = path.with_name(path.name + ".part")
     try:
-        with part.open("wb") as file:
+        with whole_file(path) as part, part.open("wb") as file:
             np.savez(file, **arrays)
-        part.replace(path)
     except OSError as error:
         raise InputError(f"cannot write: {error.strerror}", path=path) from error
-    finally:
-        part.unlink(missing_ok=True)
 
 
 def load_state(path: Path) -> State:

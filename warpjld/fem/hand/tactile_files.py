@@ -7,6 +7,7 @@ from typing import Any
 
 from warpjld.fem.hand.tactile import Tactile
 from warpjld.study.columns import Column, checked_values
+from warpjld.whole_file import whole_file
 
 __all__ = ["TACTILE_COLUMNS", "draw_tactile", "tactile_rows", "write_tactile"]
 
@@ -109,9 +110,8 @@ def draw_tactile(path: Path, tactile: Tactile, title: str = "", axis: str = "tim
         place.set_ylim(-0.05, 1.05)
     if not groups:
         axes[0, 0].text(0.5, 0.5, "nothing touches", ha="center", transform=axes[0, 0].transAxes)
-    beside = path.with_name(path.stem + ".part.png")
-    figure.savefig(beside, metadata={"Software": None})
-    beside.replace(path)
+    with whole_file(path) as part:
+        figure.savefig(part, metadata={"Software": None})
 
 
 def _group(pad: str) -> str:
