@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from warpjld.skeleton.recognise.tree import SourceTree
 from warpjld.skeleton.tree import Skeleton
 from warpjld.surface import Surface
 
@@ -37,10 +38,14 @@ class Rig:
         surface: Rest surface in the skeleton's frame.
         skin: Painted weights, where the source has them.
         path: Source file, or None for a generated rig.
-        source_joints: The source's own name of each joint ("" where a joint was added, as fingertips are).
-        source_frames: Rest transforms of the source's joints to the world, shape (J, 4, 4): what its animations are
-            relative to.
-        notes: What was recognised, guessed, mended or looks suspicious, for people to read.
+        source: The file's own joints, in its names, order, units and axes: what its animations move. None for a
+            generated rig.
+        sources: Joint of ``source`` that each joint of the skeleton is, -1 where it was added, as fingertips are.
+        placing: Similarity from the file's units and axes to the skeleton's, shape (4, 4).
+        rigid: Joint of the skeleton that a welded vertex follows rigidly, -1 for flesh, shape (V,); None where all
+            is flesh.
+        notes: What was recognised, guessed or mended, for people to read.
+        suspicious: What is probably wrong, and what to do about it: told on stderr by every command.
     """
 
     name: str
@@ -48,6 +53,16 @@ class Rig:
     surface: Surface
     skin: Skin | None = None
     path: Path | None = None
-    source_joints: tuple[str, ...] = ()
-    source_frames: NDArray[np.float64] | None = None
-    notes: tuple[str, ...] = field(default=())
+    source: SourceTree | None = None
+    sources: tuple[int, ...] = ()
+    placing: NDArray[np.float64] = field(default_factory=lambda: np.eye(4))
+    rigid: NDArray[np.int32] | None = None
+    notes: tuple[str, ...] = ()
+    suspicious: tuple[str, ...] = ()
+
+    @property
+    def source_joints(self) -> tuple[str, ...]:
+        """The file's own name of every joint, "" where a joint was added; empty for a generated rig."""
+        if self.source is None:
+            return ()
+        return tuple(self.source.names[j] if j >= 0 else "" for j in self.sources)

@@ -8,6 +8,7 @@ import signal
 import subprocess
 import sys
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -129,15 +130,17 @@ def test_rig_argument_names_files_and_built_in_hands(monkeypatch: pytest.MonkeyP
     from warpjld.cli.rig_argument import open_rig
 
     monkeypatch.setattr("warpjld.hand.build_hand", lambda side: side)
-    monkeypatch.setattr("warpjld.io.load_rig", lambda path, **options: f"rig of {path}")
-    assert [open_rig(text) for text in ("builtin:right", "a/b.glb", "C:/b.glb")] == [
+    monkeypatch.setattr(
+        "warpjld.io.load_rig", lambda path, **options: SimpleNamespace(name=f"rig of {path}", suspicious=())
+    )
+    assert [getattr(rig := open_rig(text), "name", rig) for text in ("builtin:right", "a/b.glb", "C:/b.glb")] == [
         "right",
         "rig of a/b.glb",
         "rig of C:/b.glb",
     ]
     with pytest.raises(InputError, match="builtin:left or builtin:right"):
         open_rig("builtin:foot")
-    with pytest.raises(InputError, match="are for files"):
+    with pytest.raises(InputError, match="--unit only work for files"):
         open_rig("builtin:left", unit="cm")
 
 

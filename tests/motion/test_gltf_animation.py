@@ -13,9 +13,10 @@ from tests.motion.skeletons import body, hand, rig
 from warpjld.errors import InputError
 from warpjld.io import load_rig
 from warpjld.io.gltf.document import open_document
-from warpjld.motion.gltf_animation import poses_of_gltf
+from warpjld.motion import load_motion
 from warpjld.rig import Rig
 from warpjld.skeleton import CHANNELS, Poses, Skeleton, default_limits, poses_from_angles
+from warpjld.skeleton.recognise.tree import SourceTree
 
 FLOAT32 = 2e-6
 """glTF stores float32; transforms of a few joints in a row."""
@@ -80,7 +81,11 @@ def chain() -> tuple[File, Rig]:
     frames = np.tile(np.eye(4), (4, 1, 1))
     frames[:, :3, :3] = 2 * Rotation.from_euler("z", 90, degrees=True).as_matrix()
     frames[:, :3, 3] = rest
-    return file, rig(skeleton, source_joints=("Root", "Middle", "End", ""), source_frames=frames)
+    return file, rig(
+        skeleton,
+        source=SourceTree(("Root", "Middle", "End"), np.arange(-1, 2), frames[:3]),
+        sources=(0, 1, 2, -1),
+    )
 
 
 def turn(axis: str, degrees: float) -> np.ndarray:
@@ -90,7 +95,7 @@ def turn(axis: str, degrees: float) -> np.ndarray:
 def test_linear_rotations_are_slerped_and_added_joints_follow(tmp_path: Path) -> None:
     file, driven = chain()
     file.animate(2, "rotation", [0, 1], np.array([turn("z", 0), turn("z", -90)]))
-    poses, rate = poses_of_gltf(file.save(tmp_path / "a.glb"), driven, rate=10)
+    poses, rate = load_motion(file.save(tmp_path / "a.glb"), driven, rate=10)
     assert (len(poses), rate) == (11, 10)
     degrees = Rotation.from_quat(poses.rotations[:, 1]).as_rotvec(degrees=True)
     np.testing.assert_allclose(degrees, np.linspace(0, -90, 11)[:, None] * [0, 0, 1], atol=1e-4)
@@ -105,7 +110,7 @@ def test_steps_and_cubics_of_translations(tmp_path: Path) -> None:
     cubic = np.zeros((6, 3))
     cubic[[1, 4]] = [[0, 0.5, 0], [0, 1.5, 0]]  # values; tangents zero: 3u² - 2u³
     file.animate(2, "translation", [0, 2], cubic, "CUBICSPLINE")
-    poses, _ = poses_of_gltf(file.save(tmp_path / "a.glb"), driven, rate=2)
+    poses, _ = load_motion(file.save(tmp_path / "a.glb"), driven, rate=2)
     np.testing.assert_allclose(poses.positions[:, 0, 0], [0, 0, 2, 2, 6], atol=FLOAT32)
     u = np.linspace(0, 1, 5)
     stretched = np.linalg.norm(poses.positions[:, 1] - poses.positions[:, 0], axis=1)
@@ -117,7 +122,7 @@ def test_cubic_rotations_are_unit_and_hit_their_keys(tmp_path: Path) -> None:
     keys = np.zeros((6, 4))
     keys[[1, 4]] = [turn("x", 0), turn("x", 80)]
     file.animate(3, "rotation", [0, 1], keys, "CUBICSPLINE")
-    poses, _ = poses_of_gltf(file.save(tmp_path / "a.glb"), driven, rate=4)
+    poses, _ = load_motion(file.save(tmp_path / "a.glb"), driven, rate=4)
     np.testing.assert_allclose(np.linalg.norm(poses.rotations, axis=-1), 1, atol=1e-12)
     angles = Rotation.from_quat(poses.rotations[:, 2]).magnitude()
     np.testing.assert_allclose(np.degrees(angles[[0, 2, 4]]), [0, 40, 80], atol=1e-4)
@@ -126,7 +131,7 @@ def test_cubic_rotations_are_unit_and_hit_their_keys(tmp_path: Path) -> None:
 def test_scale_moves_joints_and_leaves_rotations(tmp_path: Path) -> None:
     file, driven = chain()
     file.animate(1, "scale", [0, 1], np.array([[1, 1, 1], [1, 3, 1]]))
-    poses, _ = poses_of_gltf(file.save(tmp_path / "a.glb"), driven, rate=1)
+    poses, _ = load_motion(file.save(tmp_path / "a.glb"), driven, rate=1)
     np.testing.assert_allclose(poses.positions[1, 1], [-3, 1, 0], atol=FLOAT32)
     np.testing.assert_allclose(poses.rotations[1], np.tile([0, 0, 0, 1], (4, 1)), atol=1e-6)
 
@@ -134,7 +139,7 @@ def test_scale_moves_joints_and_leaves_rotations(tmp_path: Path) -> None:
 def test_rate_is_that_of_the_keys(tmp_path: Path) -> None:
     file, driven = chain()
     file.animate(2, "rotation", np.arange(5) / 24, np.array([turn("z", d) for d in range(0, 50, 10)]))
-    poses, rate = poses_of_gltf(file.save(tmp_path / "a.glb"), driven)
+    poses, rate = load_motion(file.save(tmp_path / "a.glb"), driven)
     assert (len(poses), rate) == (5, 24)
 
 
@@ -153,8 +158,8 @@ def animated_copy(source: Path, driven: Rig, poses: Poses, target: Path) -> Path
     nodes = file.gltf.nodes
     above = {child: n for n, node in enumerate(nodes) for child in node.children or ()}
     number = {node.name: n for n, node in enumerate(nodes)}
-    rest = driven.source_frames
-    assert rest is not None
+    assert driven.source is not None
+    rest = driven.placing @ driven.source.frames[list(driven.sources)]
     shown, worlds = open_document(source).worlds, {}
     for j, name in enumerate(driven.source_joints):
         if name:
@@ -176,7 +181,7 @@ def test_real_rigs_play_animations_of_their_own(data: Path, tmp_path: Path, name
     driven = load_rig(data / name)
     wanted = bent(driven.skeleton)
     copy = animated_copy(data / name, driven, wanted, tmp_path / "copy.glb")
-    got, rate = poses_of_gltf(copy, driven)
+    got, rate = load_motion(copy, driven)
     assert rate == 25
     np.testing.assert_allclose(got.positions, wanted.positions, atol=FLOAT32)
     np.testing.assert_allclose(got.rotations, wanted.rotations, atol=5e-6)
@@ -187,7 +192,7 @@ def test_another_skeleton_is_retargeted(data: Path, tmp_path: Path) -> None:
     source = load_rig(data / "hand_webxr_generic" / "left.glb")
     copy = animated_copy(data / "hand_webxr_generic" / "left.glb", source, bent(source.skeleton), tmp_path / "copy.glb")
     driven = rig(hand("left"))
-    poses, rate = poses_of_gltf(copy, driven)
+    poses, rate = load_motion(copy, driven)
     assert (len(poses), rate) == (5, 25)
     knuckle = driven.skeleton.index("index.knuckle3")
     assert np.degrees(poses.flexion[-1, knuckle] - poses.flexion[0, knuckle]) == pytest.approx(
@@ -200,38 +205,38 @@ def test_files_without_animation_are_refused(tmp_path: Path) -> None:
     file.accessor(np.zeros(1))
     file.gltf.animations = []
     with pytest.raises(InputError, match="no animation"):
-        poses_of_gltf(file.save(tmp_path / "a.glb"), driven)
+        load_motion(file.save(tmp_path / "a.glb"), driven)
 
 
 def test_broken_samplers_are_named(tmp_path: Path) -> None:
     file, driven = chain()
     file.animate(2, "rotation", [0, 1, 2], np.array([turn("z", 0)] * 2))
     with pytest.raises(InputError, match=r"animation of 'Middle', rotation: want \(3, 4\) values, got \(2, 4\)"):
-        poses_of_gltf(file.save(tmp_path / "a.glb"), driven)
+        load_motion(file.save(tmp_path / "a.glb"), driven)
     file, driven = chain()
     file.animate(2, "rotation", [0, 1, 1], np.array([turn("z", 0)] * 3))
     with pytest.raises(InputError, match="key times must increase"):
-        poses_of_gltf(file.save(tmp_path / "b.glb"), driven)
+        load_motion(file.save(tmp_path / "b.glb"), driven)
 
 
 def test_impossible_values_are_refused(tmp_path: Path) -> None:
     file, driven = chain()
     file.animate(2, "rotation", [0, 1], np.zeros((2, 4)))
     with pytest.raises(InputError, match="its quaternion is zero"):
-        poses_of_gltf(file.save(tmp_path / "a.glb"), driven)
+        load_motion(file.save(tmp_path / "a.glb"), driven)
     file, driven = chain()
     file.animate(2, "translation", [0, 1], np.zeros((2, 3)))
     file.gltf.accessors[0].componentType = None
     with pytest.raises(InputError, match=r"a\.glb: not as glTF 2.0 wants it|a\.glb: accessor"):
-        poses_of_gltf(file.save(tmp_path / "a.glb"), driven)
+        load_motion(file.save(tmp_path / "a.glb"), driven)
     file, driven = chain()
     file.animate(2, "translation", [0, 1e9], np.zeros((2, 3)))
     with pytest.raises(InputError, match="at most 1000000"):
-        poses_of_gltf(file.save(tmp_path / "a.glb"), driven, rate=30)
+        load_motion(file.save(tmp_path / "a.glb"), driven, rate=30)
 
 
 def test_unrelated_skeleton_is_refused(tmp_path: Path) -> None:
     file, _ = chain()
     file.animate(2, "rotation", [0, 1], np.array([turn("z", 0)] * 2))
     with pytest.raises(InputError, match="was recognised"):
-        poses_of_gltf(file.save(tmp_path / "a.glb"), rig(body()))
+        load_motion(file.save(tmp_path / "a.glb"), rig(body()))

@@ -41,16 +41,13 @@ __all__ = ["command"]
 def command(
     rig: str,
     out: Path,
-    skeleton: Path | None,
-    side: str | None,
-    unit: str | None,
-    up: str | None,
     start: Path | None,
     domains: Literal["geometry", "skin"],
     poses: int | None,
     iterations: int,
     as_json: bool,
     quiet: bool,
+    **how: Any,
 ) -> None:
     """Fit the covering's parameters to RIG over its joint ranges: volume kept, least stretch.
 
@@ -68,7 +65,7 @@ def command(
     silence_warp()
     if not out.absolute().parent.is_dir():
         raise InputError("cannot write the parameter file: no such folder", path=out.parent)
-    opened = open_rig(rig, skeleton=skeleton, side=side, unit=unit, up=up)
+    opened = open_rig(rig, **how)
     begin = None if start is None else load_parameters(start, opened.skeleton)
     with progress(quiet) as report:
         covering = bind(opened.skeleton, opened.surface, parameters=begin, skin=opened.skin, domains=domains)

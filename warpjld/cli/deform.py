@@ -10,6 +10,7 @@ import click
 
 from warpjld.cli import options
 from warpjld.cli.answer import answer
+from warpjld.cli.warn import warn
 from warpjld.errors import InputError
 from warpjld.io.caches import FORMATS
 
@@ -55,10 +56,6 @@ def command(
     rig: str,
     motion: Path,
     out: Path,
-    skeleton: Path | None,
-    side: str | None,
-    unit: str | None,
-    up: str | None,
     span: str | None,
     rate: float | None,
     limits: str,
@@ -69,6 +66,7 @@ def command(
     threads: int | None,
     as_json: bool,
     quiet: bool,
+    **how: Any,
 ) -> None:
     """Deform RIG by a motion and write the surface, frame after frame, in the vertex order of RIG's file.
 
@@ -83,8 +81,9 @@ def command(
 
     silence_warp()
     began = time.perf_counter()
-    driven = open_rig(rig, skeleton=skeleton, side=side, unit=unit, up=up)
+    driven = open_rig(rig, **how)
     moved = open_motion(motion, driven, rate=rate, limits=limits)  # type: ignore[arg-type]
+    warn(moved.warnings)
     first, last = _span(span, len(moved.poses))
     poses = moved.poses[slice(first, last + 1)]
     chosen = None if parameters is None else load_parameters(parameters, driven.skeleton)
@@ -114,6 +113,7 @@ def command(
         "vertices": len(driven.surface.weld),
         "triangles": len(driven.surface.source_faces),
         "seconds": round(time.perf_counter() - began, 3),
+        "warnings": [*driven.suspicious, *moved.warnings],
         "notes": [*moved.notes, *([cache.note] if cache.note else [])],
     }
     if as_json:

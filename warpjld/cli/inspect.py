@@ -27,15 +27,12 @@ __all__ = ["command"]
 @click.option("-q", "--quiet", is_flag=True, help="Say only what looks suspicious.")
 def command(
     rig: str,
-    skeleton: Path | None,
-    side: str | None,
-    unit: str | None,
-    up: str | None,
     out: Path | None,
     no_picture: bool,
     write_skeleton: Path | None,
     as_json: bool,
     quiet: bool,
+    **how: Any,
 ) -> None:
     """Report what was recognised in RIG: joints, domains, limits, and joints that look misplaced.
 
@@ -46,7 +43,7 @@ def command(
     from warpjld.quiet import silence_warp
 
     silence_warp()
-    opened = open_rig(rig, skeleton=skeleton, side=side, unit=unit, up=up)
+    opened = open_rig(rig, **how)
     report = _report(opened)
     if write_skeleton is not None:
         from warpjld.io.skeleton_file import write_skeleton_file
@@ -102,6 +99,7 @@ def _report(rig: Rig) -> dict[str, Any]:
             vars(finding) | {"message": finding.message}
             for finding in check_placing(skeleton, surface.vertices, surface.faces)
         ],
+        "suspicious": list(rig.suspicious),
         "notes": list(rig.notes),
     }
 

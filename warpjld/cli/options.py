@@ -34,9 +34,10 @@ quiet: Decorator = click.option("-q", "--quiet", is_flag=True, help="Say nothing
 
 
 def rig(command: Callable[..., Any]) -> Callable[..., Any]:
-    """How to read a RIG that does not say everything itself: ``skeleton``, ``side``, ``unit``, ``up``."""
+    """How to read a RIG that does not say everything itself: the keyword arguments of ``open_rig``."""
     for option in (
         click.option("--up", type=click.Choice(["y", "z"]), help="RIG's up axis; guessed by default."),
+        click.option("--scale", type=float, help="Factor for all of RIG's lengths; without --unit none is guessed."),
         click.option("--unit", type=click.Choice(["m", "cm", "mm"]), help="RIG's unit; guessed by default."),
         click.option(
             "--side", type=click.Choice(["left", "right"]), help="Which hand RIG is, if the file leaves it open."

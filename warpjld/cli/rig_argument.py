@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
+from warpjld.cli.warn import warn
 from warpjld.errors import InputError
 
 if TYPE_CHECKING:
@@ -13,19 +13,12 @@ if TYPE_CHECKING:
 __all__ = ["open_rig"]
 
 
-def open_rig(
-    text: str,
-    *,
-    skeleton: Path | None = None,
-    side: str | None = None,
-    unit: str | None = None,
-    up: str | None = None,
-) -> Rig:
-    """The rig a user named: a path, ``builtin:left`` or ``builtin:right``.
+def open_rig(text: str, **how: Any) -> Rig:
+    """The rig a user named: a path, ``builtin:left`` or ``builtin:right``; what looks suspicious goes to stderr.
 
     Args:
         text: What stands on the command line.
-        skeleton: Skeleton file for a surface without joints; likewise ``side``, ``unit`` and ``up`` as in ``load_rig``.
+        how: Keyword arguments of ``load_rig``, as ``options.rig`` collects them; None for what was not given.
 
     Raises:
         InputError: No such side, a file that is no rig, or options that only files take.
@@ -34,11 +27,14 @@ def open_rig(
     if kind != "builtin" or not colon:
         from warpjld.io import load_rig
 
-        return load_rig(text, skeleton=skeleton, side=side, unit=unit, up=up)
+        rig = load_rig(text, **how)
+        warn(rig.suspicious, "suspicious")
+        return rig
     if which not in ("left", "right"):
         raise InputError(f"no built-in hand '{which}': want builtin:left or builtin:right")
-    if any(option is not None for option in (skeleton, side, unit, up)):
-        raise InputError(f"{text}: --skeleton, --side, --unit and --up are for files")
+    given = [f"--{name.replace('_', '-')}" for name, value in how.items() if value is not None]
+    if given:
+        raise InputError(f"{text}: {', '.join(given)} only work for files")
     from warpjld.hand import build_hand
 
     return build_hand(which)

@@ -16,6 +16,7 @@ from warpjld.rig import Rig
 from warpjld.rotations import unit
 from warpjld.skeleton import DIGITS, PALM_SEGMENTS, Skeleton, default_limits, hand_joint_names
 from warpjld.skeleton.hand import FINGER_JOINTS, HAND_PARENTS
+from warpjld.skeleton.recognise.tree import SourceTree
 from warpjld.suggest import one_of
 from warpjld.surface import Part, Surface
 
@@ -63,8 +64,15 @@ def build_hand(
         name=f"{side} hand",
         skeleton=skeleton,
         surface=_surface(vertices * _MILLIMETRE, np.ascontiguousarray(faces, dtype=np.int32)),
-        source_joints=skeleton.names,
+        source=_source(skeleton),
+        sources=tuple(range(len(skeleton))),
     )
+
+
+def _source(skeleton: Skeleton) -> SourceTree:
+    frames = np.tile(np.eye(4), (len(skeleton), 1, 1))
+    frames[:, :3, 3] = skeleton.rest
+    return SourceTree(skeleton.names, skeleton.parents.astype(np.int64), frames)
 
 
 def _check(side: str, length: float, breadth: float, resolution: int) -> None:

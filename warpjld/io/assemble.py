@@ -17,25 +17,33 @@ __all__ = ["assemble_rig"]
 _FURTHEST = 1e12
 
 
-def assemble_rig(source: SourceRig, *, side: str | None = None, unit: str | None = None, up: str | None = None) -> Rig:
+def assemble_rig(
+    source: SourceRig,
+    *,
+    side: str | None = None,
+    unit: str | None = None,
+    scale: float | None = None,
+    up: str | None = None,
+) -> Rig:
     """Recognise what ``source`` holds and bring it to the canonical form; arguments as in ``load_rig``.
 
     Raises:
         InputError: What it holds cannot be used; the file is named.
     """
     try:
-        return _assemble(source, side, unit, up)
+        return _assemble(source, side, unit, scale, up)
     except InputError as error:
         if error.path is not None:
             raise
         raise InputError(error.message, path=source.path) from None
 
 
-def _assemble(source: SourceRig, side: str | None, unit: str | None, up: str | None) -> Rig:
+def _assemble(source: SourceRig, side: str | None, unit: str | None, scale: float | None, up: str | None) -> Rig:
     reach = max(np.abs(source.vertices).max(initial=0.0), np.abs(source.tree.frames).max(initial=0.0))
     if not reach < _FURTHEST:
         raise InputError(f"vertices or joints lie at {reach:.3g}: beyond anything that can be computed with")
-    source = place(source, unit=unit, up=up)
+    file_tree = source.tree
+    source = place(source, unit=unit, scale=scale, up=up)
     surface = weld_surface(source.vertices, source.faces, uv=source.uv, parts=source.parts)
     found = canonical_skeleton(
         source.tree, surface.vertices, surface.faces, side=side, axes=source.axes, limits=source.limits
@@ -43,19 +51,18 @@ def _assemble(source: SourceRig, side: str | None, unit: str | None, up: str | N
     skin = None
     if source.joints is not None and source.weights is not None:
         skin = _skin(source.joints, source.weights, found.owner, len(found.skeleton), surface)
-    frames = np.tile(np.eye(4), (len(found.skeleton), 1, 1))
-    frames[:, :3, 3] = found.skeleton.rest
-    known = np.array(found.sources) >= 0
-    frames[known] = source.tree.frames[np.array(found.sources)[known]]
     return Rig(
         name=source.path.stem,
         skeleton=found.skeleton,
         surface=surface,
         skin=skin,
         path=source.path,
-        source_joints=tuple(source.tree.names[j] if j >= 0 else "" for j in found.sources),
-        source_frames=frames,
+        source=file_tree,
+        sources=found.sources,
+        placing=source.placing,
+        rigid=_rigid(source, found.owner, surface),
         notes=(*source.notes, *found.notes),
+        suspicious=source.suspicious,
     )
 
 
@@ -70,3 +77,12 @@ def _skin(
     strongest = np.argsort(-dense, axis=1, kind="stable")[:, :width]
     chosen = np.take_along_axis(dense, strongest, axis=1)
     return Skin(np.where(chosen > 0, strongest, strongest[:, :1]).astype(np.int32), chosen)
+
+
+def _rigid(source: SourceRig, owner: NDArray[np.int64], surface: Surface) -> NDArray[np.int32] | None:
+    """Rigid parts over welded vertices and canonical joints."""
+    if source.rigid is None or not (source.rigid >= 0).any():
+        return None
+    out = np.full(len(surface.vertices), -1, dtype=np.int32)
+    out[surface.weld] = np.where(source.rigid >= 0, owner[source.rigid], -1)
+    return out

@@ -12,30 +12,34 @@ from warpjld.skeleton.recognise.recognise import recognise
 from warpjld.skeleton.recognise.roles import Roles
 from warpjld.skeleton.recognise.tree import SourceTree
 
-__all__ = ["place"]
+__all__ = ["METRES", "place"]
 
-_METRES = {"m": 1.0, "cm": 0.01, "mm": 0.001}
+METRES = {"m": 1.0, "cm": 0.01, "mm": 0.001}
 _HAND = (0.08, 0.30)  # wrist to middle fingertip or last knuckle, children to giants [m]
 _BODY = (0.5, 2.6)  # ankle to head [m]
 
 
-def place(source: SourceRig, *, unit: str | None = None, up: str | None = None) -> SourceRig:
+def place(
+    source: SourceRig, *, unit: str | None = None, scale: float | None = None, up: str | None = None
+) -> SourceRig:
     """``source`` in metres with Y up; guesses are noted.
 
     Args:
         source: What the file says.
         unit: ``m``, ``cm``, ``mm`` or None: the one with which hand or body has a plausible size.
+        scale: Factor by which all lengths are multiplied besides; where it is given and ``unit`` is not, nothing is
+            guessed: the file is taken to be in metres.
         up: ``y``, ``z`` or None: Z only where a body's head lies that way from its hips.
     """
     notes = []
-    factor = 1.0 if unit is None else _METRES[unit]
+    factor = (1.0 if unit is None else METRES[unit]) * (1.0 if scale is None else scale)
     roles = recognise(source.tree) if unit is None or up is None else Roles()
-    if unit is None:
+    if unit is None and scale is None:
         size, plausible, what = _size(source.tree, roles)
         if size and not plausible[0] <= size <= plausible[1]:
-            fits = [u for u, f in _METRES.items() if plausible[0] <= size * f <= plausible[1]]
+            fits = [u for u, f in METRES.items() if plausible[0] <= size * f <= plausible[1]]
             if fits:
-                factor = _METRES[fits[0]]
+                factor = METRES[fits[0]]
                 notes.append(f"unit: a {what} of {size:.4g} units is taken to be in {fits[0]}")
             else:
                 notes.append(f"unit: a {what} of {size:.4g} m is not plausible in m, cm or mm: left as it is")
@@ -43,6 +47,8 @@ def place(source: SourceRig, *, unit: str | None = None, up: str | None = None) 
         up = "z"
         notes.append("up axis: the body stands along Z, turned to Y")
     turn = np.array([[1.0, 0, 0], [0, 0, 1.0], [0, -1.0, 0]]) if up == "z" else np.eye(3)
+    placing = np.eye(4)
+    placing[:3, :3] = factor * turn
     frames = source.tree.frames.copy()
     frames[:, :3, :3] = turn @ frames[:, :3, :3]  # directions turn, they do not scale
     frames[:, :3, 3] = factor * frames[:, :3, 3] @ turn.T
@@ -51,6 +57,7 @@ def place(source: SourceRig, *, unit: str | None = None, up: str | None = None) 
         vertices=factor * source.vertices @ turn.T,
         tree=replace(source.tree, frames=frames),
         axes={j: turn @ axis for j, axis in source.axes.items()},
+        placing=placing @ source.placing,
         notes=(*source.notes, *notes),
     )
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from pathlib import Path
 
 from warpjld.errors import InputError
@@ -17,6 +18,7 @@ def load_rig(
     skeleton: str | Path | None = None,
     side: str | None = None,
     unit: str | None = None,
+    scale: float | None = None,
     up: str | None = None,
 ) -> Rig:
     """Load a rig: a skinned .glb or .gltf, or any surface (OBJ, PLY, STL, …) with a skeleton file.
@@ -26,6 +28,7 @@ def load_rig(
         skeleton: Skeleton file (JSON, see :mod:`warpjld.io.skeleton_file`); needed where the surface has no joints.
         side: ``left`` or ``right`` for a single hand, where the file leaves it open or is wrong.
         unit: ``m``, ``cm`` or ``mm``; by default guessed from a hand's or body's plausible size, with a note.
+        scale: Factor by which all lengths are multiplied besides; without ``unit`` nothing is guessed then.
         up: ``y`` or ``z``: the file's up axis; turned to Y.
 
     Returns:
@@ -43,19 +46,30 @@ def load_rig(
     ):
         if value is not None and value not in allowed:
             raise InputError(f"{name}: want {' or '.join(repr(a) for a in allowed)}, got {value!r}")
-    return assemble_rig(_read(Path(path), skeleton), side=side, unit=unit, up=up)
+    if scale is not None and not 0.0 < scale < float("inf"):
+        raise InputError(f"scale: want a factor above 0, got {scale:g}")
+    return assemble_rig(_read(Path(path), skeleton), side=side, unit=unit, scale=scale, up=up)
 
 
 def _read(path: Path, skeleton: str | Path | None) -> SourceRig:
     if not path.is_file():
         raise InputError("is a folder" if path.is_dir() else "no such file", path=path)
-    if path.suffix.lower() in (".glb", ".gltf") and skeleton is None:
-        from warpjld.io.gltf.skin import read_gltf_rig
+    if skeleton is not None:
+        from warpjld.io.mesh_file import read_mesh
+        from warpjld.io.skeleton_file import read_skeleton_file
 
-        return read_gltf_rig(path)
-    if skeleton is None:
+        return read_skeleton_file(skeleton, read_mesh(path))
+    reader = _READERS.get(path.suffix.lower())
+    if reader is None:
         raise InputError("has no joints: give a skeleton file for this surface", path=path)
-    from warpjld.io.mesh_file import read_mesh
-    from warpjld.io.skeleton_file import read_skeleton_file
+    return reader(path)
 
-    return read_skeleton_file(skeleton, read_mesh(path))
+
+def _read_gltf(path: Path) -> SourceRig:
+    from warpjld.io.gltf.skin import read_gltf_rig
+
+    return read_gltf_rig(path)
+
+
+_READERS: dict[str, Callable[[Path], SourceRig]] = {".glb": _read_gltf, ".gltf": _read_gltf}
+"""What reads the rigs of each suffix; libraries are imported when a file of their kind is opened."""

@@ -1,4 +1,4 @@
-"""Animations of glTF files, sampled at frames: of a rig's own skin as they are, of another by retargeting."""
+"""Animations of glTF files, sampled at frames."""
 
 from __future__ import annotations
 
@@ -10,55 +10,41 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from warpjld.errors import InputError
-from warpjld.motion.clip import Clip
 from warpjld.motion.frame_times import frame_times
-from warpjld.motion.retarget import retarget
-from warpjld.rig import Rig
+from warpjld.motion.joint_animation import JointAnimation
 from warpjld.rotations import slerp, unit
-from warpjld.skeleton import Poses, poses_from_world
 
 if TYPE_CHECKING:
     from warpjld.io.gltf.document import Document
 
-__all__ = ["poses_of_gltf"]
+__all__ = ["read_gltf_animation"]
 
 _PATHS = {"translation": 3, "rotation": 4, "scale": 3}
-_SAME = 1e-4
-"""Rest transforms that differ by less, relative to the skeleton's size, are those of one skeleton."""
 _DEFAULT_RATE = 30.0
 
 
-def poses_of_gltf(path: str | Path, rig: Rig, *, rate: float | None = None) -> tuple[Poses, float]:
-    """Poses of the first animation of a glTF file.
-
-    Where the file's joints are the rig's own, names and rest, each joint takes its world transform relative to rest,
-    so that flat hierarchies and moving joints are followed; scale moves joints, but does not widen the flesh, and
-    joints that recognition merged into another (twist bones, say) only count by where they carry the joints below
-    them. Another skeleton's animation drives the rig by ``retarget``.
+def read_gltf_animation(path: str | Path, *, rate: float | None = None, name: str | None = None) -> JointAnimation:
+    """An animation of a glTF file.
 
     Args:
         path: A .gltf or .glb file with an animation.
-        rig: What is driven.
         rate: Frames a second; None for the spacing of the file's keys, or 30 where they are uneven.
+        name: Which animation; None for the first.
 
     Raises:
-        InputError: No glTF, no animation, broken samplers, or no joint in common.
+        InputError: No glTF, no animation, or broken samplers.
     """
     from warpjld.io.gltf.document import open_document
+    from warpjld.io.gltf.skin import joint_nodes, joint_tree
 
     document = open_document(path)
     try:
         worlds, rate = _sample(document, rate)
+        nodes = joint_nodes(document) if document.gltf.skins else list(range(worlds.shape[1]))
+        return JointAnimation(joint_tree(document, nodes), worlds[:, nodes], rate)
     except (AttributeError, IndexError, KeyError, TypeError, ValueError) as error:
         # pygltflib takes any JSON: what the schema forbids shows where it is used
         raise InputError(f"not as glTF 2.0 wants it: {error}", path=path) from error
-    moved = _own_joints(document, rig, worlds)
-    if moved is None:
-        return retarget(_clip(document, worlds, rate), rig.skeleton), rate
-    skeleton = rig.skeleton
-    rotations = Rotation.from_matrix(moved[..., :3, :3].reshape(-1, 3, 3)).as_quat().reshape(*moved.shape[:2], 4)
-    positions = np.einsum("fjab,jb->fja", moved[..., :3, :3], skeleton.rest) + moved[..., :3, 3]
-    return poses_from_world(skeleton, positions, rotations), rate
 
 
 def _sample(document: Document, rate: float | None) -> tuple[NDArray[np.float64], float]:
@@ -192,54 +178,3 @@ def _animated(document: Document, node: int, keys: dict[str, _Keys], at: NDArray
     out[:, :3, 3] = values["translation"]
     out[:, 3, 3] = 1.0
     return out
-
-
-def _own_joints(document: Document, rig: Rig, worlds: NDArray[np.float64]) -> NDArray[np.float64] | None:
-    """Each joint's motion from the rig's rest, shape (F, J, 4, 4); None where the file has another skeleton.
-
-    The rig may have been turned and scaled on loading: the same motion then turns and scales what the file animates.
-    """
-    if rig.source_frames is None or not any(rig.source_joints):
-        return None
-    joints_last = [*range(len(document.gltf.nodes)), *(n for skin in document.gltf.skins or () for n in skin.joints)]
-    nodes = {document.name(n): n for n in joints_last}  # of nodes with one name the last counts: a skin's joint
-    own = [(j, nodes[name]) for j, name in enumerate(rig.source_joints) if name and name in nodes]
-    if len(own) < sum(bool(name) for name in rig.source_joints):
-        return None
-    joints, where = (np.array(column) for column in zip(*own, strict=True))
-    frames, rest = rig.source_frames[joints], document.worlds[where]
-    placing = frames[0] @ np.linalg.inv(rest[0])
-    size = float(np.linalg.norm(np.ptp(rig.skeleton.rest, axis=0))) or 1.0
-    off = placing @ rest - frames
-    if np.abs(off[:, :3, 3]).max() > _SAME * size or np.abs(off[:, :3, :3]).max() > _SAME * np.abs(frames).max():
-        return None
-    moved = np.empty((len(worlds), len(rig.skeleton), 4, 4))
-    moved[:, joints] = placing @ worlds[:, where] @ np.linalg.inv(frames)
-    for j, parent in enumerate(rig.skeleton.parents):
-        if j not in joints:  # an added fingertip, say
-            moved[:, j] = moved[:, parent] if parent >= 0 else np.eye(4)
-    return moved
-
-
-def _clip(document: Document, worlds: NDArray[np.float64], rate: float) -> Clip:
-    """The joints of the file's skins, or all its nodes, as another skeleton's motion."""
-    nodes = sorted({n for skin in document.gltf.skins or () for n in skin.joints}) or list(range(worlds.shape[1]))
-    depth = {}
-    for node in nodes:
-        depth[node], above = 0, int(document.parents[node])
-        while above >= 0:
-            depth[node], above = depth[node] + 1, int(document.parents[above])
-    nodes.sort(key=lambda n: (depth[n], n))
-    number = {node: b for b, node in enumerate(nodes)}
-    parents = np.full(len(nodes), -1)
-    for b, node in enumerate(nodes):
-        above = int(document.parents[node])
-        while above >= 0 and above not in number:
-            above = int(document.parents[above])
-        parents[b] = number.get(above, -1)
-    rest = document.worlds[nodes]
-    joints = worlds[:, nodes]
-    turned = joints[..., :3, :3] @ np.linalg.inv(rest[:, :3, :3])
-    rotations = Rotation.from_matrix(turned.reshape(-1, 3, 3)).as_quat().reshape(len(worlds), len(nodes), 4)
-    names = tuple(document.name(n) for n in nodes)
-    return Clip(names, parents, rest[:, :3, 3], joints[..., :3, 3], rotations, rate)

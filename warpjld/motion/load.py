@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Callable
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
 
 from warpjld.errors import InputError
+from warpjld.motion.joint_animation import JointAnimation
 from warpjld.motion.tracks import Limits
 from warpjld.rig import Rig
 from warpjld.skeleton import Poses
@@ -32,11 +34,13 @@ class LoadedMotion:
         poses: The rig's poses, frame after frame.
         rate: Frames a second.
         notes: What drives what, and what was held at a limit, for people to read.
+        warnings: What of the motion the rig does not follow, and what looks wrong: told on stderr by every command.
     """
 
     poses: Poses
     rate: float
     notes: tuple[str, ...] = ()
+    warnings: tuple[str, ...] = ()
 
 
 def load_motion(
@@ -47,7 +51,15 @@ def load_motion(
     return loaded.poses, loaded.rate
 
 
-def open_motion(path: str | Path, rig: Rig, *, rate: float | None = None, limits: Limits = "error") -> LoadedMotion:
+def open_motion(
+    path: str | Path,
+    rig: Rig,
+    *,
+    rate: float | None = None,
+    limits: Limits = "error",
+    side: str | None = None,
+    animation: str | None = None,
+) -> LoadedMotion:
     """Read a motion file for a rig; the suffix says which kind it is (see ``MOTION_FORMATS``).
 
     Tables of angles are drawn by Kochanek–Bartels splines from the first key to the last, and are the only ones that
@@ -55,10 +67,12 @@ def open_motion(path: str | Path, rig: Rig, *, rate: float | None = None, limits
 
     Args:
         path: The file.
-        rig: What is driven; see ``read_csv``, ``retarget``, ``poses_of_gltf`` and ``poses_of_hand`` for how.
+        rig: What is driven; see ``read_csv``, ``retarget``, ``own_poses`` and ``poses_of_hand`` for how.
         rate: Frames a second of the result; None for the file's own, or 30 for tables, which have none. A table's
             frames are played at that rate, all others are resampled to it.
         limits: What to do with angles beyond a joint's limit, see ``Motion.sample``.
+        side: ``left`` or ``right``: which hand a recording is of, where its file leaves it open or is wrong.
+        animation: Name of one of the file's animations; None for the first.
 
     Raises:
         InputError: An unknown suffix, a file that cannot be read or understood, or that does not fit the rig.
@@ -76,14 +90,35 @@ def open_motion(path: str | Path, rig: Rig, *, rate: float | None = None, limits
         if suffix == ".bvh":
             return _capture(path, rig, rate)
         if suffix == ".json":
-            return _tracked_hand(path, rig, rate)
-        from warpjld.motion.gltf_animation import poses_of_gltf
-
-        return LoadedMotion(*poses_of_gltf(path, rig, rate=rate))
+            return _tracked_hand(path, rig, rate, side)
+        return _animation(_ANIMATIONS[suffix](path, rate, animation), rig)
     except InputError as error:
         if error.path is not None:
             raise
         raise InputError(error.message, path=path) from error
+
+
+def _animation(animation: JointAnimation, rig: Rig) -> LoadedMotion:
+    from warpjld.motion.own_joints import own_poses
+    from warpjld.motion.retarget import retarget
+
+    poses = own_poses(animation, rig)
+    if poses is None:
+        poses = retarget(animation.clip(), rig.skeleton)
+    return LoadedMotion(poses, animation.rate, animation.notes)
+
+
+def _read_gltf(path: Path, rate: float | None, name: str | None) -> JointAnimation:
+    from warpjld.motion.gltf_animation import read_gltf_animation
+
+    return read_gltf_animation(path, rate=rate, name=name)
+
+
+_ANIMATIONS: dict[str, Callable[[Path, float | None, str | None], JointAnimation]] = {
+    ".glb": _read_gltf,
+    ".gltf": _read_gltf,
+}
+"""What reads the animations of each suffix: the file, frames a second or None, the animation's name or None."""
 
 
 def _table(path: Path, rig: Rig, rate: float | None, limits: Limits) -> LoadedMotion:
@@ -106,11 +141,13 @@ def _capture(path: Path, rig: Rig, rate: float | None) -> LoadedMotion:
     return LoadedMotion(retarget(clip, rig.skeleton), clip.rate, notes)
 
 
-def _tracked_hand(path: Path, rig: Rig, rate: float | None) -> LoadedMotion:
+def _tracked_hand(path: Path, rig: Rig, rate: float | None, side: str | None) -> LoadedMotion:
     from warpjld.motion.hand_track import poses_of_hand
     from warpjld.motion.json_file import read_hand_track
 
     track, own_rate = read_hand_track(path)
+    if side is not None:
+        track = replace(track, side=side)
     rate = own_rate if rate is None else rate
     mirrored = f"{track.side}.wrist" not in rig.skeleton.names
     notes = (f"a recorded {track.side} hand drives the other one, mirrored",) if mirrored else ()

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+import sys
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Literal
@@ -92,6 +93,10 @@ class Actor:
         return (min(frames), max(frames)) if frames else None
 
 
+def _to_stderr(line: str) -> None:
+    print(f"warning: {line}", file=sys.stderr)
+
+
 @dataclass(eq=False)
 class Scene:
     """A stage with actors, a clock, a camera, and a list of files to make.
@@ -112,6 +117,7 @@ class Scene:
         asked: Where in a script they were asked for, by name.
         folder: The output folder.
         say: Where PRINT and SHOW write.
+        warn: Told what is probably wrong with a rig or a motion, as it is met; ``warnings`` keeps it for the summary.
     """
 
     actors: dict[str, Actor] = field(default_factory=dict)
@@ -130,6 +136,14 @@ class Scene:
     asked: dict[str, Where] = field(default_factory=dict)
     folder: Path = Path("out")
     say: Callable[[str], None] = print
+    warn: Callable[[str], None] = _to_stderr
+    warnings: list[str] = field(default_factory=list)
+
+    def warned(self, lines: Iterable[str]) -> None:
+        """Tell warnings, and keep them."""
+        for line in lines:
+            self.warnings.append(line)
+            self.warn(line)
 
     def add(self, name: str, rig: Rig) -> Actor:
         """Bring a rig on stage; it becomes the current actor.
@@ -146,6 +160,7 @@ class Scene:
         actor = Actor(name, rig, rig.skeleton, Motion(), default_parameters(rig.skeleton))
         self.actors[name] = actor
         self.current = name
+        self.warned(f"{name}: {doubt}" for doubt in rig.suspicious)
         return actor
 
     def actor(self, name: str | None = None) -> Actor:

@@ -99,6 +99,7 @@ class Summary:
             "press": self.press,
             "files": list(files),
             "seconds": self.seconds,
+            "warnings": self.scene.warnings,
             "notes": self.notes,
         }
 

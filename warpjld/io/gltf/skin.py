@@ -15,7 +15,7 @@ from warpjld.io.source import SourceRig
 from warpjld.skeleton.recognise.tree import SourceTree
 from warpjld.surface import Part
 
-__all__ = ["read_gltf_rig"]
+__all__ = ["joint_nodes", "joint_tree", "read_gltf_rig"]
 
 _TRIANGLES, _STRIP, _FAN = 4, 5, 6
 _BIND_TOLERANCE = 1e-4  # of the surface's size: where bind and shown pose count as one
@@ -56,9 +56,9 @@ def _read(document: Document) -> SourceRig:
         raise InputError(
             "has no skin (no joints): give a rigged file, or a skeleton file for this surface", path=document.path
         )
-    nodes = _joint_nodes(document)
+    nodes = joint_nodes(document)
     number = {node: j for j, node in enumerate(nodes)}
-    tree = _tree(document, nodes, number)
+    tree = joint_tree(document, nodes)
     primitives: list[_Primitive] = []
     parts: list[Part] = []
     notes: list[str] = []
@@ -94,7 +94,12 @@ def _read(document: Document) -> SourceRig:
     )
 
 
-def _joint_nodes(document: Document) -> list[int]:
+def joint_nodes(document: Document) -> list[int]:
+    """The nodes that are joints of any skin, in the skins' order.
+
+    Raises:
+        InputError: A skin without joints, or with one that does not exist.
+    """
     nodes: dict[int, None] = {}
     for i, skin in enumerate(document.gltf.skins):
         if not skin.joints:
@@ -106,7 +111,9 @@ def _joint_nodes(document: Document) -> list[int]:
     return list(nodes)
 
 
-def _tree(document: Document, nodes: list[int], number: dict[int, int]) -> SourceTree:
+def joint_tree(document: Document, nodes: list[int]) -> SourceTree:
+    """These nodes as a joint tree, at the pose that the file shows."""
+    number = {node: j for j, node in enumerate(nodes)}
     parents = np.full(len(nodes), -1)
     for j, node in enumerate(nodes):
         above = int(document.parents[node])

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 
+from warpjld.io.placement import METRES
 from warpjld.script.arguments import Arguments
 from warpjld.script.commands.animation import SIDES
 from warpjld.script.keys import read_joint
@@ -23,7 +24,7 @@ if TYPE_CHECKING:
     "HAND",
     syntax=(
         "HAND <LEFT/RIGHT> BUILTIN [LENGTH <metres>] [BREADTH <metres>] [RESOLUTION <vertices>] [NAME <actor>]"
-        ' or HAND <LEFT/RIGHT> "<rig file>" [NAME <actor>]'
+        ' or HAND <LEFT/RIGHT> "<rig file>" [UNIT <M/CM/MM or metres>] [SCALE <factor>] [NAME <actor>]'
     ),
     help="Bring on a hand: the built-in one, or a rig from a file. The actor is called LEFT or RIGHT unless named.",
     group="Actors",
@@ -46,27 +47,31 @@ def hand(scene: Scene, arguments: Arguments) -> None:
         if not arguments.has_text():
             raise arguments.expected("BUILTIN or a rig file in quotes")
         path = arguments.input_file("a rig file")
-        name = _name(arguments, side)
-        rig = _load(path, side=side)
+        options = _options(arguments)
+        name = options.pop("name", side)
+        rig = _load(path, side=side, **options)
     scene.add(str(name), rig)
 
 
 @command(
     "BODY",
-    syntax='BODY "<rig file>" [NAME <actor>]',
+    syntax='BODY "<rig file>" [UNIT <M/CM/MM or metres>] [SCALE <factor>] [NAME <actor>]',
     help="Bring on a rig with any skeleton: a body, an animal. The actor is called BODY unless named.",
     group="Actors",
 )
 def body(scene: Scene, arguments: Arguments) -> None:
     """R12, R30."""
     path = arguments.input_file("a rig file")
-    name = _name(arguments, "body")
-    scene.add(name, _load(path))
+    options = _options(arguments)
+    name = str(options.pop("name", "body"))
+    scene.add(name, _load(path, **options))
 
 
 @command(
     "MODEL",
-    syntax='MODEL "<surface file>" SKELETON "<skeleton file>" [NAME <actor>]',
+    syntax=(
+        'MODEL "<surface file>" SKELETON "<skeleton file>" [UNIT <M/CM/MM or metres>] [SCALE <factor>] [NAME <actor>]'
+    ),
     help="Bring on a bare surface with a skeleton file. The actor is called MODEL unless named.",
     group="Actors",
 )
@@ -75,8 +80,9 @@ def model(scene: Scene, arguments: Arguments) -> None:
     path = arguments.input_file("a surface file")
     arguments.choice("", ("SKELETON",))
     skeleton = arguments.input_file("a skeleton file")
-    name = _name(arguments, "model")
-    scene.add(name, _load(path, skeleton=skeleton))
+    options = _options(arguments)
+    name = str(options.pop("name", "model"))
+    scene.add(name, _load(path, skeleton=skeleton, **options))
 
 
 @command(
@@ -92,20 +98,25 @@ def actor(scene: Scene, arguments: Arguments) -> None:
 
 @command(
     "MOTION",
-    syntax='MOTION "<motion file>"',
+    syntax='MOTION "<motion file>" [SIDE <LEFT/RIGHT>] [ANIMATION "<name>"]',
     help="Drive the current actor by a motion file instead of keys, at the RATE set before.",
     group="Actors",
 )
 def motion(scene: Scene, arguments: Arguments) -> None:
     """R110 and any recorded motion."""
-    from warpjld.motion import load_motion
+    from warpjld.motion import open_motion
 
     chosen = scene.actor()
     path = arguments.input_file("a motion file")
     if chosen.keyed:
         raise arguments.error(f"actor {chosen.name} has keys already: it cannot be driven by a file as well")
+    options = arguments.options(
+        side=lambda: arguments.choice("the side", SIDES).lower(), animation=lambda: arguments.text("an animation")
+    )
     rig = replace(chosen.rig, skeleton=chosen.skeleton)  # with the script's axes and limits
-    chosen.recorded = load_motion(path, rig, rate=scene.rate)
+    moved = open_motion(path, rig, rate=scene.rate, **options)  # type: ignore[arg-type]
+    chosen.recorded = moved.poses, moved.rate
+    scene.warned(f"{chosen.name}: {warning}" for warning in moved.warnings)
 
 
 @command(
@@ -144,8 +155,23 @@ def limit(scene: Scene, arguments: Arguments) -> None:
     chosen.skeleton = replace(chosen.skeleton, limits=limits)
 
 
-def _name(arguments: Arguments, default: str) -> str:
-    return str(arguments.options(name=lambda: arguments.name("the actor's name")).get("name", default))
+def _options(arguments: Arguments) -> dict[str, object]:
+    """How to read a rig file, and the actor's name: keyword arguments of ``load_rig``, and ``name``."""
+    options = arguments.options(
+        unit=lambda: _unit(arguments),
+        scale=lambda: arguments.number("the scale", above=0.0),
+        name=lambda: arguments.name("the actor's name"),
+    )
+    metres = options.get("unit")
+    if isinstance(metres, float):  # so many metres: a factor like any other
+        options["unit"], options["scale"] = "m", metres * float(str(options.get("scale", 1.0)))
+    return options
+
+
+def _unit(arguments: Arguments) -> str | float:
+    if arguments.has_number():
+        return arguments.number("the unit in metres", above=0.0)
+    return arguments.choice("the unit, or its length in metres", [u.upper() for u in METRES]).lower()
 
 
 def _load(path: object, **options: object) -> Rig:

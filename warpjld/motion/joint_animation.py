@@ -1,0 +1,54 @@
+"""An animation as a file with rigs states it: a world transform for every joint and frame."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial.transform import Rotation
+
+from warpjld.motion.clip import Clip
+from warpjld.skeleton.recognise.tree import SourceTree
+
+__all__ = ["JointAnimation"]
+
+
+@dataclass(frozen=True, eq=False)
+class JointAnimation:
+    """F frames of a joint tree, in its file's names, order, units and axes.
+
+    Attributes:
+        tree: The joints and their rest; of a file that also holds a rig, the same joints in the same order as that
+            rig's ``source``.
+        worlds: Joint-to-world transforms, shape (F, N, 4, 4).
+        rate: Frames a second.
+        title: The animation's name; "" where the file gives none.
+        notes: What a reader of the result should know.
+    """
+
+    tree: SourceTree
+    worlds: NDArray[np.float64]
+    rate: float
+    title: str = ""
+    notes: tuple[str, ...] = ()
+
+    def __len__(self) -> int:
+        return len(self.worlds)
+
+    def clip(self) -> Clip:
+        """The same as positions and rotations from rest, parents first: what another skeleton is driven by."""
+        order = np.array(sorted(range(len(self.tree)), key=lambda j: (self.tree.depth(j), j)))
+        place = np.empty_like(order)
+        place[order] = np.arange(len(order))
+        parents = self.tree.parents[order]
+        rest, worlds = self.tree.frames[order], self.worlds[:, order]
+        turned = worlds[..., :3, :3] @ np.linalg.inv(rest[:, :3, :3])
+        return Clip(
+            names=tuple(self.tree.names[j] for j in order),
+            parents=np.where(parents >= 0, place[parents], -1),
+            rest=rest[:, :3, 3],
+            positions=worlds[..., :3, 3],
+            rotations=Rotation.from_matrix(turned.reshape(-1, 3, 3)).as_quat().reshape(*worlds.shape[:2], 4),
+            rate=self.rate,
+        )
