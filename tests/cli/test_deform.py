@@ -7,39 +7,18 @@ import os
 import signal
 import subprocess
 import sys
+import time
 from pathlib import Path
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
+from tests.finger import finger
 from warpjld.cli import main
 from warpjld.errors import InputError
-from warpjld.rig import Rig
-from warpjld.skeleton import Skeleton, default_limits
-from warpjld.surface import weld_surface
 
 MOTION = "frame,index.base.flexion,index.knuckle2.flexion\n0,0,0\n20,60,90\n"
-
-
-def finger() -> Rig:
-    """Two phalanges along -z in a closed tube."""
-    names = ("left.index.base", "left.index.knuckle2", "left.index.tip")
-    rest = np.array([[0, 0, 0], [0, 0, -0.05], [0, 0, -0.09]])
-    skeleton = Skeleton(
-        names, np.array([-1, 0, 1], dtype=np.int32), rest, np.tile([-1.0, 0, 0], (3, 1)), default_limits(names)
-    )
-    around, along = np.meshgrid(np.arange(16) * np.pi / 8, np.linspace(0.005, -0.095, 21), indexing="xy")
-    ring = np.stack([0.008 * np.cos(around), 0.008 * np.sin(around), along], axis=-1).reshape(-1, 3)
-    vertices = np.vstack([ring, [[0, 0, 0.01], [0, 0, -0.1]]])
-    faces = []
-    for i in range(20):
-        for k in range(16):
-            a, b = 16 * i + k, 16 * i + (k + 1) % 16
-            faces += [[a, a + 16, b], [b, a + 16, b + 16]]
-    faces += [[336, k, (k + 1) % 16] for k in range(16)]
-    faces += [[337, 320 + (k + 1) % 16, 320 + k] for k in range(16)]
-    return Rig("finger", skeleton, weld_surface(vertices, faces))
 
 
 @pytest.fixture
@@ -160,3 +139,62 @@ def test_a_polite_kill_leaves_nothing_behind(data: Path, tmp_path: Path) -> None
     process.send_signal(signal.SIGTERM)
     assert process.wait(60) == 130
     assert [path.name for path in tmp_path.iterdir()] == ["curl.csv"]
+
+
+def test_a_batch_goes_on_past_a_clip_that_fails_and_says_so(place: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    (place / "broken.csv").write_text("frame,index.base.flexion\n0,much\n")
+    assert run("finger.glb", "*.csv", "-o", "out", "--format", "npz", "--format", "pc2", "--processes", "1") == 1
+    told = capsys.readouterr()
+    assert "curl: 21 frames at 30 a second → curl.npz, curl.pc2, curl.rest.obj" in told.out
+    assert "2 clips, 21 frames: 1 made" in told.out
+    assert "failed: broken: broken.csv:2:2" in told.err
+    (place / "broken.csv").unlink()
+    assert run("finger.glb", "curl.csv", "-o", "out", "--format", "npz", "--format", "pc2", "--json") == 0
+    summary = json.loads(capsys.readouterr().out)
+    assert (summary["made"], summary["failed"], summary["frames"]) == (0, 0, 21)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (("curl.csv", "other.csv", "-o", "out"), "2 clips: say by --format"),
+        (("-o", "out"), "want a motion file behind RIG"),
+        (("*.bvh", "-o", "out", "--format", "pc2"), "no file fits the pattern '*.bvh'"),
+        (("curl.csv", "-o", "curl.csv", "--format", "pc2"), "is a file; want a folder"),
+    ],
+)
+def test_batches_that_cannot_be(
+    place: Path, capsys: pytest.CaptureFixture[str], arguments: tuple[str, ...], message: str
+) -> None:
+    assert run("finger.glb", *arguments) == 1
+    assert message in capsys.readouterr().err
+    assert [path.name for path in place.iterdir()] == ["curl.csv"]
+
+
+@pytest.mark.slow
+def test_a_killed_batch_goes_on_to_the_same_bytes(data: Path, tmp_path: Path) -> None:
+    for k in range(8):
+        rows = "\n".join(["frame,index.base.flexion", "0,0", f"1500,{20 + 5 * k}"])
+        (tmp_path / f"curl{k:02d}.csv").write_text(rows)
+    rig = str(data / "hand_webxr_generic" / "left.glb")
+    command = [sys.executable, "-m", "warpjld", "deform", rig, "curl*.csv", "--format", "pc2", "-o"]
+    root = Path(__file__).parents[2]
+    environment = os.environ | {"PYTHONPATH": os.pathsep.join([str(root), str(root / "kernels")])}
+    process = subprocess.Popen([*command, "killed"], cwd=tmp_path, env=environment, start_new_session=True)
+    out = tmp_path / "killed"
+    while len(list((out / ".clips").glob("curl*.json"))) < 4:
+        assert process.poll() is None
+        time.sleep(0.05)
+    os.killpg(process.pid, signal.SIGKILL)  # its workers with it, whatever they are writing
+    process.wait()
+    assert not (out / "manifest.json").exists()
+    again = subprocess.run(
+        [*command, "killed", "--json"], cwd=tmp_path, env=environment, check=True, stdout=subprocess.PIPE
+    )
+    assert 0 < json.loads(again.stdout)["made"] <= 4
+    subprocess.run([*command, "whole", "--processes", "1", "-q"], cwd=tmp_path, env=environment, check=True)
+    killed, whole = (
+        {path.name: path.read_bytes() for path in (tmp_path / name).iterdir() if path.is_file()}
+        for name in ("killed", "whole")
+    )
+    assert killed == whole

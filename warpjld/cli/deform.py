@@ -1,10 +1,11 @@
-"""``warpjld deform``: a rig moved by a motion file, its surface written as a vertex cache."""
+"""``warpjld deform``: a rig moved by motion files, its surface written as vertex caches."""
 
 from __future__ import annotations
 
 import time
+from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any, Literal
 
 import click
 
@@ -14,22 +15,33 @@ from warpjld.cli.warn import warn
 from warpjld.errors import InputError
 from warpjld.io.caches import FORMATS
 
-__all__ = ["command"]
+if TYPE_CHECKING:
+    from warpjld.batch import ClipJob, ClipRecord, Deforming
 
-_BLOCK = 16  # frames deformed at once: memory does not grow with the length of the motion
+__all__ = ["command"]
 
 
 @click.command("deform")
 @click.argument("rig")
-@click.option("--motion", required=True, type=click.Path(path_type=Path), help="Motion: CSV, BVH, glTF/GLB, JSON.")
+@click.argument("clips", nargs=-1, type=click.Path(path_type=Path), metavar="[MOTION]...")
+@click.option("--motion", "motions", multiple=True, type=click.Path(path_type=Path), help="A motion, likewise.")
 @click.option(
     "-o",
     "--out",
     required=True,
     type=click.Path(path_type=Path),
-    help=f"Cache to write: {', '.join(FORMATS)}.",
+    help=f"Cache to write ({', '.join(FORMATS)}); with --format the folder for one of every motion.",
+)
+@click.option(
+    "--format",
+    "formats",
+    multiple=True,
+    type=click.Choice([suffix.lstrip(".") for suffix in FORMATS]),
+    help="Make a batch: every motion becomes a cache of this format in the folder --out; repeatable.",
 )
 @options.rig
+@click.option("--animation", help="Which animation of the motion file, by name, or all; the first by default.")
+@click.option("--motion-side", type=click.Choice(["left", "right"]), help="Which hand a recording is of.")
 @click.option("--frames", "span", metavar="A:B", help="Only frames A to B, both included, the motion's first being 0.")
 @click.option("--rate", type=float, help="Frames a second; the motion's own by default, 30 for CSV.")
 @click.option(
@@ -48,92 +60,197 @@ _BLOCK = 16  # frames deformed at once: memory does not grow with the length of 
     show_default=True,
     help="Soft domain borders, or one segment a vertex as published.",
 )
+@click.option("--processes", type=click.IntRange(min=1), help="Worker processes of a batch; one a core by default.")
+@click.option("--fresh", is_flag=True, help="Make a batch again from its start, whatever the folder holds of it.")
 @options.device
 @options.threads
 @options.json
 @options.quiet
-def command(
-    rig: str,
-    motion: Path,
-    out: Path,
-    span: str | None,
-    rate: float | None,
-    limits: str,
-    parameters: Path | None,
-    domains: str,
-    method: str,
-    device: str,
-    threads: int | None,
-    as_json: bool,
-    quiet: bool,
-    **how: Any,
-) -> None:
-    """Deform RIG by a motion and write the surface, frame after frame, in the vertex order of RIG's file.
+def command(rig: str, clips: tuple[Path, ...], motions: tuple[Path, ...], **given: Any) -> None:
+    """Deform RIG by MOTION files and write the surface, frame after frame, in the vertex order of RIG's file.
 
-    RIG is a rig file, or builtin:left or builtin:right for the built-in hand.
+    RIG is a rig file, or builtin:left or builtin:right for the built-in hand. With --format (and with more than one
+    clip) it is a batch: RIG is bound once, clips are made in several processes, a clip that fails does not end the
+    others, and the same command goes on where it was stopped. manifest.json lists what was made of what.
     """
-    from warpjld.cli.progress import progress
+    from warpjld.batch import clip_jobs
+
+    jobs = clip_jobs([*motions, *clips], given["animation"])
+    if not jobs:
+        raise InputError("deform: want a motion file behind RIG")
+    how = {name: given.pop(name) for name in options.RIG}
+    wanted = _Wanted(rig, how, tuple(f".{suffix}" for suffix in dict.fromkeys(given.pop("formats"))), **given)
+    if wanted.formats:
+        _batch(wanted, jobs)
+    elif len(jobs) > 1:
+        raise InputError(f"{len(jobs)} clips: say by --format what each is to become, in the folder --out")
+    else:
+        _single(wanted, jobs[0])
+
+
+@dataclass(frozen=True)
+class _Wanted:
+    """The command line, but for the motions."""
+
+    rig: str
+    how: dict[str, Any]
+    formats: tuple[str, ...]
+    out: Path
+    animation: str | None
+    motion_side: str | None
+    span: str | None
+    rate: float | None
+    limits: str
+    parameters: Path | None
+    domains: Literal["geometry", "skin"]
+    method: Literal["smooth", "paper"]
+    processes: int | None
+    fresh: bool
+    device: str
+    threads: int | None
+    as_json: bool
+    quiet: bool
+
+    @property
+    def reading(self) -> dict[str, Any]:
+        """How motions are read."""
+        return {"rate": self.rate, "limits": self.limits, "side": self.motion_side}
+
+    def settings(self) -> dict[str, Any]:
+        """All that determines a batch's files besides the motions."""
+        from warpjld.study.manifest import file_hash, versions
+
+        files = {"rig": Path(self.rig), "parameters": self.parameters} | {
+            name: value for name, value in self.how.items() if isinstance(value, Path)
+        }
+        hashes = {name: file_hash(path) for name, path in files.items() if path is not None and path.is_file()}
+        plain = {name: value for name, value in self.how.items() if not isinstance(value, Path)}
+        return {
+            "rig": hashes.pop("rig", self.rig),
+            **hashes,
+            **plain,
+            **self.reading,
+            "frames": self.span,
+            "formats": list(self.formats),
+            "domains": self.domains,
+            "method": self.method,
+            "device": self.device,
+            "warpjld": versions(["warpjld"])["warpjld"],
+        }
+
+
+def _deforming(wanted: _Wanted) -> Deforming:
+    from warpjld.batch import Deforming
     from warpjld.cli.rig_argument import open_rig
-    from warpjld.covering import bind, load_parameters
-    from warpjld.io.caches import open_cache
-    from warpjld.motion import open_motion
+    from warpjld.covering import load_parameters
     from warpjld.quiet import silence_warp
 
     silence_warp()
+    rig = open_rig(wanted.rig, **wanted.how)
+    return Deforming(
+        rig,
+        None if wanted.parameters is None else load_parameters(wanted.parameters, rig.skeleton),
+        wanted.domains,
+        wanted.method,
+        wanted.reading,
+        wanted.span,
+        wanted.device,
+        wanted.threads,
+    )
+
+
+def _single(wanted: _Wanted, job: ClipJob) -> None:
+    from warpjld.batch import deform_clip
+    from warpjld.cli.progress import progress
+    from warpjld.io.caches import check_cache
+
     began = time.perf_counter()
-    driven = open_rig(rig, **how)
-    moved = open_motion(motion, driven, rate=rate, limits=limits)  # type: ignore[arg-type]
-    warn(moved.warnings)
-    first, last = _span(span, len(moved.poses))
-    poses = moved.poses[slice(first, last + 1)]
-    chosen = None if parameters is None else load_parameters(parameters, driven.skeleton)
-    # opened first: an unknown suffix or a forbidden folder must not cost the work of binding
-    writing = open_cache(out, driven.surface, frames=len(poses), rate=moved.rate, start_frame=first, name=driven.name)
-    with progress(quiet) as report, writing as cache:
-        report("binding", 0, len(poses))
-        covering = bind(
-            driven.skeleton,
-            driven.surface,
-            parameters=chosen,
-            skin=driven.skin,
-            domains=domains,  # type: ignore[arg-type]
-            method=method,  # type: ignore[arg-type]
-        )
-        for start, block in covering.blocks(poses, frames=_BLOCK, device=device, threads=threads):
-            cache.write(block)
-            report("deforming", start + len(block), len(poses))
+    check_cache(wanted.out)  # an unknown suffix or a missing library must not cost the work of binding
+    how = _deforming(wanted)
+    with progress(wanted.quiet) as report:
+        made = deform_clip(how, job.motion, animation=job.animation, surfaces=(wanted.out,), report=report)
+    warn(made.moved.warnings)
     summary = {
-        "rig": rig,
-        "motion": str(motion),
-        "files": [str(file) for file in cache.files],
-        "frames": len(poses),
-        "first_frame": first,
-        "rate": moved.rate,
-        "joints": len(driven.skeleton),
-        "vertices": len(driven.surface.weld),
-        "triangles": len(driven.surface.source_faces),
+        "rig": wanted.rig,
+        "motion": str(job.motion),
+        "files": [str(file) for file in made.files],
+        "frames": made.frames,
+        "first_frame": made.first,
+        "rate": made.moved.rate,
+        "joints": len(how.rig.skeleton),
+        "vertices": len(how.rig.surface.weld),
+        "triangles": len(how.rig.surface.source_faces),
         "seconds": round(time.perf_counter() - began, 3),
-        "warnings": [*driven.suspicious, *moved.warnings],
-        "notes": [*moved.notes, *([cache.note] if cache.note else [])],
+        "warnings": [*how.rig.suspicious, *made.moved.warnings],
+        "notes": [*made.moved.notes, *made.notes],
     }
-    if as_json:
+    if wanted.as_json:
         answer(summary)
-    elif not quiet:
+    elif not wanted.quiet:
         _tell(summary)
 
 
-def _span(text: str | None, count: int) -> tuple[int, int]:
-    """First and last frame of ``A:B``; either may be left out."""
-    if text is None:
-        return 0, count - 1
-    left, colon, right = text.partition(":")
-    try:
-        first, last = int(left or 0), int(right) if right else (count - 1 if colon else int(left))
-    except ValueError:
-        raise InputError(f"--frames '{text}': want two frame numbers, such as 10:60") from None
-    if not 0 <= first <= last < count:
-        raise InputError(f"--frames '{text}': the motion has frames 0 to {count - 1}")
-    return first, last
+def _batch(wanted: _Wanted, jobs: list[ClipJob]) -> None:
+    from warpjld.batch import run_batch
+    from warpjld.cli.progress import progress
+    from warpjld.io.caches import check_cache
+
+    for suffix in wanted.formats:
+        check_cache(wanted.out / f"clip{suffix}")
+    settings = wanted.settings()
+    how = _deforming(replace(wanted, threads=wanted.threads or 1))
+    with progress(wanted.quiet) as report:
+        try:
+            result = run_batch(
+                how,
+                jobs,
+                wanted.out,
+                wanted.formats,
+                settings,
+                processes=wanted.processes,
+                fresh=wanted.fresh,
+                report=report,
+                ended=lambda record: _tell_clip(record, wanted.quiet or wanted.as_json),
+            )
+        except KeyboardInterrupt:
+            click.echo(f"stopped; the same command goes on from what is in {wanted.out}", err=True)
+            raise
+    frames = sum(clip.frames for clip in result.clips)
+    if wanted.as_json:
+        answer(
+            {
+                "rig": wanted.rig,
+                "manifest": str(result.manifest),
+                "clips": [clip.content() for clip in result.clips],
+                "made": result.made,
+                "failed": result.failed,
+                "frames": frames,
+                "seconds": round(result.seconds, 3),
+                "warnings": list(how.rig.suspicious),
+            }
+        )
+    elif not wanted.quiet:
+        there = len(result.clips) - result.made
+        click.echo(
+            f"{len(result.clips)} clips, {frames} frames: {result.made - result.failed} made in {result.seconds:.1f} s"
+            f"{f', {there} there already' if there else ''}"
+            f"{f', {result.failed} failed' if result.failed else ''}; {result.manifest}"
+        )
+    if result.failed:
+        raise SystemExit(1)
+
+
+def _tell_clip(clip: ClipRecord, quiet: bool) -> None:
+    warn(f"{clip.name}: {warning}" for warning in clip.warnings)
+    if clip.status != "done":
+        warn([f"{clip.name}: {clip.message}"], clip.status)
+    elif not quiet:
+        click.echo(f"{clip.name}: {clip.frames} frames at {clip.rate:g} a second → {', '.join(_few(clip.files))}")
+
+
+def _few(files: dict[str, str]) -> list[str]:
+    names = list(files)
+    return names if len(names) < 4 else [names[0], "…", f"{names[-1]} ({len(names)} files)"]
 
 
 def _tell(summary: dict[str, Any]) -> None:

@@ -8,7 +8,7 @@ from typing import Any
 
 import click
 
-__all__ = ["commands", "device", "domains", "json", "out_folder", "quiet", "rig", "threads"]
+__all__ = ["RIG", "commands", "device", "domains", "json", "out_folder", "quiet", "rig", "threads"]
 
 Decorator = Callable[[Callable[..., None]], Callable[..., None]]
 
@@ -31,6 +31,10 @@ domains: Decorator = click.option(
 )
 json: Decorator = click.option("--json", "as_json", is_flag=True, help="Write the result to stdout as JSON.")
 quiet: Decorator = click.option("-q", "--quiet", is_flag=True, help="Say nothing but errors.")
+
+
+RIG = ("skeleton", "side", "unit", "scale", "up")
+"""Names of the options that ``rig`` adds: keyword arguments of ``load_rig``."""
 
 
 def rig(command: Callable[..., Any]) -> Callable[..., Any]:

@@ -1,32 +1,28 @@
-"""Trials over processes. Whatever happens to a worker, every trial ends as one row."""
+"""Trials over processes: each is kept as soon as it ends, and whatever happens to a worker, it ends as a row."""
 
 from __future__ import annotations
 
-import multiprocessing
-from collections import deque
+import time
+import traceback
 from collections.abc import Callable, Iterable
-from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
-from concurrent.futures.process import BrokenProcessPool
+from dataclasses import dataclass
 from pathlib import Path
 
 from warpjld.errors import WarpjldError
-from warpjld.study.experiment import Experiment, Outcome
+from warpjld.processes import run_jobs
+from warpjld.study.columns import COMMON_COLUMNS, checked_values
+from warpjld.study.experiment import Experiment, Outcome, generator
 from warpjld.study.shards import Shard, Shards
-from warpjld.study.worker import one_thread, ping, row_of, start, work
 
-__all__ = ["run_trials"]
-
-_AHEAD = 2  # trials handed out for each process: keeps it busy, and few are suspected when it dies
-_LIVES = 2  # times a trial may kill a worker that has nothing else to do
-
-Done = Callable[[int, str], None]
+__all__ = ["TrialWork", "perform", "run_trials"]
 
 
-def run_trials(experiment: Experiment, trials: Iterable[int], folder: Path, *, processes: int, done: Done) -> None:
+def run_trials(
+    experiment: Experiment, trials: Iterable[int], folder: Path, *, processes: int, done: Callable[[int, str], None]
+) -> None:
     """Run trials and keep each in ``folder`` as soon as it ends.
 
-    When a worker dies (killed, out of memory, crashed), all that was handed out is run again one by one in a process
-    of its own; a trial that kills it twice becomes a row with status "crashed", and the rest goes on.
+    A trial that kills its worker twice becomes a row with status "crashed", and the rest goes on.
 
     Args:
         experiment: What to repeat.
@@ -36,77 +32,65 @@ def run_trials(experiment: Experiment, trials: Iterable[int], folder: Path, *, p
         done: Called with every finished trial and its status.
 
     Raises:
-        WarpjldError: Workers do not even start.
+        WarpjldError: Workers do not even start, or a trial cannot be kept.
     """
-    waiting = deque(trials)
-    with one_thread():
-        while waiting:
-            suspects = _together(experiment, waiting, folder, processes, done)
-            _alone(experiment, suspects, folder, done)
+    run_jobs(TrialWork(experiment, folder), trials, processes=processes, done=done)
 
 
-def _together(experiment: Experiment, waiting: deque[int], folder: Path, processes: int, done: Done) -> list[int]:
-    """Work off ``waiting``; if the pool breaks, stop and return the trials that were handed out."""
-    out: dict[Future[tuple[int, str]], int] = {}
-    with _pool(experiment, min(processes, len(waiting))) as pool:
+@dataclass(frozen=True)
+class TrialWork:
+    """Trials of an experiment, kept in a folder: what a worker does."""
+
+    experiment: Experiment
+    folder: Path
+
+    def begin(self) -> None:
+        """Once in every worker."""
+        self.experiment.begin()
+
+    def do(self, trial: int) -> str:
+        """Run a trial and keep it; returns its status.
+
+        Raises:
+            WarpjldError: It cannot be written, the disk being full for example.
+        """
+        began = time.perf_counter()
+        row, outcome = perform(self.experiment, trial)
+        shard = Shard(trial, row, dict(outcome.arrays), time.perf_counter() - began)
         try:
-            while waiting or out:
-                while waiting and len(out) < _AHEAD * processes:
-                    trial = waiting[0]
-                    out[pool.submit(work, trial, folder)] = trial
-                    waiting.popleft()
-                for future in wait(out, return_when=FIRST_COMPLETED).done:
-                    done(*future.result())
-                    del out[future]
-        except BrokenProcessPool:
-            # some may have been kept before the pool noticed that it is broken
-            return _settle(out.values(), folder, done)
-        except BaseException:
-            pool.shutdown(wait=False, cancel_futures=True)
-            raise
-    return []
+            Shards(self.folder).write(shard)
+        except OSError as error:
+            raise WarpjldError(f"trial {trial} cannot be kept in {self.folder}: {error}") from error
+        return outcome.status
+
+    def kept(self, trial: int) -> str | None:
+        """Status of a trial that is kept already."""
+        shard = Shards(self.folder).read(trial)
+        return None if shard is None else str(shard.row["status"])
+
+    def bury(self, trial: int) -> str:
+        """Keep that a trial ended its process."""
+        outcome = Outcome("crashed", message="the trial ended its process")
+        Shards(self.folder).write(Shard(trial, _row(self.experiment, trial, outcome), {}, 0.0))
+        return outcome.status
 
 
-def _settle(trials: Iterable[int], folder: Path, done: Done) -> list[int]:
-    lost, shards = [], Shards(folder)
-    for trial in sorted(trials):
-        shard = shards.read(trial)
-        if shard is None:
-            lost.append(trial)
-        else:
-            done(trial, str(shard.row["status"]))
-    return lost
-
-
-def _alone(experiment: Experiment, suspects: list[int], folder: Path, done: Done) -> None:
-    lives = dict.fromkeys(suspects, _LIVES)
-    while lives:
-        with _pool(experiment, 1) as pool:
-            for trial in list(lives):
-                try:
-                    finished = pool.submit(work, trial, folder).result()
-                except BrokenProcessPool:
-                    lives[trial] -= 1
-                    if not lives[trial]:
-                        del lives[trial]
-                        done(trial, _bury(experiment, trial, folder))
-                    break
-                del lives[trial]
-                done(*finished)
-
-
-def _bury(experiment: Experiment, trial: int, folder: Path) -> str:
-    outcome = Outcome("crashed", message="the trial ended its process")
-    Shards(folder).write(Shard(trial, row_of(experiment, trial, outcome), {}, 0.0))
-    return outcome.status
-
-
-def _pool(experiment: Experiment, processes: int) -> ProcessPoolExecutor:
-    pool = ProcessPoolExecutor(
-        processes, mp_context=multiprocessing.get_context("spawn"), initializer=start, initargs=(experiment,)
-    )
+def perform(experiment: Experiment, trial: int) -> tuple[dict[str, object], Outcome]:
+    """Row and outcome of a trial; a failing one is a row too."""
     try:
-        pool.submit(ping).result()
-    except BrokenProcessPool as error:
-        raise WarpjldError(f"study: worker processes do not start: {error}") from error
-    return pool
+        outcome = experiment.run(trial, generator(experiment.seed, trial))
+        return _row(experiment, trial, outcome), outcome
+    except WarpjldError as error:
+        outcome = Outcome("error", message=str(error))
+    except Exception as error:
+        place = traceback.extract_tb(error.__traceback__)[-1]
+        where = f"{Path(place.filename).name}:{place.lineno}"
+        outcome = Outcome("error", message=f"{type(error).__name__}: {error} ({where})")
+    return _row(experiment, trial, outcome), outcome
+
+
+def _row(experiment: Experiment, trial: int, outcome: Outcome) -> dict[str, object]:
+    """A trial's row of the table, columns in order."""
+    common = {"trial": trial, "seed": f"({trial},)", "status": outcome.status, "message": outcome.message}
+    values = {**experiment.plan(trial), **outcome.values}
+    return {**checked_values(common, COMMON_COLUMNS), **checked_values(values, experiment.columns)}

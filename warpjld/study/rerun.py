@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import multiprocessing
 from collections.abc import Callable
-from concurrent.futures import ProcessPoolExecutor
 from concurrent.futures.process import BrokenProcessPool
 from dataclasses import dataclass
 from pathlib import Path
@@ -13,10 +11,11 @@ from typing import Any
 import numpy as np
 
 from warpjld.errors import InputError, WarpjldError
+from warpjld.processes import one_thread, worker_pool
 from warpjld.study.experiment import Experiment, Outcome
 from warpjld.study.manifest import write_json
+from warpjld.study.pool import TrialWork, perform
 from warpjld.study.run import opened
-from warpjld.study.worker import one_thread, perform, start
 
 __all__ = ["Rerun", "rerun_trial"]
 
@@ -56,7 +55,7 @@ def rerun_trial(
     if kept is None:
         raise InputError(f"row {trial} is not in the study in {folder}; it has rows 0 to {experiment.trials - 1}")
     report(f"trial {trial}", 0, 2)
-    row, outcome = _in_a_worker(experiment, trial)
+    row, outcome = _in_a_worker(experiment, trial, folder)
     differences = [name for name in row if row[name] != kept.row.get(name)]
     for name in sorted({*outcome.arrays, *kept.arrays}):
         new, old = outcome.arrays.get(name), kept.arrays.get(name)
@@ -71,14 +70,9 @@ def rerun_trial(
     return Rerun(row, tuple(differences), tuple(files))
 
 
-def _pool(experiment: Experiment) -> ProcessPoolExecutor:
-    context = multiprocessing.get_context("spawn")
-    return ProcessPoolExecutor(1, mp_context=context, initializer=start, initargs=(experiment,))
-
-
-def _in_a_worker(experiment: Experiment, trial: int) -> tuple[dict[str, Any], Outcome]:
+def _in_a_worker(experiment: Experiment, trial: int, folder: Path) -> tuple[dict[str, Any], Outcome]:
     # not in this process: its libraries may sum on several threads, in another order
-    with one_thread(), _pool(experiment) as pool:
+    with one_thread(), worker_pool(TrialWork(experiment, folder), 1) as pool:
         try:
             return pool.submit(perform, experiment, trial).result()
         except BrokenProcessPool as error:

@@ -20,8 +20,8 @@ from warpjld.grasp.segments import SEGMENTS
 from warpjld.study.columns import checked_values
 from warpjld.study.experiment import generator
 from warpjld.study.grasping import GraspExperiment, load_plan
+from warpjld.study.pool import perform
 from warpjld.study.table import read_table
-from warpjld.study.worker import perform
 
 _ROOT = Path(__file__).resolve().parents[3]
 

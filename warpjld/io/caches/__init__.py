@@ -13,7 +13,7 @@ from warpjld.errors import InputError
 from warpjld.io.caches.cache import Cache, Clip
 from warpjld.surface import Surface
 
-__all__ = ["FORMATS", "Cache", "open_cache"]
+__all__ = ["FORMATS", "Cache", "check_cache", "open_cache"]
 
 #: What each suffix is, for help texts.
 FORMATS = {
@@ -75,11 +75,25 @@ def open_cache(
         MissingExtraError: USD without the extra ``usd``.
     """
     path = Path(path)
+    cache: Cache = _kind(path)(path, surface, Clip(frames=frames, rate=rate, start=start_frame, name=name))
+    return cache
+
+
+def check_cache(path: str | Path) -> None:
+    """Make sure that a cache of this kind can be written, before anything else is computed.
+
+    Raises:
+        InputError: Unknown suffix.
+        MissingExtraError: A library that the format needs is not installed.
+    """
+    _kind(Path(path)).check()
+
+
+def _kind(path: Path) -> type[Cache]:
     writer = _WRITERS.get(path.suffix.lower())
     if writer is None:
         listed = "\n".join(f"  {suffix:6} {what}" for suffix, what in FORMATS.items())
         raise InputError(f"unknown kind of cache '{path.suffix}'; known are\n{listed}", path=path)
     module, kind = writer
-    make = getattr(import_module(f"{__name__}.{module}"), kind)
-    cache: Cache = make(path, surface, Clip(frames=frames, rate=rate, start=start_frame, name=name))
-    return cache
+    found: type[Cache] = getattr(import_module(f"{__name__}.{module}"), kind)
+    return found

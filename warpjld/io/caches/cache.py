@@ -63,6 +63,15 @@ class Cache(ABC):
         self._open = False
         self._forget = weakref.finalize(self, _remove, self._parts)
 
+    @classmethod
+    def check(cls) -> None:
+        """Make sure that what the format needs is installed; most need nothing.
+
+        Raises:
+            MissingExtraError: It is not.
+        """
+        return
+
     @property
     def rest(self) -> NDArray[np.float32]:
         """Rest positions in source order [m], shape (W, 3)."""

@@ -23,6 +23,15 @@ class UsdCache(Cache):
 
     _stage: Any = None
 
+    @classmethod
+    def check(cls) -> None:
+        """Make sure that OpenUSD is installed.
+
+        Raises:
+            MissingExtraError: It is not.
+        """
+        _pxr()
+
     def _begin(self) -> None:
         self._stage, self._mesh = build_stage(self, self._part(self.path, keep_suffix=True))
         self._pending = 0
@@ -56,10 +65,9 @@ def build_stage(cache: Cache, file: Path | None) -> tuple[Any, Any]:
     Raises:
         MissingExtraError: OpenUSD is not installed.
     """
-    try:
-        from pxr import Sdf, Tf, Usd, UsdGeom, Vt
-    except ImportError as error:
-        raise MissingExtraError("USD", "usd") from error
+    _pxr()
+    from pxr import Sdf, Tf, Usd, UsdGeom, Vt
+
     surface, clip = cache.surface, cache.clip
     stage = Usd.Stage.CreateInMemory() if file is None else _create(file)
     UsdGeom.SetStageUpAxis(stage, UsdGeom.Tokens.y)
@@ -83,6 +91,13 @@ def build_stage(cache: Cache, file: Path | None) -> tuple[Any, Any]:
         )
         primvar.Set(Vt.Vec2fArray.FromNumpy(np.ascontiguousarray(surface.uv, np.float32)))
     return stage, mesh
+
+
+def _pxr() -> None:
+    try:
+        import pxr  # noqa: F401
+    except ImportError as error:
+        raise MissingExtraError("USD", "usd") from error
 
 
 def _create(file: Path) -> Any:

@@ -26,6 +26,15 @@ class UsdTextCache(Cache):
     _stage: Any = None
     _samples: IO[bytes] | None = None
 
+    @classmethod
+    def check(cls) -> None:
+        """Make sure that OpenUSD is installed.
+
+        Raises:
+            MissingExtraError: It is not.
+        """
+        UsdCache.check()
+
     def _begin(self) -> None:
         self._stage, self._mesh = build_stage(self, None)
         self._mesh.GetPointsAttr().Set([(0.125, 0.25, 0.5)], 0)

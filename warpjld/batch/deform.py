@@ -1,0 +1,144 @@
+"""One clip on one rig: its motion read, the surface deformed, and everything asked for written."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from functools import cached_property
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Literal
+
+from warpjld.errors import InputError
+from warpjld.motion.load import LoadedMotion, open_motion
+from warpjld.rig import Rig
+
+if TYPE_CHECKING:
+    from warpjld.covering import Covering, Parameters
+
+__all__ = ["ClipFiles", "Deforming", "deform_clip", "frame_span"]
+
+_BLOCK = 16  # frames deformed at once: memory does not grow with the length of the motion
+
+
+@dataclass(frozen=True, eq=False)
+class Deforming:
+    """A rig to be moved, and how motions are read and surfaces computed.
+
+    Attributes:
+        rig: The rig.
+        parameters: The covering's; None for the defaults.
+        domains: The covering's; likewise ``method``.
+        reading: Keyword arguments of ``open_motion``: rate, limits, side.
+        span: ``A:B``, the frames to make, the motion's first being 0; None for all.
+        device: Warp device.
+        threads: CPU threads; None for as many as pay.
+    """
+
+    rig: Rig
+    parameters: Parameters | None = None
+    domains: Literal["geometry", "skin"] = "geometry"
+    method: Literal["smooth", "paper"] = "smooth"
+    reading: dict[str, Any] = field(default_factory=dict)
+    span: str | None = None
+    device: str = "cpu"
+    threads: int | None = None
+
+    @cached_property
+    def covering(self) -> Covering:
+        """The rig's surface, bound when it is first wanted; copies sent to other processes take it along."""
+        from warpjld.covering import bind
+
+        rig = self.rig
+        return bind(
+            rig.skeleton,
+            rig.surface,
+            parameters=self.parameters,
+            skin=rig.skin,
+            domains=self.domains,
+            method=self.method,
+        )
+
+
+@dataclass(frozen=True, eq=False)
+class ClipFiles:
+    """What one clip became.
+
+    Attributes:
+        files: Files written.
+        frames: Number of frames; ``first`` the number of the first.
+        moved: The motion on the rig.
+        notes: What whoever opens the files should know.
+    """
+
+    files: tuple[Path, ...]
+    frames: int
+    first: int
+    moved: LoadedMotion
+    notes: tuple[str, ...]
+
+
+def deform_clip(
+    how: Deforming,
+    motion: str | Path,
+    *,
+    animation: str | None = None,
+    surfaces: tuple[Path, ...] = (),
+    report: Callable[[str, int, int], None] = lambda what, done, total: None,
+) -> ClipFiles:
+    """Move a rig by a motion file and write its surface.
+
+    Args:
+        how: The rig and the settings.
+        motion: The motion file.
+        animation: Name of the animation to take of it; None for the first.
+        surfaces: Vertex caches to write; suffixes choose their formats.
+        report: Called with what is being done, how much of it is done, and how much there is.
+
+    Raises:
+        InputError: A motion that cannot be read or does not fit the rig, frames it does not have, or a file that
+            cannot be written. No file is left then.
+    """
+    from contextlib import ExitStack
+
+    from warpjld.io.caches import open_cache
+
+    rig = how.rig
+    moved = open_motion(motion, rig, animation=animation, **how.reading)
+    first, last = frame_span(how.span, len(moved.poses))
+    poses = moved.poses[slice(first, last + 1)]
+    caches = []
+    with ExitStack() as opened:
+        for path in surfaces:
+            cache = open_cache(path, rig.surface, frames=len(poses), rate=moved.rate, start_frame=first, name=rig.name)
+            caches.append(opened.enter_context(cache))
+        if caches:
+            report("binding", 0, len(poses))
+            for start, block in how.covering.blocks(poses, frames=_BLOCK, device=how.device, threads=how.threads):
+                for cache in caches:
+                    cache.write(block)
+                report("deforming", start + len(block), len(poses))
+    return ClipFiles(
+        files=tuple(file for cache in caches for file in cache.files),
+        frames=len(poses),
+        first=first,
+        moved=moved,
+        notes=tuple(cache.note for cache in caches if cache.note),
+    )
+
+
+def frame_span(text: str | None, count: int) -> tuple[int, int]:
+    """First and last frame of ``A:B``; either may be left out.
+
+    Raises:
+        InputError: Not of that form, or beyond the motion's frames.
+    """
+    if text is None:
+        return 0, count - 1
+    left, colon, right = text.partition(":")
+    try:
+        first, last = int(left or 0), int(right) if right else (count - 1 if colon else int(left))
+    except ValueError:
+        raise InputError(f"--frames '{text}': want two frame numbers, such as 10:60") from None
+    if not 0 <= first <= last < count:
+        raise InputError(f"--frames '{text}': the motion has frames 0 to {count - 1}")
+    return first, last

@@ -1,0 +1,145 @@
+"""Running a batch from start, or from where it was stopped, to its manifest."""
+
+from __future__ import annotations
+
+import json
+import shutil
+import time
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from warpjld.batch.clips import ClipJob
+from warpjld.batch.deform import Deforming
+from warpjld.batch.record import FOLDER, ClipRecord, read_record, still_there
+from warpjld.batch.work import BatchWork
+from warpjld.errors import InputError
+from warpjld.folders import make_folder
+from warpjld.processes import run_jobs
+from warpjld.study.manifest import fingerprint, write_json
+from warpjld.threads import cores
+
+__all__ = ["BatchResult", "run_batch"]
+
+_MANIFEST = "manifest.json"
+_SETTINGS = ".settings.json"  # no clip is called so
+
+
+@dataclass(frozen=True, eq=False)
+class BatchResult:
+    """What a batch left.
+
+    Attributes:
+        clips: How every clip ended, in the order they were given.
+        manifest: The file that says it all.
+        made: Clips made now; the others were there already.
+        seconds: Wall-clock time.
+    """
+
+    clips: tuple[ClipRecord, ...]
+    manifest: Path
+    made: int
+    seconds: float
+
+    @property
+    def failed(self) -> int:
+        """Clips that could not be made."""
+        return sum(clip.status != "done" for clip in self.clips)
+
+
+def run_batch(
+    how: Deforming,
+    jobs: Sequence[ClipJob],
+    out: Path,
+    formats: tuple[str, ...],
+    settings: dict[str, Any],
+    *,
+    processes: int | None = None,
+    fresh: bool = False,
+    report: Callable[[str, int, int], None] = lambda what, done, total: None,
+    ended: Callable[[ClipRecord], None] = lambda record: None,
+) -> BatchResult:
+    """Make what is missing of a batch, then write its manifest.
+
+    A clip is there already when its record says so and neither its motion file nor a file made of it has changed
+    since. Files and manifest depend on the rig, the motions and the settings only: not on the number of processes,
+    nor on how often the batch was stopped.
+
+    Args:
+        how: The rig, bound, and how motions are read.
+        jobs: The clips.
+        out: Output folder.
+        formats: Suffixes of the vertex caches to write of every clip.
+        settings: All that determines the files besides the motions, as JSON: settings, hashes of the rig's files.
+        processes: Worker processes; as many as the machine has cores by default.
+        fresh: Forget what ``out`` holds of another batch.
+        report: Called with what is being done, how much is done, and of how much.
+        ended: Called with every clip as it ends.
+
+    Raises:
+        InputError: ``out`` holds a batch with other settings, or cannot be written.
+    """
+    began = time.perf_counter()
+    _open(out, settings, fresh)
+    waiting = [job for job in jobs if (kept := read_record(out, job.name)) is None or not _same(out, job, kept)]
+    for job in waiting:
+        _forget(out, job)
+    count = len(jobs) - len(waiting)
+    report("clips", count, len(jobs))
+
+    def done(job: ClipJob, status: str) -> None:
+        nonlocal count
+        count += 1
+        report("clips", count, len(jobs))
+        record = read_record(out, job.name)
+        if record is not None:
+            ended(record)
+
+    if waiting:
+        if formats:
+            report("binding", count, len(jobs))
+            _ = how.covering.runs  # bound and packed once here, not once in every worker
+        workers = min(processes or cores(), len(waiting))
+        run_jobs(BatchWork(how, out, formats), waiting, processes=workers, done=done)
+    records = [record for job in jobs if (record := read_record(out, job.name)) is not None]
+    write_json(
+        out / _MANIFEST,
+        {"fingerprint": fingerprint(settings), "settings": settings, "clips": [r.content() for r in records]},
+    )
+    return BatchResult(tuple(records), out / _MANIFEST, len(waiting), time.perf_counter() - began)
+
+
+def _same(out: Path, job: ClipJob, record: ClipRecord) -> bool:
+    return (record.motion, record.animation) == (str(job.motion), job.animation) and still_there(out, record)
+
+
+def _open(out: Path, settings: dict[str, Any], fresh: bool) -> None:
+    """Make sure that what the folder holds was made with these settings."""
+    make_folder(out)
+    known = out / FOLDER / _SETTINGS
+    try:
+        if fresh:
+            shutil.rmtree(out / FOLDER, ignore_errors=True)
+        if known.exists():
+            before = json.loads(known.read_text(encoding="utf-8"))
+            plain = json.loads(json.dumps(settings, ensure_ascii=False))
+            names = [name for name in {**before, **plain} if before.get(name) != plain.get(name)]
+            if names:
+                raise InputError(
+                    f"holds clips made with other settings ({', '.join(names)}); choose another folder, or --fresh "
+                    "to make them again",
+                    path=out,
+                )
+        (out / FOLDER).mkdir(exist_ok=True)
+        write_json(known, settings)
+    except (OSError, ValueError) as error:
+        raise InputError(f"cannot be used as the batch's folder: {error}", path=out) from error
+
+
+def _forget(out: Path, job: ClipJob) -> None:
+    """Remove a clip's record before it is made again, and what a killed worker left of it."""
+    (out / FOLDER / f"{job.name}.json").unlink(missing_ok=True)
+    for part in out.iterdir():
+        if ".part" in part.name and part.name.lstrip(".").startswith(f"{job.name}."):
+            part.unlink(missing_ok=True)
