@@ -73,6 +73,13 @@ def test_a_resumed_batch_makes_what_is_missing_or_changed_and_nothing_else(clips
     assert run(clips[:3], out, processes=1).made == 0
 
 
+def test_motions_alone_need_no_surface(clips: list[Path], tmp_path: Path) -> None:
+    jobs, out = clip_jobs(clips[:2]), tmp_path / "out"
+    result = run_batch(Deforming(finger(), threads=1), jobs, out, (), SETTINGS, motion_formats=(".bvh",), processes=1)
+    assert [clip.files.keys() for clip in result.clips] == [{"little.motion.bvh"}, {"half.motion.bvh"}]
+    assert "Frames: 13" in (out / "half.motion.bvh").read_text()
+
+
 def test_another_batch_does_not_mix_with_it(clips: list[Path], tmp_path: Path) -> None:
     out = tmp_path / "out"
     run(clips[:1], out, processes=1)

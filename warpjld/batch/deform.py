@@ -68,6 +68,7 @@ class ClipFiles:
         frames: Number of frames; ``first`` the number of the first.
         moved: The motion on the rig.
         notes: What whoever opens the files should know.
+        warnings: What of the motion is not followed or not written, and what looks wrong.
     """
 
     files: tuple[Path, ...]
@@ -75,6 +76,7 @@ class ClipFiles:
     first: int
     moved: LoadedMotion
     notes: tuple[str, ...]
+    warnings: tuple[str, ...]
 
 
 def deform_clip(
@@ -83,15 +85,17 @@ def deform_clip(
     *,
     animation: str | None = None,
     surfaces: tuple[Path, ...] = (),
+    motions: tuple[Path, ...] = (),
     report: Callable[[str, int, int], None] = lambda what, done, total: None,
 ) -> ClipFiles:
-    """Move a rig by a motion file and write its surface.
+    """Move a rig by a motion file, and write its surface or the motion of its joints.
 
     Args:
         how: The rig and the settings.
         motion: The motion file.
         animation: Name of the animation to take of it; None for the first.
         surfaces: Vertex caches to write; suffixes choose their formats.
+        motions: Files of the motion of the rig's own joints to write, likewise.
         report: Called with what is being done, how much of it is done, and how much there is.
 
     Raises:
@@ -101,6 +105,7 @@ def deform_clip(
     from contextlib import ExitStack
 
     from warpjld.io.caches import open_cache
+    from warpjld.io.motion_out import write_motion
 
     rig = how.rig
     moved = open_motion(motion, rig, animation=animation, **how.reading)
@@ -117,12 +122,15 @@ def deform_clip(
                 for cache in caches:
                     cache.write(block)
                 report("deforming", start + len(block), len(poses))
+        # here, so that a motion that cannot be written leaves no cache either
+        told = [write_motion(path, rig, poses, rate=moved.rate, start_frame=first) for path in motions]
     return ClipFiles(
-        files=tuple(file for cache in caches for file in cache.files),
+        files=(*(file for cache in caches for file in cache.files), *motions),
         frames=len(poses),
         first=first,
         moved=moved,
-        notes=tuple(cache.note for cache in caches if cache.note),
+        notes=(*(cache.note for cache in caches if cache.note), *(note for one in told for note in one.notes)),
+        warnings=(*moved.warnings, *(warning for one in told for warning in one.warnings)),
     )
 
 

@@ -55,6 +55,7 @@ def run_batch(
     formats: tuple[str, ...],
     settings: dict[str, Any],
     *,
+    motion_formats: tuple[str, ...] = (),
     processes: int | None = None,
     fresh: bool = False,
     report: Callable[[str, int, int], None] = lambda what, done, total: None,
@@ -72,6 +73,7 @@ def run_batch(
         out: Output folder.
         formats: Suffixes of the vertex caches to write of every clip.
         settings: All that determines the files besides the motions, as JSON: settings, hashes of the rig's files.
+        motion_formats: Suffixes of the files of joint motion to write of every clip, as ``<clip>.motion.bvh``.
         processes: Worker processes; as many as the machine has cores by default.
         fresh: Forget what ``out`` holds of another batch.
         report: Called with what is being done, how much is done, and of how much.
@@ -101,7 +103,7 @@ def run_batch(
             report("binding", count, len(jobs))
             _ = how.covering.runs  # bound and packed once here, not once in every worker
         workers = min(processes or cores(), len(waiting))
-        run_jobs(BatchWork(how, out, formats), waiting, processes=workers, done=done)
+        run_jobs(BatchWork(how, out, formats, motion_formats), waiting, processes=workers, done=done)
     records = [record for job in jobs if (record := read_record(out, job.name)) is not None]
     write_json(
         out / _MANIFEST,

@@ -23,11 +23,13 @@ class BatchWork:
         how: The rig and the settings.
         out: The output folder.
         formats: Suffixes of the vertex caches to write of every clip.
+        motion_formats: Suffixes of the files of joint motion to write of every clip.
     """
 
     how: Deforming
     out: Path
     formats: tuple[str, ...]
+    motion_formats: tuple[str, ...] = ()
 
     def begin(self) -> None:
         """Keep Warp's remarks off the output of many workers."""
@@ -45,6 +47,7 @@ class BatchWork:
                 job.motion,
                 animation=job.animation,
                 surfaces=tuple(self.out / f"{job.name}{suffix}" for suffix in self.formats),
+                motions=tuple(self.out / f"{job.name}.motion{suffix}" for suffix in self.motion_formats),
             )
             record = ClipRecord(
                 job.name,
@@ -55,7 +58,7 @@ class BatchWork:
                 frames=made.frames,
                 rate=made.moved.rate,
                 files={file.relative_to(self.out).as_posix(): file_hash(file) for file in made.files},
-                warnings=list(made.moved.warnings),
+                warnings=list(made.warnings),
                 notes=[*made.moved.notes, *made.notes],
             )
         except OSError as error:

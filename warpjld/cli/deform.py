@@ -14,6 +14,7 @@ from warpjld.cli.answer import answer
 from warpjld.cli.warn import warn
 from warpjld.errors import InputError
 from warpjld.io.caches import FORMATS
+from warpjld.io.motion_out import MOTION_OUT
 
 if TYPE_CHECKING:
     from warpjld.batch import ClipJob, ClipRecord, Deforming
@@ -28,9 +29,15 @@ __all__ = ["command"]
 @click.option(
     "-o",
     "--out",
-    required=True,
     type=click.Path(path_type=Path),
-    help=f"Cache to write ({', '.join(FORMATS)}); with --format the folder for one of every motion.",
+    help=f"Cache to write ({', '.join(FORMATS)}); of a batch the folder to write into.",
+)
+@click.option(
+    "--motion-out",
+    "motions_out",
+    multiple=True,
+    type=click.Path(path_type=Path),
+    help=f"Motion of RIG's own joints to write ({', '.join(MOTION_OUT)}); repeatable.",
 )
 @click.option(
     "--format",
@@ -38,6 +45,13 @@ __all__ = ["command"]
     multiple=True,
     type=click.Choice([suffix.lstrip(".") for suffix in FORMATS]),
     help="Make a batch: every motion becomes a cache of this format in the folder --out; repeatable.",
+)
+@click.option(
+    "--motion-format",
+    "motion_formats",
+    multiple=True,
+    type=click.Choice([suffix.lstrip(".") for suffix in MOTION_OUT]),
+    help="Likewise: the motion of RIG's own joints, as NAME.motion.bvh; repeatable.",
 )
 @options.rig
 @click.option("--animation", help="Which animation of the motion file, by name, or all; the first by default.")
@@ -67,11 +81,13 @@ __all__ = ["command"]
 @options.json
 @options.quiet
 def command(rig: str, clips: tuple[Path, ...], motions: tuple[Path, ...], **given: Any) -> None:
-    """Deform RIG by MOTION files and write the surface, frame after frame, in the vertex order of RIG's file.
+    """Deform RIG by MOTION files and write the surface, frame after frame, in the vertex order of RIG's file, or the
+    motion of its joints.
 
-    RIG is a rig file, or builtin:left or builtin:right for the built-in hand. With --format (and with more than one
-    clip) it is a batch: RIG is bound once, clips are made in several processes, a clip that fails does not end the
-    others, and the same command goes on where it was stopped. manifest.json lists what was made of what.
+    RIG is a rig file, or builtin:left or builtin:right for the built-in hand. With --format or --motion-format (and
+    with more than one clip) it is a batch: RIG is bound once, clips are made in several processes, a clip that fails
+    does not end the others, and the same command goes on where it was stopped. manifest.json lists what was made of
+    what.
     """
     from warpjld.batch import clip_jobs
 
@@ -79,11 +95,18 @@ def command(rig: str, clips: tuple[Path, ...], motions: tuple[Path, ...], **give
     if not jobs:
         raise InputError("deform: want a motion file behind RIG")
     how = {name: given.pop(name) for name in options.RIG}
-    wanted = _Wanted(rig, how, tuple(f".{suffix}" for suffix in dict.fromkeys(given.pop("formats"))), **given)
-    if wanted.formats:
-        _batch(wanted, jobs)
-    elif len(jobs) > 1:
+    for name in ("formats", "motion_formats"):
+        given[name] = tuple(f".{suffix}" for suffix in dict.fromkeys(given[name]))
+    wanted = _Wanted(rig, how, **given)
+    batch = bool(wanted.formats or wanted.motion_formats)
+    if len(jobs) > 1 and not batch:
         raise InputError(f"{len(jobs)} clips: say by --format what each is to become, in the folder --out")
+    if batch and wanted.motions_out:
+        raise InputError("--motion-out names one file: a batch takes --motion-format")
+    if wanted.out is None and (batch or not wanted.motions_out):
+        raise InputError(f"deform: want --out, the {'folder' if batch else 'file'} to write")
+    if batch:
+        _batch(wanted, jobs)
     else:
         _single(wanted, jobs[0])
 
@@ -95,7 +118,9 @@ class _Wanted:
     rig: str
     how: dict[str, Any]
     formats: tuple[str, ...]
-    out: Path
+    motion_formats: tuple[str, ...]
+    motions_out: tuple[Path, ...]
+    out: Path | None
     animation: str | None
     motion_side: str | None
     span: str | None
@@ -131,7 +156,7 @@ class _Wanted:
             **plain,
             **self.reading,
             "frames": self.span,
-            "formats": list(self.formats),
+            "formats": [*self.formats, *(f".motion{suffix}" for suffix in self.motion_formats)],
             "domains": self.domains,
             "method": self.method,
             "device": self.device,
@@ -163,13 +188,25 @@ def _single(wanted: _Wanted, job: ClipJob) -> None:
     from warpjld.batch import deform_clip
     from warpjld.cli.progress import progress
     from warpjld.io.caches import check_cache
+    from warpjld.io.motion_out import check_motion
 
     began = time.perf_counter()
-    check_cache(wanted.out)  # an unknown suffix or a missing library must not cost the work of binding
+    surfaces = () if wanted.out is None else (wanted.out,)
+    for path in surfaces:  # an unknown suffix or a missing library must not cost the work of binding
+        check_cache(path)
+    for path in wanted.motions_out:
+        check_motion(path)
     how = _deforming(wanted)
     with progress(wanted.quiet) as report:
-        made = deform_clip(how, job.motion, animation=job.animation, surfaces=(wanted.out,), report=report)
-    warn(made.moved.warnings)
+        made = deform_clip(
+            how,
+            job.motion,
+            animation=job.animation,
+            surfaces=surfaces,
+            motions=wanted.motions_out,
+            report=report,
+        )
+    warn(made.warnings)
     summary = {
         "rig": wanted.rig,
         "motion": str(job.motion),
@@ -181,7 +218,7 @@ def _single(wanted: _Wanted, job: ClipJob) -> None:
         "vertices": len(how.rig.surface.weld),
         "triangles": len(how.rig.surface.source_faces),
         "seconds": round(time.perf_counter() - began, 3),
-        "warnings": [*how.rig.suspicious, *made.moved.warnings],
+        "warnings": [*how.rig.suspicious, *made.warnings],
         "notes": [*made.moved.notes, *made.notes],
     }
     if wanted.as_json:
@@ -194,9 +231,13 @@ def _batch(wanted: _Wanted, jobs: list[ClipJob]) -> None:
     from warpjld.batch import run_batch
     from warpjld.cli.progress import progress
     from warpjld.io.caches import check_cache
+    from warpjld.io.motion_out import check_motion
 
+    assert wanted.out is not None
     for suffix in wanted.formats:
-        check_cache(wanted.out / f"clip{suffix}")
+        check_cache(f"clip{suffix}")
+    for suffix in wanted.motion_formats:
+        check_motion(f"clip{suffix}")
     settings = wanted.settings()
     how = _deforming(replace(wanted, threads=wanted.threads or 1))
     with progress(wanted.quiet) as report:
@@ -207,6 +248,7 @@ def _batch(wanted: _Wanted, jobs: list[ClipJob]) -> None:
                 wanted.out,
                 wanted.formats,
                 settings,
+                motion_formats=wanted.motion_formats,
                 processes=wanted.processes,
                 fresh=wanted.fresh,
                 report=report,

@@ -14,7 +14,7 @@ from warpjld.rig import Rig
 from warpjld.skeleton import Poses
 from warpjld.whole_file import whole_file
 
-__all__ = ["MOTION_OUT", "Timing", "Writer", "WrittenMotion", "write_motion"]
+__all__ = ["MOTION_OUT", "Timing", "Writer", "WrittenMotion", "check_motion", "write_motion"]
 
 MOTION_OUT = {
     ".bvh": "BVH: the rig's own joints, metres, Y up",
@@ -88,12 +88,8 @@ def write_motion(
         MissingExtraError: The format needs an optional dependency.
     """
     path = Path(path)
-    known = _WRITERS.get(path.suffix.lower())
-    if known is None:
-        listed = "\n".join(f"  {suffix:6} {what}" for suffix, what in MOTION_OUT.items())
-        raise InputError(f"unknown kind of motion file '{path.suffix}'; known are\n{listed}", path=path)
+    write = check_motion(path)
     timing = Timing(rate, start_frame, path.stem if name is None else name)
-    write: Writer = getattr(import_module(f"warpjld.io.motion_out.{known[0]}"), known[1])
     make_folder(path.parent)
     try:
         with whole_file(path) as part:
@@ -104,3 +100,18 @@ def write_motion(
         if error.path is not None:
             raise
         raise InputError(error.message, path=path) from error
+
+
+def check_motion(path: str | Path) -> Writer:
+    """What writes this kind of motion file, before anything else is computed.
+
+    Raises:
+        InputError: Unknown suffix.
+    """
+    path = Path(path)
+    known = _WRITERS.get(path.suffix.lower())
+    if known is None:
+        listed = "\n".join(f"  {suffix:6} {what}" for suffix, what in MOTION_OUT.items())
+        raise InputError(f"unknown kind of motion file '{path.suffix}'; known are\n{listed}", path=path)
+    writer: Writer = getattr(import_module(f"warpjld.io.motion_out.{known[0]}"), known[1])
+    return writer
