@@ -8,9 +8,20 @@ from pathlib import PurePosixPath
 
 from warpjld.errors import MissingExtraError
 from warpjld.io.caches import FORMATS
+from warpjld.io.motion_out import MOTION_OUT
 from warpjld.render.camera import VIEWS as _VIEWS
 
-__all__ = ["EXPORTS", "FILMS", "PICTURES", "TABLES", "VIEWS", "VOLUMES", "check_available", "video_is_available"]
+__all__ = [
+    "EXPORTS",
+    "FILMS",
+    "MOTIONS",
+    "PICTURES",
+    "TABLES",
+    "VIEWS",
+    "VOLUMES",
+    "check_available",
+    "video_is_available",
+]
 
 PICTURES = (".png",)
 TABLES = (".csv", ".parquet")
@@ -18,6 +29,7 @@ VOLUMES = (".pvd",)
 FILMS = (".mp4", ".mov", ".mkv", ".gif", ".webp")
 _VIDEO = FILMS[:3]
 EXPORTS = tuple(FORMATS)
+MOTIONS = tuple(MOTION_OUT)
 VIEWS = tuple(name.upper() for name in _VIEWS)
 
 

@@ -11,6 +11,7 @@ __all__ = [
     "Export",
     "Film",
     "Grips",
+    "MotionFile",
     "Output",
     "Picture",
     "Style",
@@ -77,6 +78,14 @@ class Export:
 
 
 @dataclass(frozen=True)
+class MotionFile:
+    """The motion of one actor, or of all, on the joints of its rig's own file."""
+
+    name: str
+    actor: str | None
+
+
+@dataclass(frozen=True)
 class Table:
     """Forces, areas and pressures by frame and digit, as CSV or Parquet."""
 
@@ -105,4 +114,4 @@ class Volume:
     name: str
 
 
-Output = Picture | Film | ContactSheet | Export | Table | Touch | Grips | Volume
+Output = Picture | Film | ContactSheet | Export | MotionFile | Table | Touch | Grips | Volume

@@ -16,7 +16,8 @@ from warpjld.script.crowd import Crowd, Role
 from warpjld.script.folder import OutputFolder
 from warpjld.script.formats import check_available, video_is_available
 from warpjld.script.grasping import contact_reports
-from warpjld.script.outputs import ContactSheet, Export, Film, Grips, Output, Picture, Table
+from warpjld.script.motion_files import motion_name, shown_actors, write_motions
+from warpjld.script.outputs import ContactSheet, Export, Film, Grips, MotionFile, Output, Picture, Table
 from warpjld.script.pictures import draw_contact_sheet, draw_picture, film_studio
 from warpjld.script.press_files import check_press, write_press
 from warpjld.script.props import Prop, prop_surface
@@ -95,6 +96,7 @@ def run_scene(
             summary.notes += report.notes
         with summary.timed("frames"):
             _make_sequences(scene, crowd, frames, outputs, out, threads, progress)
+        summary.notes += write_motions(scene, crowd, frames, outputs, out)
         if report is not None:
             write_press(report, outputs, out)
         if scene.props:
@@ -126,6 +128,8 @@ def _names(scene: Scene, outputs: Sequence[Output]) -> list[str]:
         if isinstance(output, Export):
             names += [_export_name(output, actor, scene) for actor in _exported(output, scene)]
             names += [_prop_export_name(output, prop) for prop in _exported_props(output, scene)]
+        elif isinstance(output, MotionFile):
+            names += [motion_name(output, actor, scene) for actor in shown_actors(output, scene)]
         else:
             names.append(output.name)
     return names

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import sys
 from dataclasses import replace
 from pathlib import Path
 
@@ -13,6 +12,7 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation, Slerp
 
+from tests.io.motion_out.bvh_reader import evaluate
 from warpjld.hand import build_hand
 from warpjld.io import load_rig
 from warpjld.io.motion_out import write_motion
@@ -20,9 +20,6 @@ from warpjld.io.motion_out.euler import ContinuousEuler
 from warpjld.motion.bvh import read_bvh
 from warpjld.rig import Rig
 from warpjld.skeleton import Poses, poses_from_rotations, poses_from_world, rest_poses
-
-sys.path.insert(0, str(Path(__file__).parent))
-from bvh_reader import evaluate
 
 SHARED = Path(__file__).resolve().parents[4] / "shared" / "data"
 
@@ -110,6 +107,18 @@ def test_end_sites_are_the_tips_that_were_added(tmp_path: Path) -> None:
     tip = rig.skeleton.rest[rig.skeleton.index("index.tip")]
     base = rig.skeleton.rest[rig.skeleton.index("index.knuckle3")]
     np.testing.assert_allclose(end, tip - base, atol=1e-7)
+
+
+def test_another_library_takes_it(hand: Rig, tmp_path: Path) -> None:
+    bvhio = pytest.importorskip("bvhio")
+    poses = turning(hand, 4)
+    write_motion(tmp_path / "a.bvh", hand, poses, rate=25.0)
+    root = bvhio.readAsHierarchy(str(tmp_path / "a.bvh"))
+    for frame in range(4):
+        root.loadPose(frame)
+        shown = {joint.Name: list(joint.PositionWorld) for joint, _, _ in root.layout()}
+        places = np.array([shown[name] for name in hand.skeleton.names])
+        np.testing.assert_allclose(places, poses.positions[frame], atol=1e-5)  # it computes in float32
 
 
 def test_the_packages_own_reader_takes_it(hand: Rig, tmp_path: Path) -> None:

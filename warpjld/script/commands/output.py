@@ -6,8 +6,8 @@ from typing import cast
 
 from warpjld.script.arguments import Arguments
 from warpjld.script.commands.animation import FINGERS
-from warpjld.script.formats import EXPORTS, FILMS, PICTURES, VIEWS
-from warpjld.script.outputs import Camera, ContactSheet, Export, Film, Output, Picture, Style
+from warpjld.script.formats import EXPORTS, FILMS, MOTIONS, PICTURES, VIEWS
+from warpjld.script.outputs import Camera, ContactSheet, Export, Film, MotionFile, Output, Picture, Style
 from warpjld.script.registry import command
 from warpjld.script.scene import Scene
 from warpjld.suggest import did_you_mean
@@ -105,6 +105,19 @@ def export(scene: Scene, arguments: Arguments) -> None:
     name = arguments.output_name("the file's name", EXPORTS)
     actor = scene.actor(arguments.name("an actor's name")).name if arguments else None
     ask_for(scene, arguments, Export(name, actor))
+
+
+@command(
+    "EXPORT_MOTION",
+    syntax=f'EXPORT_MOTION "<name>{"/".join(MOTIONS)}" [<actor>]',
+    help="The motion of an actor on its rig's own joints; of all, each in a file of its own, if none is named.",
+    group="Output",
+)
+def export_motion(scene: Scene, arguments: Arguments) -> None:
+    """R89: to programs that move the rig themselves."""
+    name = arguments.output_name("the file's name", MOTIONS)
+    actor = scene.actor(arguments.name("an actor's name")).name if arguments else None
+    ask_for(scene, arguments, MotionFile(name, actor))
 
 
 def _style(arguments: Arguments) -> Style:

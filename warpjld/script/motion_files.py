@@ -1,0 +1,67 @@
+"""The motion of actors, on the joints of their rigs' own files."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import PurePosixPath
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from warpjld.errors import InputError
+from warpjld.press.where import placed
+from warpjld.script.folder import OutputFolder
+from warpjld.script.outputs import MotionFile, Output
+
+if TYPE_CHECKING:
+    from warpjld.script.crowd import Crowd
+    from warpjld.script.scene import Actor, Scene
+
+__all__ = ["motion_name", "shown_actors", "write_motions"]
+
+
+def shown_actors(output: MotionFile, scene: Scene) -> list[Actor]:
+    """The actors whose motion a line asks for."""
+    return [actor for actor in scene.actors.values() if output.actor in (None, actor.name)]
+
+
+def motion_name(output: MotionFile, actor: Actor, scene: Scene) -> str:
+    """``hands.bvh``; for one of several actors ``hands-left.bvh``."""
+    if output.actor is not None or len(scene.actors) == 1:
+        return output.name
+    path = PurePosixPath(output.name)
+    return str(path.with_name(f"{path.stem}-{actor.name.lower()}{path.suffix}"))
+
+
+def write_motions(
+    scene: Scene, crowd: Crowd, frames: NDArray[np.float64], outputs: Sequence[Output], out: OutputFolder
+) -> list[str]:
+    """Write what was asked for, at these frames (F,); returns notes, and warns through the scene."""
+    from warpjld.io.motion_out import write_motion
+
+    notes: list[str] = []
+    for output in outputs:
+        if not isinstance(output, MotionFile):
+            continue
+        shown = [actor.name for actor in shown_actors(output, scene)]
+        for role in crowd.roles:
+            if role.actor.name not in shown:
+                continue
+            name = motion_name(output, role.actor, scene)
+            place = out.place(name)
+            try:
+                written = write_motion(
+                    place,
+                    role.actor.rig,
+                    role.poses,
+                    rate=scene.rate,
+                    start_frame=int(frames[0]),
+                    name=role.actor.name.lower(),
+                )
+            except InputError as error:
+                said = error.message if error.path == place else str(error)  # its place for now is no one's concern
+                raise placed(InputError(f"'{name}': {said}"), scene.asked.get(output.name)) from error
+            notes += [f"{name}: {note}" for note in written.notes]
+            scene.warned(f"{name}: {warning}" for warning in written.warnings)
+    return notes
