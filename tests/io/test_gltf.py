@@ -147,7 +147,8 @@ def test_uv_seams_are_welded_for_geometry_and_kept_for_export(write_glb, hand_gl
     written = rig.surface.to_source(rig.surface.vertices.astype(np.float32))
     used = np.unique(faces)
     np.testing.assert_allclose(written, split.vertices[used], atol=CLOSE)
-    np.testing.assert_allclose(rig.surface.uv, uv[used], atol=CLOSE)
+    # glTF counts v downwards, this project upwards
+    np.testing.assert_allclose(rig.surface.uv, uv[used] * [1, -1] + [0, 1], atol=CLOSE)
 
 
 @pytest.mark.parametrize("unit", ["cm", "mm"])
@@ -239,9 +240,8 @@ def test_bad_numbers_are_named(write_glb, hand_glb, tmp_path):
     joints[9, 0] = 40
     with pytest.raises(InputError, match="vertex 9 follows joint 40, the skin has 25"):
         load_rig(write_glb(replace(glb, joints=joints), tmp_path / "joint.glb"))
-    weights[11] = 0
-    with pytest.raises(InputError, match="vertex 11 has no weight"):
-        load_rig(write_glb(replace(glb, weights=weights), tmp_path / "weight.glb"))
+    with pytest.raises(InputError, match="no vertex has any weight"):
+        load_rig(write_glb(replace(glb, weights=0 * weights), tmp_path / "weight.glb"))
     rig = load_rig(write_glb(replace(glb, weights=glb.weights * 0.5), tmp_path / "half.glb"))
     np.testing.assert_allclose(rig.skin.weights.sum(axis=1), 1.0, atol=1e-12)
     assert any("did not sum to one" in note for note in rig.notes)

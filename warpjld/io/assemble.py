@@ -10,6 +10,7 @@ from warpjld.io.placement import place
 from warpjld.io.source import SourceRig
 from warpjld.rig import Rig, Skin
 from warpjld.skeleton.recognise.canonical import Canonical, canonical_skeleton
+from warpjld.skeleton.recognise.leaf_ends import Painted
 from warpjld.surface import Surface, weld_surface
 
 __all__ = ["assemble_rig"]
@@ -45,8 +46,17 @@ def _assemble(source: SourceRig, side: str | None, unit: str | None, scale: floa
     file_tree = source.tree
     source = place(source, unit=unit, scale=scale, up=up)
     surface = weld_surface(source.vertices, source.faces, uv=source.uv, parts=source.parts)
+    painted = None
+    if source.joints is not None and source.weights is not None:
+        painted = Painted(source.vertices, source.joints, source.weights)
     found = canonical_skeleton(
-        source.tree, surface.vertices, surface.faces, side=side, axes=source.axes, limits=source.limits
+        source.tree,
+        surface.vertices,
+        surface.faces,
+        side=side,
+        axes=source.axes,
+        limits=source.limits,
+        painted=painted,
     )
     skin = None
     if source.joints is not None and source.weights is not None:

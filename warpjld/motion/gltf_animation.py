@@ -10,17 +10,36 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from warpjld.errors import InputError
-from warpjld.motion.frame_times import frame_times
+from warpjld.motion.animations import choose_animation
+from warpjld.motion.frame_times import frame_rate, frame_times, merged_times
 from warpjld.motion.joint_animation import JointAnimation
 from warpjld.rotations import slerp, unit
+from warpjld.scales import TINY, never_zero
 
 if TYPE_CHECKING:
     from warpjld.io.gltf.document import Document
 
-__all__ = ["read_gltf_animation"]
+__all__ = ["gltf_animation_names", "read_gltf_animation"]
 
 _PATHS = {"translation": 3, "rotation": 4, "scale": 3}
-_DEFAULT_RATE = 30.0
+_OTHER_PATHS = {"weights": "morph targets", "pointer": "properties that are no joint's"}
+_SINGLE = float(np.finfo(np.float32).eps)
+
+
+def gltf_animation_names(path: str | Path) -> tuple[str, ...]:
+    """Names of a glTF file's animations, each once.
+
+    Raises:
+        InputError: No glTF.
+    """
+    from warpjld.io.gltf.animation_list import list_animations
+    from warpjld.io.gltf.document import open_document
+
+    document = open_document(path)
+    try:
+        return tuple(list_animations(document))
+    except _SCHEMA as error:
+        raise InputError(f"not as glTF 2.0 wants it: {error}", path=path) from error
 
 
 def read_gltf_animation(path: str | Path, *, rate: float | None = None, name: str | None = None) -> JointAnimation:
@@ -28,40 +47,52 @@ def read_gltf_animation(path: str | Path, *, rate: float | None = None, name: st
 
     Args:
         path: A .gltf or .glb file with an animation.
-        rate: Frames a second; None for the spacing of the file's keys, or 30 where they are uneven.
-        name: Which animation; None for the first.
+        rate: Frames a second; None for the spacing of the file's keys, see ``frame_rate``.
+        name: Which animation, in any case; None for the first.
 
     Raises:
-        InputError: No glTF, no animation, or broken samplers.
+        InputError: No glTF, no animation, none of that name, or broken samplers.
     """
+    from warpjld.io.gltf.animation_list import list_animations
     from warpjld.io.gltf.document import open_document
     from warpjld.io.gltf.skin import joint_nodes, joint_tree
 
     document = open_document(path)
     try:
-        worlds, rate = _sample(document, rate)
+        animations = list_animations(document)
+        if not animations:
+            raise InputError("no animation in this file", path=document.path)
+        title, notes = choose_animation(name, tuple(animations), document.path)
+        keys, warnings = _read_channels(document, [document.gltf.animations[n] for n in animations[title]])
+        if len(animations[title]) > 1:
+            notes = (*notes, f"{len(animations[title])} animations, each of one node, play together")
+        worlds, rate, mirrored = _sample(document, keys, rate)
         nodes = joint_nodes(document) if document.gltf.skins else list(range(worlds.shape[1]))
-        return JointAnimation(joint_tree(document, nodes), worlds[:, nodes], rate)
-    except (AttributeError, IndexError, KeyError, TypeError, ValueError) as error:
+        warnings += mirrored
+        return JointAnimation(
+            joint_tree(document, nodes), worlds[:, nodes], rate, title=title, notes=notes, warnings=tuple(warnings)
+        )
+    except _SCHEMA as error:
         # pygltflib takes any JSON: what the schema forbids shows where it is used
         raise InputError(f"not as glTF 2.0 wants it: {error}", path=path) from error
 
 
-def _sample(document: Document, rate: float | None) -> tuple[NDArray[np.float64], float]:
-    """World transforms of all nodes, shape (F, N, 4, 4), over the first animation, and its frames a second."""
-    if not document.gltf.animations:
-        raise InputError("no animation in this file", path=document.path)
-    keys = _read_channels(document, document.gltf.animations[0])
+_SCHEMA = (AttributeError, IndexError, KeyError, TypeError, ValueError)
+
+
+def _sample(document: Document, keys: list[_Keys], rate: float | None) -> tuple[NDArray[np.float64], float, list[str]]:
+    """World transforms of all nodes, shape (F, N, 4, 4), frames a second, and where scale mirrors."""
     if not keys:
         raise InputError("its animation moves no joint", path=document.path)
-    times = np.unique(np.concatenate([key.times for key in keys]))
-    rate = _spacing(times) if rate is None else rate
+    times = merged_times(np.concatenate([key.times for key in keys]))
+    rate = frame_rate(times) if rate is None else rate
+    at = frame_times(times[0], times[-1], rate)
     with np.errstate(invalid="ignore", over="ignore"):
-        worlds = _worlds(document, keys, frame_times(times[0], times[-1], rate))
+        worlds, mirrored = _worlds(document, keys, at)
     if not np.isfinite(worlds).all():
         frame, node = np.argwhere(~np.isfinite(worlds))[0][:2]
         raise InputError(f"node '{document.name(node)}' is not finite at frame {frame}", path=document.path)
-    return worlds, rate
+    return worlds, rate, mirrored
 
 
 class _Keys:
@@ -95,7 +126,9 @@ class _Keys:
         if len(self.times) == 1:
             out = np.repeat(values, len(at), axis=0)
         elif self.mode == "STEP":
-            out = values[np.searchsorted(self.times, at, side="right") - 1]
+            # keys are rounded to float32: a frame on a key must not fall before it
+            rounding = 2.0 * _SINGLE * np.abs(self.times).max()
+            out = values[np.maximum(np.searchsorted(self.times - rounding, at, side="right") - 1, 0)]
         elif self.mode == "CUBICSPLINE":
             out = self._cubic(at)
         elif rotation:
@@ -118,63 +151,85 @@ class _Keys:
         )
 
 
-def _read_channels(document: Document, animation: Any) -> list[_Keys]:
-    keys = []
-    for channel in animation.channels:
-        node, path = channel.target.node, channel.target.path
-        if node is None or path not in _PATHS:  # morph weights, or a target an extension names
-            continue
-        if not (0 <= node < len(document.gltf.nodes) and 0 <= channel.sampler < len(animation.samplers)):
-            raise InputError(f"its animation names node {node} or sampler {channel.sampler}", path=document.path)
-        keys.append(_Keys(document, animation.samplers[channel.sampler], node, path))
-    return keys
+def _read_channels(document: Document, animations: list[Any]) -> tuple[list[_Keys], list[str]]:
+    """Keys of all joints, and what of the animations is not followed."""
+    keys: dict[tuple[int, str], _Keys] = {}
+    left_out: dict[str, None] = {}
+    for animation in animations:
+        for channel in animation.channels:
+            node, path = channel.target.node, channel.target.path
+            if node is None or path not in _PATHS:
+                left_out[_OTHER_PATHS.get(path, path)] = None
+                continue
+            if not (0 <= node < len(document.gltf.nodes) and 0 <= channel.sampler < len(animation.samplers)):
+                raise InputError(f"its animation names node {node} or sampler {channel.sampler}", path=document.path)
+            keys[node, path] = _Keys(document, animation.samplers[channel.sampler], node, path)
+    return list(keys.values()), [f"the animation of {what} is not followed" for what in left_out]
 
 
-def _spacing(times: NDArray[np.float64]) -> float:
-    steps = np.diff(times)
-    if len(steps) == 0:
-        return _DEFAULT_RATE
-    step = float(np.median(steps))
-    even = np.abs(steps - step).max() < 0.02 * step
-    return round(1.0 / step, 3) if even and 1.0 <= 1.0 / step <= 1000.0 else _DEFAULT_RATE
+def _worlds(document: Document, keys: list[_Keys], at: NDArray[np.float64]) -> tuple[NDArray[np.float64], list[str]]:
+    """World transforms of all nodes, shape (F, N, 4, 4), as ``JointAnimation.worlds`` has them, and warnings.
 
-
-def _worlds(document: Document, keys: list[_Keys], at: NDArray[np.float64]) -> NDArray[np.float64]:
-    """World transforms of all nodes, shape (F, N, 4, 4)."""
+    Places are those of the file. Where scale turns negative that was not so at rest, axes are those of its amount: no
+    rotation says which way a mirrored joint points.
+    """
     count = len(document.gltf.nodes)
-    local = np.empty((len(at), count, 4, 4))
     by_node: dict[int, dict[str, _Keys]] = {}
     for key in keys:
         by_node.setdefault(key.node, {})[key.path] = key
+    local = np.empty((len(at), count, 4, 4))
+    held: dict[int, NDArray[np.float64]] = {}
+    warnings: list[str] = []
     for node in range(count):
         local[:, node] = document.local(node)
         if node in by_node:
-            local[:, node] = _animated(document, node, by_node[node], at)
-    worlds = np.empty_like(local)
-    done: set[int] = set()
-    for node in range(count):
-        chain = [node]
-        while (above := int(document.parents[chain[-1]])) >= 0 and above not in done:
-            chain.append(above)
-        for link in reversed([n for n in chain if n not in done]):
-            above = int(document.parents[link])
-            worlds[:, link] = local[:, link] if above < 0 else worlds[:, above] @ local[:, link]
-            done.add(link)
+            local[:, node], turned = _animated(document, node, by_node[node], at)
+            if turned is not None:
+                held[node], frame = turned
+                warnings.append(
+                    f"node '{document.name(node)}': its scale turns negative at frame {frame}: "
+                    "joints are placed as the file says, but no flesh is mirrored"
+                )
+    order = sorted(range(count), key=lambda n: _depth(document, n))
+    worlds = _compose(document, order, local)
+    if held:
+        for node, linear in held.items():
+            local[:, node, :3, :3] = linear
+        worlds[..., :3, :3] = _compose(document, order, local)[..., :3, :3]
+    return worlds, warnings
+
+
+def _compose(document: Document, order: list[int], local: NDArray[np.float64]) -> NDArray[np.float64]:
+    worlds = local.copy()
+    for node in order:
+        above = int(document.parents[node])
+        if above >= 0:
+            worlds[:, node] = worlds[:, above] @ local[:, node]
     return worlds
 
 
-def _animated(document: Document, node: int, keys: dict[str, _Keys], at: NDArray[np.float64]) -> NDArray[np.float64]:
-    record = document.gltf.nodes[node]
-    if record.matrix is not None:
-        raise InputError(f"node '{document.name(node)}' is animated, yet has a matrix", path=document.path)
-    fixed = {
-        "translation": record.translation or (0.0, 0.0, 0.0),
-        "rotation": record.rotation or (0.0, 0.0, 0.0, 1.0),
-        "scale": record.scale or (1.0, 1.0, 1.0),
-    }
-    values = {p: keys[p](at) if p in keys else np.tile(fixed[p], (len(at), 1)).astype(np.float64) for p in _PATHS}
+def _depth(document: Document, node: int) -> int:
+    depth = 0
+    while (node := int(document.parents[node])) >= 0:
+        depth += 1
+    return depth
+
+
+def _animated(
+    document: Document, node: int, keys: dict[str, _Keys], at: NDArray[np.float64]
+) -> tuple[NDArray[np.float64], tuple[NDArray[np.float64], int] | None]:
+    """Transforms of a node relative to its parent, shape (F, 4, 4); where its scale changes sign, its linear parts
+    without, shape (F, 3, 3), and the first such frame."""
+    fixed = dict(zip(_PATHS, document.parts(node), strict=True))
+    values = {p: keys[p](at) if p in keys else np.tile(fixed[p], (len(at), 1)) for p in _PATHS}
+    turn = Rotation.from_quat(values["rotation"]).as_matrix()
     out = np.zeros((len(at), 4, 4))
-    out[:, :3, :3] = Rotation.from_quat(values["rotation"]).as_matrix() * values["scale"][:, None, :]
+    out[:, :3, :3] = turn * never_zero(values["scale"])[:, None, :]
     out[:, :3, 3] = values["translation"]
     out[:, 3, 3] = 1.0
-    return out
+    signs = np.where(fixed["scale"] < 0.0, -1.0, 1.0)
+    changed = (values["scale"] * signs < -TINY).any(axis=1)
+    if not changed.any():
+        return out, None
+    magnitude = signs * np.abs(never_zero(values["scale"]))
+    return out, (turn * magnitude[:, None, :], int(np.argmax(changed)))

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from warpjld.motion.clip import Clip
+from warpjld.scales import polar
 from warpjld.skeleton.recognise.tree import SourceTree
 
 __all__ = ["JointAnimation"]
@@ -21,10 +22,12 @@ class JointAnimation:
     Attributes:
         tree: The joints and their rest; of a file that also holds a rig, the same joints in the same order as that
             rig's ``source``.
-        worlds: Joint-to-world transforms, shape (F, N, 4, 4).
+        worlds: Joint-to-world transforms, shape (F, N, 4, 4). Zero scale is replaced by a tiny one, and axes are not
+            mirrored where they were not at rest (see ``warpjld.scales``), so that every frame has a rotation.
         rate: Frames a second.
         title: The animation's name; "" where the file gives none.
         notes: What a reader of the result should know.
+        warnings: What of the file cannot be followed.
     """
 
     tree: SourceTree
@@ -32,6 +35,7 @@ class JointAnimation:
     rate: float
     title: str = ""
     notes: tuple[str, ...] = ()
+    warnings: tuple[str, ...] = ()
 
     def __len__(self) -> int:
         return len(self.worlds)
@@ -43,7 +47,7 @@ class JointAnimation:
         place[order] = np.arange(len(order))
         parents = self.tree.parents[order]
         rest, worlds = self.tree.frames[order], self.worlds[:, order]
-        turned = worlds[..., :3, :3] @ np.linalg.inv(rest[:, :3, :3])
+        turned, _ = polar(worlds[..., :3, :3] @ np.linalg.inv(rest[:, :3, :3]))
         return Clip(
             names=tuple(self.tree.names[j] for j in order),
             parents=np.where(parents >= 0, place[parents], -1),

@@ -102,10 +102,12 @@ def _animation(animation: JointAnimation, rig: Rig) -> LoadedMotion:
     from warpjld.motion.own_joints import own_poses
     from warpjld.motion.retarget import retarget
 
-    poses = own_poses(animation, rig)
-    if poses is None:
+    own = own_poses(animation, rig)
+    if own is None:
         poses = retarget(animation.clip(), rig.skeleton)
-    return LoadedMotion(poses, animation.rate, animation.notes)
+        return LoadedMotion(poses, animation.rate, animation.notes, animation.warnings)
+    notes, warnings = (*animation.notes, *own.notes), (*animation.warnings, *own.warnings)
+    return LoadedMotion(own.poses, animation.rate, notes, warnings)
 
 
 def _read_gltf(path: Path, rate: float | None, name: str | None) -> JointAnimation:

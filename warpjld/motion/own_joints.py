@@ -9,59 +9,161 @@ world in their files, the flesh on it moves by
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from warpjld.motion.joint_animation import JointAnimation
+from warpjld.motion.same_skeleton import match_joints, same_bones, same_rest
 from warpjld.rig import Rig
+from warpjld.scales import polar
 from warpjld.skeleton import Poses, poses_from_world
+from warpjld.skeleton.recognise.names import read_name
 from warpjld.skeleton.recognise.tree import SourceTree
 
-__all__ = ["own_poses"]
+__all__ = ["OwnMotion", "own_poses"]
 
-_SAME = 1e-4
-"""Rest transforms that differ by less, relative to the skeleton's size, are those of one skeleton."""
+_ENOUGH = 0.5  # share of a rig's joints that an animation must know to be its own
+_WIDENED = 1e-3  # change of size of a joint's flesh from which it is told
+_COLLAPSED = 1e3  # times: of flesh that was shrunk to a point at rest, which is told on loading
+_TURNED = np.radians(5.0)  # own rotation of a merged joint from which it is told
+_FEW = 4  # names in a message
 
 
-def own_poses(animation: JointAnimation, rig: Rig) -> Poses | None:
-    """Poses of a rig whose own joints, by name and rest, an animation moves; None where they are another skeleton's.
+@dataclass(frozen=True, eq=False)
+class OwnMotion:
+    """A rig moved by its own joints.
+
+    Attributes:
+        poses: Its poses.
+        notes: How its joints were found.
+        warnings: What of the animation the flesh does not follow.
+    """
+
+    poses: Poses
+    notes: tuple[str, ...] = ()
+    warnings: tuple[str, ...] = ()
+
+
+def own_poses(animation: JointAnimation, rig: Rig) -> OwnMotion | None:
+    """A rig moved by an animation of its own joints, by name and rest; None where they are another skeleton's.
 
     Flat hierarchies and joints that move are followed. Scale moves joints, but does not widen the flesh; joints that
-    recognition merged into another (twist bones, say) only count by where they carry the joints below them.
+    recognition merged into another (twist bones, say) only count by where they carry the joints below them. Both are
+    told where they matter.
     """
     if rig.source is None:
         return None
+    match = match_joints(animation.tree, rig.source)
     joints = [j for j, source in enumerate(rig.sources) if source >= 0]
-    sources = [rig.sources[j] for j in joints]
-    where = _same_joints(animation.tree, rig.source, sources)
-    if where is None:
+    known = [j for j in joints if match[rig.sources[j]] >= 0]
+    if not known or known[0] != joints[0] or len(known) < _ENOUGH * len(joints):
         return None
-    own, theirs = rig.source.frames[sources], animation.tree.frames[where]
-    placing = own[0] @ np.linalg.inv(theirs[0])
-    if not _same_rest(placing @ theirs, own):
+    sources = np.array([rig.sources[j] for j in known])
+    placed = _placed(animation, rig.source, match, sources)
+    if placed is None:
         return None
-    into = rig.placing @ placing
+    worlds, notes = placed
+    # worlds: transforms of all matched joints of the file, in the file's own units and axes
     moved = np.empty((len(animation), len(rig.skeleton), 4, 4))
-    moved[:, joints] = into @ animation.worlds[:, where] @ np.linalg.inv(own) @ np.linalg.inv(rig.placing)
+    moved[:, known] = _flesh(rig, worlds[:, sources], sources)
     for j, parent in enumerate(rig.skeleton.parents):
-        if rig.sources[j] < 0:  # an added fingertip, say
+        if j not in known:  # an added fingertip, say
             moved[:, j] = moved[:, parent] if parent >= 0 else np.eye(4)
-    rotations = Rotation.from_matrix(moved[..., :3, :3].reshape(-1, 3, 3)).as_quat().reshape(*moved.shape[:2], 4)
+    turned, stretch = polar(moved[..., :3, :3])
     positions = np.einsum("fjab,jb->fja", moved[..., :3, :3], rig.skeleton.rest) + moved[..., :3, 3]
-    return poses_from_world(rig.skeleton, positions, rotations)
+    rotations = Rotation.from_matrix(turned.reshape(-1, 3, 3)).as_quat().reshape(*moved.shape[:2], 4)
+    if unknown := [rig.source.names[rig.sources[j]] for j in joints if j not in known]:
+        notes.append(f"not in the animation's file, follow the joints above them: {_some(unknown)}")
+    warnings = [*_widened(rig, stretch), *_merged(rig, worlds, match, turned)]
+    return OwnMotion(poses_from_world(rig.skeleton, positions, rotations), tuple(notes), tuple(warnings))
 
 
-def _same_joints(theirs: SourceTree, own: SourceTree, wanted: list[int]) -> list[int] | None:
-    """Joints of the animation with the names of the rig's wanted ones; None unless all are there."""
-    if theirs.names == own.names:
-        return wanted
-    number = {name: j for j, name in enumerate(theirs.names)}
-    found = [number.get(own.names[j], -1) for j in wanted]
-    return None if -1 in found else found
+def _placed(
+    animation: JointAnimation, own: SourceTree, match: NDArray[np.int64], sources: NDArray[np.int64]
+) -> tuple[NDArray[np.float64], list[str]] | None:
+    """Animated transforms of the rig file's joints in its world, shape (F, N, 4, 4), the rest pose where unknown."""
+    known = np.flatnonzero(match >= 0)
+    out = np.tile(own.frames, (len(animation), 1, 1, 1))
+    placing = same_rest(animation.tree.frames[match[sources]], own.frames[sources])
+    if placing is not None:
+        out[:, known] = placing @ animation.worlds[:, match[known]]
+        return out, []
+    number = {int(j): k for k, j in enumerate(known)}
+    parents = np.array([next((number[a] for a in own.ancestors(int(j)) if a in number), -1) for j in known])
+    bones = same_bones(animation.tree.frames[match[known]], own.frames[known], parents)
+    if bones is None:
+        return None
+    placing, factor = bones
+    theirs = animation.worlds[:, match[known]]
+    for k in sorted(range(len(known)), key=lambda k: own.depth(int(known[k]))):
+        if parents[k] < 0:
+            out[:, known[k]] = placing @ theirs[:, k]
+            # the scale of the file's joint frames stays that of the rig's
+            shown = placing @ animation.tree.frames[match[known[k]]]
+            out[:, known[k], :3, :3] *= _size(own.frames[known[k]]) / _size(shown)
+            continue
+        local = np.linalg.inv(theirs[:, parents[k]]) @ theirs[:, k]
+        local[:, :3, 3] *= factor
+        out[:, known[k]] = out[:, known[parents[k]]] @ local
+    note = "the animation's file shows another rest pose: its joints' transforms are played on this rig's bones"
+    return out, [note]
 
 
-def _same_rest(theirs: NDArray[np.float64], own: NDArray[np.float64]) -> bool:
-    off = np.abs(theirs - own)
-    size = float(np.linalg.norm(np.ptp(own[:, :3, 3], axis=0))) or 1.0
-    return bool(off[:, :3, 3].max() <= _SAME * size and off[:, :3, :3].max() <= _SAME * np.abs(own[:, :3, :3]).max())
+def _size(frame: NDArray[np.float64]) -> float:
+    """Mean scale of a transform."""
+    return float(np.abs(np.linalg.det(frame[:3, :3])) ** (1.0 / 3.0))
+
+
+def _flesh(rig: Rig, worlds: NDArray[np.float64], sources: NDArray[np.int64]) -> NDArray[np.float64]:
+    """How joints' flesh moves, in the rig's own metres and axes, shape (F, K, 4, 4)."""
+    assert rig.source is not None
+    return rig.placing @ worlds @ np.linalg.inv(rig.source.frames[sources]) @ np.linalg.inv(rig.placing)
+
+
+def _widened(rig: Rig, stretch: NDArray[np.float64]) -> list[str]:
+    """Joints whose flesh the file scales, stretch (F, J, 3)."""
+    fleshy = np.ones(len(rig.skeleton), dtype=bool)
+    if rig.skin is not None:
+        fleshy[:] = False
+        fleshy[rig.skin.joints[rig.skin.weights > 0.01]] = True
+    size = np.abs(stretch)
+    off = np.abs(size - 1.0).max(axis=2) * fleshy
+    told: list[tuple[str, int, float]] = []
+    for j in np.flatnonzero((off > _WIDENED).any(axis=0)):
+        parent = int(rig.skeleton.parents[j])
+        inherited = parent >= 0 and off[:, parent].any() and np.allclose(size[:, j], size[:, parent], rtol=_WIDENED)
+        if not inherited and size[:, j].max() < _COLLAPSED:
+            frame = int(np.argmax(off[:, j]))
+            told.append((rig.skeleton.names[j], frame, float(size[frame, j, np.argmax(np.abs(size[frame, j] - 1.0))])))
+    if not told:
+        return []
+    shown = _some([f"'{name}' to {factor:.3g} at frame {frame}" for name, frame, factor in told])
+    return [f"the animation scales {shown}: joints are placed as the file says, but the flesh keeps its size"]
+
+
+def _merged(rig: Rig, worlds: NDArray[np.float64], match: NDArray[np.int64], turned: NDArray[np.float64]) -> list[str]:
+    """Joints of the file that belong to another of the skeleton, and turn by themselves."""
+    assert rig.source is not None
+    of_source = {source: j for j, source in enumerate(rig.sources) if source >= 0}
+    told: list[tuple[float, str]] = []
+    for s, name in enumerate(rig.source.names):
+        over = next((of_source[a] for a in rig.source.ancestors(s) if a in of_source), None)
+        inside = any(below in of_source for below in rig.source.subtree(s))
+        if over is None or inside or match[s] < 0 or read_name(name).kind == "helper":
+            continue
+        own, _ = polar(_flesh(rig, worlds[:, [s]], np.array([s]))[:, 0, :3, :3])
+        apart = float(Rotation.from_matrix(np.swapaxes(turned[:, over], 1, 2) @ own).magnitude().max())
+        if apart > _TURNED:
+            told.append((apart, f"{name} ({np.degrees(apart):.0f}°, part of {rig.skeleton.names[over]})"))
+    if not told:
+        return []
+    shown = _some([text for _, text in sorted(told, reverse=True)])
+    return [f"the animation turns joints that are no joints of this skeleton, their flesh does not follow: {shown}"]
+
+
+def _some(items: list[str]) -> str:
+    more = f" and {len(items) - _FEW} more" if len(items) > _FEW else ""
+    return f"{', '.join(items[:_FEW])}{more}"

@@ -12,6 +12,8 @@ from warpjld.errors import InputError
 __all__ = ["read_accessor"]
 
 _COMPONENTS = {5120: np.int8, 5121: np.uint8, 5122: np.int16, 5123: np.uint16, 5125: np.uint32, 5126: np.float32}
+_MOST = 100_000_000
+"""Elements of an accessor: ten times more vertices than anything here can take."""
 _SHAPES: dict[str, tuple[int, ...]] = {
     "SCALAR": (),
     "VEC2": (2,),
@@ -37,12 +39,16 @@ def read_accessor(gltf: Any, buffers: list[bytes], index: int) -> NDArray[Any]:
         raise InputError(f"{what}: unknown type {accessor.type} of {accessor.componentType}")
     dtype: np.dtype[Any] = np.dtype(_COMPONENTS[accessor.componentType]).newbyteorder("<")
     shape = _SHAPES[accessor.type]
+    if not 0 <= accessor.count <= _MOST:
+        raise InputError(f"{what}: {accessor.count} elements; want 0 to {_MOST}")
     if accessor.bufferView is None:
         out = np.zeros((accessor.count, *shape), dtype)
     else:
         out = _strided(gltf, buffers, what, accessor.bufferView, accessor.byteOffset or 0, accessor.count, dtype, shape)
     if accessor.sparse is not None:
         sparse, out = accessor.sparse, out.copy()
+        if sparse.indices.componentType not in (5121, 5123, 5125):
+            raise InputError(f"{what}: sparse indices of unknown type {sparse.indices.componentType}")
         at_dtype = np.dtype(_COMPONENTS[sparse.indices.componentType]).newbyteorder("<")
         at = _strided(
             gltf, buffers, what, sparse.indices.bufferView, sparse.indices.byteOffset or 0, sparse.count, at_dtype, ()
@@ -79,6 +85,8 @@ def _strided(
         raise InputError(f"{what}: matrices of components smaller than 4 bytes are not read")
     stride = view.byteStride or size
     start = (view.byteOffset or 0) + offset
+    if min(stride, offset, view.byteOffset or 0, view.byteLength, count) < 0:
+        raise InputError(f"{what}: a count, offset, length or stride below 0")
     end = start + (stride * (count - 1) + size if count else 0)
     limit = min((view.byteOffset or 0) + view.byteLength, len(buffers[view.buffer]))
     if end > limit:

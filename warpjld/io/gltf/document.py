@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-import struct
+import base64
+import binascii
 from functools import cached_property
 from pathlib import Path
 from typing import Any
-from urllib.parse import unquote
+from urllib.parse import unquote, unquote_to_bytes
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,18 +15,24 @@ from scipy.spatial.transform import Rotation
 
 from warpjld.errors import InputError
 from warpjld.io.gltf.accessor import read_accessor
+from warpjld.io.gltf.container import read_container
+from warpjld.io.gltf.extensions import check_extensions, packed_view
+from warpjld.scales import never_zero, regular_linear
 
 __all__ = ["Document", "open_document"]
 
 _FURTHEST = 1e12
+_UNPACK = "export it without compression"
 
 
 class Document:
-    """An open file: ``gltf`` is pygltflib's tree of plain objects; arrays and transforms come from the methods."""
+    """An open file: ``gltf`` is pygltflib's tree of plain objects, ``content`` the JSON, of which that leaves out some;
+    arrays and transforms come from the methods."""
 
-    def __init__(self, path: Path, gltf: Any) -> None:
+    def __init__(self, path: Path, gltf: Any, content: dict[str, Any]) -> None:
         self.path = path
         self.gltf = gltf
+        self.content = content
 
     @cached_property
     def buffers(self) -> list[bytes]:
@@ -38,6 +45,8 @@ class Document:
         Raises:
             InputError: It does not exist, points beyond the file, or is of an unknown type.
         """
+        if (extension := packed_view(self.gltf, index)) is not None:
+            raise InputError(f"accessor {index} is compressed with {extension}: {_UNPACK}", path=self.path)
         try:
             return read_accessor(self.gltf, self.buffers, index)
         except InputError as error:
@@ -98,22 +107,80 @@ class Document:
             raise InputError(f"node '{self.name(bad)}': its transform is not finite or too large", path=self.path)
         return worlds
 
+    @cached_property
+    def shown(self) -> frozenset[int]:
+        """Nodes of the default scene; all where the file has no scene."""
+        scenes = self.gltf.scenes
+        if not scenes:
+            return frozenset(range(len(self.gltf.nodes)))
+        number = self.gltf.scene or 0
+        if not 0 <= number < len(scenes):
+            raise InputError(f"its default scene {number} does not exist", path=self.path)
+        out: set[int] = set()
+        todo = list(scenes[number].nodes or ())
+        while todo:
+            node = todo.pop()
+            if not 0 <= node < len(self.gltf.nodes):
+                raise InputError(f"scene {number}: node {node} does not exist", path=self.path)
+            if node not in out:
+                out.add(node)
+                todo.extend(self.gltf.nodes[node].children or ())
+        return frozenset(out)
+
+    @cached_property
+    def flattened(self) -> tuple[int, ...]:
+        """Nodes whose own scale is zero in some direction; their transforms have a tiny one there, so that they can
+        be inverted."""
+        return tuple(n for n in range(len(self.gltf.nodes)) if not _invertible(self._plain(n)[:3, :3]))
+
     def local(self, node: int) -> NDArray[np.float64]:
-        """A node's transform relative to its parent, shape (4, 4).
+        """A node's transform relative to its parent, shape (4, 4); zero scale is replaced by a tiny one.
+
+        Raises:
+            InputError: A rotation without length.
+        """
+        record = self.gltf.nodes[node]
+        out = self._plain(node)
+        if record.matrix is not None and np.isfinite(out).all() and not _invertible(out[:3, :3]):
+            out[:3, :3] = regular_linear(out[:3, :3])
+        elif record.matrix is None:
+            _, rotation, scale = self.parts(node)
+            out[:3, :3] = Rotation.from_quat(rotation).as_matrix() * never_zero(scale)
+        return out
+
+    def parts(self, node: int) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
+        """A node's translation, rotation (unit quaternion x, y, z, w) and scale; those of a matrix without shear.
 
         Raises:
             InputError: A rotation without length.
         """
         record = self.gltf.nodes[node]
         if record.matrix is not None:
-            return np.array(record.matrix, dtype=np.float64).reshape(4, 4).T  # glTF stores columns
-        local = np.eye(4)
+            matrix = self._plain(node)
+            scale = np.linalg.norm(matrix[:3, :3], axis=0)
+            turned = matrix[:3, :3] / np.where(scale > 0.0, scale, 1.0)
+            if np.linalg.det(turned) < 0.0:
+                turned[:, 0], scale[0] = -turned[:, 0], -scale[0]
+            if not np.allclose(turned.T @ turned, np.eye(3), atol=1e-3):
+                raise InputError(
+                    f"node '{self.name(node)}' is animated, yet has a matrix with shear or zero scale", path=self.path
+                )
+            return matrix[:3, 3], Rotation.from_matrix(turned).as_quat(), scale
         quaternion = np.array(record.rotation or (0.0, 0.0, 0.0, 1.0), dtype=np.float64)
         length = np.linalg.norm(quaternion)
         if not length > 0.0:
             raise InputError(f"node '{self.name(node)}': its rotation is not a quaternion", path=self.path)
-        local[:3, :3] = Rotation.from_quat(quaternion / length).as_matrix() * np.array(record.scale or (1.0, 1.0, 1.0))
-        local[:3, 3] = record.translation or (0.0, 0.0, 0.0)
+        translation = np.array(record.translation or (0.0, 0.0, 0.0), dtype=np.float64)
+        return translation, quaternion / length, np.array(record.scale or (1.0, 1.0, 1.0), dtype=np.float64)
+
+    def _plain(self, node: int) -> NDArray[np.float64]:
+        """A node's transform relative to its parent as the file states it, shape (4, 4)."""
+        record = self.gltf.nodes[node]
+        if record.matrix is not None:
+            return np.array(record.matrix, dtype=np.float64).reshape(4, 4).T  # glTF stores columns
+        local = np.eye(4)
+        local[:3, 3], rotation, scale = self.parts(node)
+        local[:3, :3] = Rotation.from_quat(rotation).as_matrix() * scale
         return local
 
     def _buffer(self, index: int, buffer: Any) -> bytes:
@@ -121,7 +188,7 @@ class Document:
         if uri is None:
             data: bytes = self.gltf.binary_blob() or b""
         elif uri.startswith("data:"):
-            data = self.gltf.decode_data_uri(uri)
+            data = _data_uri(uri, f"buffer {index}", self.path)
         else:
             file = self.path.parent / unquote(uri)
             try:
@@ -141,36 +208,37 @@ def open_document(path: str | Path) -> Document:
     """Open a .gltf or .glb file.
 
     Raises:
-        InputError: No such file, not glTF 2.0, or truncated.
+        InputError: No such file, not glTF 2.0, truncated, or it needs an extension that is not read.
     """
     path = Path(path)
-    try:
-        data = path.read_bytes()
-    except OSError as error:
-        raise InputError(f"cannot be read: {error.strerror}", path=path) from None
+    text, content, blob = read_container(path)
     from pygltflib import GLTF2
 
-    if data[:4] == b"glTF":
-        _check_glb(path, data)
-    elif data.lstrip()[:1] != b"{":
-        raise InputError("is not a glTF 2.0 file: neither binary nor JSON", path=path)
     try:
-        gltf = GLTF2().load_from_bytes(data) if data[:4] == b"glTF" else GLTF2.gltf_from_json(data.decode("utf-8"))
+        gltf = GLTF2.gltf_from_json(text)
+        check_extensions(gltf)
+    except InputError as error:
+        raise InputError(error.message, path=path) from None
     except Exception as error:  # pygltflib raises whatever its JSON layers raise
         raise InputError(f"is not a glTF 2.0 file: {error}", path=path) from None
-    if gltf is None or gltf.asset is None or not str(gltf.asset.version).startswith("2."):
-        raise InputError("is not a glTF 2.0 file: no asset version 2", path=path)
-    needed = set(gltf.extensionsRequired or ()) & {"KHR_draco_mesh_compression", "EXT_meshopt_compression"}
-    if needed:
-        raise InputError(f"is compressed with {needed.pop()}: export it without compression", path=path)
-    return Document(path, gltf)
+    if blob is not None:
+        gltf.set_binary_blob(blob)
+    return Document(path, gltf, content)
 
 
-def _check_glb(path: Path, data: bytes) -> None:
-    if len(data) < 20:
-        raise InputError(f"is truncated: a GLB starts with a 20 byte header, got {len(data)} bytes", path=path)
-    version, length = struct.unpack_from("<II", data, 4)
-    if version != 2:
-        raise InputError(f"is GLB version {version}: version 2 is read", path=path)
-    if len(data) < length:
-        raise InputError(f"is truncated: its header says {length} bytes, got {len(data)}", path=path)
+def _invertible(linear: NDArray[np.float64]) -> bool:
+    lengths = np.linalg.svd(linear, compute_uv=False) if np.isfinite(linear).all() else np.ones(3)
+    return bool(lengths[-1] > 1e-7 * max(lengths[0], 1.0))
+
+
+def _data_uri(uri: str, what: str, path: Path) -> bytes:
+    """Bytes of a data URI of any media type (RFC 2397)."""
+    head, comma, content = uri.partition(",")
+    if not comma:
+        raise InputError(f"{what}: its data URI has no data", path=path)
+    if not head.endswith(";base64"):
+        return unquote_to_bytes(content)
+    try:
+        return base64.b64decode(unquote(content))
+    except binascii.Error as error:
+        raise InputError(f"{what}: its data URI is not base64: {error}", path=path) from None

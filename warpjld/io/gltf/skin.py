@@ -11,6 +11,9 @@ from numpy.typing import NDArray
 
 from warpjld.errors import InputError
 from warpjld.io.gltf.document import Document, open_document
+from warpjld.io.gltf.influences import read_influences
+from warpjld.io.gltf.morph import morphed
+from warpjld.io.gltf.texture import texture_coordinates
 from warpjld.io.source import SourceRig
 from warpjld.skeleton.recognise.tree import SourceTree
 from warpjld.surface import Part
@@ -30,6 +33,7 @@ class _Primitive:
     uv: NDArray[np.float32] | None
     joints: NDArray[np.int64]
     weights: NDArray[np.float64]
+    rigid: bool
     moved: float
 
 
@@ -37,7 +41,9 @@ def read_gltf_rig(path: str | Path) -> SourceRig:
     """Read the skinned meshes of a glTF file.
 
     Vertices are placed by joint · inverse bind matrix: a skinned mesh's own node transform does not count (glTF 2.0
-    §3.7.3.3). Meshes without a skin that hang on a joint follow it rigidly; others are left out, with a note.
+    §3.7.3.3). Meshes without a skin that hang on a joint follow it rigidly; others are left out, with a note, as are
+    meshes outside the default scene. Morph targets count by their default weights. Faces that a transform mirrors are
+    turned over, so that they stay anticlockwise from outside.
 
     Raises:
         InputError: Not glTF, no skin, or broken skin data.
@@ -63,9 +69,9 @@ def _read(document: Document) -> SourceRig:
     parts: list[Part] = []
     notes: list[str] = []
     vertex_count = face_count = 0
-    for node, record in enumerate(gltf.nodes):
-        if record.mesh is None:
-            continue
+    holders = _mesh_nodes(document, notes)
+    for node in holders:
+        record = gltf.nodes[node]
         name = gltf.meshes[record.mesh].name or document.name(node)
         read = _mesh(document, node, number, name, notes)
         for primitive in read:
@@ -81,6 +87,7 @@ def _read(document: Document) -> SourceRig:
     if max(p.moved for p in primitives) > _BIND_TOLERANCE * np.linalg.norm(np.ptp(vertices, axis=0)):
         notes.append("bind pose differs from the pose the file shows: the shown pose is used as rest pose")
     influences = max(p.joints.shape[1] for p in primitives)
+    rigid = np.concatenate([np.where(p.rigid, p.joints[:, 0], -1) for p in primitives])
     return SourceRig(
         path=document.path,
         tree=tree,
@@ -90,8 +97,39 @@ def _read(document: Document) -> SourceRig:
         parts=tuple(parts),
         joints=np.concatenate([_widen(p.joints, influences) for p in primitives]),
         weights=np.concatenate([_widen(p.weights, influences) for p in primitives]),
+        rigid=rigid if (rigid >= 0).any() else None,
         notes=tuple(notes),
+        suspicious=tuple(
+            f"node '{document.name(n)}': scale 0 at rest: what hangs on it is collapsed, and stays so when moved"
+            for n in document.flattened
+            if n in number or set(tree_below(document, n)) & set(number)
+        ),
     )
+
+
+def _mesh_nodes(document: Document, notes: list[str]) -> list[int]:
+    """Nodes with meshes in the default scene; those elsewhere are left out where it holds a skinned one."""
+    gltf = document.gltf
+    holders = [n for n, record in enumerate(gltf.nodes) if record.mesh is not None]
+    for n in holders:
+        if not 0 <= gltf.nodes[n].mesh < len(gltf.meshes):
+            raise InputError(f"node '{document.name(n)}': mesh {gltf.nodes[n].mesh} does not exist", path=document.path)
+    skinned = [n for n in holders if gltf.nodes[n].skin is not None]
+    if skinned and not document.shown.intersection(skinned):
+        notes.append("its default scene shows no skinned mesh: those of all scenes are taken")
+        return holders
+    hidden = sorted({document.name(n) for n in holders if n not in document.shown})
+    if hidden:
+        notes.append(f"not in the default scene, left out: {', '.join(hidden)}")
+    return [n for n in holders if n in document.shown]
+
+
+def tree_below(document: Document, node: int) -> list[int]:
+    """A node and all below it."""
+    out = [node]
+    for n in out:
+        out.extend(document.gltf.nodes[n].children or ())
+    return out
 
 
 def joint_nodes(document: Document) -> list[int]:
@@ -145,7 +183,9 @@ def _mesh(document: Document, node: int, number: dict[int, int], name: str, note
         if mode not in (_TRIANGLES, _STRIP, _FAN):
             notes.append(f"mesh '{name}': points or lines left out")
             continue
-        out.append(_primitive(document, primitive, mode, joints, transforms, name, record.skin is not None, notes))
+        read = _primitive(document, primitive, mode, joints, transforms, name, node, notes)
+        if len(read.faces):
+            out.append(read)
     return out
 
 
@@ -156,35 +196,45 @@ def _primitive(
     joints: NDArray[np.int64],
     transforms: NDArray[np.float64],
     name: str,
-    skinned: bool,
+    node: int,
     notes: list[str],
 ) -> _Primitive:
     attributes = vars(primitive.attributes)
     if attributes.get("POSITION") is None:
         raise InputError(f"mesh '{name}' has no positions", path=document.path)
     points = document.accessor(attributes["POSITION"]).astype(np.float64)
+    if points.ndim != 2 or points.shape[1] != 3:
+        raise InputError(f"mesh '{name}': positions are no VEC3", path=document.path)
+    points = morphed(document, primitive, node, points, name)
     if not np.isfinite(points).all():
         bad = int(np.argwhere(~np.isfinite(points))[0][0])
         raise InputError(f"mesh '{name}': vertex {bad} is not finite", path=document.path)
     faces = _triangles(document, primitive, mode, len(points), name)
+    skinned = document.gltf.nodes[node].skin is not None
     if skinned:
-        indices, weights = _influences(document, attributes, len(points), len(joints), name, notes)
+        indices, weights = read_influences(document, attributes, points, faces, len(joints), name, notes)
     else:
         indices, weights = np.zeros((len(points), 1), dtype=np.int64), np.ones((len(points), 1))
     blended = np.einsum("vk,vkij->vij", weights, transforms[indices])
     placed = np.einsum("vij,vj->vi", blended[:, :3, :3], points) + blended[:, :3, 3]
-    uv = document.accessor(attributes["TEXCOORD_0"]) if attributes.get("TEXCOORD_0") is not None else None
+    mirrored = np.linalg.det(blended[:, :3, :3]) < 0.0
+    over = mirrored[faces].sum(axis=1) >= 2
+    faces[over] = faces[over][:, ::-1]
     # one rigid motion of the whole mesh is a placement; several mean that the file shows another pose
     rigid = transforms[0]
-    moved = float(np.abs(placed - (points @ rigid[:3, :3].T + rigid[:3, 3])).max())
-    return _Primitive(placed, faces, None if uv is None else uv.astype(np.float32), joints[indices], weights, moved)
+    moved = float(np.abs(placed - (points @ rigid[:3, :3].T + rigid[:3, 3])).max(initial=0.0))
+    uv = texture_coordinates(document, primitive, len(points), name)
+    return _Primitive(placed, faces, uv, joints[indices], weights, not skinned, moved)
 
 
 def _triangles(document: Document, primitive: Any, mode: int, count: int, name: str) -> NDArray[np.int64]:
     if primitive.indices is None:
         corners = np.arange(count)
     else:
-        corners = document.accessor(primitive.indices).astype(np.int64).ravel()
+        indices = document.accessor(primitive.indices)
+        if indices.dtype.kind != "u" or indices.ndim != 1:
+            raise InputError(f"mesh '{name}': its face indices are no unsigned integers", path=document.path)
+        corners = indices.astype(np.int64)
     if corners.size and corners.max() >= count:
         raise InputError(
             f"mesh '{name}': face index {corners.max()} is beyond its {count} vertices", path=document.path
@@ -193,45 +243,11 @@ def _triangles(document: Document, primitive: Any, mode: int, count: int, name: 
         if len(corners) % 3:
             raise InputError(f"mesh '{name}': {len(corners)} indices are not whole triangles", path=document.path)
         return corners.reshape(-1, 3)
-    steps = np.arange(len(corners) - 2)
+    steps = np.arange(max(len(corners) - 2, 0))
     if mode == _FAN:
         return np.stack([np.full_like(steps, corners[0]), corners[steps + 1], corners[steps + 2]], axis=1)
     odd = steps % 2
     return np.stack([corners[steps], corners[steps + 1 + odd], corners[steps + 2 - odd]], axis=1)
-
-
-def _influences(
-    document: Document, attributes: dict[str, Any], vertices: int, joints: int, name: str, notes: list[str]
-) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
-    """All JOINTS_n and WEIGHTS_n side by side, unused slots on joint 0 with weight 0, rows summing to one."""
-    indices, weights = [], []
-    for n in range(8):
-        if attributes.get(f"JOINTS_{n}") is None or attributes.get(f"WEIGHTS_{n}") is None:
-            break
-        indices.append(document.accessor(attributes[f"JOINTS_{n}"]).astype(np.int64))
-        weights.append(document.accessor(attributes[f"WEIGHTS_{n}"]).astype(np.float64))
-    if not indices:
-        raise InputError(f"mesh '{name}' uses a skin but has no JOINTS_0 and WEIGHTS_0", path=document.path)
-    index, weight = np.concatenate(indices, axis=1), np.concatenate(weights, axis=1)
-    if index.shape != weight.shape or len(index) != vertices:
-        raise InputError(f"mesh '{name}': joints and weights do not match its {vertices} vertices", path=document.path)
-    if not np.isfinite(weight).all() or (weight < 0).any():
-        bad = int(np.argwhere(~(np.isfinite(weight) & (weight >= 0)))[0][0])
-        raise InputError(f"mesh '{name}': vertex {bad} has a negative or non-finite weight", path=document.path)
-    used = np.where(weight > 0, index, 0)
-    if used.max() >= joints:
-        bad = int(np.argwhere(used >= joints)[0][0])
-        raise InputError(
-            f"mesh '{name}': vertex {bad} follows joint {used[bad].max()}, the skin has {joints}", path=document.path
-        )
-    total = weight.sum(axis=1)
-    if (total <= 0).any():
-        bad = int(np.flatnonzero(total <= 0)[0])
-        raise InputError(f"mesh '{name}': vertex {bad} has no weight at all", path=document.path)
-    off = np.abs(total - 1) > 0.01
-    if off.any():
-        notes.append(f"mesh '{name}': weights of {int(off.sum())} vertices did not sum to one, normalised")
-    return used, weight / total[:, None]
 
 
 def _inverse_binds(document: Document, index: int) -> NDArray[np.float64]:

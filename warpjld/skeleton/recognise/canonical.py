@@ -19,6 +19,7 @@ from warpjld.skeleton.recognise.complete_body import find_extremities, merge_pel
 from warpjld.skeleton.recognise.complete_hand import complete_hand
 from warpjld.skeleton.recognise.hand_frame import chirality
 from warpjld.skeleton.recognise.layout import Layout, lay_out
+from warpjld.skeleton.recognise.leaf_ends import Painted, add_leaf_ends
 from warpjld.skeleton.recognise.recognise import recognise
 from warpjld.skeleton.recognise.roles import HandRoles, Roles
 from warpjld.skeleton.recognise.tree import SourceTree
@@ -55,6 +56,7 @@ def canonical_skeleton(
     side: str | None = None,
     axes: Mapping[int, NDArray[np.float64]] | None = None,
     limits: Mapping[int, Mapping[str, tuple[float, float]]] | None = None,
+    painted: Painted | None = None,
 ) -> Canonical:
     """Recognise a tree inside its surface.
 
@@ -65,6 +67,7 @@ def canonical_skeleton(
         side: Side of a single hand, overriding what names and shape say.
         axes: Flexion axes the file states, by its joint numbers.
         limits: Channel limits [rad] the file states, likewise.
+        painted: Whose skin is whose, by its joint numbers, where the file says.
     """
     roles = recognise(tree)
     notes: list[str] = []
@@ -84,6 +87,7 @@ def canonical_skeleton(
         layout.positions[layout.names.index("pelvis")] = place
     if roles.body:
         _extremities(layout, vertices, faces)
+    add_leaf_ends(layout, vertices, faces, painted, branches=not (roles.body or roles.hands))
     skeleton = _skeleton(layout, hand_points, axes or {}, limits or {})
     return Canonical(skeleton, tuple(layout.sources), layout.owner, (*notes, *layout.notes))
 

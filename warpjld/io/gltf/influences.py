@@ -1,0 +1,108 @@
+"""Joints and weights of a skinned primitive: all JOINTS_n and WEIGHTS_n, checked, every vertex with some."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import scipy.sparse as sp
+from numpy.typing import NDArray
+from scipy.sparse.csgraph import dijkstra
+from scipy.spatial import cKDTree
+
+from warpjld.errors import InputError
+from warpjld.io.gltf.document import Document
+
+__all__ = ["read_influences"]
+
+_MOST_SETS = 64  # of four influences: more is no file that anyone made
+
+
+def read_influences(
+    document: Document,
+    attributes: dict[str, Any],
+    points: NDArray[np.float64],
+    faces: NDArray[np.int64],
+    joints: int,
+    name: str,
+    notes: list[str],
+) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
+    """Influencing joints and weights, shape (V, K): unused slots on joint 0 with weight 0, rows summing to one.
+
+    A vertex without any weight takes those of the nearest one along the surface that has some.
+
+    Args:
+        document: The file.
+        attributes: The primitive's attributes by name.
+        points: Its vertices, shape (V, 3).
+        faces: Its triangles, shape (T, 3).
+        joints: Number of the skin's joints.
+        name: The mesh's, for messages.
+        notes: What was mended is added.
+
+    Raises:
+        InputError: No weights, of the wrong shape, negative or not finite, or joints that do not exist.
+    """
+    index, weight = _all_sets(document, attributes, len(points), name)
+    if not np.isfinite(weight).all() or (weight < 0).any():
+        bad = int(np.argwhere(~(np.isfinite(weight) & (weight >= 0)))[0][0])
+        raise InputError(f"mesh '{name}': vertex {bad} has a negative or non-finite weight", path=document.path)
+    used = np.where(weight > 0, index, 0)
+    if used.size and used.max() >= joints:
+        bad = int(np.argwhere(used >= joints)[0][0])
+        raise InputError(
+            f"mesh '{name}': vertex {bad} follows joint {used[bad].max()}, the skin has {joints}", path=document.path
+        )
+    bare = weight.sum(axis=1) <= 0.0
+    if bare.any():
+        if bare.all():
+            raise InputError(f"mesh '{name}': no vertex has any weight", path=document.path)
+        source = _nearest_weighted(points, faces, bare)
+        used[bare], weight[bare] = used[source], weight[source]
+        few = ", ".join(str(v) for v in np.flatnonzero(bare)[:4]) + (", …" if bare.sum() > 4 else "")
+        notes.append(f"mesh '{name}': {int(bare.sum())} vertices without any weight ({few}) follow their neighbours")
+    total = weight.sum(axis=1)
+    off = np.abs(total - 1) > 0.01
+    if off.any():
+        notes.append(f"mesh '{name}': weights of {int(off.sum())} vertices did not sum to one, normalised")
+    return used, weight / total[:, None]
+
+
+def _all_sets(
+    document: Document, attributes: dict[str, Any], vertices: int, name: str
+) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
+    indices, weights = [], []
+    for n in range(_MOST_SETS):
+        if attributes.get(f"JOINTS_{n}") is None or attributes.get(f"WEIGHTS_{n}") is None:
+            break
+        indices.append(document.accessor(attributes[f"JOINTS_{n}"]).astype(np.int64))
+        weights.append(document.accessor(attributes[f"WEIGHTS_{n}"]).astype(np.float64))
+    if not indices:
+        raise InputError(f"mesh '{name}' uses a skin but has no JOINTS_0 and WEIGHTS_0", path=document.path)
+    index, weight = np.concatenate(indices, axis=1), np.concatenate(weights, axis=1)
+    if index.shape != weight.shape or len(index) != vertices:
+        raise InputError(f"mesh '{name}': joints and weights do not match its {vertices} vertices", path=document.path)
+    return index, weight
+
+
+def _nearest_weighted(
+    points: NDArray[np.float64], faces: NDArray[np.int64], bare: NDArray[np.bool_]
+) -> NDArray[np.int64]:
+    """For every bare vertex the nearest one with weights, along edges; through space where no edge leads to one."""
+    weighted = np.flatnonzero(~bare)
+    wanted = np.flatnonzero(bare)
+    # vertices doubled at a seam are one: joined by edges without length (tiny: zero means "no edge" to scipy)
+    size = float(np.linalg.norm(np.ptp(points, axis=0))) or 1.0
+    seams = cKDTree(points).query_pairs(1e-7 * size, output_type="ndarray")
+    edges = np.concatenate([faces[:, [0, 1]], faces[:, [1, 2]], faces[:, [2, 0]], seams])
+    length = np.linalg.norm(points[edges[:, 0]] - points[edges[:, 1]], axis=1) + 1e-12 * size
+    # of an edge that two triangles share one entry must stay: duplicates would be added up
+    shortest = {(min(a, b), max(a, b)): d for (a, b), d in zip(edges.tolist(), length.tolist(), strict=True) if a != b}
+    pairs = np.array(list(shortest), dtype=np.int64).reshape(-1, 2)
+    graph = sp.csr_array((list(shortest.values()), (pairs[:, 0], pairs[:, 1])), shape=(len(points),) * 2)
+    far, _, source = dijkstra(graph, directed=False, indices=weighted, min_only=True, return_predecessors=True)
+    out = source[wanted]
+    apart = ~np.isfinite(far[wanted])
+    if apart.any():
+        out[apart] = weighted[cKDTree(points[weighted]).query(points[wanted[apart]])[1]]
+    return np.asarray(out, dtype=np.int64)

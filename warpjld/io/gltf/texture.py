@@ -1,0 +1,45 @@
+"""Texture coordinates of a primitive, in this project's convention: v upwards from the picture's lower left corner."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from warpjld.errors import InputError
+from warpjld.io.gltf.document import Document
+
+__all__ = ["texture_coordinates"]
+
+
+def texture_coordinates(document: Document, primitive: Any, count: int, name: str) -> NDArray[np.float32] | None:
+    """Coordinates that the base colour of the primitive's material uses, shape (V, 2); None where there are none.
+
+    ``KHR_texture_transform`` is applied: coordinates are those at which the picture itself is read.
+
+    Raises:
+        InputError: As many as vertices are wanted.
+    """
+    info = _base_colour(document, primitive)
+    moved = (info.extensions or {}).get("KHR_texture_transform", {}) if info is not None else {}
+    number = moved.get("texCoord", (info.texCoord if info is not None else None) or 0)
+    attributes = vars(primitive.attributes)
+    accessor = attributes.get(f"TEXCOORD_{number}")
+    if accessor is None:
+        return None
+    uv = document.accessor(accessor).astype(np.float64)
+    if uv.shape != (count, 2):
+        raise InputError(f"mesh '{name}': want {count} texture coordinates, got {len(uv)}", path=document.path)
+    if moved:
+        angle = float(moved.get("rotation", 0.0))
+        turn = np.array([[np.cos(angle), np.sin(angle)], [-np.sin(angle), np.cos(angle)]])
+        uv = (uv * moved.get("scale", (1.0, 1.0))) @ turn.T + moved.get("offset", (0.0, 0.0))
+    return (uv * [1.0, -1.0] + [0.0, 1.0]).astype(np.float32)
+
+
+def _base_colour(document: Document, primitive: Any) -> Any:
+    if primitive.material is None or not 0 <= primitive.material < len(document.gltf.materials):
+        return None
+    surface = document.gltf.materials[primitive.material].pbrMetallicRoughness
+    return None if surface is None else surface.baseColorTexture

@@ -1,0 +1,169 @@
+"""Ends of bones that files leave out: a joint without children carries flesh too, and turns it (R13).
+
+The covering's segments run from joint to joint. Flesh beyond the last joint of a tail, an ear or a toe would hang on
+the segment before it, and the joint's own rotation would be lost.
+"""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from warpjld.rotations import unit
+from warpjld.skeleton.recognise.extremity import find_extremity
+from warpjld.skeleton.recognise.layout import Layout
+from warpjld.skeleton.recognise.section import nearby
+
+__all__ = ["Painted", "add_leaf_ends"]
+
+_IS_END = re.compile(r"((left|right)\.)?(thumb|index|middle|ring|pinky|hand|toe\d*)\.tip|head\.top")
+"""Canonical extremities: they end a bone and carry nothing."""
+_OWN = 0.5  # weight from which a vertex is a joint's own
+_SMALLEST = 5e-3  # of the skeleton's size: flesh that reaches less far needs no bone
+_ONE_SIDED = 0.2  # of its reach: centroid of the flesh, relative to the joint, that tells a direction
+_GOES_ON = 0.4  # of the bone before: how far a surface without weights must go on beyond its last joint
+_SHORTEST, _LONGEST = 0.3, 0.9  # of the flesh's reach: length of the added bone
+_UNSERVED = 0.6  # share of a joint's flesh that lies on none of its bones, from which it needs one more
+
+
+@dataclass(frozen=True, eq=False)
+class Painted:
+    """A file's skin weights.
+
+    Attributes:
+        points: Vertices [m], shape (W, 3).
+        joints: Influencing joints of the file, shape (W, K).
+        weights: Their weights, rows summing to one, shape (W, K).
+    """
+
+    points: NDArray[np.float64]
+    joints: NDArray[np.int64]
+    weights: NDArray[np.float64]
+
+
+def add_leaf_ends(
+    layout: Layout,
+    vertices: NDArray[np.float64],
+    faces: NDArray[np.int32],
+    painted: Painted | None,
+    *,
+    branches: bool,
+) -> None:
+    """Add an end, ``tail3.end``, to every joint without children that owns skin and is no end itself.
+
+    Its place is where the joint's own skin reaches to; without weights, where the surface goes on along the bone
+    before.
+
+    Args:
+        layout: The canonical joints; ends are appended.
+        vertices: Surface [m], shape (V, 3).
+        faces: Its triangles, shape (T, 3).
+        painted: Whose skin is whose; None where nothing says.
+        branches: Whether joints with children get one too, where most of their skin lies beside and beyond the bones
+            that they have, as an animal's snout does where ears are the head's children.
+    """
+    size = float(np.linalg.norm(np.ptp(layout.positions, axis=0)))
+    if painted is not None:
+        size = max(size, 0.1 * float(np.linalg.norm(np.ptp(painted.points, axis=0))))
+    found: dict[str, str] = {}
+    for joint, name in list(enumerate(layout.names)):
+        kids = [k for k, parent in enumerate(layout.parents) if parent == joint]
+        if _IS_END.fullmatch(name) or (kids and not (branches and painted is not None)):
+            continue
+        if painted is None:
+            end = _along_the_bone(layout, joint, vertices, faces)
+        else:
+            end = _own_flesh(layout, joint, kids, vertices, faces, painted, _SMALLEST * size)
+        if end is not None:
+            added = f"{name}.end"
+            while added in layout.names:
+                added += "#2"
+            layout.add(added, name, end)
+            found[added] = name
+    if found:
+        layout.notes.append(f"ends of bones added in the surface: {', '.join(found)}")
+
+
+def _along_the_bone(
+    layout: Layout, joint: int, vertices: NDArray[np.float64], faces: NDArray[np.int32]
+) -> NDArray[np.float64] | None:
+    parent = layout.parents[joint]
+    if parent < 0:
+        return None
+    start = layout.positions[joint]
+    bone = start - layout.positions[parent]
+    length = float(np.linalg.norm(bone))
+    if not length > 0.0:
+        return None
+    near = nearby(vertices, faces, start, 4.0 * length)
+    end = find_extremity(vertices, near, start, bone / length, length)
+    return end if end is not None and np.linalg.norm(end - start) > _GOES_ON * length else None
+
+
+def _own_flesh(
+    layout: Layout,
+    joint: int,
+    kids: list[int],
+    vertices: NDArray[np.float64],
+    faces: NDArray[np.int32],
+    painted: Painted,
+    smallest: float,
+) -> NDArray[np.float64] | None:
+    """Where the skin that a joint owns reaches to; None where it owns none, or its bones serve most of it."""
+    share = np.where(layout.owner[painted.joints] == joint, painted.weights, 0.0).sum(axis=1)
+    own = share > _OWN
+    if own.sum() < 3:
+        return None
+    start = layout.positions[joint]
+    flesh = painted.points[own] - start
+    if kids:
+        bones = [layout.positions[k] - start for k in kids]
+        served = np.zeros(len(flesh), dtype=bool)
+        for bone in bones:
+            along = flesh @ bone / max(float(bone @ bone), 1e-30)
+            served |= (along > 0.0) & (along < 1.2)
+        if np.mean(~served) < _UNSERVED:
+            return None
+        flesh = flesh[~served]
+    reach = float(np.quantile(np.linalg.norm(flesh, axis=1), 0.98))
+    if reach < smallest:
+        return None
+    direction = _direction(layout, joint, flesh, reach)
+    along = flesh @ direction
+    beyond = float(along.max())
+    if beyond < smallest:
+        return None
+    near = nearby(vertices, faces, start, 2.0 * reach)
+    end = find_extremity(vertices, near, start, direction, beyond)
+    if end is not None:
+        # the surface that the line meets may be another one's, or a fold of it
+        length = float((end - start) @ direction)
+        if _SHORTEST * beyond <= length <= beyond and np.linalg.norm(end - start) < 1.2 * length:
+            return end
+    return start + _middle(flesh, direction, beyond)
+
+
+def _direction(layout: Layout, joint: int, flesh: NDArray[np.float64], reach: float) -> NDArray[np.float64]:
+    """Unit direction in which a joint's flesh lies: its centroid's, or else the bone's before, or its longest axis."""
+    centre = flesh.mean(axis=0)
+    if np.linalg.norm(centre) > _ONE_SIDED * reach:
+        return unit(centre)
+    parent = layout.parents[joint]
+    bone = layout.positions[joint] - layout.positions[parent] if parent >= 0 else np.zeros(3)
+    if np.linalg.norm(bone) > 1e-6 * reach:
+        return unit(bone)
+    longest = np.linalg.svd(flesh - centre, full_matrices=False)[2][0]
+    return np.asarray(longest if (flesh @ longest).max() >= -(flesh @ longest).min() else -longest)
+
+
+def _middle(flesh: NDArray[np.float64], direction: NDArray[np.float64], beyond: float) -> NDArray[np.float64]:
+    """Middle of the flesh near its far end, relative to the joint, one radius before it or at least half-way."""
+    along = flesh @ direction
+    last = flesh[along > 0.6 * beyond]
+    aside = last - np.outer(last @ direction, direction)
+    centre = aside.mean(axis=0)
+    radius = float(np.median(np.linalg.norm(aside - centre, axis=1)))
+    return np.asarray(np.clip(beyond - radius, 0.5 * beyond, _LONGEST * beyond) * direction + centre)
