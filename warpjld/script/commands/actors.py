@@ -24,7 +24,8 @@ if TYPE_CHECKING:
     "HAND",
     syntax=(
         "HAND <LEFT/RIGHT> BUILTIN [LENGTH <metres>] [BREADTH <metres>] [RESOLUTION <vertices>] [NAME <actor>]"
-        ' or HAND <LEFT/RIGHT> "<rig file>" [UNIT <M/CM/MM or metres>] [SCALE <factor>] [MAP "<joint map>"] [NAME <actor>]'
+        ' or HAND <LEFT/RIGHT> "<rig file>" [UNIT <M/CM/MM or metres>] [SCALE <factor>] [MAP "<joint map>"]'
+        " [NAME <actor>]"
     ),
     help="Bring on a hand: the built-in one, or a rig from a file. The actor is called LEFT or RIGHT unless named.",
     group="Actors",
@@ -70,7 +71,8 @@ def body(scene: Scene, arguments: Arguments) -> None:
 @command(
     "MODEL",
     syntax=(
-        'MODEL "<surface file>" SKELETON "<skeleton file>" [UNIT <M/CM/MM or metres>] [SCALE <factor>] [MAP "<joint map>"] [NAME <actor>]'
+        'MODEL "<surface file>" SKELETON "<skeleton file>" [UNIT <M/CM/MM or metres>] [SCALE <factor>]'
+        ' [MAP "<joint map>"] [NAME <actor>]'
     ),
     help="Bring on a bare surface with a skeleton file. The actor is called MODEL unless named.",
     group="Actors",

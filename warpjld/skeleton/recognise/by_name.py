@@ -21,6 +21,7 @@ _ARM = (
     ("elbow", ("forearm",)),
     ("clavicle", ("clavicle", "scapula", "shoulder")),
 )
+_PALM = ("index", "middle", "ring", "pinky")
 _LEG = (("hip", ("thigh", "hip")), ("knee", ("shin",)), ("ankle", ("ankle", "foot")), ("ball", ("ball", "foot")))
 
 
@@ -71,6 +72,10 @@ def _hand(
         below = {meanings[k].digit for k in tree.subtree(j) if meanings[k].kind == "digit"}
         if len(below) == 1:
             digits[str(below.pop())].insert(0, j)
+    carpals = kinds[side, "carpal"]
+    if tree.flat and len(carpals) == len(_PALM):  # counted from the index finger (MakeHuman, DAZ, Rigify)
+        for digit, j in zip(_PALM, sorted(carpals, key=lambda j: meanings[j].number or 0), strict=True):
+            digits[digit].append(j)
     wrists = kinds[side, "wrist"] or kinds[side, "hand"] or (kinds[None, "wrist"] or kinds[None, "hand"])
     wrist = wrists[-1] if kinds[side, "wrist"] else (wrists[0] if wrists else None)
     if wrist is None and digits:

@@ -2,16 +2,16 @@
 
 from __future__ import annotations
 
-from warpjld.skeleton.recognise.digits import Digit, HandDigits, assign_hands
+from warpjld.skeleton.recognise.digits import Digit, assign_hands
 from warpjld.skeleton.recognise.flesh import Flesh
 from warpjld.skeleton.recognise.prune import prune
 from warpjld.skeleton.recognise.reconnect import reconnect
-from warpjld.skeleton.recognise.roles import Roles
+from warpjld.skeleton.recognise.roles import HandRoles, Roles
 from warpjld.skeleton.recognise.shape_body import body_by_shape
 from warpjld.skeleton.recognise.shape_hand import hand_by_shape, hand_roots
 from warpjld.skeleton.recognise.tree import SourceTree
 
-__all__ = ["roles_by_shape"]
+__all__ = ["hands_by_shape", "roles_by_shape"]
 
 
 def roles_by_shape(tree: SourceTree, flesh: Flesh | None = None) -> Roles:
@@ -20,6 +20,25 @@ def roles_by_shape(tree: SourceTree, flesh: Flesh | None = None) -> Roles:
     Joints without flesh that end nothing are left aside; a flat file is first chained by its bone axes.
     """
     flesh = flesh or Flesh(tree, None)
+    small, numbers, hands = _find_hands(tree, flesh)
+    if len(hands) == 2 and _have_common_ancestor(small, hands):
+        roles = body_by_shape(small, [hand.joints for hand in hands])
+    else:
+        roles = Roles(hands=hands, how="shape")
+    for hand in roles.hands:
+        hand.joints = {name: numbers[j] for name, j in hand.joints.items()}
+    roles.body = {name: numbers[j] for name, j in roles.body.items()}
+    return roles
+
+
+def hands_by_shape(tree: SourceTree, flesh: Flesh) -> list[HandRoles]:
+    """Hands alone, without sides."""
+    _, numbers, hands = _find_hands(tree, flesh)
+    return [HandRoles(None, {name: numbers[j] for name, j in hand.joints.items()}) for hand in hands]
+
+
+def _find_hands(tree: SourceTree, flesh: Flesh) -> tuple[SourceTree, list[int], list[HandRoles]]:
+    """The tree without dead joints, the number in ``tree`` of each of its joints, and hands in its own numbers."""
     small, numbers = prune(tree, flesh)
     if small.flat:
         small = reconnect(small)
@@ -28,15 +47,7 @@ def roles_by_shape(tree: SourceTree, flesh: Flesh | None = None) -> Roles:
     for hand in found:
         for digit in hand.digits.values():
             _mark_end(digit, shares)
-    hands = assign_hands(small, found, shares)
-    if len(hands) == 2 and _have_common_ancestor(small, found):
-        roles = body_by_shape(small, [hand.joints for hand in hands])
-    else:
-        roles = Roles(hands=hands, how="shape")
-    for hand_roles in roles.hands:
-        hand_roles.joints = {name: numbers[j] for name, j in hand_roles.joints.items()}
-    roles.body = {name: numbers[j] for name, j in roles.body.items()}
-    return roles
+    return small, numbers, assign_hands(small, found, shares)
 
 
 def _mark_end(digit: Digit, flesh: Flesh) -> None:
@@ -44,6 +55,6 @@ def _mark_end(digit: Digit, flesh: Flesh) -> None:
         digit.ranks[-1] = 4
 
 
-def _have_common_ancestor(tree: SourceTree, hands: list[HandDigits]) -> bool:
-    first, second = (set(tree.ancestors(hand.wrist)) if hand.wrist is not None else set() for hand in hands)
+def _have_common_ancestor(tree: SourceTree, hands: list[HandRoles]) -> bool:
+    first, second = (set(tree.ancestors(hand.joints["wrist"])) for hand in hands)
     return bool(first & second)

@@ -19,6 +19,7 @@ from warpjld.skeleton.recognise.limbs import (
     divide_limb,
     limb_misfit,
     path_below,
+    toes_by_place,
 )
 from warpjld.skeleton.recognise.names import read_name
 from warpjld.skeleton.recognise.roles import Roles
@@ -29,6 +30,7 @@ __all__ = ["check_limbs"]
 _MAP = "state it with --map (inspect --write-map writes what was recognised, for editing)"
 _PLAUSIBLE = np.log(2.0)  # lower per upper segment may be half or twice the usual
 _AT_TRUNK = 0.03  # of the limb: a joint nearer than this to where limbs part is none of the limb's
+_TOES = 3  # chains below an ankle from which they are toes
 _UNEQUAL = 1.25  # left per right length from which one is doubtful
 
 
@@ -71,6 +73,7 @@ def check_limbs(tree: SourceTree, roles: Roles, flesh: Flesh, stated: Collection
         _compare(tree, roles, kind)
     _pelvis(tree, roles, stated)
     _trunk_between(tree, roles, stated)
+    _feet(tree, roles, flesh, stated)
     _ends(roles, flesh, stated)
 
 
@@ -277,6 +280,23 @@ def _trunk_between(tree: SourceTree, roles: Roles, stated: Collection[str]) -> N
     roles.body |= {f"spine{n}": j for n, j in enumerate(spine, start=1)}
     if spine:
         roles.notes.append(f"spine {', '.join(repr(tree.names[j]) for j in spine)}: between pelvis and arms")
+
+
+def _feet(tree: SourceTree, roles: Roles, flesh: Flesh, stated: Collection[str]) -> None:
+    """The only joint below an ankle, or its toes, if no name says them."""
+    ankles = {side: roles.body[f"{side}.ankle"] for side in ("left", "right") if f"{side}.ankle" in roles.body}
+    middle = tree.positions[list(ankles.values())].mean(axis=0) if ankles else np.zeros(3)
+    for side, ankle in ankles.items():
+        known = {n for n in (*roles.body, *stated) if n.startswith((f"{side}.ball", f"{side}.toe"))}
+        below = [c for c in tree.children[ankle] if flesh.live[c] and read_name(tree.names[c]).kind != "helper"]
+        if known or not flesh.known or set(below) & set(roles.body.values()):
+            continue
+        if len(below) == 1 and not flesh.bare[below[0]]:
+            roles.body[f"{side}.ball"] = below[0]
+            roles.notes.append(f"{side}.ball '{tree.names[below[0]]}': the only joint below the ankle")
+        elif len(below) >= _TOES and len(ankles) == 2:
+            roles.body |= toes_by_place(tree, below, side, tree.positions[ankle] - middle)
+            roles.notes.append(f"{side} toes: {len(below)} chains below the ankle, the innermost is the big one")
 
 
 def _ends(roles: Roles, flesh: Flesh, stated: Collection[str]) -> None:

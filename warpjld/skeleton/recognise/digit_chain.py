@@ -37,8 +37,13 @@ def digit_chain(
 
 
 def _order(tree: SourceTree, meaning: Meaning, joint: int) -> tuple[int, int, int, int]:
-    rank = -1 if meaning.rank is None else meaning.rank
-    return tree.depth(joint), rank, meaning.number or 0, joint
+    """By depth; where that tells nothing by rank, which metacarpal, 01, 02 and tip share with numbers."""
+    return tree.depth(joint), *_place(meaning), joint
+
+
+def _place(meaning: Meaning) -> tuple[int, int]:
+    number = meaning.number or 0
+    return (number if meaning.rank is None else meaning.rank), number
 
 
 def _one_line(tree: SourceTree, chain: list[int]) -> list[int]:
@@ -80,7 +85,7 @@ def _without_helpers(
 
 
 def _last_by_rank(chain: list[int], meanings: Sequence[Meaning], fleshy: list[int]) -> int:
-    order = [(-1 if (r := meanings[j].rank) is None else r, meanings[j].number or 0) for j in chain]
+    order = [_place(meanings[j]) for j in chain]
     return max(k for k, at in enumerate(order) if at <= max(order[chain.index(j)] for j in fleshy))
 
 

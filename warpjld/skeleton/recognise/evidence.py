@@ -73,7 +73,7 @@ def _heading(chain: list[NDArray[np.float64]]) -> NDArray[np.float64]:
 def _is_body(tree: SourceTree, roles: Roles) -> bool:
     """A limb of two joints in one line, or a trunk with a head in one line."""
     if tree.flat:
-        return True
+        return len(roles.body) > 2
     pairs = [(f"{side}.{a}", f"{side}.{b}") for side in ("left", "right") for a, b in _SEGMENTS]
     if any(a in roles.body and b in roles.body and _below(tree, roles.body[a], roles.body[b]) for a, b in pairs):
         return True

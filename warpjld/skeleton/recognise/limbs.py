@@ -7,9 +7,10 @@ from collections.abc import Collection, Mapping, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from warpjld.skeleton.hand import FINGER_JOINTS
 from warpjld.skeleton.recognise.tree import SourceTree
 
-__all__ = ["FOREARM_RATIO", "SHIN_RATIO", "ankle_of", "divide_limb", "limb_misfit", "path_below"]
+__all__ = ["FOREARM_RATIO", "SHIN_RATIO", "ankle_of", "divide_limb", "limb_misfit", "path_below", "toes_by_place"]
 
 FOREARM_RATIO = 0.9  # forearm per upper arm, elbow to wrist
 SHIN_RATIO = 1.0  # shin per thigh
@@ -67,3 +68,21 @@ def ankle_of(tree: SourceTree, leg: Sequence[int]) -> int:
     late = len(turns) // 2
     sharpest = late + int(turns[late:].argmax())
     return sharpest + 1 if turns[sharpest] > _ANKLE_TURN else len(leg) - 1
+
+
+def toes_by_place(tree: SourceTree, heads: Sequence[int], side: str, outwards: NDArray[np.float64]) -> dict[str, int]:
+    """Joints of toes that begin at ``heads``: the big toe is the innermost.
+
+    Args:
+        tree: The file's joints.
+        heads: First joint of each toe.
+        side: Which foot.
+        outwards: From the middle of the body to the foot, shape (3,).
+    """
+    out: dict[str, int] = {}
+    for n, head in enumerate(sorted(heads, key=lambda j: float(outwards @ tree.positions[j])), start=1):
+        toe = [head]
+        while len(tree.children[toe[-1]]) == 1:
+            toe.append(tree.children[toe[-1]][0])
+        out |= {f"{side}.toe{n}.{name}": j for name, j in zip(FINGER_JOINTS, toe, strict=False)}
+    return out

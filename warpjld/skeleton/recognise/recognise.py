@@ -13,6 +13,7 @@ from warpjld.skeleton.recognise.by_shape import roles_by_shape
 from warpjld.skeleton.recognise.check_hands import check_hands
 from warpjld.skeleton.recognise.check_limbs import check_limbs
 from warpjld.skeleton.recognise.evidence import reject_unfounded
+from warpjld.skeleton.recognise.fill_hands import fill_hands
 from warpjld.skeleton.recognise.flesh import Flesh
 from warpjld.skeleton.recognise.joint_map import JointMap
 from warpjld.skeleton.recognise.roles import Roles
@@ -45,10 +46,21 @@ def recognise(
     roles = roles_by_name(tree, flesh)
     if not (roles.hands or roles.body):
         roles = roles_by_shape(tree, flesh)
+    roles = _checked(tree, roles, flesh, by_hand)
+    if roles.how == "names" and not (roles.hands or roles.body):
+        by_shape = _checked(tree, roles_by_shape(tree, flesh), flesh, by_hand)
+        if by_shape.hands or by_shape.body:
+            roles = by_shape
+    check_hands(tree, roles)
+    roles.left_out = frozenset(by_hand.ignored)
+    return roles
+
+
+def _checked(tree: SourceTree, roles: Roles, flesh: Flesh, by_hand: JointMap) -> Roles:
+    """What names or shape propose, with what is stated, as far as geometry agrees."""
     by_hand.apply(roles)
+    fill_hands(tree, roles, flesh, by_hand.names)
     check_limbs(tree, roles, flesh, by_hand.names)
     reject_unfounded(tree, roles, by_hand.names)
     by_hand.apply(roles)
-    check_hands(tree, roles)
-    roles.left_out = frozenset(by_hand.ignored)
     return roles

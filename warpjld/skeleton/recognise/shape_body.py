@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from warpjld.skeleton.recognise.hand_frame import chirality
-from warpjld.skeleton.recognise.limbs import FOREARM_RATIO, SHIN_RATIO, ankle_of, divide_limb, path_below
+from warpjld.skeleton.recognise.limbs import FOREARM_RATIO, SHIN_RATIO, ankle_of, divide_limb, path_below, toes_by_place
 from warpjld.skeleton.recognise.roles import HandRoles, Roles
 from warpjld.skeleton.recognise.tree import SourceTree
 
@@ -74,14 +74,7 @@ def _toes(tree: SourceTree, leg: list[int], ankle: int, side: str, middle: NDArr
     heads = tree.children[leg[ankle]]
     if len(heads) == 1:
         return {f"{side}.ball": heads[0]}
-    outwards = tree.positions[leg[ankle]] - middle
-    heads = tuple(sorted(heads, key=lambda j: float(outwards @ tree.positions[j])))  # the big toe is the innermost
-    names = ("base", "knuckle2", "knuckle3", "tip")
-    return {
-        f"{side}.toe{n}.{name}": joint
-        for n, head in enumerate(heads, start=1)
-        for name, joint in zip(names, _single_file(tree, head), strict=False)
-    }
+    return toes_by_place(tree, heads, side, tree.positions[leg[ankle]] - middle)
 
 
 def _head(tree: SourceTree, chest: int, wrists: list[int]) -> dict[str, int]:
