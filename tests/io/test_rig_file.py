@@ -198,7 +198,7 @@ def test_twist_bones_give_their_weights_to_the_limb(rigs):
     assert on_elbow[near].min() > 0.95
 
 
-def test_a_given_side_wins_with_a_note(data):
+def test_a_given_side_wins_and_doubt_is_told(data):
     rig = load_rig(data / HANDS[0], side="right")
     assert rig.skeleton.names[0] == "right.wrist"
-    assert any("look like a left one" in note for note in rig.notes)
+    assert any("look like a left one" in note for note in rig.suspicious)

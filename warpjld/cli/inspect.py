@@ -23,6 +23,7 @@ __all__ = ["command"]
 @click.option("-o", "--out", type=click.Path(path_type=Path), help="Picture to write; the rig's name.png by default.")
 @click.option("--no-picture", is_flag=True, help="Write no picture.")
 @click.option("--write-skeleton", type=click.Path(path_type=Path), help="Skeleton file to write, for editing.")
+@click.option("--write-map", type=click.Path(path_type=Path), help="Joint map to write, for editing (see --map).")
 @options.json
 @click.option("-q", "--quiet", is_flag=True, help="Say only what looks suspicious.")
 def command(
@@ -30,6 +31,7 @@ def command(
     out: Path | None,
     no_picture: bool,
     write_skeleton: Path | None,
+    write_map: Path | None,
     as_json: bool,
     quiet: bool,
     **how: Any,
@@ -49,6 +51,10 @@ def command(
         from warpjld.io.skeleton_file import write_skeleton_file
 
         write_skeleton_file(write_skeleton, opened.skeleton)
+    if write_map is not None:
+        from warpjld.io.joint_map_file import write_joint_map
+
+        write_joint_map(write_map, opened)
     picture = None if no_picture else out or Path(f"{opened.name.replace(' ', '-')}.png")
     if picture is not None:
         from warpjld.cli.inspect_picture import draw_rig

@@ -46,6 +46,12 @@ def rig(command: Callable[..., Any]) -> Callable[..., Any]:
         click.option(
             "--side", type=click.Choice(["left", "right"]), help="Which hand RIG is, if the file leaves it open."
         ),
+        click.option(
+            "--map",
+            "joint_map",
+            type=click.Path(path_type=Path),
+            help="JSON that states joints by hand: canonical name to RIG's own.",
+        ),
         click.option("--skeleton", type=click.Path(path_type=Path), help="Skeleton file for a RIG without joints."),
     ):
         command = option(command)

@@ -12,6 +12,8 @@ if TYPE_CHECKING:
 
 __all__ = ["open_rig"]
 
+_OPTIONS = {"joint_map": "map"}  # options that are called otherwise than the arguments of load_rig
+
 
 def open_rig(text: str, **how: Any) -> Rig:
     """The rig a user named: a path, ``builtin:left`` or ``builtin:right``; what looks suspicious goes to stderr.
@@ -32,7 +34,7 @@ def open_rig(text: str, **how: Any) -> Rig:
         return rig
     if which not in ("left", "right"):
         raise InputError(f"no built-in hand '{which}': want builtin:left or builtin:right")
-    given = [f"--{name.replace('_', '-')}" for name, value in how.items() if value is not None]
+    given = [f"--{_OPTIONS.get(name, name)}" for name, value in how.items() if value is not None]
     if given:
         raise InputError(f"{text}: {', '.join(given)} only work for files")
     from warpjld.hand import build_hand

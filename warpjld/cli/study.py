@@ -9,6 +9,7 @@ import click
 
 from warpjld.cli import options
 from warpjld.cli.answer import answer
+from warpjld.cli.warn import warn
 
 if TYPE_CHECKING:
     from warpjld.study import Rerun, StudyResult
@@ -67,6 +68,7 @@ def command(
     with progress(quiet) as report:
         report("loading hands and objects", 0, 1)
         notes = experiment.check()
+        warn(experiment.doubts(), "suspicious")
         if not check:
             try:
                 result = run_study(

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+from typing import Any
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -10,7 +13,9 @@ from warpjld.io.placement import place
 from warpjld.io.source import SourceRig
 from warpjld.rig import Rig, Skin
 from warpjld.skeleton.recognise.canonical import Canonical, canonical_skeleton
+from warpjld.skeleton.recognise.flesh import flesh_shares
 from warpjld.skeleton.recognise.leaf_ends import Painted
+from warpjld.skeleton.recognise.recognise import recognise
 from warpjld.surface import Surface, weld_surface
 
 __all__ = ["assemble_rig"]
@@ -25,26 +30,38 @@ def assemble_rig(
     unit: str | None = None,
     scale: float | None = None,
     up: str | None = None,
+    joint_map: Mapping[str, Any] | None = None,
 ) -> Rig:
     """Recognise what ``source`` holds and bring it to the canonical form; arguments as in ``load_rig``.
+
+    ``joint_map`` is what such a file holds.
 
     Raises:
         InputError: What it holds cannot be used; the file is named.
     """
     try:
-        return _assemble(source, side, unit, scale, up)
+        return _assemble(source, side, unit, scale, up, joint_map)
     except InputError as error:
         if error.path is not None:
             raise
         raise InputError(error.message, path=source.path) from None
 
 
-def _assemble(source: SourceRig, side: str | None, unit: str | None, scale: float | None, up: str | None) -> Rig:
+def _assemble(
+    source: SourceRig,
+    side: str | None,
+    unit: str | None,
+    scale: float | None,
+    up: str | None,
+    joint_map: Mapping[str, Any] | None,
+) -> Rig:
     reach = max(np.abs(source.vertices).max(initial=0.0), np.abs(source.tree.frames).max(initial=0.0))
     if not reach < _FURTHEST:
         raise InputError(f"vertices or joints lie at {reach:.3g}: beyond anything that can be computed with")
     file_tree = source.tree
-    source = place(source, unit=unit, scale=scale, up=up)
+    shares = flesh_shares(len(source.tree), source.joints, source.weights, source.rigid)
+    roles = recognise(source.tree, shares, joint_map)
+    source = place(source, roles, unit=unit, scale=scale, up=up)
     surface = weld_surface(source.vertices, source.faces, uv=source.uv, parts=source.parts)
     painted = None
     if source.joints is not None and source.weights is not None:
@@ -53,10 +70,12 @@ def _assemble(source: SourceRig, side: str | None, unit: str | None, scale: floa
         source.tree,
         surface.vertices,
         surface.faces,
+        roles=roles,
+        shares=shares,
+        painted=painted,
         side=side,
         axes=source.axes,
         limits=source.limits,
-        painted=painted,
     )
     skin = None
     if source.joints is not None and source.weights is not None:
@@ -73,7 +92,7 @@ def _assemble(source: SourceRig, side: str | None, unit: str | None, scale: floa
         placing=source.placing,
         rigid=_rigid(source, found.owner, surface),
         notes=(*source.notes, *found.notes),
-        suspicious=source.suspicious,
+        suspicious=(*source.suspicious, *found.suspicious),
     )
 
 

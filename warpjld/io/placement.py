@@ -8,41 +8,43 @@ import numpy as np
 from numpy.typing import NDArray
 
 from warpjld.io.source import SourceRig
-from warpjld.skeleton.recognise.recognise import recognise
 from warpjld.skeleton.recognise.roles import Roles
 from warpjld.skeleton.recognise.tree import SourceTree
 
 __all__ = ["METRES", "place"]
 
 METRES = {"m": 1.0, "cm": 0.01, "mm": 0.001}
-_HAND = (0.08, 0.30)  # wrist to middle fingertip or last knuckle, children to giants [m]
+_HAND = (0.10, 0.30)  # wrist to middle fingertip, children of three to giants [m]
+_FINGERTIP = 1.15  # hand's length per distance from the wrist to the last knuckle
+_SMALLER, _LARGER = 0.6, 1.2  # beyond plausible sizes that a unit is guessed for
 _BODY = (0.5, 2.6)  # ankle to head [m]
 
 
 def place(
-    source: SourceRig, *, unit: str | None = None, scale: float | None = None, up: str | None = None
+    source: SourceRig, roles: Roles, *, unit: str | None = None, scale: float | None = None, up: str | None = None
 ) -> SourceRig:
-    """``source`` in metres with Y up; guesses are noted.
+    """``source`` in metres with Y up; guesses are noted, and an implausible size is told.
 
     Args:
         source: What the file says.
+        roles: What was recognised in its joints.
         unit: ``m``, ``cm``, ``mm`` or None: the one with which hand or body has a plausible size.
         scale: Factor by which all lengths are multiplied besides; where it is given and ``unit`` is not, nothing is
             guessed: the file is taken to be in metres.
         up: ``y``, ``z`` or None: Z only where a body's head lies that way from its hips.
     """
     notes = []
+    doubts = []
     factor = (1.0 if unit is None else METRES[unit]) * (1.0 if scale is None else scale)
-    roles = recognise(source.tree) if unit is None or up is None else Roles()
-    if unit is None and scale is None:
-        size, plausible, what = _size(source.tree, roles)
-        if size and not plausible[0] <= size <= plausible[1]:
-            fits = [u for u, f in METRES.items() if plausible[0] <= size * f <= plausible[1]]
-            if fits:
-                factor = METRES[fits[0]]
-                notes.append(f"unit: a {what} of {size:.4g} units is taken to be in {fits[0]}")
-            else:
-                notes.append(f"unit: a {what} of {size:.4g} m is not plausible in m, cm or mm: left as it is")
+    size, plausible, what = _size(source.tree, roles)
+    possible = (_SMALLER * plausible[0], _LARGER * plausible[1])
+    if unit is None and scale is None and size and not possible[0] <= size <= possible[1]:
+        fits = [u for u, f in METRES.items() if possible[0] <= size * f <= possible[1]]
+        if fits:
+            factor = METRES[fits[0]]
+            notes.append(f"unit: a {what} of {size:.4g} units is taken to be in {fits[0]}")
+    if size and not plausible[0] <= size * factor <= plausible[1]:
+        doubts.append(_implausible(size * factor, plausible, what, (scale or 1.0)))
     if up is None and _lies_on_z(source.tree, roles):
         up = "z"
         notes.append("up axis: the body stands along Z, turned to Y")
@@ -59,6 +61,7 @@ def place(
         axes={j: turn @ axis for j, axis in source.axes.items()},
         placing=placing @ source.placing,
         notes=(*source.notes, *notes),
+        suspicious=(*source.suspicious, *doubts),
     )
 
 
@@ -71,8 +74,20 @@ def _size(tree: SourceTree, roles: Roles) -> tuple[float, tuple[float, float], s
         joints = hand.joints
         last = next((joints[f"middle.{j}"] for j in ("tip", "knuckle3", "knuckle2") if f"middle.{j}" in joints), None)
         if "wrist" in joints and last is not None:
-            return _distance(tree, joints["wrist"], last), _HAND, "hand"
+            reach = 1.0 if "middle.tip" in joints else _FINGERTIP
+            return reach * _distance(tree, joints["wrist"], last), _HAND, "hand"
     return 0.0, (0.0, 0.0), ""
+
+
+def _implausible(size: float, plausible: tuple[float, float], what: str, scale: float) -> str:
+    """What is said of a size that no hand or body has, with the factor that would bring it to a usual one."""
+    usual = {"hand": 0.19, "body": 1.5}[what]
+    ends = {"hand": "from wrist to fingertip", "body": "from ankle to head"}[what]
+    reach = f"{plausible[0]:g} to {plausible[1]:g} m"
+    return (
+        f"size: this {what} measures {size:.4g} m {ends}; {reach} are plausible. Objects and recorded motion in metres "
+        f"do not fit it: give its unit or --scale (about {scale * usual / size:.3g})"
+    )
 
 
 def _lies_on_z(tree: SourceTree, roles: Roles) -> bool:

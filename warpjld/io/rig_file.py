@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from pathlib import Path
+from typing import Any
 
 from warpjld.errors import InputError
 from warpjld.io.source import SourceRig
@@ -20,6 +21,7 @@ def load_rig(
     unit: str | None = None,
     scale: float | None = None,
     up: str | None = None,
+    joint_map: str | Path | Mapping[str, Any] | None = None,
 ) -> Rig:
     """Load a rig: a skinned .glb or .gltf, or any surface (OBJ, PLY, STL, …) with a skeleton file.
 
@@ -30,6 +32,8 @@ def load_rig(
         unit: ``m``, ``cm`` or ``mm``; by default guessed from a hand's or body's plausible size, with a note.
         scale: Factor by which all lengths are multiplied besides; without ``unit`` nothing is guessed then.
         up: ``y`` or ``z``: the file's up axis; turned to Y.
+        joint_map: Joints stated by hand, which win over what is recognised: a JSON file (see
+            :mod:`warpjld.io.joint_map_file`), or what it holds: ``{"left.knee": "LeftShin", "ignore": ["Socket"]}``.
 
     Returns:
         Skeleton in canonical names, metres; each hand has its 25 joints, those the file lacks added.
@@ -48,7 +52,11 @@ def load_rig(
             raise InputError(f"{name}: want {' or '.join(repr(a) for a in allowed)}, got {value!r}")
     if scale is not None and not 0.0 < scale < float("inf"):
         raise InputError(f"scale: want a factor above 0, got {scale:g}")
-    return assemble_rig(_read(Path(path), skeleton), side=side, unit=unit, scale=scale, up=up)
+    if isinstance(joint_map, str | Path):
+        from warpjld.io.joint_map_file import read_joint_map
+
+        joint_map = read_joint_map(joint_map)
+    return assemble_rig(_read(Path(path), skeleton), side=side, unit=unit, scale=scale, up=up, joint_map=joint_map)
 
 
 def _read(path: Path, skeleton: str | Path | None) -> SourceRig:

@@ -24,7 +24,8 @@ if TYPE_CHECKING:
     "HAND",
     syntax=(
         "HAND <LEFT/RIGHT> BUILTIN [LENGTH <metres>] [BREADTH <metres>] [RESOLUTION <vertices>] [NAME <actor>]"
-        ' or HAND <LEFT/RIGHT> "<rig file>" [UNIT <M/CM/MM or metres>] [SCALE <factor>] [NAME <actor>]'
+        ' or HAND <LEFT/RIGHT> "<rig file>" [UNIT <M/CM/MM or metres>] [SCALE <factor>] [MAP "<joint map>"]'
+        " [NAME <actor>]"
     ),
     help="Bring on a hand: the built-in one, or a rig from a file. The actor is called LEFT or RIGHT unless named.",
     group="Actors",
@@ -55,7 +56,7 @@ def hand(scene: Scene, arguments: Arguments) -> None:
 
 @command(
     "BODY",
-    syntax='BODY "<rig file>" [UNIT <M/CM/MM or metres>] [SCALE <factor>] [NAME <actor>]',
+    syntax='BODY "<rig file>" [UNIT <M/CM/MM or metres>] [SCALE <factor>] [MAP "<joint map>"] [NAME <actor>]',
     help="Bring on a rig with any skeleton: a body, an animal. The actor is called BODY unless named.",
     group="Actors",
 )
@@ -70,7 +71,8 @@ def body(scene: Scene, arguments: Arguments) -> None:
 @command(
     "MODEL",
     syntax=(
-        'MODEL "<surface file>" SKELETON "<skeleton file>" [UNIT <M/CM/MM or metres>] [SCALE <factor>] [NAME <actor>]'
+        'MODEL "<surface file>" SKELETON "<skeleton file>" [UNIT <M/CM/MM or metres>] [SCALE <factor>]'
+        ' [MAP "<joint map>"] [NAME <actor>]'
     ),
     help="Bring on a bare surface with a skeleton file. The actor is called MODEL unless named.",
     group="Actors",
@@ -160,8 +162,11 @@ def _options(arguments: Arguments) -> dict[str, object]:
     options = arguments.options(
         unit=lambda: _unit(arguments),
         scale=lambda: arguments.number("the scale", above=0.0),
+        map=lambda: arguments.input_file("a joint map"),
         name=lambda: arguments.name("the actor's name"),
     )
+    if "map" in options:
+        options["joint_map"] = options.pop("map")
     metres = options.get("unit")
     if isinstance(metres, float):  # so many metres: a factor like any other
         options["unit"], options["scale"] = "m", metres * float(str(options.get("scale", 1.0)))

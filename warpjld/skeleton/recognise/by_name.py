@@ -5,9 +5,11 @@ from __future__ import annotations
 from collections import defaultdict
 
 from warpjld.skeleton.hand import DIGITS, FINGER_JOINTS
-from warpjld.skeleton.recognise.digits import assign_digit
+from warpjld.skeleton.recognise.digit_chain import digit_chain
+from warpjld.skeleton.recognise.digits import HandDigits, assign_hands
+from warpjld.skeleton.recognise.flesh import Flesh
 from warpjld.skeleton.recognise.names import Meaning, read_name
-from warpjld.skeleton.recognise.roles import HandRoles, Roles
+from warpjld.skeleton.recognise.roles import Roles
 from warpjld.skeleton.recognise.tree import SourceTree
 
 __all__ = ["roles_by_name"]
@@ -19,29 +21,40 @@ _ARM = (
     ("elbow", ("forearm",)),
     ("clavicle", ("clavicle", "scapula", "shoulder")),
 )
+_PALM = ("index", "middle", "ring", "pinky")
 _LEG = (("hip", ("thigh", "hip")), ("knee", ("shin",)), ("ankle", ("ankle", "foot")), ("ball", ("ball", "foot")))
 
 
-def roles_by_name(tree: SourceTree) -> Roles:
-    """Parts found by names alone; empty where the names say nothing."""
-    meanings = [read_name(name) for name in tree.names]
+def roles_by_name(tree: SourceTree, flesh: Flesh | None = None) -> Roles:
+    """Parts found by names; empty where the names say nothing.
+
+    Joints that own skin come before others of the same name; what neither owns any nor ends a bone is no part.
+    """
+    flesh = flesh or Flesh(tree, None)
+    meanings = [Meaning() if flesh.dead[j] else read_name(name) for j, name in enumerate(tree.names)]
     roles = Roles(how="names")
     kinds: dict[tuple[str | None, str], list[int]] = defaultdict(list)
-    for j in sorted(range(len(tree)), key=lambda j: (tree.depth(j), meanings[j].number or 0, j)):
+    for j in sorted(range(len(tree)), key=lambda j: (flesh.bare[j], tree.depth(j), meanings[j].number or 0, j)):
         if meanings[j].kind:
             kinds[meanings[j].side, str(meanings[j].kind)].append(j)
     sides: list[str | None] = [*sorted({side for side, _ in kinds if side})] or [None]
     if sides != [None] and any(meanings[j].kind == "digit" and meanings[j].side is None for j in range(len(tree))):
         sides.append(None)
+    hands: list[HandDigits] = []
     for side in sides:
-        _hand(tree, meanings, kinds, side, roles)
+        hand = _hand(tree, meanings, kinds, side, flesh)
+        if hand is not None and hand.digits:
+            hands.append(hand)
+        elif hand is not None and side and hand.wrist is not None:
+            roles.body[f"{side}.wrist"] = hand.wrist
         if side:
             _limbs(kinds, side, roles)
             _forearm_stub(tree, side, roles)
             if kinds[side, "hand end"]:
                 roles.body[f"{side}.hand.tip"] = kinds[side, "hand end"][0]
-            _toes(tree, kinds, side, roles)
-    _trunk(kinds, roles)
+            _toes(tree, kinds, side, roles, flesh)
+    roles.hands = assign_hands(tree, hands, flesh)
+    _trunk(kinds, roles, flesh)
     return roles
 
 
@@ -50,8 +63,8 @@ def _hand(
     meanings: list[Meaning],
     kinds: dict[tuple[str | None, str], list[int]],
     side: str | None,
-    roles: Roles,
-) -> None:
+    flesh: Flesh,
+) -> HandDigits | None:
     digits: dict[str, list[int]] = defaultdict(list)
     for j in kinds[side, "digit"]:
         digits[str(meanings[j].digit)].append(j)
@@ -59,26 +72,17 @@ def _hand(
         below = {meanings[k].digit for k in tree.subtree(j) if meanings[k].kind == "digit"}
         if len(below) == 1:
             digits[str(below.pop())].insert(0, j)
+    carpals = kinds[side, "carpal"]
+    if tree.flat and len(carpals) == len(_PALM):  # counted from the index finger (MakeHuman, DAZ, Rigify)
+        for digit, j in zip(_PALM, sorted(carpals, key=lambda j: meanings[j].number or 0), strict=True):
+            digits[digit].append(j)
     wrists = kinds[side, "wrist"] or kinds[side, "hand"] or (kinds[None, "wrist"] or kinds[None, "hand"])
     wrist = wrists[-1] if kinds[side, "wrist"] else (wrists[0] if wrists else None)
     if wrist is None and digits:
         wrist = _common_ancestor(tree, [joints[0] for joints in digits.values()])
-    if not digits:
-        if wrist is not None and side:
-            roles.body[f"{side}.wrist"] = wrist
-        return
-    joints = {} if wrist is None else {"wrist": wrist}
-    for digit in DIGITS:
-        chain = sorted(digits[digit], key=lambda j: _order(tree, meanings[j], j))
-        if chain:
-            at = None if wrist is None else tree.positions[wrist]
-            joints |= assign_digit(digit, chain, [meanings[j].rank for j in chain], tree.positions, at)
-    roles.hands.append(HandRoles(side, joints))
-
-
-def _order(tree: SourceTree, meaning: Meaning, joint: int) -> tuple[int, int, int]:
-    rank = -1 if meaning.rank is None else meaning.rank
-    return tree.depth(joint), rank, meaning.number or 0
+    chains = {digit: digit_chain(tree, digits[digit], meanings, flesh, wrist) for digit in DIGITS if digits[digit]}
+    found = {digit: chain for digit, chain in chains.items() if chain is not None}
+    return None if wrist is None and not found else HandDigits(side, wrist, found)
 
 
 def _common_ancestor(tree: SourceTree, joints: list[int]) -> int | None:
@@ -104,26 +108,30 @@ def _forearm_stub(tree: SourceTree, side: str, roles: Roles) -> None:
         roles.body[f"{side}.forearm"] = roles.body.pop(f"{side}.elbow")
 
 
-def _toes(tree: SourceTree, kinds: dict[tuple[str | None, str], list[int]], side: str, roles: Roles) -> None:
-    toes = kinds[side, "toe"]
-    heads = [j for j in toes if tree.parents[j] not in toes]
+def _toes(
+    tree: SourceTree, kinds: dict[tuple[str | None, str], list[int]], side: str, roles: Roles, flesh: Flesh
+) -> None:
+    toes = [j for j in kinds[side, "toe"] if not flesh.passing[j]]
+    heads = [j for j in toes if not set(tree.ancestors(j)) & set(toes)]
     if len(heads) == 1:
-        rest = tree.subtree(heads[0])
+        rest = [j for j in tree.subtree(heads[0]) if not flesh.dead[j] and not flesh.passing[j]]
         if f"{side}.ball" not in roles.body:
             roles.body[f"{side}.ball"] = rest.pop(0)
         if rest:
             roles.body[f"{side}.toe.tip"] = rest[-1]
         return
     for n, head in enumerate(heads, start=1):
-        for name, joint in zip(FINGER_JOINTS, tree.subtree(head), strict=False):
+        rest = [j for j in tree.subtree(head) if not flesh.dead[j] and not flesh.passing[j]]
+        for name, joint in zip(FINGER_JOINTS, rest, strict=False):
             roles.body[f"{side}.toe{n}.{'tip' if read_name(tree.names[joint]).rank == 4 else name}"] = joint
 
 
-def _trunk(kinds: dict[tuple[str | None, str], list[int]], roles: Roles) -> None:
+def _trunk(kinds: dict[tuple[str | None, str], list[int]], roles: Roles, flesh: Flesh) -> None:
     if not (kinds[None, "spine"] or kinds[None, "pelvis"] or kinds[None, "head"]):
         return
     for name in ("spine", "neck"):
-        for n, joint in enumerate(kinds[None, name], start=1):
+        fleshy = [j for j in kinds[None, name] if not flesh.bare[j]]
+        for n, joint in enumerate(fleshy or kinds[None, name], start=1):
             roles.body[f"{name}{n}"] = joint
     for kind, name in (("head", "head"), ("head end", "head.top")):
         if kinds[None, kind]:

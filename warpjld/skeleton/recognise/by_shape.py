@@ -2,20 +2,59 @@
 
 from __future__ import annotations
 
+from warpjld.skeleton.recognise.digits import Digit, assign_hands
+from warpjld.skeleton.recognise.flesh import Flesh
+from warpjld.skeleton.recognise.prune import prune
 from warpjld.skeleton.recognise.reconnect import reconnect
 from warpjld.skeleton.recognise.roles import HandRoles, Roles
 from warpjld.skeleton.recognise.shape_body import body_by_shape
 from warpjld.skeleton.recognise.shape_hand import hand_by_shape, hand_roots
 from warpjld.skeleton.recognise.tree import SourceTree
 
-__all__ = ["roles_by_shape"]
+__all__ = ["hands_by_shape", "roles_by_shape"]
 
 
-def roles_by_shape(tree: SourceTree) -> Roles:
-    """Hands, or a body with two; empty for anything else. A flat file is first chained by its bone axes."""
-    if tree.flat:
-        tree = reconnect(tree)
-    hands = [hand_by_shape(tree, wrist) for wrist in hand_roots(tree)]
-    if len(hands) == 2 and set(tree.ancestors(hands[0]["wrist"])) & set(tree.ancestors(hands[1]["wrist"])):
-        return body_by_shape(tree, hands)
-    return Roles(hands=[HandRoles(None, hand) for hand in hands], how="shape")
+def roles_by_shape(tree: SourceTree, flesh: Flesh | None = None) -> Roles:
+    """Hands, or a body with two; empty for anything else.
+
+    Joints without flesh that end nothing are left aside; a flat file is first chained by its bone axes.
+    """
+    flesh = flesh or Flesh(tree, None)
+    small, numbers, hands = _find_hands(tree, flesh)
+    if len(hands) == 2 and _have_common_ancestor(small, hands):
+        roles = body_by_shape(small, [hand.joints for hand in hands])
+    else:
+        roles = Roles(hands=hands, how="shape")
+    for hand in roles.hands:
+        hand.joints = {name: numbers[j] for name, j in hand.joints.items()}
+    roles.body = {name: numbers[j] for name, j in roles.body.items()}
+    return roles
+
+
+def hands_by_shape(tree: SourceTree, flesh: Flesh) -> list[HandRoles]:
+    """Hands alone, without sides."""
+    _, numbers, hands = _find_hands(tree, flesh)
+    return [HandRoles(None, {name: numbers[j] for name, j in hand.joints.items()}) for hand in hands]
+
+
+def _find_hands(tree: SourceTree, flesh: Flesh) -> tuple[SourceTree, list[int], list[HandRoles]]:
+    """The tree without dead joints, the number in ``tree`` of each of its joints, and hands in its own numbers."""
+    small, numbers = prune(tree, flesh)
+    if small.flat:
+        small = reconnect(small)
+    found = [hand_by_shape(small, wrist) for wrist in hand_roots(small)]
+    shares = Flesh(small, flesh.shares[numbers] if flesh.known else None)
+    for hand in found:
+        for digit in hand.digits.values():
+            _mark_end(digit, shares)
+    return small, numbers, assign_hands(small, found, shares)
+
+
+def _mark_end(digit: Digit, flesh: Flesh) -> None:
+    if flesh.known and flesh.bare[digit.joints[-1]] and len(digit.joints) > 3:
+        digit.ranks[-1] = 4
+
+
+def _have_common_ancestor(tree: SourceTree, hands: list[HandRoles]) -> bool:
+    first, second = (set(tree.ancestors(hand.joints["wrist"])) for hand in hands)
+    return bool(first & second)

@@ -17,6 +17,7 @@ from warpjld.skeleton.recognise.axes import body_axes, hand_axes, perpendicular
 from warpjld.skeleton.recognise.bones import bone_axis, bone_directions
 from warpjld.skeleton.recognise.complete_body import find_extremities, merge_pelvis
 from warpjld.skeleton.recognise.complete_hand import complete_hand
+from warpjld.skeleton.recognise.flesh import Flesh, without_flesh
 from warpjld.skeleton.recognise.hand_frame import chirality
 from warpjld.skeleton.recognise.layout import Layout, lay_out
 from warpjld.skeleton.recognise.leaf_ends import Painted, add_leaf_ends
@@ -40,12 +41,14 @@ class Canonical:
         sources: Joint of the file for each of its joints, -1 for added ones.
         owner: Joint of the skeleton that each joint of the file belongs to, shape (N,).
         notes: What was recognised, added, merged or moved.
+        suspicious: What is probably wrong, and what to do about it.
     """
 
     skeleton: Skeleton
     sources: tuple[int, ...]
     owner: NDArray[np.int64]
     notes: tuple[str, ...]
+    suspicious: tuple[str, ...] = ()
 
 
 def canonical_skeleton(
@@ -53,6 +56,8 @@ def canonical_skeleton(
     vertices: NDArray[np.float64],
     faces: NDArray[np.int32],
     *,
+    roles: Roles | None = None,
+    shares: NDArray[np.float64] | None = None,
     side: str | None = None,
     axes: Mapping[int, NDArray[np.float64]] | None = None,
     limits: Mapping[int, Mapping[str, tuple[float, float]]] | None = None,
@@ -64,32 +69,38 @@ def canonical_skeleton(
         tree: The file's joints [m].
         vertices: Surface [m], shape (V, 3).
         faces: Its triangles, shape (T, 3).
+        roles: What was recognised in it, as from :func:`.recognise`, which is asked where they are None.
+        shares: Share of the surface that each joint of the file moves, shape (N,); None where no skin tells.
         side: Side of a single hand, overriding what names and shape say.
         axes: Flexion axes the file states, by its joint numbers.
         limits: Channel limits [rad] the file states, likewise.
         painted: Whose skin is whose, by its joint numbers, where the file says.
     """
-    roles = recognise(tree)
+    if roles is None:
+        roles = recognise(tree, shares)
     notes: list[str] = []
+    doubts = list(roles.suspicious)
     hand_points: dict[str, dict[str, NDArray[np.float64]]] = {}
     _release_partial_hands(roles, side)
     for hand in roles.hands:
         found = {name: tree.positions[j] for name, j in hand.joints.items()}
-        hand.side = _side(hand, found, side if len(roles.hands) == 1 else None, notes)
+        hand.side = _side(hand, found, side if len(roles.hands) == 1 else None, doubts)
         points, added = complete_hand(found, _last_bones(tree, hand), vertices, faces, f"{hand.side} hand")
         hand_points[hand.side] = points
         notes.append(f"{hand.side} hand: recognised by {roles.how}, {len(hand.joints)} of 25 joints in the file")
         notes.extend(added)
     place = merge_pelvis(tree, roles)
     notes = [*roles.notes, *notes]
-    layout = lay_out(tree, roles, hand_points)
+    flesh = Flesh(tree, shares)
+    layout = lay_out(tree, roles, hand_points, flesh)
+    doubts.extend(without_flesh(tree, layout.names, layout.sources, layout.owner, flesh))
     if place is not None:
         layout.positions[layout.names.index("pelvis")] = place
     if roles.body:
         _extremities(layout, vertices, faces)
     add_leaf_ends(layout, vertices, faces, painted, branches=not (roles.body or roles.hands))
     skeleton = _skeleton(layout, hand_points, axes or {}, limits or {})
-    return Canonical(skeleton, tuple(layout.sources), layout.owner, (*notes, *layout.notes))
+    return Canonical(skeleton, tuple(layout.sources), layout.owner, (*notes, *layout.notes), tuple(doubts))
 
 
 def _release_partial_hands(roles: Roles, side: str | None) -> None:
@@ -102,14 +113,17 @@ def _release_partial_hands(roles: Roles, side: str | None) -> None:
         roles.notes.append(f"{', '.join(digits)}: part of a hand only, nothing was added")
 
 
-def _side(hand: HandRoles, points: Mapping[str, NDArray[np.float64]], given: str | None, notes: list[str]) -> str:
+def _side(hand: HandRoles, points: Mapping[str, NDArray[np.float64]], given: str | None, doubts: list[str]) -> str:
     turn = chirality(points) if {"wrist", "index.base", "pinky.base"} <= set(points) else 0.0
     seen = None if abs(turn) < _SURE else ("right" if turn > 0 else "left")
     chosen = given or hand.side or seen
     if chosen is None:
         raise InputError("neither names nor shape tell whether this is a left or a right hand: give its side")
     if seen not in (None, chosen):
-        notes.append(f"named a {chosen} hand, but thumb and fingers look like a {seen} one")
+        doubts.append(
+            f"named a {chosen} hand, but thumb and fingers look like a {seen} one, or bend backwards at rest: "
+            + (f"--side {seen}" if given else "state the side with --side, or wrong joints with --map")
+        )
     return chosen
 
 

@@ -1,72 +1,145 @@
-"""From the joints of one digit, in order, to its canonical joints, whatever a convention leaves out or adds."""
+"""From the joints of a hand's digits, in order, to canonical joints, whatever a convention leaves out or adds.
+
+Whether fingers of four joints begin with a metacarpal is one decision for all hands of a file: finger by finger it
+would fall out differently where proportions lie near the border.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
 
-from warpjld.skeleton.hand import FINGER_JOINTS
+from warpjld.skeleton.hand import DIGITS, FINGER_JOINTS
+from warpjld.skeleton.recognise.flesh import Flesh
+from warpjld.skeleton.recognise.roles import HandRoles
+from warpjld.skeleton.recognise.tree import SourceTree
 
-__all__ = ["assign_digit"]
+__all__ = ["Digit", "HandDigits", "assign_hands"]
 
 # distance from the wrist to a chain's first joint, per length of its first bone: about 0.7 where that bone is a
 # metacarpal, about 2 where it is the first phalanx (WebXR, Anny, MANO)
 _METACARPAL_RATIO = 1.3
+_CLEAR_RATIO = 1.45  # by which a ratio must differ from that to count as one vote
+# spread of the chains' first joints per spread of their second ones: metacarpals meet at the wrist
+_METACARPAL_SPREAD, _CLEAR_SPREAD = 0.75, 1.3
+_BARE = 0.1  # flesh of a last joint per that of the one before: below, it is an end
+_FLESHY = 0.25
 
 
-def assign_digit(
-    digit: str,
-    joints: Sequence[int],
-    ranks: Sequence[int | None],
-    positions: NDArray[np.float64],
-    wrist: NDArray[np.float64] | None,
-) -> dict[str, int]:
-    """Canonical joints of one digit.
+@dataclass
+class Digit:
+    """One digit's joints of the file, from the root outwards.
 
-    Args:
-        digit: ``thumb``, ``index``, …
-        joints: Its joints from the root outwards.
+    Attributes:
+        joints: Joint numbers.
         ranks: What names say of each: 0 metacarpal … 4 tip, or None.
-        positions: Positions of all joints of the file, shape (N, 3).
-        wrist: Position of the wrist, where there is one.
-
-    Returns:
-        Canonical names without the side → joints; fewer than five where the file has fewer.
     """
-    chain, marks = list(joints), list(ranks)
+
+    joints: list[int]
+    ranks: list[int | None]
+
+
+@dataclass
+class HandDigits:
+    """A hand before its digits are told apart joint by joint.
+
+    Attributes:
+        side: ``left``, ``right`` or None.
+        wrist: Its wrist, where there is one.
+        digits: ``thumb``, ``index``, … → joints.
+    """
+
+    side: str | None
+    wrist: int | None
+    digits: dict[str, Digit] = field(default_factory=dict)
+
+
+def assign_hands(tree: SourceTree, hands: Sequence[HandDigits], flesh: Flesh) -> list[HandRoles]:
+    """Canonical joints of all hands of a file, names without the side; fewer than 25 where the file has fewer."""
+    for hand in hands:
+        for digit in hand.digits.values():
+            _leave_out_zero_bones(tree, digit)
+    metacarpals = _fingers_begin_with_metacarpals(tree, hands, flesh)
+    out = []
+    for hand in hands:
+        joints = {} if hand.wrist is None else {"wrist": hand.wrist}
+        for name in DIGITS:
+            if name in hand.digits:
+                joints |= _assign(name, hand.digits[name], metacarpals)
+        out.append(HandRoles(hand.side, joints))
+    return out
+
+
+def _leave_out_zero_bones(tree: SourceTree, digit: Digit) -> None:
+    """Leap's thumb has a metacarpal of no length."""
+    at = tree.positions
+    size = float(np.linalg.norm(np.ptp(at[digit.joints], axis=0))) or 1.0
+    while len(digit.joints) > 3 and np.linalg.norm(at[digit.joints[1]] - at[digit.joints[0]]) < 1e-3 * size:
+        del digit.joints[0], digit.ranks[0]
+
+
+def _assign(name: str, digit: Digit, metacarpals: bool) -> dict[str, int]:
+    chain, ranks = list(digit.joints), list(digit.ranks)
     roles: dict[str, int] = {}
-    size = float(np.linalg.norm(np.ptp(positions[chain], axis=0))) or 1.0
-    while len(chain) > 3 and np.linalg.norm(positions[chain[1]] - positions[chain[0]]) < 1e-3 * size:
-        chain, marks = chain[1:], marks[1:]  # Leap's thumb has a metacarpal of no length
-    if len(chain) > 1 and marks[-1] == 4:
-        roles[f"{digit}.tip"] = chain.pop()
-        marks.pop()
-    if digit == "thumb":
-        names = ["thumb.base", "thumb.knuckle2", "thumb.knuckle3"]
-        if len(chain) > 3 and "thumb.tip" in roles:
+    if len(chain) > 1 and ranks[-1] == 4:
+        roles[f"{name}.tip"] = chain.pop()
+        ranks.pop()
+    names = [f"{name}.{joint}" for joint in FINGER_JOINTS]
+    if name == "thumb":
+        if len(chain) > 3 and ("thumb.tip" in roles or metacarpals):
             chain = chain[-3:]  # a trapezium comes first
-        names.append("thumb.tip")
-    else:
-        if len(chain) > 1 and (marks[0] == 0 or _starts_with_metacarpal(chain, positions, wrist, roles, digit)):
-            roles[f"{digit}.carpometacarpal"] = chain.pop(0)
-        names = [f"{digit}.{joint}" for joint in FINGER_JOINTS]
-    for name, joint in zip(names, chain, strict=False):
-        roles.setdefault(name, joint)
+    elif len(chain) > 1 and (
+        ranks[0] == 0 or len(chain) >= 5 or (len(chain) == 4 and (f"{name}.tip" in roles or metacarpals))
+    ):
+        roles[f"{name}.carpometacarpal"] = chain.pop(0)
+    for joint_name, joint in zip(names, chain, strict=False):
+        roles.setdefault(joint_name, joint)
     return roles
 
 
-def _starts_with_metacarpal(
-    chain: list[int],
-    positions: NDArray[np.float64],
-    wrist: NDArray[np.float64] | None,
-    roles: dict[str, int],
-    digit: str,
-) -> bool:
-    if len(chain) >= 5 or (len(chain) == 4 and f"{digit}.tip" in roles):
-        return True
-    if len(chain) < 4 or wrist is None:
-        return False
-    first = np.linalg.norm(positions[chain[1]] - positions[chain[0]])
-    return bool(np.linalg.norm(positions[chain[0]] - wrist) < _METACARPAL_RATIO * first)
+def _fingers_begin_with_metacarpals(tree: SourceTree, hands: Sequence[HandDigits], flesh: Flesh) -> bool:
+    """Decide for all fingers whose four joints may be metacarpal to third knuckle, or base to tip.
+
+    Votes: how far their first joints are from the wrist, how much they spread, whether the last ones own flesh, and
+    whether the thumb has as many joints (then it has no metacarpal more than the fingers).
+    """
+    ratios, spreads, last, thumbs = [], [], [], []
+    for hand in hands:
+        open_ = {name: d.joints for name, d in hand.digits.items() if name != "thumb" and _is_open(d)}
+        for chain in open_.values():
+            first = np.linalg.norm(tree.positions[chain[1]] - tree.positions[chain[0]])
+            if hand.wrist is not None and first > 0:
+                ratios.append(float(np.linalg.norm(tree.positions[chain[0]] - tree.positions[hand.wrist]) / first))
+            if flesh.known:
+                last.append(float(flesh.shares[chain[-1]] / max(flesh.shares[chain[-2]], 1e-12)))
+        if len(open_) >= 3:
+            heads, second = (_spread(tree.positions[[chain[k] for chain in open_.values()]]) for k in (0, 1))
+            spreads.append(heads / second if second > 0 else 1.0)
+        if open_ and "thumb" in hand.digits:
+            thumb = hand.digits["thumb"]
+            thumbs.append(len(thumb.joints) - (thumb.ranks[-1] == 4))
+    votes = 0.0
+    if ratios:
+        share = np.log(_METACARPAL_RATIO / max(float(np.median(ratios)), 1e-6)) / np.log(_CLEAR_RATIO)
+        votes += float(np.clip(share, -2.0, 2.0))
+    if spreads:
+        share = np.log(_METACARPAL_SPREAD / max(float(np.median(spreads)), 1e-6)) / np.log(_CLEAR_SPREAD)
+        votes += float(np.clip(share, -1.0, 1.0))
+    if last:
+        owned = float(np.median(last))
+        votes += -1.5 if owned < _BARE else (1.0 if owned > _FLESHY else 0.0)
+    if thumbs:
+        votes += 0.75 if np.median(thumbs) <= 3 else -0.75
+    return votes > 0
+
+
+def _is_open(digit: Digit) -> bool:
+    """Whether neither names nor the count of joints say where a finger begins."""
+    return len(digit.joints) == 4 and digit.ranks[0] != 0 and digit.ranks[-1] != 4
+
+
+def _spread(points: NDArray[np.float64]) -> float:
+    return float(np.linalg.norm(points - points.mean(axis=0), axis=1).mean())

@@ -9,7 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from warpjld.skeleton.hand import HAND_PARENTS
-from warpjld.skeleton.recognise.names import read_name
+from warpjld.skeleton.recognise.flesh import Flesh
+from warpjld.skeleton.recognise.kept import kept_joints
 from warpjld.skeleton.recognise.roles import Roles
 from warpjld.skeleton.recognise.tree import SourceTree
 
@@ -52,25 +53,32 @@ class Layout:
         self.positions = np.vstack([self.positions, position])
 
 
-def lay_out(tree: SourceTree, roles: Roles, hand_points: Mapping[str, Mapping[str, NDArray[np.float64]]]) -> Layout:
+def lay_out(
+    tree: SourceTree,
+    roles: Roles,
+    hand_points: Mapping[str, Mapping[str, NDArray[np.float64]]],
+    flesh: Flesh | None = None,
+) -> Layout:
     """Arrange recognised and remaining joints.
 
     Limbs are single segments: twist bones, and joints that divide a limb or lie between two recognised ones, belong
     to the recognised joint above them, with their weights. JLD spreads a twist along a segment by itself, and a
-    bisector plane in the middle of a limb would only add a crease. Face bones belong to the head. What else was not
-    recognised keeps its name, in lower case.
+    bisector plane in the middle of a limb would only add a crease. Face bones belong to the head. Joints without flesh
+    (helpers, sockets, targets) belong to the joint above them. What else was not recognised keeps its name, in lower
+    case.
 
     Args:
         tree: The file's joints.
         roles: What was recognised; every hand has a side.
         hand_points: Per side, positions of its 25 joints, names without the side.
+        flesh: Which joints own skin; None where no skin tells.
     """
     named = dict(roles.body)
     for hand in roles.hands:
         named |= {f"{hand.side}.{name}": joint for name, joint in hand.joints.items()}
     of_source = {joint: name for name, joint in named.items()}
     notes: list[str] = []
-    kept = _kept(tree, of_source, notes)
+    kept = kept_joints(tree, of_source, flesh or Flesh(tree, None), roles.left_out, notes)
     of_source |= kept
     named |= {name: joint for joint, name in kept.items()}
 
@@ -99,47 +107,6 @@ def lay_out(tree: SourceTree, roles: Roles, hand_points: Mapping[str, Mapping[st
         owner=owner,
         notes=notes,
     )
-
-
-def _kept(tree: SourceTree, of_source: Mapping[int, str], notes: list[str]) -> dict[int, str]:
-    """Joints that were not recognised and stay joints of their own, with their names."""
-    if not of_source:
-        return {j: _own_name(tree, j, range(len(tree))) for j in range(len(tree))}
-    size = float(np.linalg.norm(np.ptp(tree.positions, axis=0))) or 1.0
-    kept: dict[int, str] = {}
-    merged: dict[str, list[str]] = {}
-    for j in range(len(tree)):
-        if j in of_source:
-            continue
-        over = [of_source[k] for k in tree.ancestors(j) if k in of_source]
-        below = [of_source[k] for k in tree.subtree(j) if k in of_source]
-        near = [tree.parents[j], *(k for k in range(len(tree)) if tree.parents[k] == tree.parents[j] and k != j)]
-        double = (
-            any(k >= 0 and np.linalg.norm(tree.positions[j] - tree.positions[k]) < 1e-4 * size for k in near)
-            and not tree.children[j]
-        )
-        helper = read_name(tree.names[j]).kind in ("helper", "palm", "root")
-        in_hand = bool(over) and over[0].partition(".")[2] in HAND_PARENTS
-        if below or helper or double or in_hand or "head" in over or (not over and tree.flat):
-            into = over[0] if over else (below[0] if below else "the root")
-            merged.setdefault(into, []).append(tree.names[j])
-        else:
-            kept[j] = _own_name(tree, j, of_source)
-    if merged:
-        shown = (
-            f"{', '.join(names[:4])}{f' and {len(names) - 4} more' if len(names) > 4 else ''} → {into}"
-            for into, names in merged.items()
-        )
-        notes.append(f"merged into recognised joints: {'; '.join(shown)}")
-    if kept:
-        notes.append(f"not recognised, kept as joints: {', '.join(kept.values())}")
-    return kept
-
-
-def _own_name(tree: SourceTree, joint: int, _: object) -> str:
-    name = tree.names[joint].lower()
-    twice = [j for j in range(len(tree)) if tree.names[j].lower() == name]
-    return name if len(twice) == 1 else f"{name}#{twice.index(joint) + 1}"
 
 
 def _fallback(name: str, named: Mapping[str, int]) -> str | None:

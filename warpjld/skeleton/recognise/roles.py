@@ -23,10 +23,14 @@ class Roles:
         hands: Its hands; their wrists are in ``body`` terms the arms' ends.
         body: Canonical names of everything else (``left.elbow``, ``spine1``) → joint numbers.
         how: ``names`` or ``shape``.
-        notes: What was doubtful.
+        notes: What was settled otherwise than names say.
+        suspicious: What is doubtful, and what to do about it.
+        left_out: Joints of the file that are to be no joints of their own.
     """
 
     hands: list[HandRoles] = field(default_factory=list)
     body: dict[str, int] = field(default_factory=dict)
     how: str = "names"
     notes: list[str] = field(default_factory=list)
+    suspicious: list[str] = field(default_factory=list)
+    left_out: frozenset[int] = frozenset()

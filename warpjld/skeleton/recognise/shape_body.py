@@ -6,14 +6,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from warpjld.skeleton.recognise.hand_frame import chirality
+from warpjld.skeleton.recognise.limbs import FOREARM_RATIO, SHIN_RATIO, ankle_of, divide_limb, path_below, toes_by_place
 from warpjld.skeleton.recognise.roles import HandRoles, Roles
 from warpjld.skeleton.recognise.tree import SourceTree
 
 __all__ = ["body_by_shape"]
-
-_FOREARM_RATIO = 0.9  # forearm per upper arm, elbow to wrist
-_SHIN_RATIO = 1.0
-_ANKLE_TURN = np.radians(35.0)
 
 
 def body_by_shape(tree: SourceTree, hands: list[dict[str, int]]) -> Roles:
@@ -26,15 +23,15 @@ def body_by_shape(tree: SourceTree, hands: list[dict[str, int]]) -> Roles:
     sides = _sides(tree, hands, legs)
     for side, hand in zip(sides, hands, strict=True):
         roles.hands.append(HandRoles(side, hand))
-        arm = _path(tree, chest, hand["wrist"])
-        roles.body |= _limb(tree, arm, side, ("shoulder", "elbow"), _FOREARM_RATIO)
+        arm = path_below(tree, chest, hand["wrist"])
+        roles.body |= _limb(tree, arm, side, ("shoulder", "elbow"), FOREARM_RATIO)
         shoulder = arm.index(roles.body[f"{side}.shoulder"])
         if shoulder > 0:
             roles.body[f"{side}.clavicle"] = arm[0]
     middle = np.mean([tree.positions[leg[-1]] for leg in legs] or [np.zeros(3)], axis=0)
     for side, leg in zip(_leg_sides(tree, sides, wrists, legs), legs, strict=True):
-        ankle = _ankle(tree, leg)
-        roles.body |= _limb(tree, leg[: ankle + 1], side, ("hip", "knee"), _SHIN_RATIO)
+        ankle = ankle_of(tree, leg)
+        roles.body |= _limb(tree, leg[: ankle + 1], side, ("hip", "knee"), SHIN_RATIO)
         roles.body[f"{side}.ankle"] = leg[ankle]
         roles.body |= _toes(tree, leg, ankle, side, middle)
     for n, joint in enumerate(trunk[: trunk.index(pelvis)][::-1], start=1):
@@ -66,38 +63,9 @@ def _length(tree: SourceTree, chain: list[int]) -> float:
     return float(np.linalg.norm(np.diff(tree.positions[chain], axis=0), axis=1).sum())
 
 
-def _path(tree: SourceTree, above: int, joint: int) -> list[int]:
-    """Joints between ``above``, left out, and ``joint``, included."""
-    return [j for j in [joint, *tree.ancestors(joint)][::-1] if j not in (above, *tree.ancestors(above))]
-
-
 def _limb(tree: SourceTree, chain: list[int], side: str, names: tuple[str, str], ratio: float) -> dict[str, int]:
-    """The two joints that part a limb into segments of the expected ratio and nearly its whole length."""
-    at = tree.positions[chain]
-    end, whole = at[-1], max(float(np.linalg.norm(p - at[-1])) for p in at)
-
-    def misfit(first: int, second: int) -> float:
-        upper = float(np.linalg.norm(at[second] - at[first]))
-        lower = float(np.linalg.norm(end - at[second]))
-        if min(upper, lower) < 0.05 * whole or upper + lower < 0.7 * whole:
-            return np.inf
-        return abs(float(np.log(lower / upper / ratio)))
-
-    pairs = [(a, b) for a in range(len(chain) - 2) for b in range(a + 1, len(chain) - 1)]
-    first, second = min(pairs, key=lambda pair: misfit(*pair), default=(0, min(1, len(chain) - 1)))
-    return {f"{side}.{names[0]}": chain[first], f"{side}.{names[1]}": chain[second]}
-
-
-def _ankle(tree: SourceTree, leg: list[int]) -> int:
-    """Where toes branch off, or where the chain turns into the foot."""
-    if tree.children[leg[-1]] or len(leg) < 4:
-        return len(leg) - 1
-    bones = np.diff(tree.positions[leg], axis=0)
-    bones /= np.maximum(np.linalg.norm(bones, axis=1, keepdims=True), 1e-12)
-    turns = np.arccos(np.clip((bones[1:] * bones[:-1]).sum(axis=1), -1, 1))
-    late = len(turns) // 2
-    sharpest = late + int(turns[late:].argmax())
-    return sharpest + 1 if turns[sharpest] > _ANKLE_TURN else len(leg) - 1
+    first, second, _ = divide_limb(tree, chain, ratio)
+    return {f"{side}.{names[0]}": first, f"{side}.{names[1]}": second}
 
 
 def _toes(tree: SourceTree, leg: list[int], ankle: int, side: str, middle: NDArray[np.float64]) -> dict[str, int]:
@@ -106,14 +74,7 @@ def _toes(tree: SourceTree, leg: list[int], ankle: int, side: str, middle: NDArr
     heads = tree.children[leg[ankle]]
     if len(heads) == 1:
         return {f"{side}.ball": heads[0]}
-    outwards = tree.positions[leg[ankle]] - middle
-    heads = tuple(sorted(heads, key=lambda j: float(outwards @ tree.positions[j])))  # the big toe is the innermost
-    names = ("base", "knuckle2", "knuckle3", "tip")
-    return {
-        f"{side}.toe{n}.{name}": joint
-        for n, head in enumerate(heads, start=1)
-        for name, joint in zip(names, _single_file(tree, head), strict=False)
-    }
+    return toes_by_place(tree, heads, side, tree.positions[leg[ankle]] - middle)
 
 
 def _head(tree: SourceTree, chest: int, wrists: list[int]) -> dict[str, int]:
@@ -134,7 +95,7 @@ def _sides(tree: SourceTree, hands: list[dict[str, int]], legs: list[list[int]])
     hips = np.array([tree.positions[leg[0]] for leg in legs] or [wrists.mean(axis=0)])
     feet: NDArray[np.float64] = np.zeros(3)
     for leg in legs:
-        ankle = _ankle(tree, leg)
+        ankle = ankle_of(tree, leg)
         beyond = leg[ankle + 1 :] or list(tree.children[leg[-1]])
         if beyond:
             feet += tree.positions[beyond].mean(axis=0) - tree.positions[leg[ankle]]

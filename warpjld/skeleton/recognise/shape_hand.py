@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from warpjld.rotations import unit
-from warpjld.skeleton.recognise.digits import assign_digit
+from warpjld.skeleton.recognise.digits import Digit, HandDigits
 from warpjld.skeleton.recognise.tree import SourceTree
 
 __all__ = ["digit_chains", "hand_by_shape", "hand_roots"]
@@ -46,8 +46,8 @@ def digit_chains(tree: SourceTree, joint: int) -> list[list[int]]:
     return chains
 
 
-def hand_by_shape(tree: SourceTree, wrist: int) -> dict[str, int]:
-    """Canonical names without the side → joints, for the hand below ``wrist``.
+def hand_by_shape(tree: SourceTree, wrist: int) -> HandDigits:
+    """The digits of the hand below ``wrist``.
 
     The thumb is the digit with fewer joints than all others or, where counts are equal, the one that points
     elsewhere; the fingers follow from index to pinky with growing distance from it.
@@ -69,7 +69,5 @@ def hand_by_shape(tree: SourceTree, wrist: int) -> dict[str, int]:
     lateral = np.linalg.svd(spread)[2][0]
     lateral *= np.sign(lateral @ (middles[thumb] - np.mean([middles[c] for c in fingers], axis=0))) or 1.0
     fingers.sort(key=lambda c: -float(lateral @ middles[c]))
-    joints = {"wrist": wrist}
-    for digit, c in zip(("thumb", "index", "middle", "ring", "pinky"), (thumb, *fingers), strict=True):
-        joints |= assign_digit(digit, chains[c], [None] * len(chains[c]), at, at[wrist])
-    return joints
+    order = zip(("thumb", "index", "middle", "ring", "pinky"), (thumb, *fingers), strict=True)
+    return HandDigits(None, wrist, {digit: Digit(chains[c], [None] * len(chains[c])) for digit, c in order})

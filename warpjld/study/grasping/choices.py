@@ -30,7 +30,8 @@ class HandChoice:
         breadth: Of a built-in hand, across the palm [m].
         resolution: Vertices of a built-in hand, about.
         file: Rig file.
-        skeleton: Skeleton file of a surface without joints; likewise ``unit`` and ``up``, as for ``load_rig``.
+        skeleton: Skeleton file of a surface without joints; likewise ``unit``, ``scale``, ``up`` and ``map`` (its
+            ``joint_map``), as for ``load_rig``.
     """
 
     name: str
@@ -42,6 +43,8 @@ class HandChoice:
     skeleton: Path | None = None
     unit: str | None = None
     up: str | None = None
+    scale: float | None = None
+    map: Path | None = None
 
     def load(self) -> Rig:
         """Build or read the hand."""
@@ -53,7 +56,15 @@ class HandChoice:
             )
         from warpjld.io import load_rig
 
-        return load_rig(self.file, skeleton=self.skeleton, side=self.side, unit=self.unit, up=self.up)
+        return load_rig(
+            self.file,
+            skeleton=self.skeleton,
+            side=self.side,
+            unit=self.unit,
+            scale=self.scale,
+            up=self.up,
+            joint_map=self.map,
+        )
 
     def identity(self) -> dict[str, Any]:
         """Settings, and hashes in place of paths."""
@@ -112,6 +123,8 @@ def read_hand(table: TomlTable) -> HandChoice:
             skeleton=_path(table, "skeleton") if "skeleton" in table else None,
             unit=table.text("unit", known=("m", "cm", "mm")),
             up=table.text("up", known=("y", "z")),
+            scale=table.number("scale", above=0.0),
+            map=_path(table, "map") if "map" in table else None,
         )
     else:
         side = table.text("builtin", known=("left", "right"))

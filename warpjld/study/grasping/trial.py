@@ -92,6 +92,14 @@ class GraspExperiment:
             notes += [f"{wanted.name}: {note}" for note in thing.body.report.notes()]
         return notes
 
+    def doubts(self) -> list[str]:
+        """What looks suspicious in the hands: their size, joints taken for others.
+
+        Raises:
+            InputError: A hand cannot be used.
+        """
+        return [f"{hand.name}: {doubt}" for hand in self.settings.hands for doubt in hand_of(hand).rig.suspicious]
+
     def begin(self) -> None:
         """Keep Warp's remarks off the output of a command that runs many workers."""
         from warpjld.quiet import silence_warp

@@ -1,0 +1,68 @@
+"""Joint maps: which joint of a file is which, stated by hand where recognition errs or doubts, as JSON.
+
+::
+
+    {
+      "left.hip": "LeftLeg",
+      "left.knee": "LeftShin",
+      "left.index.tip": null,
+      "ignore": ["Weapon_Socket", "LeftLegHelper"]
+    }
+
+Keys are canonical joints, values the file's own names (``name#2`` is the second of that name); null: the file has no
+such joint. ``ignore`` lists joints of the file that are to be no joints of their own: their flesh follows the joint
+above. What is not stated is recognised as ever; what is stated wins over everything. ``warpjld inspect RIG --write-map
+map.json`` writes what was recognised, for editing.
+"""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+from warpjld.errors import InputError
+from warpjld.rig import Rig
+from warpjld.skeleton.recognise.joint_map import check_stated, is_canonical
+from warpjld.text_file import read_json
+from warpjld.whole_file import whole_file
+
+__all__ = ["read_joint_map", "write_joint_map"]
+
+
+def read_joint_map(path: str | Path) -> dict[str, Any]:
+    """What a joint map states; whether a file has those joints is checked when that is loaded.
+
+    Raises:
+        InputError: It cannot be read, or is no joint map.
+    """
+    content = read_json(path)
+    if not isinstance(content, dict):
+        raise InputError('want a joint map: {"left.knee": "name in the file", …}', path=path)
+    try:
+        check_stated(content)
+    except InputError as error:
+        raise InputError(error.message, path=path) from None
+    return content
+
+
+def write_joint_map(path: str | Path, rig: Rig) -> None:
+    """Write which joint of its file each recognised joint of a rig is, null for those that were added.
+
+    Raises:
+        InputError: The rig has no joints of a file, or the map cannot be written.
+    """
+    tree = rig.source
+    if tree is None:
+        raise InputError("a built-in hand has no joints of a file: there is nothing to map")
+    content: dict[str, str | None] = {}
+    for name, joint in zip(rig.skeleton.names, rig.sources, strict=True):
+        if is_canonical(name):
+            own = "" if joint < 0 else tree.names[joint]
+            same = [j for j, other in enumerate(tree.names) if other == own]
+            content[name] = None if joint < 0 else own if len(same) == 1 else f"{own}#{same.index(joint) + 1}"
+    try:
+        with whole_file(Path(path)) as part:
+            part.write_text(json.dumps(content, indent=2, ensure_ascii=False) + "\n", "utf-8")
+    except OSError as error:
+        raise InputError(f"cannot be written: {error.strerror}", path=path) from None

@@ -1,0 +1,312 @@
+"""Arms and legs as names propose them, checked by the chains' geometry: what disagrees is settled by it, or told.
+
+A leg is a line of joints from where the legs part to the ankle; hip and knee part it into two segments of like length,
+on both sides at the same places. So ``LeftLeg`` above ``LeftShin`` is a thigh, whatever it is elsewhere.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Collection
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from warpjld.skeleton.recognise.flesh import Flesh
+from warpjld.skeleton.recognise.limbs import (
+    FOREARM_RATIO,
+    SHIN_RATIO,
+    ankle_of,
+    divide_limb,
+    limb_misfit,
+    path_below,
+    toes_by_place,
+)
+from warpjld.skeleton.recognise.names import read_name
+from warpjld.skeleton.recognise.roles import Roles
+from warpjld.skeleton.recognise.tree import SourceTree
+
+__all__ = ["check_limbs"]
+
+_MAP = "state it with --map (inspect --write-map writes what was recognised, for editing)"
+_PLAUSIBLE = np.log(2.0)  # lower per upper segment may be half or twice the usual
+_AT_TRUNK = 0.03  # of the limb: a joint nearer than this to where limbs part is none of the limb's
+_TOES = 3  # chains below an ankle from which they are toes
+_UNEQUAL = 1.25  # left per right length from which one is doubtful
+
+
+@dataclass(frozen=True)
+class _Kind:
+    """Names of a limb's parts: its two joints, its end, and the usual ratio of its segments."""
+
+    word: str
+    first: str
+    second: str
+    end: str
+    ratio: float
+
+
+_ARM = _Kind("arm", "shoulder", "elbow", "wrist", FOREARM_RATIO)
+_LEG = _Kind("leg", "hip", "knee", "ankle", SHIN_RATIO)
+
+
+@dataclass
+class _Limb:
+    side: str
+    chain: list[int]  # from the trunk, left out, to wrist or ankle
+    named: tuple[int | None, int | None] = (None, None)
+    fixed: dict[int, Collection[int]] = field(default_factory=dict)
+    found: tuple[int, int] | None = None
+
+
+def check_limbs(tree: SourceTree, roles: Roles, flesh: Flesh, stated: Collection[str] = ()) -> None:
+    """Settle hips, knees, shoulders, elbows and what hangs on them, in ``roles``; joints ``stated`` stay as they are.
+
+    Only in a body's hierarchy: a hand with a forearm, or a flat file, has no chains to judge by.
+    """
+    if tree.flat or not any(name == "pelvis" or name.startswith(("spine", "head", "neck")) for name in roles.body):
+        return
+    for kind in (_LEG, _ARM):
+        limbs = _limbs(tree, roles, flesh, kind, stated)
+        _divide(tree, limbs, kind)
+        for limb in limbs:
+            _settle(tree, roles, limb, kind, stated)
+        _compare(tree, roles, kind)
+    _pelvis(tree, roles, stated)
+    _trunk_between(tree, roles, stated)
+    _feet(tree, roles, flesh, stated)
+    _ends(roles, flesh, stated)
+
+
+def _limbs(tree: SourceTree, roles: Roles, flesh: Flesh, kind: _Kind, stated: Collection[str]) -> list[_Limb]:
+    ends = {}
+    for side in ("left", "right"):
+        end = _end(tree, roles, flesh, kind, side)
+        if end is not None:
+            ends[side] = end
+    trunk = {j for name, j in roles.body.items() if "." not in name or name == "head.top"}
+    out = []
+    for side, end in ends.items():
+        other = ends.get("right" if side == "left" else "left")
+        above = _parting(tree, roles, end, other, trunk)
+        if above is None:
+            continue
+        chain = [j for j in path_below(tree, above, end) if j not in trunk]
+        size = float(np.linalg.norm(tree.positions[end] - tree.positions[above])) or 1.0
+        chain = [j for j in chain if j == end or not _is_helper(tree, flesh, j, above, size)]
+        names = (f"{side}.{kind.first}", f"{side}.{kind.second}")
+        limb = _Limb(side, chain, (roles.body.get(names[0]), roles.body.get(names[1])))
+        for k, name in enumerate(names):
+            if name in stated and name in roles.body:
+                limb.fixed[k] = (roles.body[name],)
+        if len(chain) >= 2:
+            out.append(limb)
+    return out
+
+
+def _is_helper(tree: SourceTree, flesh: Flesh, joint: int, above: int, size: float) -> bool:
+    if read_name(tree.names[joint]).kind == "helper":
+        return True
+    if flesh.passing[joint] and flesh.on_the_way(joint):
+        return True
+    return float(np.linalg.norm(tree.positions[joint] - tree.positions[above])) < _AT_TRUNK * size
+
+
+def _end(tree: SourceTree, roles: Roles, flesh: Flesh, kind: _Kind, side: str) -> int | None:
+    """Wrist or ankle: by name, or down from what is known of the limb."""
+    if kind is _ARM:
+        hand = next((h for h in roles.hands if h.side == side), None)
+        if hand is not None and "wrist" in hand.joints:
+            return hand.joints["wrist"]
+    named = roles.body.get(f"{side}.{kind.end}")
+    if named is not None or kind is _ARM:
+        return named
+    known = [roles.body[name] for part in ("knee", "hip") if (name := f"{side}.{part}") in roles.body]
+    if not known:
+        return None
+    leg = [known[0]]
+    while len(below := [c for c in tree.children[leg[-1]] if flesh.live[c]]) == 1:
+        leg.append(below[0])
+    if len(leg) < 2:
+        return None
+    ankle = leg[ankle_of(tree, leg)]
+    roles.body[f"{side}.ankle"] = ankle
+    roles.notes.append(f"{side}.ankle: '{tree.names[ankle]}', by the leg's shape")
+    return ankle
+
+
+def _parting(tree: SourceTree, roles: Roles, end: int, other: int | None, trunk: set[int]) -> int | None:
+    """The joint at which both limbs of a kind, or one limb and the trunk, part."""
+    above = tree.ancestors(end)
+    if other is not None:
+        both = set(tree.ancestors(other))
+        return next((j for j in above if j in both), None)
+    return next((j for j in above if j in trunk), above[-1] if above else None)
+
+
+def _divide(tree: SourceTree, limbs: list[_Limb], kind: _Kind) -> None:
+    """First and second joint of each limb: as named where plausible, else as the other side or geometry has it."""
+    for limb in limbs:
+        first, second = limb.named
+        if first is not None and second is not None and _is_plausible(tree, limb, (first, second), kind):
+            limb.found = (first, second)
+    open_ = [limb for limb in limbs if limb.found is None]
+    for limb in open_:
+        other = next((o for o in limbs if o is not limb and o.found and len(o.chain) == len(limb.chain)), None)
+        if other is not None and other.found is not None and not limb.fixed:
+            mirrored = (
+                limb.chain[other.chain.index(other.found[0])],
+                limb.chain[other.chain.index(other.found[1])],
+            )
+            if _is_plausible(tree, limb, mirrored, kind):
+                limb.found = mirrored
+                continue
+        limb.found = _by_geometry(tree, limb, kind)
+
+
+def _by_geometry(tree: SourceTree, limb: _Limb, kind: _Kind) -> tuple[int, int] | None:
+    """Keeping what names say where that leaves a plausible limb."""
+    named = {k: (j,) for k, j in enumerate(limb.named) if j is not None and j in limb.chain}
+    tries: list[dict[int, Collection[int]]] = [{**named, **limb.fixed}, limb.fixed]
+    for fixed in tries:
+        first, second, misfit = divide_limb(tree, limb.chain, kind.ratio, fixed)
+        if misfit < _PLAUSIBLE:
+            return first, second
+    return None
+
+
+def _is_plausible(tree: SourceTree, limb: _Limb, pair: tuple[int, int], kind: _Kind) -> bool:
+    first, second = pair
+    if first not in limb.chain or second not in limb.chain[:-1]:
+        return False
+    if limb.chain.index(first) >= limb.chain.index(second):
+        return False
+    if any(limb.fixed.get(k, (j,)) != (j,) for k, j in enumerate(pair)):
+        return False
+    at = tree.positions
+    end = at[limb.chain[-1]]
+    whole = max(float(np.linalg.norm(at[j] - end)) for j in limb.chain)
+    return limb_misfit(at[first], at[second], end, whole, kind.ratio) < _PLAUSIBLE
+
+
+def _settle(tree: SourceTree, roles: Roles, limb: _Limb, kind: _Kind, stated: Collection[str]) -> None:
+    names = (f"{limb.side}.{kind.first}", f"{limb.side}.{kind.second}")
+    if limb.found is None:
+        first, second = limb.named
+        missing = [name for name, joint in zip(names, limb.named, strict=True) if joint is None]
+        if missing and not set(missing) & set(stated):
+            between = f"between '{tree.names[limb.chain[0]]}' and '{tree.names[limb.chain[-1]]}'"
+            what = " and ".join(name.partition(".")[2] for name in missing)
+            roles.suspicious.append(
+                f"{limb.side} {kind.word}: no {what} found {between}: it does not bend there; if one is there, {_MAP}"
+            )
+        elif first in limb.chain and second in limb.chain and first is not None and second is not None:
+            roles.suspicious.append(
+                f"{limb.side} {kind.word}: '{tree.names[first]}' and '{tree.names[second]}' "
+                f"part it into segments of odd lengths for {kind.first} and {kind.second}; if others are meant, {_MAP}"
+            )
+        return
+    changed = []
+    for name, joint in zip(names, limb.found, strict=True):
+        if roles.body.get(name) != joint and name not in stated:
+            _release(roles, joint)
+            roles.body[name] = joint
+            changed.append(f"{name} '{tree.names[joint]}'")
+    if changed:
+        roles.notes.append(f"{', '.join(changed)}: by the {kind.word}'s shape")
+    if kind is _ARM:
+        _clavicle(tree, roles, limb, stated)
+
+
+def _clavicle(tree: SourceTree, roles: Roles, limb: _Limb, stated: Collection[str]) -> None:
+    """The first joint between trunk and shoulder, where the named one is none or the shoulder itself."""
+    name = f"{limb.side}.clavicle"
+    assert limb.found is not None
+    before = limb.chain[: limb.chain.index(limb.found[0])]
+    if name in stated or roles.body.get(name) in before:
+        return
+    roles.body.pop(name, None)
+    if before and not set(before) & set(roles.body.values()):
+        roles.body[name] = before[0]
+        roles.notes.append(f"{name} '{tree.names[before[0]]}': by the arm's shape")
+
+
+def _release(roles: Roles, joint: int) -> None:
+    for name in [name for name, j in roles.body.items() if j == joint]:
+        del roles.body[name]
+
+
+def _compare(tree: SourceTree, roles: Roles, kind: _Kind) -> None:
+    """Left and right segments of a limb are about equally long."""
+    ends = {h.side: h.joints["wrist"] for h in roles.hands if "wrist" in h.joints} if kind is _ARM else {}
+    for a, b in ((kind.first, kind.second), (kind.second, kind.end)):
+        lengths = []
+        for side in ("left", "right"):
+            near = roles.body.get(f"{side}.{a}")
+            far = roles.body.get(f"{side}.{b}", ends.get(side) if b == kind.end else None)
+            if near is not None and far is not None:
+                lengths.append(float(np.linalg.norm(tree.positions[far] - tree.positions[near])))
+        if len(lengths) == 2 and max(lengths) > _UNEQUAL * min(lengths):
+            share = max(lengths) / max(min(lengths), 1e-12) - 1
+            roles.suspicious.append(
+                f"{kind.word}s: from {a} to {b} one side is {share:.0%} longer than the other; if a joint was taken "
+                f"for another, {_MAP}"
+            )
+
+
+def _pelvis(tree: SourceTree, roles: Roles, stated: Collection[str]) -> None:
+    """Where the legs part, if no name says it."""
+    hips = [roles.body[f"{side}.hip"] for side in ("left", "right") if f"{side}.hip" in roles.body]
+    if "pelvis" in roles.body or "pelvis" in stated or len(hips) < 2:
+        return
+    both = set(tree.ancestors(hips[1]))
+    parting = next((j for j in tree.ancestors(hips[0]) if j in both), None)
+    if parting is not None and parting not in roles.body.values():
+        roles.body["pelvis"] = parting
+        roles.notes.append(f"pelvis '{tree.names[parting]}': where the legs part")
+
+
+def _trunk_between(tree: SourceTree, roles: Roles, stated: Collection[str]) -> None:
+    """The spine's joints, from pelvis to where the arms part, if no name says them."""
+    if any(name.startswith("spine") for name in (*roles.body, *stated)) or "pelvis" not in roles.body:
+        return
+    arms = [roles.body[f"{side}.shoulder"] for side in ("left", "right") if f"{side}.shoulder" in roles.body]
+    if len(arms) < 2:
+        return
+    both = set(tree.ancestors(arms[1]))
+    chest = next((j for j in tree.ancestors(arms[0]) if j in both), None)
+    if chest is None or roles.body["pelvis"] not in tree.ancestors(chest):
+        return
+    spine = [j for j in path_below(tree, roles.body["pelvis"], chest) if j not in roles.body.values()]
+    roles.body |= {f"spine{n}": j for n, j in enumerate(spine, start=1)}
+    if spine:
+        roles.notes.append(f"spine {', '.join(repr(tree.names[j]) for j in spine)}: between pelvis and arms")
+
+
+def _feet(tree: SourceTree, roles: Roles, flesh: Flesh, stated: Collection[str]) -> None:
+    """The only joint below an ankle, or its toes, if no name says them."""
+    ankles = {side: roles.body[f"{side}.ankle"] for side in ("left", "right") if f"{side}.ankle" in roles.body}
+    middle = tree.positions[list(ankles.values())].mean(axis=0) if ankles else np.zeros(3)
+    for side, ankle in ankles.items():
+        known = {n for n in (*roles.body, *stated) if n.startswith((f"{side}.ball", f"{side}.toe"))}
+        below = [c for c in tree.children[ankle] if flesh.live[c] and read_name(tree.names[c]).kind != "helper"]
+        if known or not flesh.known or set(below) & set(roles.body.values()):
+            continue
+        if len(below) == 1 and not flesh.bare[below[0]]:
+            roles.body[f"{side}.ball"] = below[0]
+            roles.notes.append(f"{side}.ball '{tree.names[below[0]]}': the only joint below the ankle")
+        elif len(below) >= _TOES and len(ankles) == 2:
+            roles.body |= toes_by_place(tree, below, side, tree.positions[ankle] - middle)
+            roles.notes.append(f"{side} toes: {len(below)} chains below the ankle, the innermost is the big one")
+
+
+def _ends(roles: Roles, flesh: Flesh, stated: Collection[str]) -> None:
+    """Joints without flesh that end toes, head and handless arms."""
+    taken = set(roles.body.values())
+    for end, last in flesh.ends.items():
+        name = next((name for name, j in roles.body.items() if j == last), None)
+        if name is None or end in taken:
+            continue
+        side, _, part = name.rpartition(".")
+        tip = {"head": "head.top", "ball": f"{side}.toe.tip", "wrist": f"{side}.hand.tip"}.get(part)
+        if tip and tip not in roles.body and tip not in stated:
+            roles.body[tip] = end

@@ -1,0 +1,94 @@
+"""One digit's joints out of all that are named after it: helpers, doubles and ends beyond the end are left out."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+
+from warpjld.skeleton.recognise.digits import Digit
+from warpjld.skeleton.recognise.flesh import Flesh
+from warpjld.skeleton.recognise.names import Meaning
+from warpjld.skeleton.recognise.tree import SourceTree
+
+__all__ = ["digit_chain"]
+
+
+def digit_chain(
+    tree: SourceTree, joints: Sequence[int], meanings: Sequence[Meaning], flesh: Flesh, wrist: int | None
+) -> Digit | None:
+    """The joints that make one digit, from the root outwards; None where they are no chain.
+
+    Args:
+        tree: The file's joints.
+        joints: Those named after the digit, in any order.
+        meanings: What the names of all joints of the file say.
+        flesh: Which joints own skin.
+        wrist: The hand's wrist, where one is known.
+    """
+    chain = sorted(joints, key=lambda j: _order(tree, meanings[j], j))
+    if not tree.flat:
+        chain = _one_line(tree, chain)
+    ranks = [meanings[j].rank for j in chain]
+    if flesh.known:
+        chain, ranks = _without_helpers(tree, chain, meanings, flesh)
+    if not chain or (len(chain) == 1 and (wrist is None or flesh.bare[chain[0]])):
+        return None
+    return Digit(chain, ranks)
+
+
+def _order(tree: SourceTree, meaning: Meaning, joint: int) -> tuple[int, int, int, int]:
+    """By depth; where that tells nothing by rank, which metacarpal, 01, 02 and tip share with numbers."""
+    return tree.depth(joint), *_place(meaning), joint
+
+
+def _place(meaning: Meaning) -> tuple[int, int]:
+    number = meaning.number or 0
+    return (number if meaning.rank is None else meaning.rank), number
+
+
+def _one_line(tree: SourceTree, chain: list[int]) -> list[int]:
+    """The longest line of descent among joints sorted by depth."""
+    best: dict[int, list[int]] = {}
+    for j in chain:
+        above = next((a for a in tree.ancestors(j) if a in best), None)
+        best[j] = [*(best[above] if above is not None else []), j]
+    longest = max(best.values(), key=len, default=[])
+    # joints on no common line are one digit still where nothing else hangs together (roots of a partly flat file)
+    return longest if len(longest) > 1 else chain
+
+
+def _without_helpers(
+    tree: SourceTree, chain: list[int], meanings: Sequence[Meaning], flesh: Flesh
+) -> tuple[list[int], list[int | None]]:
+    """Joints without flesh stay where their name has a place among the others', and one as the end."""
+    bare, fleshy = flesh.bare, [j for j in chain if not flesh.bare[j]]
+    if not fleshy:
+        return chain, [meanings[j].rank for j in chain]
+    last = chain.index(fleshy[-1]) if not tree.flat else _last_by_rank(chain, meanings, fleshy)
+    stems = {_stem(tree.names[j]) for j in fleshy}
+    taken = {meanings[j].rank for j in fleshy}
+    inner: list[int] = []
+    beyond: list[int] = []
+    for k, j in enumerate(chain):
+        rank = meanings[j].rank
+        if not bare[j]:
+            inner.append(j)
+        elif k > last or (tree.flat and rank == 4):
+            beyond.append(j)
+        elif _stem(tree.names[j]) in stems or (rank in (0, 1, 2, 3) and rank not in taken):
+            taken.add(rank)
+            inner.append(j)
+    ranks = [meanings[j].rank for j in inner]
+    # the cleanest name: of index-finger-tip and index-finger-tip_null the first
+    end = min(beyond, key=lambda j: (meanings[j].rank != 4, len(tree.names[j])), default=None)
+    return (inner, ranks) if end is None else ([*inner, end], [*ranks, 4])
+
+
+def _last_by_rank(chain: list[int], meanings: Sequence[Meaning], fleshy: list[int]) -> int:
+    order = [_place(meanings[j]) for j in chain]
+    return max(k for k, at in enumerate(order) if at <= max(order[chain.index(j)] for j in fleshy))
+
+
+def _stem(name: str) -> str:
+    """A name without its numbers: joints of one digit share it where numbers count them."""
+    return re.sub(r"\d+", "#", name.lower())

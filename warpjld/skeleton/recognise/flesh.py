@@ -1,0 +1,163 @@
+"""Which joints own flesh: skin tells joints that move a body from helpers, ends, sockets and controls."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from warpjld.rotations import unit
+from warpjld.skeleton.recognise.names import read_name
+from warpjld.skeleton.recognise.tree import SourceTree
+
+__all__ = ["Flesh", "flesh_shares", "without_flesh"]
+
+_NONE = 1e-6  # share of the surface below which a joint owns nothing
+_COINCIDENT = 1e-3  # of the bone before: an end nearer than this is no end
+_LONGEST_END, _MOST_TURNED = 2.5, np.cos(np.radians(75.0))  # of the bone before; from its direction
+
+
+def flesh_shares(
+    count: int,
+    joints: NDArray[np.int64] | None,
+    weights: NDArray[np.float64] | None,
+    rigid: NDArray[np.int64] | None = None,
+) -> NDArray[np.float64] | None:
+    """Share of the surface's vertices that each of ``count`` joints moves, shape (N,); None where no skin is painted.
+
+    Args:
+        count: Joints of the file.
+        joints: Influencing joints per vertex, shape (W, K).
+        weights: Their weights, shape (W, K).
+        rigid: Joint that a vertex follows rigidly, -1 for flesh, shape (W,).
+    """
+    if joints is None or weights is None or not len(joints):
+        return None
+    shares = np.zeros(count)
+    np.add.at(shares, joints, weights)
+    if rigid is not None:
+        np.add.at(shares, rigid[rigid >= 0], 1.0)
+    return shares / len(joints)
+
+
+class Flesh:
+    """The flesh of a joint tree.
+
+    Args:
+        tree: The file's joints.
+        shares: As from :func:`flesh_shares`; None where no skin says anything: then no joint is bare.
+    """
+
+    def __init__(self, tree: SourceTree, shares: NDArray[np.float64] | None) -> None:
+        self._tree = tree
+        self.known = shares is not None and bool((shares > _NONE).any())
+        """Whether the file has a skin that tells."""
+        self.shares: NDArray[np.float64] = shares if shares is not None and self.known else np.ones(len(tree))
+        """Share of the surface that each joint moves, shape (N,); ones where nothing is known."""
+
+    @property
+    def bare(self) -> NDArray[np.bool_]:
+        """Joints that move no skin themselves, shape (N,)."""
+        return self.shares <= _NONE
+
+    @cached_property
+    def live(self) -> NDArray[np.bool_]:
+        """Joints with flesh of their own or below, shape (N,)."""
+        live = ~self.bare
+        for j in np.flatnonzero(live):
+            live[self._tree.ancestors(int(j))] = True
+        return live
+
+    @cached_property
+    def ends(self) -> dict[int, int]:
+        """The joint, without flesh, at which the flesh of a last joint ends → that last joint.
+
+        Of several the one whose name says so, else the one straightest on; sockets aside and targets far off are none.
+        """
+        tree, out = self._tree, {}
+        if not self.known or tree.flat:
+            return {}
+        for j in np.flatnonzero(~self.bare):
+            kids = tree.children[j]
+            if kids and not self.live[list(kids)].any():
+                found = [(self._end_score(int(j), c), -c) for c in kids]
+                score, end = max(found)
+                if score > 0:
+                    out[-end] = int(j)
+        return out
+
+    def _end_score(self, joint: int, end: int) -> float:
+        """Above 0 where ``end`` may end the bone of ``joint``; the larger the likelier."""
+        at, above = self._tree.positions, int(self._tree.parents[joint])
+        bone = at[end] - at[joint]
+        before = at[joint] - at[above] if above >= 0 else bone
+        length, usual = float(np.linalg.norm(bone)), float(np.linalg.norm(before))
+        meaning = read_name(self._tree.names[end])
+        if length <= _COINCIDENT * usual or length == 0.0 or meaning.kind == "helper":
+            return 0.0
+        named = meaning.rank == 4 or (meaning.kind or "").endswith(" end")
+        straight = float(unit(bone) @ unit(before)) if usual > 0 else 1.0
+        if not named and (length > _LONGEST_END * usual or straight < _MOST_TURNED):
+            return 0.0
+        return 2.0 + straight + 4.0 * named
+
+    @cached_property
+    def dead(self) -> NDArray[np.bool_]:
+        """Joints that neither move skin, themselves or by others, nor end a bone that does, shape (N,).
+
+        Nothing is dead in a hierarchy that says nothing.
+        """
+        if not self.known or self._tree.flat:
+            return np.zeros(len(self._tree), dtype=bool)
+        dead = ~self.live
+        dead[list(self.ends)] = False
+        return dead
+
+    @cached_property
+    def passing(self) -> NDArray[np.bool_]:
+        """Joints without flesh through which one chain of live joints, and nothing else, goes on, shape (N,)."""
+        if not self.known or self._tree.flat:
+            return np.zeros(len(self._tree), dtype=bool)
+        lines = np.array([sum(bool(self.live[c]) for c in kids) == 1 for kids in self._tree.children])
+        return self.bare & lines
+
+    def on_the_way(self, joint: int) -> bool:
+        """Whether a passing joint lies where its neighbours are, or on the line between them."""
+        tree = self._tree
+        above = int(tree.parents[joint])
+        below = next(c for c in tree.children[joint] if self.live[c])
+        at = tree.positions
+        if above < 0:
+            return False
+        whole = float(np.linalg.norm(at[below] - at[above]))
+        parts = float(np.linalg.norm(at[joint] - at[above]) + np.linalg.norm(at[below] - at[joint]))
+        near = min(np.linalg.norm(at[joint] - at[above]), np.linalg.norm(at[below] - at[joint]))
+        return bool(parts <= 1.01 * whole or near <= 0.02 * parts)
+
+
+_MOVES_SKIN = ("hip", "knee", "shoulder", "elbow", "knuckle2", "knuckle3")
+
+
+def without_flesh(
+    tree: SourceTree, names: Sequence[str], sources: Sequence[int], owner: NDArray[np.int64], flesh: Flesh
+) -> list[str]:
+    """Doubts about recognised joints that move no skin in the file, nor do those merged into them.
+
+    Args:
+        tree: The file's joints.
+        names: Canonical joints.
+        sources: Joint of the file that each one is, -1 for added ones.
+        owner: Canonical joint of every joint of the file, shape (N,).
+        flesh: The file's skin.
+    """
+    if not flesh.known:
+        return []
+    owned = np.bincount(owner, weights=flesh.shares, minlength=len(names))
+    return [
+        f"{name}: '{tree.names[sources[j]]}' moves no skin in the file; if another joint is meant, state it with --map "
+        "(inspect --write-map writes what was recognised, for editing)"
+        for j, name in enumerate(names)
+        if name.rpartition(".")[2] in _MOVES_SKIN and ".toe" not in name and sources[j] >= 0 and owned[j] <= _NONE
+    ]

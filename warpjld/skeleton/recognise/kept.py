@@ -1,0 +1,101 @@
+"""Joints that were not recognised: those that stay joints of their own, and those that belong to another."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Mapping
+
+import numpy as np
+
+from warpjld.skeleton.hand import HAND_PARENTS
+from warpjld.skeleton.recognise.flesh import Flesh
+from warpjld.skeleton.recognise.names import read_name
+from warpjld.skeleton.recognise.tree import SourceTree
+
+__all__ = ["kept_joints", "lies_on_bone"]
+
+_LIMBS = ("clavicle", "shoulder", "elbow", "hip", "knee")
+_ASIDE = 0.03  # of a bone's length: a joint nearer to it lies on it
+
+
+def kept_joints(
+    tree: SourceTree, of_source: Mapping[int, str], flesh: Flesh, left_out: Collection[int], notes: list[str]
+) -> dict[int, str]:
+    """Joints of the file that stay joints, with their names in lower case.
+
+    Args:
+        tree: The file's joints.
+        of_source: Recognised joints → canonical names.
+        flesh: Which joints own skin.
+        left_out: Joints that the user wants to be none.
+        notes: What was merged and what was kept is added here.
+    """
+    size = float(np.linalg.norm(np.ptp(tree.positions, axis=0))) or 1.0
+    kept: dict[int, str] = {}
+    merged: dict[str, list[str]] = {}
+    for j in range(len(tree)):
+        if j in of_source:
+            continue
+        over = [of_source[k] for k in tree.ancestors(j) if k in of_source]
+        below = [of_source[k] for k in tree.subtree(j) if k in of_source]
+        if j in left_out or _moves_nothing(tree, flesh, j) or (of_source and _belongs(tree, j, over, below, size)):
+            into = over[0] if over else (below[0] if below else "the joint above")
+            merged.setdefault(into, []).append(tree.names[j])
+        elif of_source and over and over[0].rpartition(".")[2] in _LIMBS and lies_on_bone(tree, j):
+            merged.setdefault(over[0], []).append(tree.names[j])
+        else:
+            kept[j] = _own_name(tree, j)
+    if not kept and not of_source:  # nothing is left to stand on
+        kept = {j: _own_name(tree, j) for j in range(len(tree))}
+        merged.clear()
+    if merged:
+        shown = (
+            f"{', '.join(names[:4])}{f' and {len(names) - 4} more' if len(names) > 4 else ''} → {into}"
+            for into, names in merged.items()
+        )
+        notes.append(f"merged into {'recognised joints' if of_source else 'others'}: {'; '.join(shown)}")
+    if kept and of_source:
+        notes.append(f"not recognised, kept as joints: {', '.join(kept.values())}")
+    return kept
+
+
+def _moves_nothing(tree: SourceTree, flesh: Flesh, joint: int) -> bool:
+    """Whether a joint neither moves skin nor ends a bone nor is where live chains part."""
+    if tree.flat:
+        return flesh.known and bool(flesh.bare[joint])
+    return bool(flesh.dead[joint] or flesh.passing[joint])
+
+
+def _belongs(tree: SourceTree, joint: int, over: list[str], below: list[str], size: float) -> bool:
+    """Whether an unrecognised joint is a part of a recognised one."""
+    beside = [k for k in range(len(tree)) if tree.parents[k] == tree.parents[joint] and k != joint]
+    near = [tree.parents[joint], *beside]
+    double = not tree.children[joint] and any(
+        k >= 0 and np.linalg.norm(tree.positions[joint] - tree.positions[k]) < 1e-4 * size for k in near
+    )
+    helper = read_name(tree.names[joint]).kind in ("helper", "palm", "root")
+    in_hand = bool(over) and over[0].partition(".")[2] in HAND_PARENTS
+    return bool(below) or helper or double or in_hand or "head" in over or (not over and tree.flat)
+
+
+def lies_on_bone(tree: SourceTree, joint: int) -> bool:
+    """Whether a leaf lies on the bone from its parent to one of its siblings: it twists flesh, but bends none."""
+    parent = int(tree.parents[joint])
+    if parent < 0 or tree.children[joint]:
+        return False
+    at = tree.positions
+    for sibling in tree.children[parent]:
+        bone = at[sibling] - at[parent]
+        square = float(bone @ bone)
+        if sibling == joint or square == 0.0 or not tree.children[sibling]:
+            continue
+        share = float((at[joint] - at[parent]) @ bone) / square
+        aside = float(np.linalg.norm(at[joint] - at[parent] - share * bone))
+        if -_ASIDE <= share <= 1.0 + _ASIDE and aside <= _ASIDE * square**0.5:
+            return True
+    return False
+
+
+def _own_name(tree: SourceTree, joint: int) -> str:
+    name = tree.names[joint].lower()
+    twice = [j for j in range(len(tree)) if tree.names[j].lower() == name]
+    return name if len(twice) == 1 else f"{name}#{twice.index(joint) + 1}"

@@ -1,0 +1,29 @@
+"""A joint tree without the joints that own no flesh, for recognition by shape."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from warpjld.skeleton.recognise.flesh import Flesh
+from warpjld.skeleton.recognise.kept import lies_on_bone
+from warpjld.skeleton.recognise.tree import SourceTree
+
+__all__ = ["prune"]
+
+
+def prune(tree: SourceTree, flesh: Flesh) -> tuple[SourceTree, list[int]]:
+    """The tree without dead joints, those that merely pass on between two others, and twist joints.
+
+    Returns:
+        The smaller tree, and for each of its joints its number in ``tree``.
+    """
+    gone = flesh.dead.copy()
+    if flesh.known:
+        for j in range(len(tree)):
+            gone[j] |= lies_on_bone(tree, j) or bool(flesh.passing[j] and flesh.on_the_way(j))
+    kept = [int(j) for j in np.flatnonzero(~gone)]
+    if len(kept) == len(tree):
+        return tree, kept
+    number = {j: i for i, j in enumerate(kept)}
+    parents = [next((number[a] for a in tree.ancestors(j) if a in number), -1) for j in kept]
+    return SourceTree(tuple(tree.names[j] for j in kept), np.array(parents), tree.frames[kept]), kept
