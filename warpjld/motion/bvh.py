@@ -219,7 +219,9 @@ def _clip(joints: list[_Joint], values: NDArray[np.float64], rate: float, notes:
 
 def _add_to_offsets(joints: list[_Joint], places: NDArray[np.float64], offsets: NDArray[np.float64]) -> bool:
     """Whether position channels below the root state what is added to an OFFSET, as Blender writes them."""
-    inner = [j for j, joint in enumerate(joints) if joint.parent >= 0 and any(k == "position" for k, _ in joint.channels)]
+    inner = [
+        j for j, joint in enumerate(joints) if joint.parent >= 0 and any(k == "position" for k, _ in joint.channels)
+    ]
     as_given = np.linalg.norm(places[:, inner] - offsets[inner], axis=-1).sum()
     added = np.linalg.norm(places[:, inner], axis=-1).sum()
     return bool(added < as_given)

@@ -122,7 +122,7 @@ def retarget_and_tell(clip: Clip, skeleton: Skeleton) -> Retargeted:
         poses.positions + _travel(clip, source, target, pairs, axes, poses, scale), poses.rotations, poses.flexion
     )
     used = {bone for _, bone in pairs.values()} | {source.last_part(name) for name in pairs if name in source.joints}
-    used |= {j for j in (source.pelvis, source.chest, source.joints.get("head")) if trunk and j is not None}
+    used |= _trunk_followed(source, target) if trunk else set()
     return Retargeted(
         poses,
         frozenset(j for bone in used for j in source.path(-1, bone)),
@@ -249,6 +249,12 @@ def _trunk(source: Landmarks, target: Landmarks, recorded: NDArray[np.float64]) 
     return out
 
 
+def _trunk_followed(source: Landmarks, target: Landmarks) -> set[int]:
+    """Joints of the recording's trunk that have a counterpart."""
+    ends = [(marks.pelvis, marks.chest, marks.joints.get("head")) for marks in (source, target)]
+    return {a for a, b in zip(*ends, strict=True) if a is not None and b is not None}
+
+
 def _alignment(
     name: str, source: Landmarks, target: Landmarks, axes: NDArray[np.float64], inherited: NDArray[np.float64]
 ) -> NDArray[np.float64]:
@@ -308,9 +314,7 @@ def _travel(
     return travel
 
 
-def _scale(
-    source: Landmarks, target: Landmarks, pairs: dict[str, tuple[int, int]]
-) -> tuple[float, tuple[str, ...]]:
+def _scale(source: Landmarks, target: Landmarks, pairs: dict[str, tuple[int, int]]) -> tuple[float, tuple[str, ...]]:
     """Size of the rig in the recording's units, by its legs or else by what both have, and a note on the latter."""
     legs = [name for name in pairs if name.endswith((".hip", ".knee"))]
     lengths = []
