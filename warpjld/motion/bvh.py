@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -19,6 +20,10 @@ _AXES = "xyz"
 _CHANNELS = {f"{axis}{kind}": (kind, a) for a, axis in enumerate(_AXES) for kind in ("position", "rotation")}
 
 
+_COMMENT = re.compile(r"(^|\s)(//|#).*")
+"""Nothing of the format begins with these; within a name they are the name's."""
+
+
 @dataclass
 class _Joint:
     name: str
@@ -31,16 +36,20 @@ class _Joint:
 def read_bvh(path: str | Path) -> Clip:
     """Read a BVH file: any hierarchy, any order of channels. End sites become joints called ``<parent> end``.
 
-    Position channels replace a joint's offset. Rotations apply in the order of their channels, each about an axis
-    the previous ones have turned.
+    Rotations apply in the order of their channels, each about an axis the previous ones have turned. Positions of
+    joints below the root stand in place of their OFFSET in some files and add to it in others: whichever keeps bones
+    nearer to their OFFSETs is meant.
+
+    Tabs, a byte order mark, comments (``//`` or ``#`` and what follows), keywords without the blank after their colon,
+    and another number of frames than announced are taken as they are, the last with a note, as is a last frame cut off.
 
     Raises:
         InputError: Unreadable, or not as the format wants it, with the line.
     """
     lines = _Lines(path)
     joints = _hierarchy(lines)
-    values, rate = _motion(lines, sum(len(joint.channels) for joint in joints))
-    return _clip(joints, values, rate)
+    values, rate, notes = _motion(lines, sum(len(joint.channels) for joint in joints))
+    return _clip(joints, values, rate, notes)
 
 
 class _Lines:
@@ -49,10 +58,11 @@ class _Lines:
     def __init__(self, path: str | Path) -> None:
         self.path = path
         try:
-            text = Path(path).read_text(encoding="utf-8", errors="replace")
+            text = Path(path).read_text(encoding="utf-8-sig", errors="replace")
         except OSError as error:
             raise InputError(f"cannot be read: {error.strerror}", path=path) from error
-        words = ((number, line.split()) for number, line in enumerate(text.splitlines(), start=1))
+        lines = enumerate(text.split("\n"), start=1)  # not splitlines, which also breaks at form feeds
+        words = ((number, _COMMENT.sub("", line).split()) for number, line in lines)
         self._rest: Iterator[tuple[int, list[str]]] = ((n, w) for n, w in words if w)
         self.number = 0
 
@@ -76,6 +86,14 @@ class _Lines:
         if words[0].lower() != keyword.lower():
             raise self.error(f"expected '{keyword}', not '{words[0]}'")
         return words[1:]
+
+    def setting(self, keyword: str) -> list[str]:
+        """Words after a keyword of one or two words and a colon, which a value may follow without a blank."""
+        words = self.next(f"'{keyword}'")
+        line = " ".join(words)
+        if not line.lower().startswith(keyword.lower()):
+            raise self.error(f"want '{keyword}' and its value, not '{line[:40]}'")
+        return line[len(keyword) :].split()
 
     def numbers(self, words: list[str], count: int, what: str) -> NDArray[np.float64]:
         """Words as finite numbers."""
@@ -139,49 +157,74 @@ def _channels(lines: _Lines, words: list[str], joint: str) -> list[tuple[str, in
     return [_CHANNELS[word.lower()] for word in words[1:]]
 
 
-def _motion(lines: _Lines, channels: int) -> tuple[NDArray[np.float64], float]:
-    words = lines.next("'Frames:'")
-    if words[0].lower() != "frames:" or len(words) != 2 or not words[1].isdigit() or int(words[1]) == 0:
+def _motion(lines: _Lines, channels: int) -> tuple[NDArray[np.float64], float, list[str]]:
+    """Rows of channel values, frames a second, and notes on rows more or fewer than announced."""
+    if channels == 0:
+        raise lines.error("no joint has CHANNELS: nothing moves")
+    words = lines.setting("Frames:")
+    if len(words) != 1 or not words[0].isascii() or not words[0].isdigit() or len(words[0]) > 9 or int(words[0]) == 0:
         raise lines.error("want 'Frames:' and how many, at least one")
-    count = int(words[1])
-    words = lines.next("'Frame Time:'")
-    if [word.lower() for word in words[:2]] != ["frame", "time:"]:
-        raise lines.error("want 'Frame Time:' and the seconds from frame to frame")
-    seconds = lines.numbers(words[2:], 1, "Frame Time")[0]
+    count = int(words[0])
+    seconds = lines.numbers(lines.setting("Frame Time:"), 1, "Frame Time")[0]
     if seconds <= 0.0:
         raise lines.error(f"Frame Time must be above 0, got {seconds:g}")
-    values = np.empty((count, channels))
-    for frame in range(count):
-        values[frame] = lines.numbers(lines.next(f"frame {frame} of {count}"), channels, f"frame {frame}")
-    if lines.next_or_none() is not None:
-        raise lines.error(f"more than the {count} frames announced")
-    return values, round(1.0 / seconds, 3)
+    rows: list[NDArray[np.float64]] = []
+    notes: list[str] = []
+    words_next = lines.next_or_none()
+    while words_next is not None:
+        words, line = words_next, lines.number
+        words_next = lines.next_or_none()
+        if words_next is None and rows and len(words) < channels:
+            notes.append(f"the last frame is cut off and left out: {len(words)} of {channels} numbers")
+            break
+        after, lines.number = lines.number, line
+        rows.append(lines.numbers(words, channels, f"frame {len(rows)}"))
+        lines.number = after
+    if not rows:
+        raise lines.error(f"the file ends here; expected frame 0 of {count}")
+    if len(rows) != count:
+        notes.append(f"the motion has {len(rows)} frames, not the {count} it announces: those that are there are taken")
+    return np.array(rows), round(1.0 / seconds, 3), notes
 
 
-def _clip(joints: list[_Joint], values: NDArray[np.float64], rate: float) -> Clip:
+def _clip(joints: list[_Joint], values: NDArray[np.float64], rate: float, notes: list[str]) -> Clip:
     frames = len(values)
     parents = np.array([joint.parent for joint in joints], dtype=np.int64)
+    offsets = np.array([np.zeros(3) if joint.offset is None else joint.offset for joint in joints])
     rest = np.zeros((len(joints), 3))
-    positions = np.zeros((frames, len(joints), 3))
-    rotations = np.zeros((frames, len(joints), 4))
+    places = np.repeat(offsets[None], frames, axis=0)
+    turns = np.tile([0.0, 0.0, 0.0, 1.0], (frames, len(joints), 1))
     column = 0
     for j, joint in enumerate(joints):
-        offset = np.zeros(3) if joint.offset is None else joint.offset
-        place = np.tile(offset, (frames, 1))
-        turn = np.tile([0.0, 0.0, 0.0, 1.0], (frames, 1))
         for kind, axis in joint.channels:
             if kind == "position":
-                place[:, axis] = values[:, column]
+                places[:, j, axis] = values[:, column]
             else:
-                turn = multiply(turn, _about(axis, values[:, column]))
+                turns[:, j] = multiply(turns[:, j], _about(axis, values[:, column]))
             column += 1
-        if joint.parent < 0:
-            rest[j], positions[:, j], rotations[:, j] = offset, place, turn
-        else:
-            rest[j] = rest[joint.parent] + offset
-            positions[:, j] = positions[:, joint.parent] + rotate(rotations[:, joint.parent], place)
-            rotations[:, j] = multiply(rotations[:, joint.parent], turn)
-    return Clip(tuple(joint.name for joint in joints), parents, rest, positions, rotations, rate)
+    if _add_to_offsets(joints, places, offsets):
+        moved = [(j, axis) for j, joint in enumerate(joints) for kind, axis in joint.channels if kind == "position"]
+        for j, axis in moved:
+            places[:, j, axis] += offsets[j, axis]
+        notes = [*notes, "positions of joints are taken as additions to their OFFSETs"]
+    positions, rotations = places.copy(), turns.copy()
+    for j, parent in enumerate(parents):
+        rest[j] = offsets[j]
+        if parent >= 0:
+            rest[j] += rest[parent]
+            positions[:, j] = positions[:, parent] + rotate(rotations[:, parent], places[:, j])
+            rotations[:, j] = multiply(rotations[:, parent], turns[:, j])
+    return Clip(tuple(joint.name for joint in joints), parents, rest, positions, rotations, rate, tuple(notes))
+
+
+def _add_to_offsets(joints: list[_Joint], places: NDArray[np.float64], offsets: NDArray[np.float64]) -> bool:
+    """Whether position channels below the root state what is added to an OFFSET, as Blender writes them."""
+    inner = [
+        j for j, joint in enumerate(joints) if joint.parent >= 0 and any(k == "position" for k, _ in joint.channels)
+    ]
+    as_given = np.linalg.norm(places[:, inner] - offsets[inner], axis=-1).sum()
+    added = np.linalg.norm(places[:, inner], axis=-1).sum()
+    return bool(added < as_given)
 
 
 def _about(axis: int, degrees: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from warpjld.motion.frame_times import frame_times
-from warpjld.rotations import slerp
+from warpjld.rotations import conjugate, multiply, rotate, slerp
 
 __all__ = ["Clip"]
 
@@ -24,6 +24,7 @@ class Clip:
         positions: Joint positions, shape (F, B, 3).
         rotations: Rotation of every bone from rest, world axes, unit quaternions x, y, z, w, shape (F, B, 4).
         rate: Frames a second.
+        notes: What a reader of the result should know of the file.
     """
 
     names: tuple[str, ...]
@@ -32,6 +33,7 @@ class Clip:
     positions: NDArray[np.float64]
     rotations: NDArray[np.float64]
     rate: float
+    notes: tuple[str, ...] = ()
 
     def __len__(self) -> int:
         return len(self.positions)
@@ -50,3 +52,37 @@ class Clip:
             rotations=slerp(times, self.rotations, at),
             rate=rate,
         )
+
+    def locals(self) -> NDArray[np.float64]:
+        """Rotations of all bones relative to their parent's, shape (F, B, 4)."""
+        inner = self.parents >= 0
+        out = self.rotations.copy()
+        out[:, inner] = multiply(conjugate(self.rotations[:, self.parents[inner]]), self.rotations[:, inner])
+        return out
+
+    def rebased(self, frame: int, turns: NDArray[np.float64]) -> Clip:
+        """The same motion, told from another rest: the pose of a frame, with every bone turned back.
+
+        With p and R the positions and rotations of joints, f the frame and H_j the turn of bone j, that rest's bones
+        and the rotations from it are
+
+            d'_j = H_j⁻¹ (p_child(f) − p_j(f)),   R'_j(t) = R_j(t) R_j(f)⁻¹ H_j
+
+        Args:
+            frame: Number of the frame.
+            turns: H, unit quaternions, shape (B, 4).
+        """
+        places = self.positions[frame]
+        rest = np.empty_like(self.rest)
+        for j, parent in enumerate(self.parents):
+            if parent < 0:
+                rest[j] = rotate(conjugate(turns[j]), places[j])
+            else:
+                rest[j] = rest[parent] + rotate(conjugate(turns[parent]), places[j] - places[parent])
+        back = multiply(conjugate(self.rotations[frame]), turns)
+        return replace(self, rest=rest, rotations=multiply(self.rotations, back))
+
+    def turned_rest(self, turn: NDArray[np.float64]) -> Clip:
+        """The same motion, told from its rest turned as a whole by a quaternion."""
+        rotations = multiply(self.rotations, conjugate(turn))
+        return replace(self, rest=rotate(turn, self.rest), rotations=rotations)

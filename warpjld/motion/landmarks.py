@@ -8,16 +8,19 @@ import numpy as np
 from numpy.typing import NDArray
 
 from warpjld.motion.clip import Clip
+from warpjld.rotations import unit
 from warpjld.skeleton import DIGITS, Skeleton
 
 __all__ = ["Landmarks", "landmarks_of_clip", "landmarks_of_skeleton"]
 
-_NEXT = {"shoulder": "elbow", "elbow": "wrist", "hip": "knee", "knee": "ankle"} | {
+_NEXT = {"clavicle": "shoulder", "shoulder": "elbow", "elbow": "wrist", "hip": "knee", "knee": "ankle"} | {
     f"{digit}.{joint}": f"{digit}.{following}"
     for digit in DIGITS
     for joint, following in (("base", "knuckle2"), ("knuckle2", "knuckle3"), ("knuckle3", "tip"))
 }
 _TOWARDS_FINGERS = ("middle.base", "ring.base", "index.base", "pinky.base")
+_ONE_LINE = 0.02
+"""Sine up to which offsets count as parallel: such a rest says nothing of where joints lie."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -36,13 +39,18 @@ class Landmarks:
 
     @property
     def pelvis(self) -> int | None:
-        """Where the legs meet."""
-        return self._meeting("left.hip", "right.hip")
+        """Where the legs meet; without legs the joint whose name says so."""
+        met = self._meeting("left.hip", "right.hip")
+        return met if met is not None or self._any("hip") else self.joints.get("pelvis")
 
     @property
     def chest(self) -> int | None:
-        """Where the arms meet."""
-        return self._meeting("left.shoulder", "right.shoulder")
+        """Where the arms meet; without arms the uppermost vertebra."""
+        met = self._meeting("left.shoulder", "right.shoulder")
+        if met is not None or self._any("shoulder"):
+            return met
+        spine = [j for name, j in self.joints.items() if name.rstrip("0123456789") == "spine"]
+        return max(spine, key=lambda j: len(self.path(-1, j)), default=None)
 
     def path(self, start: int, end: int) -> tuple[int, ...]:
         """Joints below ``start`` down to ``end``; empty where ``end`` is not below it."""
@@ -52,6 +60,17 @@ class Landmarks:
             out.append(joint)
             joint = int(self.parents[joint])
         return tuple(reversed(out)) if joint == start else ()
+
+    def following(self, name: str) -> int | None:
+        """Joint that ends the segment a joint begins, further down the limb or digit; None at its end."""
+        side, _, part = name.partition(".")
+        joint = self.joints.get(f"{side}.{_NEXT.get(part)}")
+        return joint if joint is not None and self.path(self.joints[name], joint) else None
+
+    def last_part(self, name: str) -> int:
+        """Joint that carries the end of a segment: itself, or the last of those which divide the segment."""
+        end = self.following(name)
+        return self.joints[name] if end is None else int(self.parents[end])
 
     def bone(self, name: str) -> NDArray[np.float64] | None:
         """Vector at rest from a joint to the next of its limb: a wrist to fingers, an ankle to toes."""
@@ -77,6 +96,28 @@ class Landmarks:
             if f"{side}.{joint}" in self.joints and f"{side}.wrist" in self.joints:
                 return np.asarray(self.rest[self.joints[f"{side}.{joint}"]] - self.rest[self.joints[f"{side}.wrist"]])
         return None
+
+    def across(self, part: str, places: NDArray[np.float64]) -> NDArray[np.float64] | None:
+        """Vector from a right joint such as the ``hip`` to the left one, of joint positions of shape (…, J, 3)."""
+        ends = self.joints.get(f"left.{part}"), self.joints.get(f"right.{part}")
+        return None if ends[0] is None or ends[1] is None else places[..., ends[0], :] - places[..., ends[1], :]
+
+    def segment(self, part: str, end: str, places: NDArray[np.float64]) -> NDArray[np.float64] | None:
+        """Unit vectors from a joint such as the ``hip`` to another, both sides', shape (2, …, 3), or None."""
+        names = [f"{side}.{joint}" for side in ("left", "right") for joint in (part, end)]
+        if not self.joints.keys() >= set(names):
+            return None
+        a, b, c, d = (places[..., self.joints[name], :] for name in names)
+        return unit(np.stack([b - a, d - c]))
+
+    def trunk(self, places: NDArray[np.float64]) -> NDArray[np.float64] | None:
+        """Vector from the pelvis to the chest, or the head where they are one, of positions of shape (…, J, 3)."""
+        start = self.pelvis
+        end = next((j for j in (self.chest, self.joints.get("head")) if j is not None and j != start), None)
+        return None if start is None or end is None else places[..., end, :] - places[..., start, :]
+
+    def _any(self, part: str) -> bool:
+        return f"left.{part}" in self.joints or f"right.{part}" in self.joints
 
     def _meeting(self, a: str, b: str) -> int | None:
         if a not in self.joints or b not in self.joints:
@@ -112,9 +153,21 @@ def landmarks_of_clip(clip: Clip, *, side: str | None = None) -> Landmarks:
     from warpjld.skeleton.recognise.tree import SourceTree
 
     frames = np.tile(np.eye(4), (len(clip.names), 1, 1))
-    frames[:, :3, 3] = clip.rest
+    frames[:, :3, 3] = clip.positions[0] if _says_nothing(clip) else clip.rest
     roles = roles_by_name(SourceTree(clip.names, clip.parents, frames))
     joints = dict(roles.body)
     for hand in roles.hands:
         joints |= {f"{hand.side or side}.{name}": joint for name, joint in hand.joints.items()}
     return Landmarks(joints, clip.parents, clip.rest)
+
+
+def _says_nothing(clip: Clip) -> bool:
+    """Whether the rest's bones have no length, or lie on one line but for a quarter of them."""
+    inner = clip.parents >= 0
+    bones = clip.rest[inner] - clip.rest[clip.parents[inner]]
+    lengths = np.linalg.norm(bones, axis=1)
+    if not inner.any() or not lengths.max() > 0.0:
+        return bool(inner.any())
+    longest = bones[lengths.argmax()] / lengths.max()
+    along = np.linalg.norm(np.cross(longest, unit(bones)), axis=1) < _ONE_LINE
+    return bool(along.mean() > 0.75)

@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from warpjld.errors import InputError
+from warpjld.motion.clip import Clip
 from warpjld.motion.joint_animation import JointAnimation
 from warpjld.motion.tracks import Limits
 from warpjld.rig import Rig
@@ -99,15 +100,28 @@ def open_motion(
 
 
 def _animation(animation: JointAnimation, rig: Rig) -> LoadedMotion:
+    from warpjld.motion.doubts import doubts_of_animation
     from warpjld.motion.own_joints import own_poses
-    from warpjld.motion.retarget import retarget
 
     own = own_poses(animation, rig)
     if own is None:
-        poses = retarget(animation.clip(), rig.skeleton)
-        return LoadedMotion(poses, animation.rate, animation.notes, animation.warnings)
-    notes, warnings = (*animation.notes, *own.notes), (*animation.warnings, *own.warnings)
+        moved = _retargeted(replace(animation.clip(), notes=animation.notes), rig, animation.rate)
+        return replace(moved, warnings=(*animation.warnings, *moved.warnings))
+    doubts = doubts_of_animation(animation, set(rig.source_joints))
+    notes, warnings = (*animation.notes, *own.notes), (*animation.warnings, *own.warnings, *doubts)
     return LoadedMotion(own.poses, animation.rate, notes, warnings)
+
+
+def _retargeted(clip: Clip, rig: Rig, rate: float | None) -> LoadedMotion:
+    """A recording of any skeleton on a rig, at a rate; jumps are looked for before it is resampled."""
+    from warpjld.motion.doubts import doubts_of_clip, jumps
+    from warpjld.motion.retarget import retarget_and_tell
+
+    flips = jumps(clip.names, clip.locals())
+    clip = clip if rate is None else clip.at_rate(rate)
+    moved = retarget_and_tell(clip, rig.skeleton)
+    warnings = (*flips, *doubts_of_clip(clip, moved.used))
+    return LoadedMotion(moved.poses, clip.rate, (*clip.notes, *moved.notes), warnings)
 
 
 def _read_gltf(path: Path, rate: float | None, name: str | None) -> JointAnimation:
@@ -134,13 +148,8 @@ def _table(path: Path, rig: Rig, rate: float | None, limits: Limits) -> LoadedMo
 
 def _capture(path: Path, rig: Rig, rate: float | None) -> LoadedMotion:
     from warpjld.motion.bvh import read_bvh
-    from warpjld.motion.retarget import correspondence, retarget
 
-    clip = read_bvh(path)
-    clip = clip if rate is None else clip.at_rate(rate)
-    driven = ", ".join(f"{own} ← {theirs}" for own, theirs in correspondence(clip, rig.skeleton).items())
-    notes = (f"besides the trunk these joints follow the recording: {driven}",) if driven else ()
-    return LoadedMotion(retarget(clip, rig.skeleton), clip.rate, notes)
+    return _retargeted(read_bvh(path), rig, rate)
 
 
 def _tracked_hand(path: Path, rig: Rig, rate: float | None, side: str | None) -> LoadedMotion:

@@ -15,9 +15,16 @@ Where both have a thumb, the hand is further turned about its axis until the thu
 exceptions, where rest directions say more about how a skeleton was modelled than about its pose: the trunk
 (A = 1, rotations interpolated along the spine, whatever the numbers of vertebrae), the collar bones (A = 1) and the
 feet (only the heading is aligned, so that flat soles stay flat). Joints without counterpart follow their parent.
+
+A recording may divide a limb into parts, or move joints along or across bones: R of a limb's segment is the rotation of
+the part that a femur or humerus turns with (the last), or an elbow or shin does (the first), and further the smallest
+rotation that brings the segment to where the *joints* at its ends lie in each frame. A rest pose that is no pose is
+replaced first, see :mod:`warpjld.motion.rest_pose`.
 """
 
 from __future__ import annotations
+
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -25,21 +32,41 @@ from scipy.spatial.transform import Rotation
 
 from warpjld.errors import InputError
 from warpjld.motion.clip import Clip
-from warpjld.motion.landmarks import Landmarks, landmarks_of_clip, landmarks_of_skeleton
+from warpjld.motion.landmarks import Landmarks, landmarks_of_skeleton
+from warpjld.motion.rest_pose import with_usable_rest
 from warpjld.rotations import conjugate, minimal_rotation, multiply, rotate, slerp, unit
 from warpjld.skeleton import DIGITS, Poses, Skeleton, poses_from_rotations
 
-__all__ = ["correspondence", "retarget"]
+__all__ = ["Retargeted", "correspondence", "retarget", "retarget_and_tell"]
 
 _LIMBS = ("clavicle", "shoulder", "elbow", "wrist", "hip", "knee", "ankle", "ball")
+_DIGIT_JOINTS = ("base", "knuckle2", "knuckle3")
 _IDENTITY = np.array([0.0, 0.0, 0.0, 1.0])
 _GROUND_PERCENTILE = 10.0
 """Feet are tracked with noise: the height they come down to is a low percentile over the clip, not its minimum."""
 
+_FLAT = 0.3
+"""Sine of the angle between foot and shin below which a rest does not say where the foot heads."""
+
+
+@dataclass(frozen=True, eq=False)
+class Retargeted:
+    """A recording on a rig.
+
+    Attributes:
+        poses: The rig's poses, frame after frame.
+        used: Joints of the recording that drive a joint of the rig, or carry one that does.
+        notes: What drives what, and what was guessed.
+    """
+
+    poses: Poses
+    used: frozenset[int]
+    notes: tuple[str, ...]
+
 
 def correspondence(clip: Clip, skeleton: Skeleton) -> dict[str, str]:
     """Which joint of a recording drives which joint of a rig, besides the trunk: rig's name → recording's name."""
-    return {skeleton.names[own]: clip.names[joint] for own, joint in _pairs(clip, skeleton)[2].values()}
+    return {skeleton.names[own]: clip.names[joint] for own, joint in _pairs(clip, skeleton)[3].values()}
 
 
 def retarget(clip: Clip, skeleton: Skeleton) -> Poses:
@@ -51,7 +78,12 @@ def retarget(clip: Clip, skeleton: Skeleton) -> Poses:
     Raises:
         InputError: Nothing of the recording was recognised in the rig.
     """
-    source, target, pairs = _pairs(clip, skeleton)
+    return retarget_and_tell(clip, skeleton).poses
+
+
+def retarget_and_tell(clip: Clip, skeleton: Skeleton) -> Retargeted:
+    """As ``retarget``, with what a reader of the result should know."""
+    clip, source, target, pairs, notes = _pairs(clip, skeleton)
     if not pairs and (source.pelvis is None or target.pelvis is None):
         raise InputError(
             f"no joint of the motion ({_some(clip.names)}) was recognised as one of the rig ({_some(skeleton.names)})"
@@ -71,8 +103,9 @@ def retarget(clip: Clip, skeleton: Skeleton) -> Poses:
             world[:, j] = trunk[j]
         elif j in driven:
             name, bone = driven[j]
+            turned = multiply(multiply(axes, _turned(clip, source, name, bone)), conjugate(axes))
             align[j] = _alignment(name, source, target, axes, align[j])
-            world[:, j] = multiply(recorded[:, bone], align[j])
+            world[:, j] = multiply(turned, align[j])
         else:
             world[:, j] = _IDENTITY if parent < 0 else world[:, parent]
     above = -1 if trunk else int(skeleton.parents[min(j for j, _ in pairs.values())])
@@ -84,22 +117,94 @@ def retarget(clip: Clip, skeleton: Skeleton) -> Poses:
         if skeleton.parents[j] >= 0:
             local[:, j] = multiply(conjugate(world[:, skeleton.parents[j]]), world[:, j])
     poses = poses_from_rotations(skeleton, local)
-    return Poses(poses.positions + _travel(clip, source, target, pairs, axes, poses), poses.rotations, poses.flexion)
+    scale, guessed = _scale(source, target, pairs)
+    poses = Poses(
+        poses.positions + _travel(clip, source, target, pairs, axes, poses, scale), poses.rotations, poses.flexion
+    )
+    used = {bone for _, bone in pairs.values()} | {source.last_part(name) for name in pairs if name in source.joints}
+    used |= _trunk_followed(source, target) if trunk else set()
+    return Retargeted(
+        poses,
+        frozenset(j for bone in used for j in source.path(-1, bone)),
+        (*notes, *_told(clip, skeleton, pairs, trunk, target), *guessed),
+    )
 
 
-def _pairs(clip: Clip, skeleton: Skeleton) -> tuple[Landmarks, Landmarks, dict[str, tuple[int, int]]]:
-    """Landmarks of both, and per canonical name its joint in the rig and in the recording."""
+def _told(
+    clip: Clip,
+    skeleton: Skeleton,
+    pairs: dict[str, tuple[int, int]],
+    trunk: dict[int, NDArray[np.float64]],
+    target: Landmarks,
+) -> list[str]:
+    """What drives what, and which limbs and digits of the rig nothing drives."""
+    besides = "besides the trunk " if trunk else ""
+    driven = ", ".join(f"{skeleton.names[own]} ← {clip.names[bone]}" for own, bone in pairs.values())
+    notes = [f"{besides}these joints follow the recording: {driven}"] if driven else []
+    idle = [name for name in _limb_names() if name in target.joints and name not in pairs]
+    if idle:
+        notes.append(f"not in the recording, these follow the joint above them: {', '.join(idle)}")
+    return notes
+
+
+def _limb_names() -> list[str]:
+    return [
+        f"{side}.{part}"
+        for side in ("left", "right")
+        for part in (*_LIMBS, *(f"{digit}.{joint}" for digit in DIGITS for joint in _DIGIT_JOINTS))
+    ]
+
+
+def _pairs(
+    clip: Clip, skeleton: Skeleton
+) -> tuple[Clip, Landmarks, Landmarks, dict[str, tuple[int, int]], tuple[str, ...]]:
+    """The clip with a usable rest, landmarks of both, and per canonical name its joint in the rig and in the clip."""
     sides = {name.partition(".")[0] for name in skeleton.names if name.endswith(".wrist")}
-    source = landmarks_of_clip(clip, side=sides.pop() if len(sides) == 1 else None)
+    clip, source, notes = with_usable_rest(clip, side=sides.pop() if len(sides) == 1 else None)
     target = landmarks_of_skeleton(skeleton)
     both = source.joints.keys() & target.joints.keys()
-    names = [f"{side}.{limb}" for side in ("left", "right") for limb in _LIMBS]
+    # a single bone for a whole finger is a mitten: it would bend this finger and not its neighbours
+    mittens = {
+        f"{side}.{digit}"
+        for side in ("left", "right")
+        for digit in DIGITS
+        if not {f"{side}.{digit}.base", f"{side}.{digit}.knuckle2"} <= both
+    }
+    names = [n for n in _limb_names() if n in both and n.rpartition(".")[0] not in mittens]
+    pairs = {n: (target.joints[n], source.joints[n]) for n in names}
+    return clip, source, target, pairs | _toes(source, target), notes
+
+
+def _toes(source: Landmarks, target: Landmarks) -> dict[str, tuple[int, int]]:
+    """Toes by number; where one has five and the other only a ball, its ball goes with all of them."""
+    out = {}
     for side in ("left", "right"):
-        for digit in DIGITS:
-            # a single bone for a whole finger is a mitten: it would bend this finger and not its neighbours
-            if {f"{side}.{digit}.base", f"{side}.{digit}.knuckle2"} <= both:
-                names += [f"{side}.{digit}.{joint}" for joint in ("base", "knuckle2", "knuckle3")]
-    return source, target, {n: (target.joints[n], source.joints[n]) for n in names if n in both}
+        toes = [name for name in target.joints if name.startswith(f"{side}.toe") and not name.endswith(".tip")]
+        ball = source.joints.get(f"{side}.ball")
+        for name in toes:
+            if name in source.joints:
+                out[name] = target.joints[name], source.joints[name]
+            elif name.endswith(".base") and ball is not None and f"{side}.ball" not in target.joints:
+                out[name] = target.joints[name], ball
+        middle = next((source.joints[k] for n in (3, 2, 1) if (k := f"{side}.toe{n}.base") in source.joints), None)
+        if f"{side}.ball" in target.joints and ball is None and middle is not None:
+            out[f"{side}.ball"] = target.joints[f"{side}.ball"], middle
+    return out
+
+
+def _turned(clip: Clip, source: Landmarks, name: str, bone: int) -> NDArray[np.float64]:
+    """R of one segment: its rotation from rest in the recording's axes, shape (F, 4); see the module's text."""
+    end = source.following(name) if name in source.joints else None
+    if end is None:
+        return clip.rotations[:, bone]
+    # an upper arm or thigh turns as a whole, an elbow or knee does not twist: what follows twists along the segment
+    part = source.last_part(name) if name.endswith((".shoulder", ".hip")) else bone
+    given = rotate(clip.rotations[:, part], clip.rest[end] - clip.rest[bone])
+    wanted = clip.positions[:, end] - clip.positions[:, bone]
+    known = (np.linalg.norm(given, axis=1) > 0.0) & (np.linalg.norm(wanted, axis=1) > 0.0)
+    out = clip.rotations[:, part].copy()
+    out[known] = multiply(minimal_rotation(given[known], wanted[known]), out[known])
+    return out
 
 
 def _axes(source: Landmarks, target: Landmarks) -> NDArray[np.float64]:
@@ -114,13 +219,14 @@ def _axes(source: Landmarks, target: Landmarks) -> NDArray[np.float64]:
 
 
 def _body_frame(marks: Landmarks) -> NDArray[np.float64] | None:
-    """Columns: left, up, forward."""
-    if marks.pelvis is None or "left.knee" not in marks.joints or "right.knee" not in marks.joints:
+    """Columns: left, up, forward; up is against the thighs, or along the trunk of half a body."""
+    thighs, trunk = marks.segment("hip", "knee", marks.rest), marks.trunk(marks.rest)
+    across = next((a for part in ("hip", "shoulder") if (a := marks.across(part, marks.rest)) is not None), None)
+    along = trunk if thighs is None else -thighs.sum(axis=0)
+    if across is None or along is None:
         return None
-    knees = marks.rest[[marks.joints["left.knee"], marks.joints["right.knee"]]]
-    hips = marks.rest[[marks.joints["left.hip"], marks.joints["right.hip"]]]
-    up = unit((hips - knees).sum(axis=0))
-    left = unit(np.cross(up, np.cross(hips[0] - hips[1], up)))
+    up = unit(along)
+    left = unit(np.cross(up, np.cross(across, up)))
     return np.column_stack([left, up, np.cross(left, up)])
 
 
@@ -143,6 +249,12 @@ def _trunk(source: Landmarks, target: Landmarks, recorded: NDArray[np.float64]) 
     return out
 
 
+def _trunk_followed(source: Landmarks, target: Landmarks) -> set[int]:
+    """Joints of the recording's trunk that have a counterpart."""
+    ends = [(marks.pelvis, marks.chest, marks.joints.get("head")) for marks in (source, target)]
+    return {a for a, b in zip(*ends, strict=True) if a is not None and b is not None}
+
+
 def _alignment(
     name: str, source: Landmarks, target: Landmarks, axes: NDArray[np.float64], inherited: NDArray[np.float64]
 ) -> NDArray[np.float64]:
@@ -150,6 +262,8 @@ def _alignment(
     side, _, part = name.partition(".")
     if part == "clavicle":
         return _IDENTITY
+    if name not in source.joints:
+        return inherited
     wanted, own = source.bone(name), target.bone(name)
     if wanted is None or own is None:
         return inherited
@@ -157,6 +271,8 @@ def _alignment(
     if part == "ankle":
         shin = target.bone(f"{side}.knee") if f"{side}.knee" in target.joints else None
         up = np.array([0.0, 1.0, 0.0]) if shin is None else rotate(inherited, -shin)
+        if np.linalg.norm(np.cross(unit(up), unit(wanted))) < _FLAT:
+            return inherited
         return multiply(_turn_about(up, moved, wanted), inherited)
     aligned = multiply(minimal_rotation(moved, wanted), inherited)
     thumbs = source.thumb_side(side), target.thumb_side(side)
@@ -180,35 +296,37 @@ def _travel(
     pairs: dict[str, tuple[int, int]],
     axes: NDArray[np.float64],
     poses: Poses,
+    scale: float,
 ) -> NDArray[np.float64]:
     """Displacement [m] to add to all joints, shape (F, 1, 3)."""
     if source.pelvis is not None and target.pelvis is not None:
         joint, bone = target.pelvis, source.pelvis
     else:
         joint, bone = min(pairs.values())
-    scale = _scale(source, target, pairs)
     moved = scale * rotate(axes, clip.positions[:, bone] - clip.positions[0, bone])
     travel = (target.rest[joint] - poses.positions[:, joint] + moved)[:, None]
-    feet = [j for side in ("left", "right") for j in _foot(target, f"{side}.ankle") if f"{side}.ankle" in pairs]
-    if feet:
-        heights = (poses.positions[:, feet, 1] + travel[..., 1]).min(axis=1)
-        travel[..., 1] += target.rest[feet, 1].min() - np.percentile(heights, _GROUND_PERCENTILE)
+    if any(name.endswith(".ankle") for name in pairs):
+        tips = {j for name, j in target.joints.items() if ".toe" in name and not name.endswith(".base")}
+        # all joints, for people kneel and stand on their hands; but toes' tips dig into the floor where shoes bend less
+        down = [j for j in range(len(target.rest)) if j not in tips]
+        heights = (poses.positions[:, down, 1] + travel[..., 1]).min(axis=1)
+        travel[..., 1] += target.rest[down, 1].min() - np.percentile(heights, _GROUND_PERCENTILE)
     return travel
 
 
-def _foot(marks: Landmarks, ankle: str) -> list[int]:
-    start = marks.joints.get(ankle)
-    return [] if start is None else [j for j in range(len(marks.rest)) if marks.path(start, j)] or [start]
-
-
-def _scale(source: Landmarks, target: Landmarks, pairs: dict[str, tuple[int, int]]) -> float:
+def _scale(source: Landmarks, target: Landmarks, pairs: dict[str, tuple[int, int]]) -> tuple[float, tuple[str, ...]]:
+    """Size of the rig in the recording's units, by its legs or else by what both have, and a note on the latter."""
     legs = [name for name in pairs if name.endswith((".hip", ".knee"))]
     lengths = []
     for marks in (source, target):
-        bones = [marks.bone(name) for name in legs or pairs]
+        bones = [marks.bone(name) if name in marks.joints else None for name in legs or pairs]
         lengths.append([0.0 if bone is None else float(np.linalg.norm(bone)) for bone in bones])
     known = [(a, b) for a, b in zip(*lengths, strict=True) if a > 0.0 and b > 0.0]
-    return sum(b for _, b in known) / sum(a for a, _ in known) if known else 1.0
+    scale = sum(b for _, b in known) / sum(a for a, _ in known) if known else 1.0
+    if legs and known:
+        return scale, ()
+    told = "by the other bones that both have" if known else "as 1 to 1, for no bone tells"
+    return scale, (f"the recording and the rig share no legs: how far it travels is guessed {told}",)
 
 
 def _some(names: tuple[str, ...]) -> str:

@@ -2,8 +2,10 @@
 
 WebXR ``index-finger-phalanx-proximal``, SMPL-X ``left_index1``, MakeHuman and Anny ``finger2-1.L``, Mixamo
 ``mixamorig:LeftHandIndex1``, Leap ``L_index_a``, Godot and VRM ``LeftIndexProximal`` ``J_Bip_L_Index1``, OpenXR
-``Index_Proximal_L``, Unreal ``index_01_l``, Rigify ``f_index.01.L``: all are a side, a few words and a number, so one
-vocabulary reads them all.
+``Index_Proximal_L``, Unreal ``index_01_l``, Rigify ``f_index.01.L``, Poser and DAZ ``lIndex1``, Rokoko
+``LeftFinger2Proximal``, Xsens ``LeftSecondPP``, Perception Neuron and HumanIK ``LeftInHandIndex``, Biped
+``Bip01 L Finger1``, OptiTrack ``LUArm``, CMU ``lhumerus``, Kinect ``ElbowLeft``: all are a side, a few words and a
+number, so one vocabulary reads them all.
 """
 
 from __future__ import annotations
@@ -11,6 +13,7 @@ from __future__ import annotations
 import re
 from dataclasses import dataclass
 from functools import cache
+from itertools import pairwise
 
 __all__ = ["Meaning", "read_name"]
 
@@ -32,6 +35,9 @@ _DIGITS = {
     "little": "pinky",
     "small": "pinky",
 }
+_ORDINALS = {"first": "thumb", "second": "index", "third": "middle", "fourth": "ring", "fifth": "pinky"}
+"""Of Xsens, before a phalanx: ``FirstMC``, ``SecondPP``."""
+_PHALANGES = {"mc": 0, "pp": 1, "mp": 2, "dp": 3}
 _NUMBERED_DIGITS = ("thumb", "index", "middle", "ring", "pinky")
 _RANKS = {
     "metacarpal": 0,
@@ -51,6 +57,7 @@ _RANKS = {
     "null": 4,
     "top": 4,
 }
+_NAMED_RANKS = ("metacarpal", "proximal", "intermediate", "medial", "distal", "tip")
 _LETTERS = {"a": 1, "b": 2, "c": 3}
 _KINDS = {
     "wrist": "wrist",
@@ -65,10 +72,19 @@ _KINDS = {
     "scapula": "scapula",
     "clavicle": "clavicle",
     "collar": "clavicle",
+    "collarbone": "clavicle",
+    "clav": "clavicle",
+    "shldr": "shoulder",
+    "humerus": "upperarm",
+    "radius": "forearm",
+    "ulna": "forearm",
+    "uarm": "upperarm",
+    "farm": "forearm",
     "thigh": "thigh",
     "upperleg": "thigh",
     "upleg": "thigh",
     "femur": "thigh",
+    "tibia": "shin",
     "hip": "hip",
     "hips": "pelvis",
     "pelvis": "pelvis",
@@ -84,11 +100,19 @@ _KINDS = {
     "toe": "toe",
     "toes": "toe",
     "toebase": "toe",
+    "bigtoe": "toe",
     "spine": "spine",
     "chest": "spine",
     "upperchest": "spine",
     "abdomen": "spine",
     "torso": "spine",
+    "thorax": "spine",
+    "waist": "spine",
+    "ab": "spine",
+    "lowerback": "spine",
+    "upperback": "spine",
+    "lowerneck": "neck",
+    "upperneck": "neck",
     "neck": "neck",
     "head": "head",
     "root": "root",
@@ -107,8 +131,20 @@ _HELPERS = {
     "ignore",
     "stub",
     "grip",
+    "share",
+    "inner",
+    "outer",
+    "bicep",
+    "tricep",
+    "pec",
+    "fwd",
+    "bck",
+    "footsteps",
 }
-_FILLERS = {"finger", "fingers", "knuckle", "phalanx", "joint", "bone", "def", "org", "bip", "mixamorig"}
+_FILLERS = {"finger", "fingers", "knuckle", "phalanx", "joint", "bone", "def", "org", "bip", "mixamorig", "bend", "big"}
+_VERTEBRAE = ("L5", "L3", "T12", "T8")
+"""Xsens names segments of the spine so; ``L`` is no side there."""
+_NOT_SIDED = {"root", "armature", "pelvis", "hips", "head", "neck", "spine", "chest", "upperchest", "torso", "ab"}
 _COMPOUNDS = {
     ("upper", "arm"),
     ("lower", "arm"),
@@ -118,6 +154,12 @@ _COMPOUNDS = {
     ("lower", "leg"),
     ("up", "leg"),
     ("low", "leg"),
+    ("u", "arm"),
+    ("f", "arm"),
+    ("lower", "back"),
+    ("upper", "back"),
+    ("lower", "neck"),
+    ("upper", "neck"),
     ("upper", "chest"),
     ("toe", "base"),
 }
@@ -126,6 +168,11 @@ _LONG_FIRST = sorted(
     key=len,
     reverse=True,
 )
+_WORDS = {*_SIDES, *_DIGITS, *_RANKS, *_KINDS, *_HELPERS, *_FILLERS}
+_SIDED = {*_DIGITS, *_KINDS, "fingers", "metacarpal", "carpal", "palm"} - _NOT_SIDED
+"""What a single letter of a side may stand before without a capital."""
+_CAPITALS = re.compile(r"(^|_)[LR][UF]Arm$")
+"""Of OptiTrack: four capitals would else be read as one word."""
 
 
 @dataclass(frozen=True)
@@ -151,26 +198,47 @@ class Meaning:
 @cache
 def read_name(name: str) -> Meaning:
     """Meaning of a joint name in any of the known conventions; an empty :class:`Meaning` for any other."""
+    if name.rsplit(":", 1)[-1] in _VERTEBRAE:
+        return Meaning(None, "spine", number=int(re.findall(r"\d+", name)[-1]))
     words = _words(name)
     side = next((_SIDES[w] for w in words if w in _SIDES), None)
     numbers = [int(w) for w in words if w.isdigit()]
     number = numbers[-1] if numbers else None
-    if any(w in _HELPERS for w in words):
-        return Meaning(side, "helper")
     kinds = [_KINDS[w] for w in words if w in _KINDS]
+    if any(w in _HELPERS for w in words) and not ("twist" in words and kinds in (["neck"], ["spine"])):
+        return Meaning(side, "helper")
     if "toe" in kinds:
         return Meaning(side, "toe", rank=_rank(words), number=numbers[0] if numbers else None)
-    digit = next((_DIGITS[w] for w in words if w in _DIGITS), None)
-    if digit is None and "finger" in words:
-        digit, number = _numbered([w for w in words[words.index("finger") :] if w.isdigit()])
+    digit, rank, number = _digit(words, number)
+    if digit is not None and "foot" in words:  # HumanIK's LeftFootIndex1, LeftInFootThumb
+        return Meaning(side, "toe", rank=rank, number=_NUMBERED_DIGITS.index(digit) + 1)
     if digit is not None:
-        return Meaning(side, "digit", digit, _rank(words), number)
+        return Meaning(side, "digit", digit, rank, number)
     if any(w in ("metacarpal", "carpal") for w in words) or ("palm" in words and numbers):
         return Meaning(side, "carpal", rank=0, number=number)
     if kinds:
+        kind = "spine" if side is None and "spine" in kinds else kinds[-1]  # Kinect's SpineShoulder
         end = " end" if _rank(words) == 4 else ""
-        return Meaning(side, kinds[-1] + end, number=number)
+        return Meaning(side, ("pelvis" if (side, kind) == (None, "hip") else kind) + end, number=number)
     return Meaning(side, "palm" if "palm" in words else None, number=number)
+
+
+def _digit(words: list[str], number: int | None) -> tuple[str | None, int | None, int | None]:
+    """Digit, rank and number of a joint of a finger."""
+    rank = _rank(words)
+    for ordinal, phalanx in pairwise(words):
+        if ordinal in _ORDINALS and phalanx in _PHALANGES:
+            return _ORDINALS[ordinal], _PHALANGES[phalanx], number
+    digit = next((_DIGITS[w] for w in words if w in _DIGITS), None)
+    if digit is not None:
+        inside = any(pair == ("in", "hand") for pair in pairwise(words))
+        return digit, 0 if inside else rank, number
+    if "finger" in words and "extra" not in words:
+        counts = [w for w in words[words.index("finger") :] if w.isdigit()]
+        if len(counts) == 1 and 1 <= int(counts[0]) <= 5 and any(w in _NAMED_RANKS for w in words):
+            return _NUMBERED_DIGITS[int(counts[0]) - 1], rank, None  # Rokoko's LeftFinger1Proximal is a thumb's
+        return _numbered(counts)[0], rank, _numbered(counts)[1]
+    return None, rank, number
 
 
 def _rank(words: list[str]) -> int | None:
@@ -194,7 +262,8 @@ def _numbered(numbers: list[str]) -> tuple[str | None, int | None]:
 
 
 def _words(name: str) -> list[str]:
-    name = name.rsplit(":", 1)[-1]
+    name = re.sub(r"^CC_Base_", "", name.rsplit(":", 1)[-1])
+    name = re.sub(r"^([LR])([UF]Arm)$", r"\1_\2", name.rsplit("_", 1)[-1]) if _CAPITALS.search(name) else name
     pieces = re.findall(r"[A-Z]+(?![a-z])|[A-Z]?[a-z]+|\d+", name)
     words: list[str] = []
     for piece in (p.lower() for p in pieces):
@@ -209,14 +278,23 @@ def _words(name: str) -> list[str]:
 
 
 def _split(piece: str) -> list[str]:
-    """Words run together, as in ``lefthandindex``; the piece itself where it is not made of known words."""
-    if piece in _KINDS or piece in _DIGITS or piece in _SIDES or len(piece) < 5:
+    """Words run together, as in ``lefthandindex`` or ``lfemur``; the piece itself where it is not of known words."""
+    if piece in _WORDS or len(piece) < 4:
         return [piece]
-    rest, out = piece, []
-    while rest:
-        word = next((w for w in _LONG_FIRST if rest.startswith(w)), None)
+    found = _known(piece)
+    if not found and piece[0] in "lr":
+        found = _known(piece[1:])
+        found = [piece[0], *found] if found and found[0] in _SIDED else []
+    return found or [piece]
+
+
+def _known(piece: str) -> list[str]:
+    """The known words a piece is made of, longest first; none where anything is left over."""
+    out = []
+    while piece:
+        word = next((w for w in _LONG_FIRST if piece.startswith(w)), None)
         if word is None:
-            return [piece]
+            return []
         out.append(word)
-        rest = rest[len(word) :]
+        piece = piece[len(word) :]
     return out

@@ -1,0 +1,140 @@
+"""What looks wrong in a recorded motion, and what of it a rig does not follow: warnings for every command."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Collection, Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial.transform import Rotation
+
+from warpjld.motion.clip import Clip
+from warpjld.motion.joint_animation import JointAnimation
+from warpjld.rotations import conjugate, multiply, rotate
+from warpjld.skeleton.recognise.names import read_name
+
+__all__ = ["doubts_of_animation", "doubts_of_clip", "jumps"]
+
+_JUMP = 90.0
+"""Degrees from one sample to the next above which a joint hardly turned by itself: 2700° a second at 30 samples."""
+
+_MOVES = 5.0
+"""Degrees that a joint turns by, to its parent, above which it is moved and not only kept in place."""
+
+_SHIFTS = 0.01
+"""Of the size of the figure, by which a joint moves from its parent, for the same."""
+
+_SHOWN = 4
+
+
+def jumps(names: Sequence[str], turns: NDArray[np.float64]) -> list[str]:
+    """Joints that turn by more than 90° from one sample to the next, each with its widest, and where.
+
+    Args:
+        names: Of the joints.
+        turns: Rotations to their parents at all samples, unit quaternions, shape (F, J, 4).
+    """
+    if len(turns) < 2:
+        return []
+    steps = _degrees_between(turns[:-1], turns[1:])
+    widest = steps.max(axis=0)
+    found = [int(j) for j in np.argsort(-np.round(widest, 1), kind="stable") if widest[j] > _JUMP]
+    lines = [
+        f"{names[j]} turns by {widest[j]:.0f}° from frame {at} to {at + 1} of the recording: a flip?"
+        for j in found[:_SHOWN]
+        for at in (int(np.argmax(steps[:, j] >= widest[j] - 0.05)),)
+    ]
+    if len(found) > _SHOWN:
+        others = [names[j] for j in found[_SHOWN:]]
+        lines.append(f"so do {_listed(others)}, by more than {_JUMP:.0f}° from one frame to the next")
+    return lines
+
+
+def doubts_of_clip(clip: Clip, used: Collection[int]) -> list[str]:
+    """What a clip moves and nothing in the rig follows.
+
+    Args:
+        clip: The recording.
+        used: Its joints that drive a joint of the rig, or carry one that does.
+    """
+    at_rest = np.tile([0.0, 0.0, 0.0, 1.0], (len(clip.names), 1))
+    return _unfollowed(clip.names, clip.parents, clip.positions, clip.rotations, (clip.rest, at_rest), used)
+
+
+def doubts_of_animation(animation: JointAnimation, followed: Collection[str]) -> list[str]:
+    """Jumps of an animation on a rig's own joints, and what it moves and the rig does not follow.
+
+    Args:
+        animation: The animation.
+        followed: Names of its joints that are joints of the rig.
+    """
+    tree, worlds = animation.tree, animation.worlds
+    rotations, at_rest = _nearest_rotations(worlds[..., :3, :3]), _nearest_rotations(tree.frames[:, :3, :3])
+    used = {k for j, name in enumerate(tree.names) if name in followed for k in (j, *tree.ancestors(j))}
+    rest = tree.positions, at_rest
+    return [
+        *jumps(tree.names, _to_parents(tree.parents, rotations)),
+        *_unfollowed(tree.names, tree.parents, worlds[..., :3, 3], rotations, rest, used),
+    ]
+
+
+def _unfollowed(
+    names: Sequence[str],
+    parents: NDArray[np.int64],
+    positions: NDArray[np.float64],
+    rotations: NDArray[np.float64],
+    rest: tuple[NDArray[np.float64], NDArray[np.float64]],
+    used: Collection[int],
+) -> list[str]:
+    """One line at most; a single frame is compared with the rest (positions and rotations), others with their first."""
+    size = float(np.linalg.norm(np.ptp(positions[0], axis=0)))
+    if len(positions) == 1:
+        positions = np.concatenate([rest[0][None], positions])
+        rotations = np.concatenate([rest[1][None], rotations])
+    local = _to_parents(parents, rotations)
+    angles = _degrees_between(local[:1], local).max(axis=0)
+    above = np.maximum(parents, 0)
+    places = rotate(conjugate(rotations[:, above]), positions - positions[:, above])
+    shifts = np.linalg.norm(places - places[:1], axis=-1).max(axis=0)
+    moved = [
+        names[j]
+        for j in range(len(names))
+        if j not in used
+        and (angles[j] > _MOVES or (parents[j] >= 0 and shifts[j] > _SHIFTS * size))
+        and read_name(names[j]).kind != "helper"
+    ]
+    return [f"the motion moves {_listed(moved)}, which nothing in the rig follows"] if moved else []
+
+
+def _to_parents(parents: NDArray[np.int64], rotations: NDArray[np.float64]) -> NDArray[np.float64]:
+    inner = parents >= 0
+    out = rotations.copy()
+    out[:, inner] = multiply(conjugate(rotations[:, parents[inner]]), rotations[:, inner])
+    return out
+
+
+def _degrees_between(a: NDArray[np.float64], b: NDArray[np.float64]) -> NDArray[np.float64]:
+    apart = multiply(conjugate(a), b)
+    return np.asarray(2.0 * np.degrees(np.arctan2(np.linalg.norm(apart[..., :3], axis=-1), np.abs(apart[..., 3]))))
+
+
+def _nearest_rotations(matrices: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Quaternions of matrices that may also scale, mirror or flatten."""
+    left, _, right = np.linalg.svd(matrices)
+    left[..., -1] *= np.sign(np.linalg.det(left @ right))[..., None]
+    turned = Rotation.from_matrix((left @ right).reshape(-1, 3, 3)).as_quat()
+    return np.asarray(turned.reshape(*matrices.shape[:-2], 4))
+
+
+def _listed(names: Sequence[str]) -> str:
+    """Names, those that only count up as ``Thumb1…Thumb3``; the first few, and how many more."""
+    runs: list[list[str]] = []
+    for name in names:
+        if runs and re.sub(r"\d", "", runs[-1][-1]) == re.sub(r"\d", "", name):
+            runs[-1].append(name)
+        else:
+            runs.append([name])
+    shown = [run[0] if len(run) == 1 else f"{run[0]}…{run[-1]}" for run in runs[:_SHOWN]]
+    rest = sum(len(run) for run in runs[_SHOWN:])
+    return ", ".join(shown) + (f" and {rest} more" if rest else "")

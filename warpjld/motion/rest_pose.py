@@ -1,0 +1,213 @@
+"""A rest that retargeting can start from: the recording's own, or, where that is arbitrary, a frame of the motion.
+
+Several mocap systems write every OFFSET along the bone's own X, or none at all and a position for every joint: the
+rest pose is then no pose. Where bones point in the *frames* holds whatever the rest is, so the frame that is most like
+somebody standing straight takes its place, told so that the body stands upright there and faces an axis; its lean and
+heading stay in the motion. A rest that is a pose may still stand along another axis than the figure does in the
+frames, where a root carries all frames from one to the other; the floor tells that from somebody who lies down.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial.transform import Rotation
+
+from warpjld.motion.clip import Clip
+from warpjld.motion.landmarks import Landmarks, landmarks_of_clip
+from warpjld.rotations import rotate, slerp, unit
+
+__all__ = ["with_usable_rest"]
+
+_OFF = 10.0
+"""Degrees by which a rest's bones, carried by the rotations, may miss those of the frames."""
+
+_LEAN = 10.0
+"""Degrees from the vertical within which a trunk counts as upright: where spines of models lean anyway."""
+
+_AS_GOOD = 10.0
+"""Degrees by which a frame may be less like somebody standing than the best one, and come first nevertheless."""
+
+_MOSTLY = 0.8
+"""Length of the mean of a figure's directions from feet to head above which it stands or lies one way all along."""
+
+_FLOOR = 0.08
+"""Heights, per size of the figure, within which its lowest joint stays on a floor."""
+
+_AXES = ("x", "y", "z")
+_SIDEWAYS = 0.2
+"""Length of what remains of a line across the body, per length, from where on it has a direction."""
+
+
+def with_usable_rest(clip: Clip, *, side: str | None = None) -> tuple[Clip, Landmarks, tuple[str, ...]]:
+    """A recording with a rest that is a pose, its landmarks, and notes on what was put in its place."""
+    marks = landmarks_of_clip(clip, side=side)
+    ways = _ways(marks, clip.positions)
+    if ways is None:
+        return clip, marks, ()
+    why = _arbitrary(clip, marks)
+    if why:
+        up = _signed_axis(ways.mean(axis=0))
+        frame = _most_like_standing(marks, clip.positions, up)
+        clip = clip.rebased(frame, _turns(marks, clip.positions[frame], up))
+        notes = (f"the motion's rest says nothing of the body ({why}): its frame {frame} is taken as the rest",)
+        return clip, landmarks_of_clip(clip, side=side), notes
+    turn, told = _whole_turn(clip, marks, ways)
+    if turn is None:
+        return clip, marks, told
+    clip = clip.turned_rest(turn)
+    return clip, landmarks_of_clip(clip, side=side), told
+
+
+def _ways(marks: Landmarks, places: NDArray[np.float64]) -> NDArray[np.float64] | None:
+    """Unit vectors from feet (or knees, or pelvis) to head (or chest), of positions of shape (…, J, 3)."""
+    for part in ("ankle", "knee"):
+        if marks.joints.keys() >= {f"left.{part}", f"right.{part}"}:
+            low = places[..., [marks.joints[f"left.{part}"], marks.joints[f"right.{part}"]], :].mean(axis=-2)
+            top = next((j for j in (marks.joints.get("head"), marks.chest, marks.pelvis) if j is not None), None)
+            return None if top is None else unit(places[..., top, :] - low)
+    trunk = marks.trunk(places)
+    return None if trunk is None else unit(trunk)
+
+
+def _arbitrary(clip: Clip, marks: Landmarks) -> str:
+    """Why a rest is no pose of a body; "" where it is one."""
+    thighs, arms = marks.segment("hip", "knee", marks.rest), marks.segment("shoulder", "elbow", marks.rest)
+    trunk = marks.trunk(marks.rest)
+    for limbs in (thighs, arms):
+        if limbs is not None and not np.linalg.norm(limbs, axis=-1).all():
+            return "its bones have no length"
+    if trunk is not None and not np.linalg.norm(trunk):
+        return "its bones have no length"
+    if _inconsistent(clip, marks):
+        return "the joints of the frames are placed otherwise"
+    if thighs is not None:
+        if _degrees(thighs[0], thighs[1]) > 120.0:
+            return "its legs point apart"
+        if trunk is not None and _degrees(thighs.sum(axis=0), trunk) < 60.0:
+            return "its legs and its trunk point the same way"
+    across = next((a for p in ("hip", "shoulder") if (a := marks.across(p, marks.rest)) is not None and a.any()), None)
+    if arms is not None and across is not None:
+        left = unit(across)
+        mirrored = arms[1] - 2.0 * left * (left @ arms[1])
+        if _degrees(arms[0], mirrored) > 60.0:
+            return "its arms are not on both sides"
+        if trunk is not None and thighs is None and _degrees(arms.sum(axis=0), trunk) < 3.0:
+            return "its arms and its trunk point the same way"
+    return ""
+
+
+def _inconsistent(clip: Clip, marks: Landmarks) -> bool:
+    """Whether most bones of limbs do not point where rotations carry them from the rest."""
+    ends = {
+        (int(marks.parents[j]), j)
+        for part in ("elbow", "wrist", "knee", "ankle")
+        for side in ("left", "right")
+        if (j := marks.joints.get(f"{side}.{part}", -1)) >= 0 and marks.parents[j] >= 0
+    }
+    off = []
+    for parent, child in sorted(ends):
+        wanted = clip.positions[:, child] - clip.positions[:, parent]
+        given = rotate(clip.rotations[:, parent], marks.rest[child] - marks.rest[parent])
+        known = (np.linalg.norm(wanted, axis=1) > 0.0) & (np.linalg.norm(given, axis=1) > 0.0)
+        off += list(_degrees(wanted[known], given[known]))
+    return bool(off) and float(np.median(off)) > _OFF
+
+
+def _most_like_standing(marks: Landmarks, places: NDArray[np.float64], up: NDArray[np.float64]) -> int:
+    """First frame with a trunk and legs about as straight, and arms about as even, as those of any."""
+    score = np.zeros(len(places))
+    trunk = marks.trunk(places)
+    if trunk is not None:
+        score += _degrees(trunk, up)
+    for chain, share in ((("hip", "knee", "ankle"), 1.0), (("shoulder", "elbow", "wrist"), 0.5)):
+        upper, lower = marks.segment(*chain[:2], places), marks.segment(*chain[1:], places)
+        if upper is not None and chain[0] == "hip":
+            score += _degrees(-upper.sum(axis=0), up)
+        if upper is not None and lower is not None:
+            score += share * _degrees(upper, lower).sum(axis=0)
+        across = marks.across(chain[0], places)
+        if upper is not None and across is not None:
+            left = unit(across)
+            mirrored = upper[1] - 2.0 * left * (left * upper[1]).sum(-1, keepdims=True)
+            score += share * _degrees(upper[0], mirrored)
+    return int(np.argmax(score <= score.min() + _AS_GOOD))
+
+
+def _turns(marks: Landmarks, places: NDArray[np.float64], up: NDArray[np.float64]) -> NDArray[np.float64]:
+    """How a pose is turned from somebody who stands upright and faces an axis, for every bone, shape (B, 4)."""
+    trunk = marks.trunk(places)
+    rises = up if trunk is None or _degrees(trunk, up) < _LEAN else unit(trunk)
+    lines = [marks.across(part, places) for part in ("hip", "shoulder")]
+    frames = [None if line is None else _frame(line, rises) for line in lines]
+    known = next((frame for frame in frames if frame is not None), None)
+    if known is None:
+        return np.tile([0.0, 0.0, 0.0, 1.0], (len(places), 1))
+    standing = [g for g in Rotation.create_group("O").as_matrix() if g[:, 1] @ up > 0.5]
+    upright = max(standing, key=lambda g: float((g * known).sum()))
+    ends = np.array([Rotation.from_matrix((known if f is None else f) @ upright.T).as_quat() for f in frames])
+    pelvis, chest = marks.pelvis, marks.chest
+    spine = () if pelvis is None or chest is None else marks.path(pelvis, chest)
+    spread = slerp(np.array([0.0, 1.0]), ends, np.arange(1, len(spine) + 1) / max(len(spine), 1))
+    turns = np.empty((len(places), 4))
+    for j, parent in enumerate(marks.parents):
+        turns[j] = spread[spine.index(j)] if j in spine else (ends[0] if parent < 0 else turns[parent])
+    return turns
+
+
+def _frame(across: NDArray[np.float64], up: NDArray[np.float64]) -> NDArray[np.float64] | None:
+    """Columns: left, up, forward."""
+    left = across - up * (up @ across)
+    if np.linalg.norm(left) <= _SIDEWAYS * np.linalg.norm(across):
+        return None
+    left = unit(left)
+    return np.column_stack([left, up, np.cross(left, up)])
+
+
+def _whole_turn(
+    clip: Clip, marks: Landmarks, ways: NDArray[np.float64]
+) -> tuple[NDArray[np.float64] | None, tuple[str, ...]]:
+    """Turn of a rest that stands along another axis than the figure does in all frames; None where there is none."""
+    at_rest, pelvis = _ways(marks, marks.rest), marks.pelvis
+    mean = ways.mean(axis=0)
+    if at_rest is None or pelvis is None or np.linalg.norm(mean) < _MOSTLY:
+        return None, ()
+    own, found = _signed_axis(at_rest), _signed_axis(mean)
+    if own @ found > 0.5:
+        return None, ()
+    told = f"stands along {_axis_name(own)} in its rest and along {_axis_name(found)} in its frames"
+    if not _stands(clip.positions, found, own):
+        return None, (f"the recorded figure {told}: it is taken to lie, not to stand",)
+    fitting = [g for g in Rotation.create_group("O") if g.apply(own) @ found > 0.5]
+    mean_turn = Rotation.from_quat(clip.rotations[:, pelvis]).mean()
+    best = min(fitting, key=lambda g: float((mean_turn * g.inv()).magnitude()))
+    return np.asarray(best.as_quat()), (f"the recorded figure {told}: the latter is taken as up",)
+
+
+def _stands(places: NDArray[np.float64], up: NDArray[np.float64], other: NDArray[np.float64]) -> bool:
+    """Whether the floor is seen across one axis rather than another.
+
+    The lowest joints of somebody who stands stay where they are, at zero, or roam along the other axis.
+    """
+    size = float(np.linalg.norm(np.ptp(places[0], axis=0))) or 1.0
+    low, across = ((places @ axis).min(axis=1) / size for axis in (up, other))
+    still = float(np.ptp(low)) < 2.0 * _FLOOR
+    at_zero = abs(float(np.median(low))) < _FLOOR
+    return still and (at_zero or float(np.ptp(across)) > 0.3)
+
+
+def _signed_axis(direction: NDArray[np.float64]) -> NDArray[np.float64]:
+    out = np.zeros(3)
+    axis = int(np.abs(direction).argmax())
+    out[axis] = np.copysign(1.0, direction[axis])
+    return out
+
+
+def _axis_name(axis: NDArray[np.float64]) -> str:
+    k = int(np.abs(axis).argmax())
+    return f"{'-' if axis[k] < 0 else '+'}{_AXES[k]}"
+
+
+def _degrees(a: NDArray[np.float64], b: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Angles between vectors, shape of all but the last axis."""
+    return np.asarray(np.degrees(np.arctan2(np.linalg.norm(np.cross(a, b), axis=-1), (a * b).sum(-1))))
