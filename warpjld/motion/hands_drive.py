@@ -17,6 +17,8 @@ _SIDES = ("left", "right")
 _MOST_JOINTS = 3
 """A quarter of the fingers' twelve joints: one or two bent back for long are someone's supple last knuckles."""
 _MOST_FRAMES = 0.25
+_FAR = np.radians(30.0)
+"""No joint gives by so much more than trackers err."""
 
 
 def poses_of_hands(
@@ -132,8 +134,8 @@ def _followed(hands: list[HandMotion], own: list[str], side: str | None, notes: 
 def _check_bends(hand: HandMotion, *, given: bool) -> tuple[str, ...]:
     """Refuse fingers that bend to the back of the hand; warn of single joints that do, as trackers err.
 
-    Refused is a recording whose fingers would bend better as the other hand's, and one in which at least three of the
-    twelve joints bend back beyond their limits, and 15° more, for a quarter of the time.
+    Refused is a recording whose fingers would bend better as the other hand's, and one in which for a quarter of the
+    time at least three of the twelve joints bend back beyond their limits and 15° more, or one does and 45° more.
 
     Raises:
         InputError: Such a recording: names the joint that is worst, its frame and angle.
@@ -151,8 +153,10 @@ def _check_bends(hand: HandMotion, *, given: bool) -> tuple[str, ...]:
         raise InputError(
             f"as a {side} hand its fingers bend backwards, worst {worst}: it looks like the other hand's ({doubt})"
         )
-    often = (excess > 0.0).mean(axis=0) > _MOST_FRAMES
-    if np.count_nonzero(often) >= _MOST_JOINTS:
-        raise InputError(f"its fingers bend backwards on either hand, worst {worst}: not a hand's motion")
+    often, far = ((excess > least).mean(axis=0) > _MOST_FRAMES for least in (0.0, _FAR))
+    if np.count_nonzero(often) >= _MOST_JOINTS or far.any():
+        raise InputError(
+            f"its fingers bend backwards on either hand, worst {worst}: no hand's motion, or one of both hands in turn"
+        )
     frames = int(np.count_nonzero(excess.any(axis=(1, 2))))
     return (f"fingers bend backwards beyond their limits in {frames} of {len(excess)} frames, worst {worst}",)
