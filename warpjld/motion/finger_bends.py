@@ -73,9 +73,15 @@ def beyond(bends: NDArray[np.float64], side: str) -> NDArray[np.float64]:
 
 
 def bending_side(bends: NDArray[np.float64]) -> str | None:
-    """The hand whose flexions are the possible ones over all frames; None where both are, or neither."""
-    left, right = (float(beyond(bends, side).sum()) for side in ("left", "right"))
-    return None if abs(left - right) < _TELLING else ("right" if right < left else "left")
+    """The hand whose flexions are the possible ones over all frames; None where both are, or neither.
+
+    As the other one, at least two joints must bend beyond their limits: a single one may be a tracker's slip.
+    """
+    left, right = beyond(bends, "left"), beyond(bends, "right")
+    worse = left if left.sum() > right.sum() else right
+    if abs(left.sum() - right.sum()) < _TELLING or np.count_nonzero(worse.any(axis=0)) < 2:
+        return None
+    return "right" if worse is left else "left"
 
 
 def leaning(points: Mapping[str, NDArray[np.float64]], bends: NDArray[np.float64]) -> str | None:

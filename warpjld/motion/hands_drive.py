@@ -48,6 +48,8 @@ def poses_of_hands(
     notes: list[str] = []
     warnings: list[str] = []
     known = [_sided(hand, own, side if len(hands) == 1 else None, notes, warnings) for hand in hands]
+    if len({hand.side for hand in known}) < len(known):
+        raise InputError(f"both recorded hands look like {known[0].side} ones: the file must state their handedness")
     known = _followed(known, own, side, notes)
     for hand in known:
         warnings += _check_bends(hand, given=side is not None)

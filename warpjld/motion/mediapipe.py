@@ -77,16 +77,21 @@ def mediapipe_hands(content: Any, rate: float | None = None) -> HandRecording:
     frames = _frames(content)
     notes: list[str] = []
     times, rate = stated_times(about, [f if isinstance(f, Mapping) else {} for f in frames], rate, notes)
-    size = _image_size(about)
-    if size is None and any(isinstance(f, Mapping) and not _has(f, _WORLD) and _has(f, _STEMS) for f in frames):
-        notes.append("landmarks in parts of an image whose size the file does not state (image_size): taken as square")
-    scale = np.array([1.0, 1.0, 1.0]) if size is None else np.array([size[0], size[1], size[0]])
     seen: list[list[SeenHand]] = []
     for number, frame in enumerate(frames):
         try:
-            seen.append(_hands_of(frame, scale, about) if frame is not None else [])
+            seen.append(_hands_of(frame, about) if frame is not None else [])
         except (AttributeError, IndexError, KeyError, TypeError, ValueError) as error:
             raise InputError(f"frame {number}: not hands of 21 landmarks ({error})") from error
+    size = _image_size(about)
+    if _in_image(seen):
+        if size is None:
+            notes.append(
+                "landmarks in parts of an image whose size the file does not state (image_size): taken as square"
+            )
+        else:
+            scale = np.array([size[0], size[1], size[0]])
+            seen = [[replace(hand, points=hand.points * scale) for hand in hands] for hands in seen]
     return recording_of(seen, MEDIAPIPE_JOINTS, times, rate, notes)
 
 
@@ -146,12 +151,12 @@ def _frames(content: Any) -> list[Any]:
     return content if isinstance(content, list) else []
 
 
-def _hands_of(frame: Any, scale: NDArray[np.float64], about: Mapping[str, Any]) -> list[SeenHand]:
+def _hands_of(frame: Any, about: Mapping[str, Any]) -> list[SeenHand]:
     """The hands of one frame."""
     if not isinstance(frame, Mapping):
         frame = {"landmarks": frame}
     if isinstance(frame.get("hands"), list):
-        each = [(k, hand) for k, one in enumerate(frame["hands"]) if one for hand in _hands_of(one, scale, about)]
+        each = [(k, hand) for k, one in enumerate(frame["hands"]) if one for hand in _hands_of(one, about)]
         return [replace(hand, slot=slot) for slot, hand in each]
     key = _has(frame, _WORLD) or _has(frame, _STEMS)
     given = frame[key] if key else None
@@ -172,9 +177,15 @@ def _hands_of(frame: Any, scale: NDArray[np.float64], about: Mapping[str, Any]) 
             continue
         sure = numbers[:, 3] if (numbers[:, 3] > 0.0).any() else np.ones(_COUNT)  # MediaPipe leaves it 0 for hands
         side, score = _label(stated)
-        place = numbers[:, :3] * (1.0 if key in _WORLD else scale) * [1.0, -1.0, -1.0]
+        place = numbers[:, :3] * [1.0, -1.0, -1.0]
         hands.append(SeenHand(place, sure * _sureness(sureness, slot, len(listed)), side, score, slot))
     return hands
+
+
+def _in_image(seen: list[list[SeenHand]]) -> bool:
+    """Whether coordinates are parts of an image: from 0 to 1, but for hands that leave it; metres are about 0."""
+    places = [hand.points[:, :2] * [1.0, -1.0] for hands in seen for hand in hands]
+    return bool(places) and bool(((np.array(places) >= 0.0) & (np.array(places) <= 1.0)).mean() > 0.8)
 
 
 def _sureness(given: Any, slot: int, hands: int) -> NDArray[np.float64] | float:
