@@ -45,7 +45,7 @@ def is_mano(fields: Any) -> bool:
     try:
         array = np.asarray(found[key], dtype=np.float64)
     except (TypeError, ValueError):
-        return False
+        return key in ("hand_pose", "mano_pose")
     return key != "" or _width(array) in (*_WIDTHS, *_BODIES)
 
 
