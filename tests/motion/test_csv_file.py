@@ -42,7 +42,13 @@ def test_aliases_and_byte_order_mark(tmp_path: Path) -> None:
     ("text", "place", "message"),
     [
         ("time,index.base.flexion\n0,1\n", ":1:1", "first heading must be 'frame', not 'time'"),
-        ("frame;index.base.flexion\n0;1\n", ":1:1", "separated by commas"),
+        ("frame;index.base.flexion\n0;1,5\n1;2.5\n", ":3:2", "'2.5': a decimal point, but line 2 has the other"),
+        ("frame;index.base.flexion\n0;1.5\n1;2,5\n", ":3:2", "'2,5': a decimal comma, but line 2 has the other"),
+        ("frame;index.base.flexion\n0;1.234,5\n", ":2:2", "thousands are not separated"),
+        ("frame;index.base.flexion\n0;1,234,567\n", ":2:2", "thousands are not separated"),
+        ("frame,index.base.flexion\n0,1,5\n", ":2", "decimal commas need semicolons"),
+        ("time;index.base.flexion\n0;1\n", ":1:1", "first heading must be 'frame', not 'time'"),
+        ("sep=;\nframe,index.base.flexion\n0,1\n", ":2:1", "first heading must be 'frame', not 'frame,index"),
         ("frame,index.base.flexion,indx.knuckle2.flexion\n0,1,2\n", ":1:3", "did you mean index.knuckle2"),
         ("frame,index.base.flexion,left.index.base.flexion\n0,1,2\n", ":1:3", "the same channel"),
         ("frame,index.base.flexion\n0,1\n5,fast\n", ":3:2", "'fast' is not a number"),
@@ -87,3 +93,22 @@ def test_writing_and_reading_give_the_same_motion(tmp_path: Path, keys: dict, te
     assert list(tmp_path.iterdir()) == [tmp_path / "out.csv"]
     for channel in motion.tracks:
         np.testing.assert_allclose(again.value(channel, motion.frames), motion.value(channel, motion.frames), atol=1e-9)
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "frame;index.base.flexion;root.y\r\n0;0;0,25\r\n10;22,5;\r\n20;;0,5\r\n",
+        "frame\tindex.base.flexion\troot.y\n0\t0\t0.25\n10\t22.5\n20\t\t0.5\n",
+        '\ufeff"Frame";"index.base.flexion";"root.y"\n"0";"0";"0,25"\n"10";"22,5";""\n"20";"";"0,5"\n',
+        'frame, "index.base.flexion", root.y\n0, 0, "0,25"\n10, "22,5",\n20,,"0,5"\n',
+        "\ufeffsep=;\nframe;index.base.flexion;root.y\n0;0;.25\n10;22.5;\n20;;.5\n",
+    ],
+)
+def test_tables_as_spreadsheets_of_any_country_write_them(tmp_path: Path, text: str) -> None:
+    motion = read_csv(write(tmp_path, text), skeleton=hand())
+    assert [(k.frame, np.degrees(k.value)) for k in motion.tracks["index.base.flexion"].keys] == [
+        (0, 0),
+        (10, pytest.approx(22.5)),
+    ]
+    assert [(k.frame, k.value) for k in motion.tracks["root.y"].keys] == [(0, 0.25), (20, 0.5)]

@@ -12,9 +12,10 @@ from scipy.spatial.transform import Rotation
 from tests.motion.skeletons import body, hand, rig, with_forearm
 from warpjld.errors import InputError
 from warpjld.io import load_rig
-from warpjld.motion import load_motion
-from warpjld.motion.hand_track import HandTrack, poses_of_hand
-from warpjld.motion.json_file import read_hand_track
+from warpjld.motion import load_motion, open_motion
+from warpjld.motion.hand_file import read_hands
+from warpjld.motion.hand_track import HandTrack
+from warpjld.motion.hands_drive import poses_of_hands
 from warpjld.motion.webxr import WEBXR_JOINTS
 from warpjld.rig import Rig
 from warpjld.skeleton import CHANNELS, DIGITS, Poses, Skeleton, poses_from_angles
@@ -32,6 +33,17 @@ def recorded(skeleton: Skeleton, poses: Poses, **changes: object) -> HandTrack:
     side = skeleton.names[0].partition(".")[0]
     points = {name.partition(".")[2]: poses.positions[:, j] for j, name in enumerate(skeleton.names)}
     return HandTrack(side, np.arange(len(poses)) / 10, points, **changes)  # type: ignore[arg-type]
+
+
+def poses_of_hand(track: HandTrack, skeleton: Skeleton, rate: float) -> Poses:
+    return poses_of_hands((track,), skeleton, rate)[0]
+
+
+def only_hand(path: Path) -> tuple[HandTrack, float]:
+    recording = read_hands(path)
+    (track,) = recording.hands
+    assert isinstance(track, HandTrack)
+    return track, recording.rate
 
 
 def gesture(skeleton: Skeleton, seed: int = 0, frames: int = 4, travel: float = 1.0) -> Poses:
@@ -191,9 +203,11 @@ def save(folder: Path, content: object) -> Path:
 def test_webxr_poses_tell_their_side_and_are_a_second_apart(tmp_path: Path, side: str) -> None:
     skeleton = hand(side)
     wanted = gesture(skeleton, travel=0.0)
-    track, rate = read_hand_track(path := save(tmp_path, webxr(skeleton, wanted)))
-    assert (track.side, rate, track.moves) == (side, 1.0, False)
-    poses, rate = load_motion(path, rig(skeleton), rate=4)
+    track, rate = only_hand(path := save(tmp_path, webxr(skeleton, wanted)))
+    assert (track.side, rate, track.moves) == (None, 1.0, False)
+    moved = open_motion(path, rig(skeleton), rate=4)
+    assert f"fingers bend as a {side} hand's" in moved.notes[0]
+    poses, rate = moved.poses, moved.rate
     assert (len(poses), rate) == (13, 4)
     np.testing.assert_allclose(poses.positions[::4], wanted.positions, atol=1e-9)
 
@@ -213,35 +227,39 @@ def test_mistakes_in_recordings_are_named(tmp_path: Path) -> None:
     broken = leap(skeleton, poses, packed=False)
     del broken["frames"][3]["pointables"][2]["dipPosition"]
     with pytest.raises(InputError, match=r"hand.json: frame 3: .*middle without dipPosition"):
-        read_hand_track(save(tmp_path, broken))
+        only_hand(save(tmp_path, broken))
     broken = leap(skeleton, poses, packed=False)
     broken["frames"][3]["timestamp"] = 0
     with pytest.raises(InputError, match="frame 3: its timestamp"):
-        read_hand_track(save(tmp_path, broken))
+        only_hand(save(tmp_path, broken))
     broken["frames"][3]["timestamp"] = float("inf")
     with pytest.raises(InputError, match="frame 3: its timestamp"):
-        read_hand_track(save(tmp_path, broken))
+        only_hand(save(tmp_path, broken))
     broken = leap(skeleton, poses, packed=False)
     broken["frames"][1]["pointables"][1]["tipPosition"] = [1, 2]
     with pytest.raises(InputError, match=r"'index.tip' wants three finite coordinates"):
-        read_hand_track(save(tmp_path, broken))
+        only_hand(save(tmp_path, broken))
     broken = leap(skeleton, poses, packed=True)
     broken["frames"][2][1] = 5
     with pytest.raises(InputError, match="packed frames do not fit"):
-        read_hand_track(save(tmp_path, broken))
+        only_hand(save(tmp_path, broken))
     broken = webxr(skeleton, poses)
     broken["pose 2"]["wrist"]["offsetMatrix"] = [1, 2]
     with pytest.raises(InputError, match="pose 'pose 2': the offsetMatrix of 'wrist'"):
-        read_hand_track(save(tmp_path, broken))
+        only_hand(save(tmp_path, broken))
     del broken["pose 1"]["thumb-tip"]
     with pytest.raises(InputError, match="pose 'pose 1': no 'thumb-tip'"):
-        read_hand_track(save(tmp_path, broken))
-    for content, message in (({"frames": []}, "no frames"), ({"a": 1}, "neither WebXR"), ([1], "neither WebXR")):
+        only_hand(save(tmp_path, broken))
+    for content, message in (
+        ({"frames": []}, "no frames"),
+        ({"a": 1}, "no hand recording"),
+        ([1], "no hand recording"),
+    ):
         with pytest.raises(InputError, match=message):
-            read_hand_track(save(tmp_path, content))
+            only_hand(save(tmp_path, content))
     (tmp_path / "hand.json").write_text('{"a": 1,\n oops}')
     with pytest.raises(InputError, match=r"hand.json:2:2: is not JSON"):
-        read_hand_track(tmp_path / "hand.json")
+        only_hand(tmp_path / "hand.json")
 
 
 LEAP = "motion_leap_grab_pinch_splay"
@@ -254,7 +272,7 @@ def real_rig(data: Path) -> Rig:
 @pytest.mark.parametrize("name", [f"{LEAP}/grab.json", f"{LEAP}/pinch-57fps.json", f"{LEAP}/HandSplay-110fps.json"])
 def test_real_recordings_are_followed_phalanx_by_phalanx(data: Path, name: str) -> None:
     driven = real_rig(data)
-    track, rate = read_hand_track(data / name)
+    track, rate = only_hand(data / name)
     assert track.side == "right"
     poses = poses_of_hand(track, driven.skeleton, rate)
     turn, _ = Rotation.align_vectors(  # the deformed hand lies as the mirrored recording does
@@ -290,7 +308,7 @@ def test_grabbing_curls_and_pinching_brings_thumb_and_index_together(data: Path)
 def test_webxr_poses_of_another_hand_are_left_and_point(data: Path) -> None:
     driven = real_rig(data)
     path = data / "motion_iwer_webxr_poses" / "poses.json"
-    assert read_hand_track(path)[0].side == "left"
+    assert "fingers bend as a left hand's" in open_motion(path, driven).notes[0]
     poses, rate = load_motion(path, driven)
     assert (len(poses), rate) == (3, 1.0)
     bends = np.degrees(poses.flexion[2])

@@ -1,10 +1,17 @@
-"""Motions as tables: a ``frame`` column, then channels in degrees, the root's displacement in metres."""
+"""Motions as tables: a ``frame`` column, then channels in degrees, the root's displacement in metres.
+
+Cells are separated by commas, semicolons or tabs, whichever makes ``frame`` the first heading; a first line ``sep=;``,
+as spreadsheets write it, says so too. Numbers have decimal points, or decimal commas all through the file.
+"""
 
 from __future__ import annotations
 
 import csv
 import math
+import re
+from collections.abc import Sequence
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -16,7 +23,13 @@ from warpjld.skeleton import Skeleton
 from warpjld.text_file import read_text
 from warpjld.whole_file import whole_file
 
+if TYPE_CHECKING:
+    import _csv
+
 __all__ = ["read_csv", "write_csv"]
+
+_SEPARATORS = ",;\t"
+_SAID = re.compile(r"sep=([,;\t])", re.IGNORECASE)
 
 
 def read_csv(path: str | Path, *, skeleton: Skeleton | None = None, rate: float = 30.0) -> Motion:
@@ -28,23 +41,48 @@ def read_csv(path: str | Path, *, skeleton: Skeleton | None = None, rate: float 
         rate: Frames a second: the file does not say.
 
     Raises:
-        InputError: Unreadable, no or a wrong header, an unknown joint, a cell that is not a number, frames that
-            are missing or do not increase; with its line and column.
+        InputError: Unreadable, no or a wrong header, an unknown joint, a cell that is not a number, decimal points and
+            commas in one file, frames that are missing or do not increase; with its line and column.
     """
-    reader = csv.reader(read_text(path).splitlines())
+    lines = read_text(path).splitlines()
+    separator, skipped = _separator(lines)
+    reader = csv.reader(lines[skipped:], delimiter=separator, skipinitialspace=True)
+    try:
+        return _read_rows(reader, skipped, separator, path, skeleton, rate)
+    except csv.Error as error:
+        raise InputError(f"is not a table: {error}", path=path, line=skipped + reader.line_num) from None
+
+
+def _separator(lines: Sequence[str]) -> tuple[str, int]:
+    """What separates the cells, and how many lines say nothing else."""
+    first = next((k for k, line in enumerate(lines) if line.strip()), 0)
+    if lines and (said := _SAID.fullmatch(lines[first].strip('\ufeff "\r\n'))):
+        return said[1], first + 1
+    header = lines[first] if lines else ""
+    for separator in _SEPARATORS:
+        if re.match(rf'\s*"?\s*frame\s*"?\s*{separator}', header, re.IGNORECASE):
+            return separator, 0
+    return max(_SEPARATORS, key=header.count), 0
+
+
+def _read_rows(
+    reader: _csv.Reader, skipped: int, separator: str, path: str | Path, skeleton: Skeleton | None, rate: float
+) -> Motion:
     motion = Motion(rate=rate)
+    marks: dict[str, int] = {}
     header: list[str] | None = None
     last = -math.inf
     for cells in reader:
-        line = reader.line_num
+        line = skipped + reader.line_num
         if not any(cell.strip() for cell in cells):
             continue
         if header is None:
             header = _read_header(cells, skeleton, path, line)
             continue
         if len(cells) > len(header):
-            raise InputError(f"{len(cells)} cells under {len(header)} headings", path=path, line=line)
-        frame = _number(cells[0], path, line, 1)
+            hint = "; decimal commas need semicolons or tabs between cells" if separator == "," else ""
+            raise InputError(f"{len(cells)} cells under {len(header)} headings{hint}", path=path, line=line)
+        frame = _number(cells[0], marks, path, line, 1)
         if frame is None:
             raise InputError("no frame number", path=path, line=line, column=1)
         if frame <= last:
@@ -52,7 +90,7 @@ def read_csv(path: str | Path, *, skeleton: Skeleton | None = None, rate: float 
             raise InputError(f"frame {frame:g} {what}", path=path, line=line, column=1)
         last = frame
         for column, (channel, cell) in enumerate(zip(header[1:], cells[1:], strict=False), start=2):
-            value = _number(cell, path, line, column)
+            value = _number(cell, marks, path, line, column)
             if value is not None:
                 motion.set_key(channel, frame, value if channel in ROOT_CHANNELS else math.radians(value))
     if header is None:
@@ -94,8 +132,7 @@ def write_csv(path: str | Path, motion: Motion, *, frames: ArrayLike | None = No
 def _read_header(cells: list[str], skeleton: Skeleton | None, path: str | Path, line: int) -> list[str]:
     names = [cell.strip() for cell in cells]
     if names[0].lower() != "frame":
-        hint = "; cells are separated by commas" if len(names) == 1 and any(s in names[0] for s in ";\t") else ""
-        raise InputError(f"first heading must be 'frame', not '{names[0]}'{hint}", path=path, line=line, column=1)
+        raise InputError(f"first heading must be 'frame', not '{names[0]}'", path=path, line=line, column=1)
     if len(names) == 1:
         raise InputError("no channels after 'frame'", path=path, line=line)
     seen: dict[object, str] = {}
@@ -112,12 +149,28 @@ def _read_header(cells: list[str], skeleton: Skeleton | None, path: str | Path, 
     return [names[0], *(name.lower() for name in names[1:])]
 
 
-def _number(cell: str, path: str | Path, line: int, column: int) -> float | None:
+def _number(cell: str, marks: dict[str, int], path: str | Path, line: int, column: int) -> float | None:
+    """A cell's number; None where it is empty.
+
+    Args:
+        cell: The cell.
+        marks: Decimal marks → line where each was first seen; added to.
+        path: For messages, as line and column.
+    """
     text = cell.strip()
     if not text:
         return None
+    for mark in ".,":
+        if mark in text:
+            marks.setdefault(mark, line)
+    if ("." in text and "," in text) or text.count(",") > 1:
+        raise InputError(f"'{text}': thousands are not separated in numbers", path=path, line=line, column=column)
+    if len(marks) > 1:
+        other = marks["." if "," in text else ","]
+        what = "a decimal comma" if "," in text else "a decimal point"
+        raise InputError(f"'{text}': {what}, but line {other} has the other", path=path, line=line, column=column)
     try:
-        value = float(text)
+        value = float(text.replace(",", "."))
     except ValueError:
         raise InputError(f"'{text}' is not a number", path=path, line=line, column=column) from None
     if not math.isfinite(value):

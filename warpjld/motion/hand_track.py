@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import cached_property
 from itertools import pairwise
 
 import numpy as np
@@ -10,17 +11,17 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from warpjld.errors import InputError
-from warpjld.motion.frame_times import frame_times
-from warpjld.rotations import conjugate, minimal_rotation, multiply, rotate, slerp
-from warpjld.skeleton import DIGITS, Poses, Skeleton, poses_from_rotations
+from warpjld.motion.finger_bends import finger_bends, leaning
+from warpjld.motion.hand_motion import IDENTITY, HandTurns, carried, hand_joints
+from warpjld.rotations import conjugate, minimal_rotation, multiply, rotate
+from warpjld.skeleton import DIGITS, Skeleton
 from warpjld.skeleton.hand import FINGER_JOINTS
 
-__all__ = ["HandTrack", "poses_of_hand"]
+__all__ = ["HandTrack"]
 
 _PALM = ("wrist", *(f"{digit}.{joint}" for digit in DIGITS for joint in ("carpometacarpal", "base")))
 _MOBILE = ("ring.base", "pinky.base")
 """Palm points that the mobile metacarpals carry (R8): left out of the palm's fit where enough others are known."""
-_IDENTITY = np.array([0.0, 0.0, 0.0, 1.0])
 
 
 @dataclass(frozen=True, eq=False)
@@ -28,68 +29,69 @@ class HandTrack:
     """Positions of a hand's joints at K times.
 
     Attributes:
-        side: ``left`` or ``right``.
+        side: ``left`` or ``right``; None where the file does not say.
         times: Times [s], increasing, shape (K,).
         points: Joint, such as ``index.base`` → its positions in any unit, shape (K, 3).
         moves: Whether the hand's place and orientation count, or its fingers only.
+        may_be_mirrored: Whether the positions may be a mirror image, as those seen by a selfie camera are.
+        labels: What the file calls each time, for messages; empty for ``frame 0`` and so on.
     """
 
-    side: str
+    side: str | None
     times: NDArray[np.float64]
     points: dict[str, NDArray[np.float64]]
     moves: bool = True
+    may_be_mirrored: bool = False
+    labels: tuple[str, ...] = ()
+
+    @cached_property
+    def bends(self) -> NDArray[np.float64]:
+        """Bends [rad] of the fingers' joints as of a right hand, shape (K, 4, 3), see ``finger_bends``."""
+        return finger_bends(self.points)
+
+    @property
+    def leaning(self) -> str | None:
+        """The side that a hand looks like whose bends do not tell."""
+        return leaning(self.points, self.bends)
+
+    def called(self, side: str) -> HandTrack:
+        """The same positions, taken for those of a hand of this side."""
+        return replace(self, side=side)
 
     def mirrored(self) -> HandTrack:
         """The other hand doing the same."""
         points = {name: place * np.array([-1.0, 1.0, 1.0]) for name, place in self.points.items()}
         return replace(self, side="right" if self.side == "left" else "left", points=points)
 
+    def turns(self, skeleton: Skeleton) -> HandTurns:
+        """How the joints of a rig's hand of the same side turn.
 
-def poses_of_hand(track: HandTrack, skeleton: Skeleton, rate: float) -> Poses:
-    """Poses of a rig whose hand follows a tracked one; a track of the other side is mirrored.
+        The palms are laid upon one another by the least-squares rotation of wrist, metacarpals and finger bases. Then
+        every phalanx turns, in its parent's frame, by the smallest rotation that gives it the tracked direction:
+        without twist about itself, so that knuckles keep their flexion axes. Bone lengths are the rig's. Where a
+        recording has metacarpals, the ring's and the pinky's flex within their limits; index and middle are fixed to
+        the wrist.
 
-    The palms are laid upon one another by the least-squares rotation of wrist, metacarpals and finger bases. Then
-    every phalanx turns, in its parent's frame, by the smallest rotation that gives it the tracked direction: without
-    twist about itself, so that knuckles keep their flexion axes. Bone lengths are the rig's. Where a recording has
-    metacarpals, the ring's and the pinky's flex within their limits; index and middle are fixed to the wrist.
-
-    A rig that is just a hand, with a forearm or without, starts where it rests and from there moves as a whole with
-    the tracked palm, seen from the palm's first orientation; other skeletons move their fingers only.
-
-    Args:
-        track: What was recorded.
-        skeleton: What is driven.
-        rate: Frames a second of the result.
-
-    Raises:
-        InputError: The rig has no hand, or the track too few joints.
-    """
-    if f"{track.side}.wrist" not in skeleton.names:
-        track = track.mirrored()
-    if f"{track.side}.wrist" not in skeleton.names:
-        raise InputError("this rig has no hand for a recording of one to drive")
-    own = {name.partition(".")[2]: j for j, name in enumerate(skeleton.names) if name.startswith(f"{track.side}.")}
-    palm = [name for name in _PALM if name in own and name in track.points]
-    if len(palm) < 4:
-        raise InputError(f"the recording has {len(palm)} joints of the palm; 4 are needed to see how the hand lies")
-    fixed = [name for name in palm if name not in _MOBILE]
-    palm = fixed if len(fixed) > 4 else palm
-    rest = skeleton.rest[[own[name] for name in palm]]
-    places = np.stack([track.points[name] for name in palm], axis=1)
-    palm_turn, scale = _fit(rest, places)
-    local = np.tile(_IDENTITY, (len(track.times), len(skeleton), 1))
-    for digit in DIGITS:
-        _drive_digit(digit, track, skeleton, own, conjugate(palm_turn), local)
-    displacement = np.zeros((len(track.times), 3))
-    if track.moves and len(own) == len(skeleton) and "shoulder" not in own:
-        turn = multiply(conjugate(palm_turn[0]), palm_turn)
-        centre = rest.mean(axis=0) - skeleton.rest[0]
-        moved = rotate(conjugate(palm_turn[0]), places.mean(axis=1) - places[0].mean(axis=0)) / scale
-        local[:, 0] = turn
-        displacement = centre + moved - rotate(turn, centre)
-    at = frame_times(track.times[0], track.times[-1], rate)
-    root = np.stack([np.interp(at, track.times, column) for column in displacement.T], axis=-1)
-    return poses_from_rotations(skeleton, slerp(track.times, local, at), root_position=root)
+        Raises:
+            InputError: The track has too few joints.
+        """
+        own = hand_joints(skeleton, self.side)
+        palm = [name for name in _PALM if name in own and name in self.points]
+        if len(palm) < 4:
+            raise InputError(f"the recording has {len(palm)} joints of the palm; 4 are needed to see how the hand lies")
+        fixed = [name for name in palm if name not in _MOBILE]
+        palm = fixed if len(fixed) > 4 else palm
+        rest = skeleton.rest[[own[name] for name in palm]]
+        places = np.stack([self.points[name] for name in palm], axis=1)
+        palm_turn, scale = _fit(rest, places)
+        local = np.tile(IDENTITY, (len(self.times), len(skeleton), 1))
+        for digit in DIGITS:
+            _drive_digit(digit, self, skeleton, own, conjugate(palm_turn), local)
+        back = conjugate(palm_turn[0])
+        moved = rotate(back, places.mean(axis=1) - places[0].mean(axis=0)) / scale
+        centre = rest.mean(axis=0)
+        root, displacement = carried(skeleton, multiply(back, palm_turn), centre, moved)
+        return HandTurns(tuple(own.values()), local, root, displacement, self.moves)
 
 
 def _fit(rest: NDArray[np.float64], places: NDArray[np.float64]) -> tuple[NDArray[np.float64], float]:
@@ -112,7 +114,7 @@ def _drive_digit(
     local: NDArray[np.float64],
 ) -> None:
     """Fill in the local rotations of one digit, from the wrist outwards."""
-    turned = np.tile(_IDENTITY, (len(track.times), 1))
+    turned = np.tile(IDENTITY, (len(track.times), 1))
     for joint, following in _pairs(digit):
         if not {joint, following} <= own.keys() or not {joint, following} <= track.points.keys():
             continue

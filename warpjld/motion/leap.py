@@ -10,9 +10,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from warpjld.errors import InputError
+from warpjld.motion.gaps import bridged
+from warpjld.motion.hand_motion import HandRecording
 from warpjld.motion.hand_track import HandTrack
 
-__all__ = ["leap_track"]
+__all__ = ["is_leap", "leap_hands"]
 
 _DIGITS = ("thumb", "index", "middle", "ring", "pinky")
 _THUMB = {"mcpPosition": "base", "pipPosition": "knuckle2", "dipPosition": "knuckle3", "tipPosition": "tip"}
@@ -20,14 +22,20 @@ _FINGER = {"carpPosition": "carpometacarpal"} | _THUMB
 _NEEDED = tuple(_THUMB)
 
 
-def leap_track(content: Mapping[str, Any]) -> tuple[HandTrack, float]:
-    """The first hand of a recording, in either of its formats: objects (0.1, 1) or packed arrays (2).
+def is_leap(content: Any) -> bool:
+    """Whether JSON holds Leap Motion frames: objects with hands or pointables, or packed rows under their fields."""
+    frames = content.get("frames") if isinstance(content, Mapping) else None
+    if not isinstance(frames, list):
+        return False
+    return not frames or isinstance(frames[0], list) or any("pointables" in f for f in frames if isinstance(f, Mapping))
+
+
+def leap_hands(content: Mapping[str, Any]) -> HandRecording:
+    """The hands of a recording, by side, in either of its formats: objects (0.1, 1) or packed arrays (2).
 
     The controller calls the joint after the metacarpal mcp; a thumb's metacarpal has no length there, so that its mcp
-    is the thumb's base. Frames where the hand was lost are left out: they are interpolated.
-
-    Returns:
-        The recording, and its mean frames a second.
+    is the thumb's base. A hand that is lost and seen again has another number: hands are told apart by their side.
+    Frames where one was lost are left out: they are interpolated.
 
     Raises:
         InputError: No frame holds a whole hand, or a frame is not as the format wants it.
@@ -36,31 +44,56 @@ def leap_track(content: Mapping[str, Any]) -> tuple[HandTrack, float]:
         frames = _unpacked(content["frames"])
     except (AttributeError, IndexError, TypeError, ValueError) as error:
         raise InputError(f"packed frames do not fit the fields their first row lists ({error})") from error
-    times: list[float] = []
-    places: list[dict[str, list[float]]] = []
-    hand_id = side = None
+    times: dict[str | None, list[float]] = {}
+    places: dict[str | None, list[dict[str, list[float]]]] = {}
+    numbers: dict[str | None, list[int]] = {}
+    doubled, began, last = 0, None, -math.inf
     for number, frame in enumerate(frames):
         try:
-            hands = {hand["id"]: hand for hand in frame.get("hands", ())}
-            if hand_id is None and hands:
-                hand_id, side = next((key, str(hand["type"])) for key, hand in hands.items())
-            fingers = [p for p in frame.get("pointables", ()) if p["handId"] == hand_id and not p.get("tool")]
-            if hand_id not in hands or len(fingers) != 5:
-                continue
-            fingers.sort(key=lambda p: p.get("type", p["id"]))
-            time, place = float(frame["timestamp"]) * 1e-6, _joints(fingers)
+            time, seen = float(frame["timestamp"]) * 1e-6, _whole_hands(frame)
         except (AttributeError, KeyError, TypeError, ValueError) as error:
             raise InputError(f"frame {number}: not a Leap Motion frame ({error})") from error
-        if not math.isfinite(time) or (times and time <= times[-1]):
+        if not math.isfinite(time) or time <= last:
             raise InputError(f"frame {number}: its timestamp is not a time after the one before")
-        times.append(time)
-        places.append(place)
-    if side not in ("left", "right") or not times:
+        last = time
+        for side, place in seen:
+            if numbers.get(side, [-1])[-1] == number:
+                doubled += 1
+                continue
+            began = time if began is None else began
+            times.setdefault(side, []).append(time - began)
+            places.setdefault(side, []).append(place)
+            numbers.setdefault(side, []).append(number)
+    if not times:
         raise InputError("no frame holds a hand with five fingers")
-    joints = set.intersection(*(set(place) for place in places))
-    points = {joint: _coordinates(joint, [place[joint] for place in places]) for joint in sorted(joints)}
-    rate = (len(times) - 1) / (times[-1] - times[0]) if len(times) > 1 else 1.0
-    return HandTrack(str(side), np.array(times) - times[0], points), round(rate, 1)
+    if None in times and len(times) > 1:
+        raise InputError(f"frame {numbers[None][0]}: a hand without a type, others say left or right")
+    hands: list[HandTrack] = []
+    notes: list[str] = []
+    for side, rows in places.items():
+        joints = set.intersection(*(set(place) for place in rows))
+        points = {joint: _coordinates(joint, [place[joint] for place in rows]) for joint in sorted(joints)}
+        labels = tuple(f"frame {number}" for number in numbers[side])
+        hands.append(HandTrack(side, np.array(times[side]), points, labels=labels))
+        notes += bridged(f"{side or 'the'} hand", numbers[side])
+    if doubled:
+        notes.append(f"a second hand of the same side was left out of {doubled} frames")
+    longest = max(times.values(), key=len)
+    rate = (len(longest) - 1) / (longest[-1] - longest[0]) if len(longest) > 1 else 1.0
+    return HandRecording(tuple(hands), round(rate, 1), tuple(notes))
+
+
+def _whole_hands(frame: Mapping[str, Any]) -> list[tuple[str | None, dict[str, list[float]]]]:
+    """Side and joints of the hands of a frame that have all five fingers."""
+    found: list[tuple[str | None, dict[str, list[float]]]] = []
+    for hand in frame.get("hands", ()):
+        fingers = [p for p in frame.get("pointables", ()) if p["handId"] == hand["id"] and not p.get("tool")]
+        if len(fingers) == 5:
+            side = str(hand["type"]).lower() if "type" in hand else None
+            if side not in ("left", "right", None):
+                raise ValueError(f"a hand of type '{side}'")
+            found.append((side, _joints(sorted(fingers, key=lambda p: p.get("type", p["id"])))))
+    return found
 
 
 def _coordinates(joint: str, rows: list[list[float]]) -> NDArray[np.float64]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -22,7 +22,9 @@ MOTION_FORMATS = {
     ".bvh": "motion capture",
     ".glb": "an animation in a binary glTF file",
     ".gltf": "an animation in a glTF file",
-    ".json": "a tracked hand: WebXR poses or a Leap Motion recording",
+    ".json": "tracked hands: WebXR poses, a Leap Motion recording, MediaPipe landmarks, MANO poses",
+    ".npz": "tracked hands: MANO poses or MediaPipe landmarks as NumPy arrays",
+    ".npy": "a tracked hand: MANO poses or MediaPipe landmarks as one NumPy array",
 }
 """What each suffix is, for help texts."""
 
@@ -60,6 +62,7 @@ def open_motion(
     limits: Limits = "error",
     side: str | None = None,
     animation: str | None = None,
+    flat_hand_mean: bool | None = None,
 ) -> LoadedMotion:
     """Read a motion file for a rig; the suffix says which kind it is (see ``MOTION_FORMATS``).
 
@@ -68,12 +71,15 @@ def open_motion(
 
     Args:
         path: The file.
-        rig: What is driven; see ``read_csv``, ``retarget``, ``own_poses`` and ``poses_of_hand`` for how.
+        rig: What is driven; see ``read_csv``, ``retarget``, ``own_poses`` and ``poses_of_hands`` for how.
         rate: Frames a second of the result; None for the file's own, or 30 for tables, which have none. A table's
             frames are played at that rate, all others are resampled to it.
         limits: What to do with angles beyond a joint's limit, see ``Motion.sample``.
-        side: ``left`` or ``right``: which hand a recording is of, where its file leaves it open or is wrong.
+        side: ``left`` or ``right``: which hand a recording is of, where its file leaves it open or is wrong; of a
+            recording of both, the hand to follow.
         animation: Name of one of the file's animations; None for the first.
+        flat_hand_mean: Whether no rotation in MANO poses means the flat hand (True) or MANO's mean pose (False), where
+            the file does not say.
 
     Raises:
         InputError: An unknown suffix, a file that cannot be read or understood, or that does not fit the rig.
@@ -82,6 +88,10 @@ def open_motion(
     if rate is not None and not (np.isfinite(rate) and rate > 0.0):
         raise InputError(f"rate: want frames a second, above 0, got {rate:g}")
     suffix = path.suffix.lower()
+    if suffix in (".pkl", ".pickle"):
+        raise InputError(
+            "pickled Python objects may run any code: not read; save plain arrays as .npz, or JSON", path=path
+        )
     if suffix not in MOTION_FORMATS:
         known = ", ".join(f"{s} ({what})" for s, what in MOTION_FORMATS.items())
         raise InputError(f"unknown kind of motion '{path.suffix}'; known: {known}", path=path)
@@ -90,8 +100,8 @@ def open_motion(
             return _table(path, rig, rate, limits)
         if suffix == ".bvh":
             return _capture(path, rig, rate)
-        if suffix == ".json":
-            return _tracked_hand(path, rig, rate, side)
+        if suffix in (".json", ".npz", ".npy"):
+            return _tracked_hands(path, rig, rate, side, flat_hand_mean)
         return _animation(_ANIMATIONS[suffix](path, rate, animation), rig)
     except InputError as error:
         if error.path is not None:
@@ -152,14 +162,13 @@ def _capture(path: Path, rig: Rig, rate: float | None) -> LoadedMotion:
     return _retargeted(read_bvh(path), rig, rate)
 
 
-def _tracked_hand(path: Path, rig: Rig, rate: float | None, side: str | None) -> LoadedMotion:
-    from warpjld.motion.hand_track import poses_of_hand
-    from warpjld.motion.json_file import read_hand_track
+def _tracked_hands(
+    path: Path, rig: Rig, rate: float | None, side: str | None, flat_hand_mean: bool | None
+) -> LoadedMotion:
+    from warpjld.motion.hand_file import read_hands
+    from warpjld.motion.hands_drive import poses_of_hands
 
-    track, own_rate = read_hand_track(path)
-    if side is not None:
-        track = replace(track, side=side)
-    rate = own_rate if rate is None else rate
-    mirrored = f"{track.side}.wrist" not in rig.skeleton.names
-    notes = (f"a recorded {track.side} hand drives the other one, mirrored",) if mirrored else ()
-    return LoadedMotion(poses_of_hand(track, rig.skeleton, rate), rate, notes)
+    recording = read_hands(path, rate=rate, flat_hand_mean=flat_hand_mean)
+    rate = recording.rate if rate is None else rate
+    poses, notes, warnings = poses_of_hands(recording.hands, rig.skeleton, rate, side=side)
+    return LoadedMotion(poses, rate, (*recording.notes, *notes), (*recording.warnings, *warnings))

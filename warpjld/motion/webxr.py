@@ -2,17 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+import re
+from collections.abc import Iterator, Mapping
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from warpjld.errors import InputError
+from warpjld.motion.hand_motion import HandRecording
 from warpjld.motion.hand_track import HandTrack
 from warpjld.skeleton import DIGITS
 
-__all__ = ["WEBXR_JOINTS", "webxr_track"]
+__all__ = ["WEBXR_JOINTS", "is_webxr", "webxr_hands"]
 
 WEBXR_JOINTS = {"wrist": "wrist"} | {
     f"{name}-{part}": f"{digit}.{joint}"
@@ -36,24 +38,76 @@ WEBXR_JOINTS = {"wrist": "wrist"} | {
 """WebXR Hand Input joint → canonical joint without the side."""
 
 
-def webxr_track(content: Mapping[str, Any]) -> tuple[HandTrack, float]:
-    """Poses in the file's order, a second apart. The side is read from the hand's shape, as the file does not say it.
+def is_webxr(content: Any) -> bool:
+    """Whether JSON holds poses of WebXR joints: a wrist, at most two levels below the top."""
+    return isinstance(content, Mapping) and any(True for _ in _poses(content))
 
-    Poses are relative to a controller's grip, so only the fingers count.
+
+def webxr_hands(content: Mapping[str, Any]) -> HandRecording:
+    """Poses in the file's order, a second apart.
+
+    The format has no place for the side. It is taken from a ``handedness`` beside the poses or inside one, from keys
+    ``left`` and ``right`` above the poses or inside one, or from the poses' names (``left fist``, ``fist_L``) where all
+    tell it; else it is left open. Poses are relative to a controller's grip, so only the fingers count.
 
     Raises:
-        InputError: A joint is missing or its matrix is not one, by name.
+        InputError: A joint is missing or its matrix is not one, by name; or sides contradict each other.
     """
-    from warpjld.skeleton.recognise.hand_frame import chirality
+    stated = _side(content.get("handedness"), "the file")
+    found: dict[str | None, dict[str, Mapping[str, Any]]] = {}
+    for name, above, pose in _poses(content):
+        side = above or _side(pose.get("handedness"), f"pose '{name}'") or stated
+        found.setdefault(side, {})[name] = pose
+    if set(found) == {None}:
+        named = {name: _named_side(name) for name in found[None]}
+        if None not in named.values():
+            found = {s: {n: p for n, p in found[None].items() if named[n] == s} for s in dict.fromkeys(named.values())}
+    if None in found and len(found) > 1:
+        raise InputError(f"pose '{next(iter(found[None]))}' does not say which hand it is of, others do")
+    return HandRecording(tuple(_track(side, poses) for side, poses in found.items()), 1.0)
 
-    poses = [
+
+def _poses(content: Mapping[str, Any]) -> Iterator[tuple[str, str | None, Mapping[str, Any]]]:
+    """Name of every pose, its side where a key says it, and its joints."""
+    for name, entry in content.items():
+        if not isinstance(entry, Mapping):
+            continue
+        side = _SIDES.get(name.lower())
+        if "wrist" in entry:
+            yield name, side, entry
+            continue
+        for inner, pose in entry.items():
+            if isinstance(pose, Mapping) and "wrist" in pose:
+                own = _SIDES.get(inner.lower())
+                yield inner if side else name if own else f"{name} {inner}", side or own, pose
+
+
+_SIDES = {"left": "left", "right": "right"}
+_IN_NAME = re.compile(r"(?:^|[\s._-])(left|right|l|r)(?=$|[\s._-])", re.IGNORECASE)
+
+
+def _named_side(name: str) -> str | None:
+    found = {match[0].lower() for match in _IN_NAME.findall(name)}
+    return {"l": "left", "r": "right"}.get(found.pop()) if len(found) == 1 else None
+
+
+def _side(stated: Any, where: str) -> str | None:
+    if stated is None or stated in ("", "none"):  # WebXR calls a hand that it does not know the side of "none"
+        return None
+    side = _SIDES.get(str(stated).lower())
+    if side is None:
+        raise InputError(f"handedness of {where}: want left or right, got '{stated}'")
+    return side
+
+
+def _track(side: str | None, poses: Mapping[str, Mapping[str, Any]]) -> HandTrack:
+    places = [
         {canonical: _place(name, pose, joint) for joint, canonical in WEBXR_JOINTS.items()}
-        for name, pose in content.items()
-        if isinstance(pose, Mapping)
+        for name, pose in poses.items()
     ]
-    points = {joint: np.array([pose[joint] for pose in poses]) for joint in WEBXR_JOINTS.values()}
-    side = "right" if sum(chirality(pose) for pose in poses) > 0.0 else "left"
-    return HandTrack(side, np.arange(len(poses), dtype=np.float64), points, moves=False), 1.0
+    points = {joint: np.array([place[joint] for place in places]) for joint in WEBXR_JOINTS.values()}
+    times = np.arange(len(places), dtype=np.float64)
+    return HandTrack(side, times, points, moves=False, labels=tuple(f"pose '{name}'" for name in poses))
 
 
 def _place(pose_name: str, pose: Mapping[str, Any], joint: str) -> NDArray[np.float64]:

@@ -1,0 +1,63 @@
+"""NumPy's files of arrays, without the Python objects that they may hold: reading those runs code."""
+
+from __future__ import annotations
+
+import zipfile
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from warpjld.errors import InputError
+
+__all__ = ["read_arrays"]
+
+_MOST_BYTES = 1 << 30
+"""A million frames of a hand are half of it: more is a mistake, or made to fill the memory."""
+
+
+def read_arrays(path: str | Path) -> dict[str, NDArray[Any]]:
+    """Arrays of an ``.npz`` file by name; the array of an ``.npy`` file is called "".
+
+    Raises:
+        InputError: It cannot be read, is no such file, holds pickled objects, or more than 1 GiB.
+    """
+    path = Path(path)
+    try:
+        if path.suffix.lower() == ".npy":
+            if path.stat().st_size > _MOST_BYTES:
+                raise InputError("larger than 1 GiB", path=path)
+            # mapped, so that a header that announces more than there is allocates nothing
+            return {"": np.array(np.load(path, mmap_mode="r", allow_pickle=False))}
+        arrays = {}
+        with zipfile.ZipFile(path) as file:
+            if sum(member.file_size for member in file.infolist()) > _MOST_BYTES:
+                raise InputError("its arrays take more than 1 GiB", path=path)
+            for member in file.infolist():
+                if member.filename.endswith(".npy"):
+                    arrays[member.filename[:-4]] = _member(file, member)
+        return arrays
+    except OSError as error:
+        raise InputError(f"cannot be read: {error.strerror or error}", path=path) from None
+    except (zipfile.BadZipFile, EOFError, MemoryError, NotImplementedError, RuntimeError, ValueError) as error:
+        if "pickle" in str(error).lower() or "object" in str(error).lower():
+            raise InputError(
+                "holds pickled Python objects, which may run any code: not read; save plain arrays of numbers or text",
+                path=path,
+            ) from None
+        raise InputError(f"is not a NumPy file of arrays ({error})", path=path) from None
+
+
+def _member(file: zipfile.ZipFile, member: zipfile.ZipInfo) -> NDArray[Any]:
+    with file.open(member) as stream:
+        version = np.lib.format.read_magic(stream)
+        read = np.lib.format.read_array_header_1_0 if version == (1, 0) else np.lib.format.read_array_header_2_0
+        shape, _, kind = read(stream)
+        if kind.hasobject:
+            raise ValueError("pickled objects")
+        if int(np.prod([int(n) for n in shape], dtype=object)) * kind.itemsize > member.file_size:
+            raise ValueError(f"'{member.filename}' announces more than it holds")
+    with file.open(member) as stream:
+        array: NDArray[Any] = np.lib.format.read_array(stream, allow_pickle=False)
+    return array

@@ -1,0 +1,54 @@
+"""Recordings of hands, JSON and NumPy arrays: read, and told apart."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from warpjld.errors import InputError
+from warpjld.motion.array_file import read_arrays
+from warpjld.motion.hand_motion import HandRecording
+from warpjld.motion.leap import is_leap, leap_hands
+from warpjld.motion.mano import is_mano, mano_hands
+from warpjld.motion.mediapipe import is_mediapipe, mediapipe_arrays, mediapipe_hands
+from warpjld.motion.webxr import is_webxr, webxr_hands
+from warpjld.text_file import read_json
+
+__all__ = ["read_hands"]
+
+
+def read_hands(path: str | Path, *, rate: float | None = None, flat_hand_mean: bool | None = None) -> HandRecording:
+    """Read a recording of one hand or two: WebXR poses, Leap Motion frames, MediaPipe landmarks or MANO parameters.
+
+    Args:
+        path: A ``.json``, ``.npz`` or ``.npy`` file.
+        rate: Frames a second, where the file does not say: 30 if left out.
+        flat_hand_mean: Whether no rotation of MANO's means the flat hand, where the file does not say.
+
+    Raises:
+        InputError: Unreadable, or none of these.
+    """
+    path = Path(path)
+    content = read_json(path) if path.suffix.lower() == ".json" else read_arrays(path)
+    try:
+        if path.suffix.lower() != ".json":
+            if is_mediapipe(content) or ("" in content and content[""].shape[-2:] == (21, 3)):
+                return mediapipe_arrays(content, rate)
+            if is_mano(content):
+                return mano_hands(content, rate, flat_hand_mean)
+            held = ", ".join(f"'{name}' {array.shape}" for name, array in content.items()) or "nothing"
+            raise InputError(f"neither hand landmarks (F, 21, 3) nor MANO parameters (hand_pose, …): holds {held}")
+        if is_leap(content):
+            return leap_hands(content)
+        if is_webxr(content):
+            return webxr_hands(content)
+        if is_mano(content):
+            return mano_hands(content, rate, flat_hand_mean)
+        if is_mediapipe(content):
+            return mediapipe_hands(content, rate)
+    except InputError as error:
+        raise InputError(error.message, path=path) from error
+    raise InputError(
+        "no hand recording: neither WebXR poses (a 'wrist'), Leap Motion frames ('pointables'), 21 MediaPipe landmarks "
+        "nor MANO parameters ('hand_pose')",
+        path=path,
+    )

@@ -1,0 +1,164 @@
+"""Recorded hands drive a rig: which recording moves which hand, and when a recording cannot be what it is taken for."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from warpjld.errors import InputError
+from warpjld.motion.finger_bends import BENDING, FINGERS, bending_side, beyond
+from warpjld.motion.frame_times import frame_times
+from warpjld.motion.hand_motion import IDENTITY, HandMotion, hand_joints
+from warpjld.rotations import slerp
+from warpjld.skeleton import Poses, Skeleton, poses_from_rotations
+
+__all__ = ["poses_of_hands"]
+
+_SIDES = ("left", "right")
+_MOST_JOINTS = 3
+"""A quarter of the fingers' twelve joints: one or two bent back for long are someone's supple last knuckles."""
+_MOST_FRAMES = 0.25
+_FAR = np.radians(30.0)
+"""No joint gives by so much more than trackers err."""
+
+
+def poses_of_hands(
+    hands: tuple[HandMotion, ...], skeleton: Skeleton, rate: float, *, side: str | None = None
+) -> tuple[Poses, tuple[str, ...], tuple[str, ...]]:
+    """Poses of a rig whose hands follow recorded ones, by side; one hand follows one of the other side mirrored.
+
+    A rig that is just a hand, with a forearm or without, starts where it rests and from there moves as a whole with
+    the recorded palm, seen from the palm's first orientation; other skeletons move their fingers only. Times before
+    the first and after the last of one of two hands hold its pose.
+
+    Args:
+        hands: What was recorded.
+        skeleton: What is driven.
+        rate: Frames a second of the result.
+        side: Which hand a recording of one is of, whatever its file says; of two, the one to follow.
+
+    Returns:
+        The poses, notes of what drives what, and warnings of what looks wrong.
+
+    Raises:
+        InputError: The rig has no hand, nothing tells which hand was recorded, or its fingers would bend backwards.
+    """
+    own = [one for one in _SIDES if f"{one}.wrist" in skeleton.names]
+    if not own:
+        raise InputError("this rig has no hand for a recording of one to drive")
+    notes: list[str] = []
+    warnings: list[str] = []
+    known = [_sided(hand, own, side if len(hands) == 1 else None, notes, warnings) for hand in hands]
+    if len({hand.side for hand in known}) < len(known):
+        raise InputError(f"both recorded hands look like {known[0].side} ones: the file must state their handedness")
+    known = _followed(known, own, side, notes)
+    for hand in known:
+        warnings += _check_bends(hand, given=side is not None)
+    if len(known) == 1 and known[0].side not in own:
+        notes.append(f"a recorded {known[0].side} hand drives the other one, mirrored")
+        known = [known[0].mirrored()]
+    elif len(own) == 2:
+        notes += [f"the recorded {hand.side} hand drives the {hand.side} one" for hand in known]
+    turns = [hand.turns(skeleton) for hand in known]
+    first, last = min(float(hand.times[0]) for hand in known), max(float(hand.times[-1]) for hand in known)
+    at = frame_times(first, last, rate)
+    local = np.tile(IDENTITY, (len(at), len(skeleton), 1))
+    root = np.zeros((len(at), 3))
+    for hand, turn in zip(known, turns, strict=True):
+        joints = list(turn.joints)
+        local[:, joints] = slerp(hand.times, turn.local[:, joints], at)
+        if turn.moves and _just_a_hand(skeleton, hand.side):
+            local[:, 0] = slerp(hand.times, turn.root, at)
+            root = np.stack([np.interp(at, hand.times, column) for column in turn.displacement.T], axis=-1)
+    if any(turn.moves for turn in turns) and not _just_a_hand(skeleton, known[0].side):
+        notes.append("only fingers follow the recording: where a hand is does not move a rig that is more than one")
+    return poses_from_rotations(skeleton, local, root_position=root), tuple(notes), tuple(warnings)
+
+
+def _just_a_hand(skeleton: Skeleton, side: str | None) -> bool:
+    own = hand_joints(skeleton, side)
+    return len(own) == len(skeleton) and "shoulder" not in own
+
+
+def _sided(hand: HandMotion, own: list[str], side: str | None, notes: list[str], warnings: list[str]) -> HandMotion:
+    """A hand with its side: the one given, else stated, else the one on which its fingers bend as fingers do."""
+    bent = bending_side(hand.bends)
+    if side is not None:
+        if hand.side not in (None, side):
+            warnings.append(f"the file says that this is a {hand.side} hand: taken for a {side} one, as asked for")
+        return hand.called(side)
+    if hand.side is not None:
+        seen = bent or hand.leaning
+        if seen in (None, hand.side):
+            return hand
+        if hand.may_be_mirrored:
+            warnings.append(
+                f"labelled a {hand.side} hand, but shaped like a {seen} one, as in a mirrored (selfie) image: "
+                f"mirrored back; --side {seen} takes it for a {seen} hand instead"
+            )
+            return hand.mirrored().called(hand.side)
+        if bent is None:
+            warnings.append(f"stated to be a {hand.side} hand, but its thumb and fingers look like a {seen} one's")
+        return hand
+    if bent is not None:
+        notes.append(f"the file does not say which hand this is: fingers bend as a {bent} hand's (--side to change)")
+        return hand.called(bent)
+    if hand.leaning is not None:
+        notes.append(
+            f"the file does not say which hand this is: thumb and fingers look like a {hand.leaning} one's "
+            "(--side to change)"
+        )
+        return hand.called(hand.leaning)
+    if len(own) == 2:
+        raise InputError(
+            "the file does not say which hand this is, and neither bends nor thumb tell: state it with --side"
+        )
+    notes.append(
+        f"the file does not say which hand this is, and neither bends nor thumb tell: taken for a {own[0]} one, "
+        "as the rig's (--side to change)"
+    )
+    return hand.called(own[0])
+
+
+def _followed(hands: list[HandMotion], own: list[str], side: str | None, notes: list[str]) -> list[HandMotion]:
+    """The recorded hands that the rig's follow."""
+    if len(hands) > 1 and side is not None:
+        hands = [hand for hand in hands if hand.side == side]
+        if not hands:
+            raise InputError(f"the recording has no {side} hand")
+    elif len(hands) > 1 and len(own) == 1:
+        left_out = [hand for hand in hands if hand.side not in own]
+        if len(left_out) < len(hands):
+            notes += [f"the recorded {hand.side} hand drives nothing: the rig has none" for hand in left_out]
+            hands = [hand for hand in hands if hand.side in own]
+    return hands
+
+
+def _check_bends(hand: HandMotion, *, given: bool) -> tuple[str, ...]:
+    """Refuse fingers that bend to the back of the hand; warn of single joints that do, as trackers err.
+
+    Refused is a recording whose fingers would bend better as the other hand's, and one in which for a quarter of the
+    time at least three of the twelve joints bend back beyond their limits and 15° more, or one does and 45° more.
+
+    Raises:
+        InputError: Such a recording: names the joint that is worst, its frame and angle.
+    """
+    side = hand.side or ""
+    excess = beyond(hand.bends, side)
+    if not excess.any():
+        return ()
+    frame, f, k = np.unravel_index(int(excess.argmax()), excess.shape)
+    angle = float(np.degrees(hand.bends[frame, f, k])) * (1.0 if side == "right" else -1.0)
+    label = hand.labels[frame] if hand.labels else f"frame {frame}"
+    worst = f"{side}.{FINGERS[f]}.{BENDING[k]} by {-angle:.0f}° at {label}"
+    if bending_side(hand.bends) not in (None, side):
+        doubt = "leave --side out, or give the other one" if given else "--side if the file is wrong"
+        raise InputError(
+            f"as a {side} hand its fingers bend backwards, worst {worst}: it looks like the other hand's ({doubt})"
+        )
+    often, far = ((excess > least).mean(axis=0) > _MOST_FRAMES for least in (0.0, _FAR))
+    if np.count_nonzero(often) >= _MOST_JOINTS or far.any():
+        raise InputError(
+            f"its fingers bend backwards on either hand, worst {worst}: no hand's motion, or one of both hands in turn"
+        )
+    frames = int(np.count_nonzero(excess.any(axis=(1, 2))))
+    return (f"fingers bend backwards beyond their limits in {frames} of {len(excess)} frames, worst {worst}",)

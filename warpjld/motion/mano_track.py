@@ -1,0 +1,125 @@
+"""A hand recorded as MANO's joint rotations drives a rig's hand."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from warpjld.motion.finger_bends import finger_bends
+from warpjld.motion.hand_motion import IDENTITY, HandTurns, carried, hand_joints
+from warpjld.motion.mano_rest import MANO_DIGITS, mano_rest
+from warpjld.rotations import about, conjugate, multiply, rotate
+from warpjld.skeleton import Skeleton
+from warpjld.skeleton.hand import FINGER_JOINTS
+
+__all__ = ["ManoTrack"]
+
+
+@dataclass(frozen=True, eq=False)
+class ManoTrack:
+    """Rotations of a hand's joints at K times, from the flat hand.
+
+    Attributes:
+        side: ``left`` or ``right``; None where the file does not say.
+        times: Times [s], increasing, shape (K,).
+        pose: Axis-angle vectors [rad] in MANO's axes, relative to the parent, in MANO's order, shape (K, 15, 3).
+        orient: The wrist's, shape (K, 3); None where the file has none.
+        place: Where the hand is [m], shape (K, 3); None where the file has none.
+        in_rig: Whether orientation and place are in a rig's own axes and from its origin, as ``write_mano`` gives
+            them; those of other files are in some camera's, and count from their first frame.
+        labels: What the file calls each time.
+    """
+
+    side: str | None
+    times: NDArray[np.float64]
+    pose: NDArray[np.float64]
+    orient: NDArray[np.float64] | None = None
+    place: NDArray[np.float64] | None = None
+    in_rig: bool = False
+    labels: tuple[str, ...] = ()
+
+    @property
+    def may_be_mirrored(self) -> bool:
+        """Rotations are of the side they state."""
+        return False
+
+    @property
+    def leaning(self) -> str | None:
+        """A flat hand's rotations say nothing of its side."""
+        return None
+
+    @cached_property
+    def bends(self) -> NDArray[np.float64]:
+        """Bends [rad] of the fingers' joints as of a right hand, shape (K, 4, 3): of MANO's rest hand, any lengths."""
+        count = len(self.times)
+        points = {"wrist": np.zeros((count, 3))}
+        turns = about(self.pose).reshape(count, len(MANO_DIGITS), 3, 4)
+        for d, digit in enumerate(MANO_DIGITS[:-1]):
+            across = {"index": 1.0, "middle": 0.0, "ring": -1.0, "pinky": -2.0}[digit]
+            at = np.tile([-4.0, 0.0, across], (count, 1))
+            turn = np.tile(IDENTITY, (count, 1))
+            points[f"{digit}.carpometacarpal"] = at + np.array([3.0, 0.0, 0.0])
+            for k, joint in enumerate(FINGER_JOINTS):
+                points[f"{digit}.{joint}"] = at
+                if k < 3:
+                    turn = multiply(turn, turns[:, d, k])
+                    at = at + rotate(turn, [-1.0, 0.0, 0.0])
+        return finger_bends(points)
+
+    def called(self, side: str) -> ManoTrack:
+        """The same numbers, taken for those of a hand of this side."""
+        return replace(self, side=side)
+
+    def mirrored(self) -> ManoTrack:
+        """The other hand doing the same: rotations mirrored in the plane x = 0 change the signs of y and z."""
+        turned = np.array([1.0, -1.0, -1.0])
+        return replace(
+            self,
+            side="right" if self.side == "left" else "left",
+            pose=self.pose * turned,
+            orient=None if self.orient is None else self.orient * turned,
+            place=None if self.place is None else self.place * -turned,
+            in_rig=False,
+        )
+
+    def turns(self, skeleton: Skeleton) -> HandTurns:
+        """How the joints of a rig's hand of the same side turn.
+
+        With R the rotation of a joint's bone from the flat hand, in the wrist's axes, W the rotation of MANO's axes
+        into the rig's and A the one that brings the rig's rest bone to the flat hand, the rig's bone turns by
+
+            Q = W R Wᵀ A
+
+        relative to its wrist: no rotation is the flat hand, and twist is followed.
+
+        Raises:
+            InputError: The rig's hand has no palm.
+        """
+        side = self.side or ""
+        own, rest = hand_joints(skeleton, side), mano_rest(skeleton, side)
+        count = len(self.times)
+        local = np.tile(IDENTITY, (count, len(skeleton), 1))
+        turned = about(self.pose)
+        for d in range(len(MANO_DIGITS)):
+            world = np.tile(IDENTITY, (count, 1))
+            before = world
+            for m in range(3 * d, 3 * d + 3):
+                world = multiply(world, turned[:, m])
+                if rest.joints[m] >= 0:
+                    bone = multiply(multiply(multiply(rest.axes, world), conjugate(rest.axes)), rest.align[m])
+                    local[:, rest.joints[m]] = multiply(conjugate(before), bone)
+                    before = bone
+        wrist = skeleton.rest[own["wrist"]]
+        palm = multiply(about(np.zeros((count, 3)) if self.orient is None else self.orient), conjugate(rest.axes))
+        place = np.zeros((count, 3)) if self.place is None else self.place
+        if self.in_rig:
+            turn, moved = palm, place - wrist
+        else:
+            turn = multiply(conjugate(palm[0]), palm)
+            moved = rotate(conjugate(palm[0]), place - place[0])
+        root, displacement = carried(skeleton, turn, wrist, moved)
+        moves = self.orient is not None or self.place is not None
+        return HandTurns(tuple(own.values()), local, root, displacement, moves)

@@ -1,0 +1,97 @@
+"""Times of frames as scripts and libraries write them: stamps in some unit, or a rate, or nothing."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from warpjld.errors import InputError
+
+__all__ = ["DEFAULT_RATE", "stated_times"]
+
+DEFAULT_RATE = 30.0
+
+_RATES = ("fps", "rate", "frame_rate", "framerate", "frameRate", "mocap_framerate", "mocap_frame_rate")
+_UNITS = {"_ms": 1e-3, "Ms": 1e-3, "_us": 1e-6, "_ns": 1e-9, "_s": 1.0, "_sec": 1.0}
+_STAMPS = tuple(f"{stem}{unit}" for stem in ("timestamp", "timestamps", "time", "times") for unit in ("", *_UNITS))
+
+
+def stated_times(
+    about: Mapping[str, Any], frames: Sequence[Mapping[str, Any]], rate: float | None, notes: list[str]
+) -> tuple[NDArray[np.float64], float]:
+    """Times [s] of all frames from the first, shape (F,), and how many there are a second.
+
+    A stamp whose name does not say its unit is in seconds, milliseconds or microseconds, whichever gives steps of a
+    camera: frames less than 2 apart are in seconds, less than 2000 apart in milliseconds.
+
+    Args:
+        about: What the file says of all frames.
+        frames: What it says of each.
+        rate: Frames a second where it says nothing; None for 30, with a note.
+        notes: Assumptions are added here.
+
+    Raises:
+        InputError: A time that is not after the one before, or a rate that is none.
+    """
+    count = len(frames)
+    stamps, unit = _stamps(about, frames)
+    if stamps is not None and count > 1:
+        steps = np.diff(stamps)
+        if not (np.isfinite(stamps).all() and (steps > 0.0).all()):
+            bad = int(np.argmin(np.nan_to_num(steps, nan=-1.0, posinf=-1.0))) + 1
+            raise InputError(f"frame {bad}: its timestamp is not a time after the one before")
+        if unit is None:
+            step = float(np.median(steps))
+            unit, name = (
+                (1.0, "seconds") if step < 2.0 else (1e-3, "milliseconds") if step < 2e3 else (1e-6, "microseconds")
+            )
+            notes.append(f"timestamps {step:.4g} apart are taken for {name}")
+        times = (stamps - stamps[0]) * unit
+        return times, round((count - 1) / float(times[-1]), 1) or float(1.0 / times[-1])
+    stated = next((about[key] for key in _RATES if key in about), None)
+    if stated is not None:
+        value = _number(stated)
+        if not (math.isfinite(value) and value > 0.0):
+            raise InputError(f"want frames a second, above 0, got {stated}")
+        return np.arange(count) / value, value
+    if rate is None and count > 1:
+        notes.append(f"the file does not state its rate: taken as {DEFAULT_RATE:g} frames a second (--rate to change)")
+    value = DEFAULT_RATE if rate is None else rate
+    return np.arange(count) / value, value
+
+
+def _stamps(
+    about: Mapping[str, Any], frames: Sequence[Mapping[str, Any]]
+) -> tuple[NDArray[np.float64] | None, float | None]:
+    """The stamps as the file has them, and their unit [s] where their name says it.
+
+    Frames without one, as those in which nothing was seen may be, get the times between their neighbours'.
+    """
+    for key in _STAMPS:
+        values = about.get(key)
+        if not isinstance(values, list):
+            values = [frame.get(key) for frame in frames]
+        where = [k for k, value in enumerate(values) if value is not None]
+        if len(values) != len(frames) or len(where) < min(2, len(frames)):
+            continue
+        try:
+            known = np.array([float(values[k]) for k in where])
+        except (TypeError, ValueError):
+            raise InputError(f"'{key}': want numbers") from None
+        at = np.arange(len(frames), dtype=np.float64)
+        array = np.interp(at, where, known)
+        step = float(np.median(np.diff(known) / np.diff(where))) if len(where) > 1 else 0.0
+        array += step * (np.minimum(at - where[0], 0.0) + np.maximum(at - where[-1], 0.0))
+        return array, next((unit for end, unit in _UNITS.items() if key.endswith(end)), None)
+    return None, None
+
+
+def _number(value: Any) -> float:
+    try:
+        return float(np.asarray(value, dtype=np.float64).reshape(-1)[0])
+    except (IndexError, TypeError, ValueError):
+        return math.nan
