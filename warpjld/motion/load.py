@@ -21,6 +21,7 @@ MOTION_FORMATS = {
     ".bvh": "motion capture",
     ".glb": "an animation in a binary glTF file",
     ".gltf": "an animation in a glTF file",
+    ".fbx": "an animation in an FBX file",
     ".json": "a tracked hand: WebXR poses or a Leap Motion recording",
 }
 """What each suffix is, for help texts."""
@@ -114,9 +115,16 @@ def _read_gltf(path: Path, rate: float | None, name: str | None) -> JointAnimati
     return read_gltf_animation(path, rate=rate, name=name)
 
 
+def _read_fbx(path: Path, rate: float | None, name: str | None) -> JointAnimation:
+    from warpjld.motion.fbx_animation import read_fbx_animation
+
+    return read_fbx_animation(path, rate=rate, name=name)
+
+
 _ANIMATIONS: dict[str, Callable[[Path, float | None, str | None], JointAnimation]] = {
     ".glb": _read_gltf,
     ".gltf": _read_gltf,
+    ".fbx": _read_fbx,
 }
 """What reads the animations of each suffix: the file, frames a second or None, the animation's name or None."""
 
