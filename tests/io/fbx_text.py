@@ -225,7 +225,9 @@ class _Writer:
         geometric = self.points(np.array(mesh.geometric, dtype=float))
         inside = np.linalg.inv(node)
         local = self.points(mesh.vertices) @ inside[:3, :3].T + inside[:3, 3] - geometric
-        corners = [v if i + 1 < len(polygon) else ~v for polygon in mesh.polygons for i, v in enumerate(polygon)]
+        inside_out = np.linalg.det(self.turn) < 0.0  # seen from outside, corners go round anticlockwise by the numbers
+        polygons = [polygon[::-1] if inside_out else polygon for polygon in mesh.polygons]
+        corners = [v if i + 1 < len(polygon) else ~v for polygon in polygons for i, v in enumerate(polygon)]
         body = f"Vertices: {_array(local.ravel())}\nPolygonVertexIndex: {_array(corners)}\nGeometryVersion: 124"
         if mesh.uv is not None:
             values, index = np.unique(mesh.uv, axis=0, return_inverse=True)

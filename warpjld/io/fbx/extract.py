@@ -2,7 +2,7 @@
 
 It runs in a process of its own, imports nothing of this package, and ends without clearing up, because ufbx's Python
 binding (0.0.5) counts references wrongly: it keeps each element of a scene in a table and hands out the table's own
-reference, and its garbage collection frees what it has freed before. Here every element that is met gets one reference
+reference, and garbage collection frees what it has freed before. Here every element that is met gets one reference
 more, nothing is ever freed, and what still goes wrong in a broken file ends this process only. Memory is bounded too.
 
 All stays in the file's own units and axes. Exit code 3 with one line on stderr means that the file cannot be used.
@@ -11,6 +11,7 @@ All stays in the file's own units and axes. Exit code 3 with one line on stderr 
 from __future__ import annotations
 
 import ctypes
+import gc
 import json
 import os
 import sys
@@ -155,10 +156,10 @@ def stacks(scene: Any, number: dict[int, int]) -> list[dict[str, Any]]:
                 element = taken(props[i].element)
                 if type(element).__name__ != "Node" or props[i].prop_name not in TRANSFORM:
                     continue
-                curves = taken(props[i].anim_value).curves
+                curves: Any = taken(props[i].anim_value).curves
                 moved.add(number[element.typed_id])
                 for curve in elements(curves):
-                    keys = () if curve is None else curve.keyframes
+                    keys: Any = () if curve is None else curve.keyframes
                     if len(keys):
                         times += [keys[0].time, keys[len(keys) - 1].time]
                     if len(keys) > 1:
@@ -170,7 +171,9 @@ def stacks(scene: Any, number: dict[int, int]) -> list[dict[str, Any]]:
     return out
 
 
-def sample(scene, nodes, parents, stack, moved, times):
+def sample(
+    scene: Any, nodes: list[Any], parents: list[int], stack: int, moved: list[int], times: Array
+) -> Array:
     """Node-to-world transforms by frame, shape (F, N, 4, 4)."""
     anim = taken(taken(scene.anim_stacks[stack]).anim)
     local = np.empty((len(times), len(nodes), 4, 4))
@@ -199,6 +202,7 @@ def rotations(quaternions: Array) -> Array:
 
 
 def main(path: str, out: str, animated: str, name: str, rate: str) -> None:
+    gc.disable()  # it frees what is in use
     bound_memory(os.path.getsize(path))
     scene = load(path)
     KEPT.append(scene)
