@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from warpjld.errors import InputError
 from warpjld.io.fbx.scene import FbxScene
+from warpjld.skeleton.recognise.names import read_name
 from warpjld.skeleton.recognise.tree import SourceTree
 
 __all__ = ["FbxSkeleton", "find_skeleton"]
@@ -83,15 +84,22 @@ def _joints(scene: FbxScene, bound: set[int]) -> set[int]:
         joints = {n for n in joints if _top(scene, n, joints) in wanted}
     elif len(bones) < 2:
         return {n for n, kind in enumerate(scene.kinds) if kind in ("bone", "null", "mesh") and scene.parents[n] >= 0}
-    # a plain node from which several chains start belongs to the skeleton: hips, say
+    joints -= _leaves(scene, joints, bound)
+    # a plain node from which several chains start belongs to the skeleton if it is called so: hips, say
     carrying = np.zeros(len(scene.names), dtype=np.int64)
     below = np.isin(np.arange(len(scene.names)), list(joints))
     for n in range(len(scene.names) - 1, 0, -1):  # parents come first
         if below[n] and scene.parents[n] >= 0:
             below[scene.parents[n]] = True
             carrying[scene.parents[n]] += 1
-    forks = {n for n in np.flatnonzero(carrying > 1) if scene.kinds[n] == "null" and scene.parents[n] >= 0}
-    return joints | {int(n) for n in forks}
+    forks = [int(n) for n in np.flatnonzero(carrying > 1) if scene.kinds[n] == "null" and scene.parents[n] >= 0]
+    return joints | {n for n in forks if read_name(scene.names[n]).kind not in (None, "root")}
+
+
+def _leaves(scene: FbxScene, joints: set[int], bound: set[int]) -> set[int]:
+    """Bones that Blender's exporter adds at the ends of chains, to say how long the last bone was drawn."""
+    ends = joints - bound - {int(parent) for parent in scene.parents}
+    return {n for n in ends if scene.names[n] == f"{scene.names[scene.parents[n]]}_end"}
 
 
 def _ordered(scene: FbxScene, joints: set[int]) -> list[int]:
