@@ -23,7 +23,7 @@ def load_rig(
     up: str | None = None,
     joint_map: str | Path | Mapping[str, Any] | None = None,
 ) -> Rig:
-    """Load a rig: a skinned .glb or .gltf, or any surface (OBJ, PLY, STL, …) with a skeleton file.
+    """Load a rig: a skinned .glb, .gltf, .fbx or .vrm, or any surface (OBJ, PLY, STL, …) with a skeleton file.
 
     Args:
         path: The file.
@@ -79,5 +79,15 @@ def _read_gltf(path: Path) -> SourceRig:
     return read_gltf_rig(path)
 
 
-_READERS: dict[str, Callable[[Path], SourceRig]] = {".glb": _read_gltf, ".gltf": _read_gltf}
+def _read_fbx(path: Path) -> SourceRig:
+    from warpjld.io.fbx.rig import read_fbx_rig
+
+    return read_fbx_rig(path)
+
+
+_READERS: dict[str, Callable[[Path], SourceRig]] = {
+    ".glb": _read_gltf,
+    ".gltf": _read_gltf,
+    ".fbx": _read_fbx,
+}
 """What reads the rigs of each suffix; libraries are imported when a file of their kind is opened."""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -22,6 +22,7 @@ MOTION_FORMATS = {
     ".bvh": "motion capture",
     ".glb": "an animation in a binary glTF file",
     ".gltf": "an animation in a glTF file",
+    ".fbx": "an animation in an FBX file",
     ".json": "tracked hands: WebXR poses, a Leap Motion recording, MediaPipe landmarks, MANO poses",
     ".npz": "tracked hands: MANO poses or MediaPipe landmarks as NumPy arrays",
     ".npy": "a tracked hand: MANO poses or MediaPipe landmarks as one NumPy array",
@@ -140,9 +141,16 @@ def _read_gltf(path: Path, rate: float | None, name: str | None) -> JointAnimati
     return read_gltf_animation(path, rate=rate, name=name)
 
 
+def _read_fbx(path: Path, rate: float | None, name: str | None) -> JointAnimation:
+    from warpjld.motion.fbx_animation import read_fbx_animation
+
+    return read_fbx_animation(path, rate=rate, name=name)
+
+
 _ANIMATIONS: dict[str, Callable[[Path, float | None, str | None], JointAnimation]] = {
     ".glb": _read_gltf,
     ".gltf": _read_gltf,
+    ".fbx": _read_fbx,
 }
 """What reads the animations of each suffix: the file, frames a second or None, the animation's name or None."""
 

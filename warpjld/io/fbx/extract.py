@@ -1,0 +1,278 @@
+"""Program that copies an FBX file's content into an NPZ file: ``extract.py FILE OUT.npz ANIMATED NAME RATE``.
+
+It runs in a process of its own, imports nothing of this package, and ends without clearing up, because ufbx's Python
+binding (0.0.5) counts references wrongly: it keeps each element of a scene in a table and hands out the table's own
+reference, and garbage collection frees what it has freed before. Here every element that is met gets one reference
+more, nothing is ever freed, and what still goes wrong in a broken file ends this process only. Memory is bounded too.
+
+All stays in the file's own units and axes. Exit code 3 with one line on stderr means that the file cannot be used.
+"""
+
+from __future__ import annotations
+
+import ctypes
+import gc
+import json
+import os
+import sys
+from typing import Any, NoReturn
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[Any]
+KEPT: list[Any] = []
+TRANSFORM = ("Lcl Translation", "Lcl Rotation", "Lcl Scaling")
+
+
+def taken(element: Any) -> Any:
+    """An element of the scene, kept for good."""
+    if element is not None:
+        ctypes.pythonapi.Py_IncRef(ctypes.py_object(element))
+        KEPT.append(element)
+    return element
+
+
+def elements(several: Any) -> list[Any]:
+    return [taken(several[i]) for i in range(len(several))]
+
+
+def array(several: Any, dtype: Any) -> Array:
+    return np.array(several, dtype=dtype) if len(several) else np.zeros(0, dtype)
+
+
+def matrix(columns: Any) -> Array:
+    out = np.eye(4)
+    out[:3] = np.array(columns).T
+    return out
+
+
+def fail(message: object) -> NoReturn:
+    print(" ".join(str(message).split()), file=sys.stderr, flush=True)
+    os._exit(3)
+
+
+def load(path: str) -> Any:
+    import ufbx
+
+    try:
+        return ufbx.load_file(
+            path,
+            file_format=ufbx.FileFormat.FBX,
+            ignore_embedded=True,
+            # an index beyond its array is told by what it is used for, not moved to another vertex in silence
+            index_error_handling=ufbx.IndexErrorHandling.NO_INDEX,
+            # after this every node is its parent's transform times its own
+            inherit_mode_handling=ufbx.InheritModeHandling.COMPENSATE,
+        )
+    except (ufbx.UfbxError, RuntimeError, ValueError) as error:
+        fail(error)
+    except MemoryError:
+        fail("needs more memory than a file of its size should")
+
+
+def bind_poses(scene: Any) -> dict[int, Array]:
+    out: dict[int, Array] = {}
+    for pose in elements(scene.poses):
+        if pose.is_bind_pose:
+            bones = pose.bone_poses
+            for i in range(len(bones)):
+                node = taken(bones[i].bone_node)
+                if node is not None:
+                    out.setdefault(node.typed_id, matrix(bones[i].bone_to_world))
+    return out
+
+
+def kind(node: Any) -> str:
+    import ufbx
+
+    kinds = ufbx.ElementType
+    names = {kinds.BONE: "bone", kinds.EMPTY: "null", kinds.UNKNOWN: "null", kinds.MESH: "mesh", kinds.LOD_GROUP: "lod"}
+    return names.get(node.attrib_type, "other")
+
+
+def blend_offsets(mesh: Any, count: int) -> Array:
+    """Sum of the blend shapes as the file has them set."""
+    out = np.zeros((count, 3))
+    for deformer in elements(mesh.blend_deformers):
+        for channel in elements(deformer.channels):
+            keys = channel.keyframes
+            for i in range(len(keys)):
+                weight = keys[i].effective_weight
+                if weight:
+                    shape = taken(keys[i].shape)
+                    index = array(shape.offset_vertices, np.int64)
+                    known = index < count
+                    np.add.at(out, index[known], weight * array(shape.position_offsets, np.float64)[known])
+    return out
+
+
+def mesh_arrays(mesh: Any, node: Any, number: dict[int, int], notes: list[str]) -> dict[str, Array]:
+    """Arrays of one mesh at a node: see :class:`~warpjld.io.fbx.scene.FbxMesh`."""
+    points = array(mesh.vertices, np.float64)
+    faces = mesh.faces
+    spans = np.array([tuple(faces[i]) for i in range(len(faces))], dtype=np.int64).reshape(-1, 2)
+    # nothing says that a polygon starts where the last one ended
+    corner = np.concatenate([np.zeros(0, np.int64), *(np.arange(a, a + n) for a, n in spans)])
+    out = {
+        "points": points + blend_offsets(mesh, len(points)),
+        "counts": spans[:, 1],
+        "corners": array(mesh.vertex_indices, np.int64)[corner],
+        "shown": matrix(node.geometry_to_world),
+    }
+    if mesh.vertex_uv.exists:
+        values = np.vstack([array(mesh.vertex_uv.values, np.float32).reshape(-1, 2), np.zeros((1, 2), np.float32)])
+        index = array(mesh.vertex_uv.indices, np.int64)[corner]
+        missing = index >= len(values) - 1
+        if missing.any():
+            notes.append(f"mesh '{node.name}': {int(missing.sum())} corners have no texture coordinates: 0, 0")
+        out["uv"] = values[np.where(missing, len(values) - 1, index)]
+    skins = elements(mesh.skin_deformers)
+    if len(skins) > 1:
+        notes.append(f"mesh '{node.name}' has {len(skins)} skins: the first is read")
+    clusters = [(c, taken(c.bone_node)) for c in (elements(skins[0].clusters) if skins else ())]
+    if any(bone is None for _, bone in clusters):
+        notes.append(f"mesh '{node.name}': clusters without a bone are left out")
+    clusters = [(c, bone) for c, bone in clusters if bone is not None]
+    if clusters:
+        out["nodes"] = np.array([number[bone.typed_id] for _, bone in clusters])
+        out["binds"] = np.array([matrix(c.bind_to_world) for c, _ in clusters])
+        out["inverses"] = np.array([matrix(c.geometry_to_bone) for c, _ in clusters])
+        vertices = [array(c.vertices, np.int64) for c, _ in clusters]
+        out["cluster"] = np.repeat(np.arange(len(clusters)), [len(v) for v in vertices])
+        out["vertex"] = np.concatenate(vertices)
+        out["weight"] = np.concatenate([array(c.weights, np.float64) for c, _ in clusters])
+    return out
+
+
+def stacks(scene: Any, number: dict[int, int]) -> list[dict[str, Any]]:
+    """Name, span and moved nodes of every animation stack; the span is the keys' own where the stack has none."""
+    out = []
+    for stack in elements(scene.anim_stacks):
+        moved, curved, times = set(), set(), []
+        for layer in elements(stack.layers):
+            props = layer.anim_props
+            for i in range(len(props)):
+                element = taken(props[i].element)
+                if type(element).__name__ != "Node" or props[i].prop_name not in TRANSFORM:
+                    continue
+                curves: Any = taken(props[i].anim_value).curves
+                moved.add(number[element.typed_id])
+                for curve in elements(curves):
+                    keys: Any = () if curve is None else curve.keyframes
+                    if len(keys):
+                        times += [keys[0].time, keys[len(keys) - 1].time]
+                    if len(keys) > 1:
+                        curved.add(number[element.typed_id])
+        begin, end = stack.time_begin, stack.time_end
+        if not end > begin and times:
+            begin, end = min(times), max(times)
+        out.append({"name": stack.name, "begin": begin, "end": end, "moved": sorted(moved), "curved": sorted(curved)})
+    return out
+
+
+def sample(scene: Any, nodes: list[Any], parents: list[int], stack: int, moved: list[int], times: Array) -> Array:
+    """Node-to-world transforms by frame, shape (F, N, 4, 4)."""
+    anim = taken(taken(scene.anim_stacks[stack]).anim)
+    local = np.empty((len(times), len(nodes), 4, 4))
+    local[:] = [matrix(node.node_to_parent) for node in nodes]
+    for n in moved:
+        evaluate = nodes[n].evaluate_transform
+        shown = [evaluate(anim, float(t)) for t in times]
+        place, turn, size = (np.array([s[i] for s in shown], dtype=float) for i in range(3))
+        local[:, n, :3, :3] = rotations(turn) * size[:, None, :]
+        local[:, n, :3, 3] = place
+    worlds = local
+    for n, parent in enumerate(parents):  # parents come first
+        if parent >= 0:
+            worlds[:, n] = worlds[:, parent] @ local[:, n]
+    return worlds
+
+
+def rotations(quaternions: Array) -> Array:
+    x, y, z, w = quaternions.T
+    rows = [
+        [1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)],
+        [2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w)],
+        [2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)],
+    ]
+    return np.moveaxis(np.array(rows), 2, 0)
+
+
+def main(path: str, out: str, animated: str, name: str, rate: str) -> None:
+    gc.disable()  # it frees what is in use
+    bound_memory(os.path.getsize(path))
+    scene = load(path)
+    KEPT.append(scene)
+    nodes = elements(scene.nodes)
+    number = {node.typed_id: n for n, node in enumerate(nodes)}
+    above = [taken(node.parent) for node in nodes]
+    parents = [-1 if parent is None else number[parent.typed_id] for parent in above]
+    poses = bind_poses(scene)
+    notes: list[str] = []
+    nothing = np.full((4, 4), np.nan)
+    arrays = {
+        "shown": np.array([matrix(node.node_to_world) for node in nodes]),
+        "pose": np.array([poses.get(node.typed_id, nothing) for node in nodes]),
+    }
+    meshes: list[dict[str, Any]] = []
+    for n, node in enumerate(nodes):
+        mesh = taken(node.mesh)
+        if mesh is not None and len(mesh.vertices):
+            arrays |= {f"{len(meshes)}.{k}": v for k, v in mesh_arrays(mesh, node, number, notes).items()}
+            meshes.append({"name": node.name or mesh.name, "node": n})
+    settings = scene.settings
+    told: dict[str, Any] = {
+        "names": [node.name for node in nodes],
+        "parents": parents,
+        "kinds": [kind(node) for node in nodes],
+        "axes": [int(axis) for axis in settings.axes],
+        "unit": settings.unit_meters,
+        "rate": settings.frames_per_second,
+        "meshes": meshes,
+        "stacks": stacks(scene, number),
+        "notes": notes,
+    }
+    chosen = choose(told["stacks"], name) if animated == "yes" else None
+    if chosen is not None:
+        stack = told["stacks"][chosen]
+        rate_ = float(rate) or settings.frames_per_second
+        rate_ = rate_ if np.isfinite(rate_) and rate_ > 0.0 else 30.0
+        count = (stack["end"] - stack["begin"]) * rate_
+        if not 0.0 <= count < 1e6:
+            fail(f"animation '{stack['name']}' would have {count:.3g} frames: at most 1000000")
+        times = stack["begin"] + np.arange(int(np.floor(count + 1e-6)) + 1) / rate_
+        arrays["worlds"] = sample(scene, nodes, parents, chosen, stack["moved"], times)
+        told |= {"chosen": stack["name"], "rate": rate_}
+    np.savez(out, told=np.array(json.dumps(told)), **arrays)  # type: ignore[arg-type]
+
+
+def choose(several: list[dict[str, Any]], name: str) -> int | None:
+    """Number of the stack of this name, or of the first that moves something; None where there is none."""
+    if name:
+        return next((i for i, stack in enumerate(several) if stack["name"] == name), None)
+    for wanted in ("curved", "moved"):
+        for i, stack in enumerate(several):
+            if stack[wanted]:
+                return i
+    return None
+
+
+def bound_memory(size: int) -> None:
+    try:
+        import resource
+    except ImportError:  # Windows has no such limit
+        return
+    limit = 4 * 2**30 + 200 * size
+    _, hard = resource.getrlimit(resource.RLIMIT_AS)
+    if hard == resource.RLIM_INFINITY or hard > limit:
+        resource.setrlimit(resource.RLIMIT_AS, (limit, hard))
+
+
+if __name__ == "__main__":
+    try:
+        main(*sys.argv[1:])
+    except MemoryError:
+        fail("needs more memory than a file of its size should")
+    sys.stdout.flush()
+    os._exit(0)  # without clearing up: see above

@@ -1,0 +1,228 @@
+"""What an FBX file says, in metres, right-handed and Y up."""
+
+from __future__ import annotations
+
+import json
+import subprocess
+import sys
+import tempfile
+from dataclasses import dataclass
+from importlib.util import find_spec
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from warpjld.errors import InputError, MissingExtraError
+
+__all__ = ["FbxMesh", "FbxScene", "FbxSkin", "FbxStack", "read_scene"]
+
+_FURTHEST = 1e12
+_LONGEST = 600.0
+"""Seconds that reading may take."""
+
+
+@dataclass(frozen=True, eq=False)
+class FbxSkin:
+    """A painted skin of C clusters and P influences.
+
+    Attributes:
+        nodes: Node of every cluster, shape (C,).
+        binds: Its node-to-world transform when it was bound [m], shape (C, 4, 4).
+        inverses: Geometry-to-node transforms then, shape (C, 4, 4).
+        cluster: Cluster of every influence, shape (P,).
+        vertex: Its vertex, shape (P,).
+        weight: Its weight, shape (P,).
+    """
+
+    nodes: NDArray[np.int64]
+    binds: NDArray[np.float64]
+    inverses: NDArray[np.float64]
+    cluster: NDArray[np.int64]
+    vertex: NDArray[np.int64]
+    weight: NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class FbxMesh:
+    """A mesh at a node, in its own geometry's space.
+
+    Attributes:
+        name: Name of its node.
+        node: Number of its node.
+        points: Vertices with the blend shapes that are set, shape (W, 3).
+        counts: Corners of every polygon.
+        corners: Vertex of every corner.
+        uv: Texture coordinates of every corner, origin at the picture's lower left, or None.
+        shown: Geometry-to-world transform that the file shows [m], shape (4, 4).
+        skin: How it is painted, or None.
+    """
+
+    name: str
+    node: int
+    points: NDArray[np.float64]
+    counts: NDArray[np.int64]
+    corners: NDArray[np.int64]
+    uv: NDArray[np.float32] | None
+    shown: NDArray[np.float64]
+    skin: FbxSkin | None
+
+
+@dataclass(frozen=True)
+class FbxStack:
+    """An animation: its name, its length [s], and how many nodes it moves."""
+
+    name: str
+    length: float
+    moving: int
+
+
+@dataclass(frozen=True, eq=False)
+class FbxScene:
+    """A file's content, N nodes.
+
+    Attributes:
+        path: The file.
+        names: Nodes' names.
+        parents: Their parents, which come first, -1 for the scene's root, shape (N,).
+        kinds: ``bone``, ``null``, ``mesh``, ``lod`` or ``other``.
+        shown: Node-to-world transforms that the file shows [m], shape (N, 4, 4).
+        pose: The same in the file's bind pose, not a number for nodes that it leaves out.
+        meshes: Meshes in the order of their nodes.
+        stacks: Animations.
+        worlds: Node-to-world transforms of the animation asked for, shape (F, N, 4, 4); None without.
+        rate: Frames a second.
+        title: That animation's name.
+        notes: What was left out.
+    """
+
+    path: Path
+    names: tuple[str, ...]
+    parents: NDArray[np.int64]
+    kinds: tuple[str, ...]
+    shown: NDArray[np.float64]
+    pose: NDArray[np.float64]
+    meshes: tuple[FbxMesh, ...]
+    stacks: tuple[FbxStack, ...]
+    worlds: NDArray[np.float64] | None
+    rate: float
+    title: str
+    notes: tuple[str, ...]
+
+
+def read_scene(path: str | Path, *, animated: bool = False, name: str | None = None, rate: float = 0.0) -> FbxScene:
+    """Read an FBX file.
+
+    Args:
+        path: The file.
+        animated: Whether an animation is wanted.
+        name: Which; None for the first that moves anything.
+        rate: Frames a second; 0 for the file's own.
+
+    Raises:
+        InputError: It cannot be read, or holds a transform or a vertex that is not finite.
+        MissingExtraError: Without ufbx.
+    """
+    path = Path(path)
+    if find_spec("ufbx") is None:
+        raise MissingExtraError("FBX", "fbx")
+    try:
+        empty = path.stat().st_size == 0
+    except OSError as error:
+        raise InputError(f"cannot be read: {error.strerror}", path=path) from None
+    if empty:
+        raise InputError("is empty: an FBX file was expected", path=path)
+    told, arrays = _extract(path, animated, name or "", rate)
+    axes = _world_axes(told["axes"], told["unit"])
+    meshes = tuple(_mesh(arrays, i, mesh, axes, path) for i, mesh in enumerate(told["meshes"]))
+    names = tuple(name or f"node {n}" for n, name in enumerate(told["names"]))
+    worlds = arrays.get("worlds")
+    for transforms in (arrays["shown"], np.nan_to_num(arrays["pose"]), *(() if worlds is None else (worlds,))):
+        _check(transforms, names, path)
+    return FbxScene(
+        path=path,
+        names=names,
+        parents=np.array(told["parents"], dtype=np.int64),
+        kinds=tuple(told["kinds"]),
+        shown=axes @ arrays["shown"],
+        pose=axes @ arrays["pose"],
+        meshes=meshes,
+        stacks=tuple(FbxStack(s["name"], s["end"] - s["begin"], len(s["curved"])) for s in told["stacks"]),
+        worlds=None if worlds is None else axes @ worlds,
+        rate=told["rate"],
+        title=told.get("chosen", ""),
+        notes=tuple(told["notes"]),
+    )
+
+
+def _extract(path: Path, animated: bool, name: str, rate: float) -> tuple[dict[str, Any], dict[str, NDArray[Any]]]:
+    """What :mod:`extract` finds, run as a program: it may crash on a broken file."""
+    program = Path(__file__).with_name("extract.py")
+    with tempfile.TemporaryDirectory() as folder:
+        out = Path(folder) / "content.npz"
+        arguments = [str(path.absolute()), str(out), "yes" if animated else "no", name, str(float(rate))]
+        try:
+            done = subprocess.run(
+                [sys.executable, "-P", str(program), *arguments],
+                capture_output=True,
+                text=True,
+                errors="replace",
+                timeout=_LONGEST,
+                check=False,
+            )
+        except subprocess.TimeoutExpired:
+            raise InputError(f"cannot be read as FBX: not done after {_LONGEST:.0f} s", path=path) from None
+        last = done.stderr.strip().splitlines()[-1:] or [""]
+        if done.returncode:
+            why = last[0] if done.returncode > 0 and last[0] else f"the reader ends with code {done.returncode}"
+            raise InputError(f"cannot be read as FBX: {why}", path=path)
+        with np.load(out) as content:
+            arrays = {key: content[key] for key in content.files}
+    told: dict[str, Any] = json.loads(str(arrays.pop("told")))
+    return told, arrays
+
+
+def _world_axes(axes: list[int], unit: float) -> NDArray[np.float64]:
+    """Transform from the file's units and axes to metres, right-handed, Y up; mirrors where they are left-handed.
+
+    Args:
+        axes: What points right, up and to the viewer: ufbx's numbers, x, -x, y, -y, z, -z.
+        unit: Metres.
+    """
+    rows = np.zeros((3, 3))
+    for row, axis in zip(rows, axes, strict=True):
+        if axis < 6:
+            row[axis // 2] = -1.0 if axis % 2 else 1.0
+    out = np.eye(4)
+    out[:3, :3] = rows if abs(np.linalg.det(rows)) > 0.5 else np.eye(3)
+    out[:3, :3] *= unit if 0.0 < unit < _FURTHEST else 0.01
+    return out
+
+
+def _mesh(
+    arrays: dict[str, NDArray[Any]], index: int, told: dict[str, Any], axes: NDArray[np.float64], path: Path
+) -> FbxMesh:
+    name, own = told["name"], {k.partition(".")[2]: v for k, v in arrays.items() if k.startswith(f"{index}.")}
+    points = own["points"]
+    if not (np.abs(points) < _FURTHEST).all():
+        bad = int(np.argwhere(~(np.abs(points) < _FURTHEST))[0][0])
+        raise InputError(f"mesh '{name}': vertex {bad} is not finite or too far away", path=path)
+    if own["corners"].size and own["corners"].max() >= len(points):
+        raise InputError(f"mesh '{name}': a polygon names a vertex beyond its {len(points)}", path=path)
+    skin = None
+    if "nodes" in own:
+        for transforms in (own["binds"], own["inverses"]):
+            _check(transforms, (f"cluster of mesh '{name}'",) * len(transforms), path)
+        binds = axes @ own["binds"]
+        skin = FbxSkin(own["nodes"], binds, own["inverses"], own["cluster"], own["vertex"], own["weight"])
+    shown = own["shown"]
+    _check(shown[None], (name,), path)
+    return FbxMesh(name, told["node"], points, own["counts"], own["corners"], own.get("uv"), axes @ shown, skin)
+
+
+def _check(transforms: NDArray[np.float64], names: tuple[str, ...], path: Path) -> None:
+    sane = (np.abs(transforms) < _FURTHEST).all(axis=(-1, -2))
+    if not sane.all():
+        node = names[int(np.argwhere(~sane)[0][-1])]
+        raise InputError(f"node '{node}': its transform is not finite or too large", path=path)
