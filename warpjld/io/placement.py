@@ -26,15 +26,24 @@ def place(
 
     Args:
         source: What the file says.
-        unit: ``m``, ``cm``, ``mm`` or None: the one with which hand or body has a plausible size.
+        unit: ``m``, ``cm``, ``mm`` or None: what the file says, else the one with which hand or body has a plausible
+            size.
         scale: Factor by which all lengths are multiplied besides; where it is given and ``unit`` is not, nothing is
-            guessed: the file is taken to be in metres.
-        up: ``y``, ``z`` or None: Z only where a body's head lies that way from its hips.
+            guessed: a file that does not say is taken to be in metres.
+        up: ``y``, ``z`` or None: what the file says, else Z only where a body's head lies that way from its hips.
     """
-    notes = []
-    factor = (1.0 if unit is None else METRES[unit]) * (1.0 if scale is None else scale)
+    notes, suspicious = [], []
+    own = 1.0 if source.metres is None else source.metres
+    factor = (own if unit is None else METRES[unit]) * (1.0 if scale is None else scale)
     roles = recognise(source.tree) if unit is None or up is None else Roles()
-    if unit is None and scale is None:
+    if unit is None and scale is None and source.metres is not None:
+        size, plausible, what = _size(source.tree, roles)
+        if size and not plausible[0] <= size * factor <= plausible[1]:
+            suspicious.append(
+                f"unit: the file says {own:g} m, with which a {what} of {size * own:.4g} m is not plausible: "
+                "give the unit or a scale if it is wrong"
+            )
+    elif unit is None and scale is None:
         size, plausible, what = _size(source.tree, roles)
         if size and not plausible[0] <= size <= plausible[1]:
             fits = [u for u, f in METRES.items() if plausible[0] <= size * f <= plausible[1]]
@@ -43,7 +52,11 @@ def place(
                 notes.append(f"unit: a {what} of {size:.4g} units is taken to be in {fits[0]}")
             else:
                 notes.append(f"unit: a {what} of {size:.4g} m is not plausible in m, cm or mm: left as it is")
-    if up is None and _lies_on_z(source.tree, roles):
+    if up is None and source.up is not None:
+        up = source.up
+        if up == "y" and _lies_on_z(source.tree, roles):
+            suspicious.append("up axis: the file says Y, yet the body lies along Z: give the up axis if it is wrong")
+    elif up is None and _lies_on_z(source.tree, roles):
         up = "z"
         notes.append("up axis: the body stands along Z, turned to Y")
     turn = np.array([[1.0, 0, 0], [0, 0, 1.0], [0, -1.0, 0]]) if up == "z" else np.eye(3)
@@ -59,6 +72,7 @@ def place(
         axes={j: turn @ axis for j, axis in source.axes.items()},
         placing=placing @ source.placing,
         notes=(*source.notes, *notes),
+        suspicious=(*source.suspicious, *suspicious),
     )
 
 
