@@ -41,6 +41,8 @@ class Rig:
         source: The file's own joints, in its names, order, units and axes: what its animations move. None for a
             generated rig.
         sources: Joint of ``source`` that each joint of the skeleton is, -1 where it was added, as fingertips are.
+        owner: Joint of the skeleton that each joint of ``source`` moves with, shape (N,); -1 for those above all
+            recognised ones that carry no flesh: they stay where they are.
         placing: Similarity from the file's units and axes to the skeleton's, shape (4, 4).
         rigid: Joint of the skeleton that a welded vertex follows rigidly, -1 for flesh, shape (V,); None where all
             is flesh.
@@ -55,6 +57,7 @@ class Rig:
     path: Path | None = None
     source: SourceTree | None = None
     sources: tuple[int, ...] = ()
+    owner: NDArray[np.int64] = field(default_factory=lambda: np.zeros(0, dtype=np.int64))
     placing: NDArray[np.float64] = field(default_factory=lambda: np.eye(4))
     rigid: NDArray[np.int32] | None = None
     notes: tuple[str, ...] = ()

@@ -66,6 +66,7 @@ def build_hand(
         surface=_surface(vertices * _MILLIMETRE, np.ascontiguousarray(faces, dtype=np.int32)),
         source=_source(skeleton),
         sources=tuple(range(len(skeleton))),
+        owner=np.arange(len(skeleton)),
     )
 
 

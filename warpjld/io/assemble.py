@@ -9,7 +9,7 @@ from warpjld.errors import InputError
 from warpjld.io.placement import place
 from warpjld.io.source import SourceRig
 from warpjld.rig import Rig, Skin
-from warpjld.skeleton.recognise.canonical import canonical_skeleton
+from warpjld.skeleton.recognise.canonical import Canonical, canonical_skeleton
 from warpjld.surface import Surface, weld_surface
 
 __all__ = ["assemble_rig"]
@@ -59,11 +59,25 @@ def _assemble(source: SourceRig, side: str | None, unit: str | None, scale: floa
         path=source.path,
         source=file_tree,
         sources=found.sources,
+        owner=_movers(source, found),
         placing=source.placing,
         rigid=_rigid(source, found.owner, surface),
         notes=(*source.notes, *found.notes),
         suspicious=source.suspicious,
     )
+
+
+def _movers(source: SourceRig, found: Canonical) -> NDArray[np.int64]:
+    """Joint of the skeleton that each joint of the file moves with, -1 for bare ones that hang on none of them."""
+    tree = source.tree
+    carries = np.zeros(len(tree), dtype=bool)
+    if source.joints is not None and source.weights is not None:
+        carries[source.joints[source.weights > 0]] = True
+    if source.rigid is not None:
+        carries[source.rigid[source.rigid >= 0]] = True
+    recognised = set(found.sources)
+    hangs = [not recognised.isdisjoint((j, *tree.ancestors(j))) for j in range(len(tree))]
+    return np.where(carries | hangs, found.owner, -1)
 
 
 def _skin(

@@ -1,0 +1,104 @@
+"""A GLB file as it is stored: JSON, and one binary chunk that grows by arrays.
+
+The JSON is kept as it is read, not as objects of pygltflib, which would lose what that library does not know and add
+its defaults: a user's file keeps its materials, extensions and extras to the letter.
+"""
+
+from __future__ import annotations
+
+import json
+import struct
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from warpjld.errors import InputError
+
+__all__ = ["ARRAY_BUFFER", "ELEMENT_ARRAY_BUFFER", "GlbFile", "read_gltf_json"]
+
+ARRAY_BUFFER, ELEMENT_ARRAY_BUFFER = 34962, 34963
+_COMPONENTS = {"f4": 5126, "u4": 5125, "u2": 5123}
+_LARGEST = 2**32 - 1  # lengths are 32 bit
+
+
+def read_gltf_json(data: bytes) -> dict[str, Any]:
+    """The JSON of a .glb or .gltf file that was opened before, and so is sound."""
+    if data[:4] == b"glTF":
+        (length,) = struct.unpack_from("<I", data, 12)
+        data = data[20 : 20 + length]
+    content: dict[str, Any] = json.loads(data.decode("utf-8-sig"))
+    return content
+
+
+class GlbFile:
+    """JSON and binary content; ``add`` appends an array to both."""
+
+    def __init__(self, content: dict[str, Any], chunks: list[bytes]) -> None:
+        """Take over ``content``, whose buffers are ``chunks``: they become one."""
+        self.content = content
+        self._chunks: list[bytes] = []
+        self._length = 0
+        starts = [self.append(chunk) for chunk in chunks]
+        for view in content.get("bufferViews", ()):
+            view["byteOffset"] = view.get("byteOffset", 0) + starts[view["buffer"]]
+            view["buffer"] = 0
+
+    def append(self, data: bytes) -> int:
+        """Put bytes behind the others, at a multiple of four; returns where they begin."""
+        start = self._length
+        self._chunks.append(data + b"\0" * (-len(data) % 4))
+        self._length += len(self._chunks[-1])
+        return start
+
+    def add_view(self, data: bytes, target: int | None = None) -> int:
+        """A buffer view of new bytes; returns its number."""
+        view = {"buffer": 0, "byteOffset": self.append(data), "byteLength": len(data)}
+        if target is not None:
+            view["target"] = target
+        return self._add("bufferViews", view)
+
+    def add(self, array: NDArray[Any], kind: str, *, target: int | None = None, bounds: bool = False) -> int:
+        """An accessor of a new array, of float32, uint32 or uint16; returns its number.
+
+        Args:
+            array: The array, one row an element.
+            kind: ``SCALAR``, ``VEC3``, ….
+            target: ``ARRAY_BUFFER`` for vertex attributes, ``ELEMENT_ARRAY_BUFFER`` for indices.
+            bounds: Whether smallest and largest values are stored, as for positions and times.
+        """
+        accessor: dict[str, Any] = {
+            "bufferView": self.add_view(np.ascontiguousarray(array).tobytes(), target),
+            "componentType": _COMPONENTS[array.dtype.str.lstrip("<=")],
+            "count": len(array),
+            "type": kind,
+        }
+        if bounds:
+            rows = array.reshape(len(array), -1)
+            accessor |= {"min": rows.min(axis=0).tolist(), "max": rows.max(axis=0).tolist()}
+        return self._add("accessors", accessor)
+
+    def write(self, path: Path) -> None:
+        """Write the file.
+
+        Raises:
+            InputError: It would be longer than the format allows.
+            OSError: The disk refuses.
+        """
+        self.content["buffers"] = [{"byteLength": self._length}]
+        text = json.dumps(self.content, ensure_ascii=False, separators=(",", ":")).encode("utf-8")
+        text += b" " * (-len(text) % 4)
+        length = 12 + 8 + len(text) + 8 + self._length
+        if length > _LARGEST:
+            raise InputError(f"would be {length / 2**30:.1f} GB; a .glb file holds up to 4: write fewer frames")
+        with path.open("wb") as file:
+            file.write(struct.pack("<4sII", b"glTF", 2, length))
+            file.write(struct.pack("<I4s", len(text), b"JSON") + text)
+            file.write(struct.pack("<I4s", self._length, b"BIN\0"))
+            file.writelines(self._chunks)
+
+    def _add(self, kind: str, entry: dict[str, Any]) -> int:
+        entries = self.content.setdefault(kind, [])
+        entries.append(entry)
+        return len(entries) - 1

@@ -1,0 +1,99 @@
+"""A glTF document of a rig that came from elsewhere: its surface, a skin, and its joints in metres with Y up."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial.transform import Rotation
+
+from warpjld import __version__
+from warpjld.io.motion_out.glb_file import ARRAY_BUFFER, ELEMENT_ARRAY_BUFFER, GlbFile
+from warpjld.io.motion_out.local_motion import nearest_rotations
+from warpjld.io.motion_out.node_tree import NodeTree
+from warpjld.io.motion_out.skin_weights import joint_weights
+from warpjld.io.motion_out.source_motion import SourceMotion
+from warpjld.normals import vertex_normals
+from warpjld.rig import Rig
+
+__all__ = ["new_document"]
+
+
+def new_document(rig: Rig, motion: SourceMotion, notes: list[str]) -> tuple[GlbFile, NodeTree]:
+    """A document with the rig at rest, and its nodes."""
+    rest_worlds = motion.rest_frames.copy()
+    # joints keep the axes that the file gives them, but no scale: nothing is left for it to do
+    rest_worlds[:, :3, :3] = nearest_rotations(rest_worlds[:, :3, :3])
+    parents = motion.tree.parents
+    rest = rest_worlds.copy()
+    hang = parents >= 0
+    rest[hang] = np.linalg.inv(rest_worlds[parents[hang]]) @ rest_worlds[hang]
+    count = len(parents)
+    file = GlbFile({"asset": {"version": "2.0", "generator": f"warpjld {__version__}"}}, [])
+    nodes = [_node(motion.tree.names[j], rest[j], motion.tree.children[j]) for j in range(count)]
+    nodes.append({"name": rig.name, "mesh": 0, "skin": 0})
+    binds = np.linalg.inv(rest_worlds).swapaxes(1, 2).reshape(count, 16).astype("<f4")  # glTF stores columns
+    binds[:, 3:12:4], binds[:, 15] = 0.0, 1.0
+    file.content |= {
+        "scene": 0,
+        "scenes": [{"nodes": [*np.flatnonzero(~hang).tolist(), count]}],
+        "nodes": nodes,
+        "meshes": [{"name": rig.name, "primitives": [_primitive(file, rig, motion, notes)]}],
+        "skins": [{"joints": list(range(count)), "inverseBindMatrices": file.add(binds, "MAT4")}],
+        # without one, glTF's default is bare metal
+        "materials": [
+            {
+                "name": "skin",
+                "pbrMetallicRoughness": {
+                    "baseColorFactor": [0.78, 0.50, 0.38, 1.0],
+                    "metallicFactor": 0.0,
+                    "roughnessFactor": 0.6,
+                },
+            }
+        ],
+    }
+
+    def worlds(frames: slice) -> NDArray[np.float64]:
+        return np.asarray(motion.moves(frames) @ rest_worlds)
+
+    every = np.arange(count)
+    return file, NodeTree(nodes, every, parents, rest, rest_worlds, np.ones((count, 3)), every, worlds)
+
+
+def _node(name: str, rest: NDArray[np.float64], children: tuple[int, ...]) -> dict[str, Any]:
+    node: dict[str, Any] = {
+        "name": name,
+        "translation": rest[:3, 3].tolist(),
+        "rotation": Rotation.from_matrix(rest[:3, :3]).as_quat().tolist(),
+    }
+    if children:
+        node["children"] = list(children)
+    return node
+
+
+def _primitive(file: GlbFile, rig: Rig, motion: SourceMotion, notes: list[str]) -> dict[str, Any]:
+    """The surface in its source's vertex order, as many sets of four influences as its weights want."""
+    surface = rig.surface
+    rest = surface.to_source(surface.vertices.astype("<f4"))
+    normals = surface.to_source(vertex_normals(surface.vertices, surface.faces)).astype("<f4")
+    attributes = {
+        "POSITION": file.add(rest, "VEC3", target=ARRAY_BUFFER, bounds=True),
+        "NORMAL": file.add(normals, "VEC3", target=ARRAY_BUFFER),
+    }
+    if surface.uv is not None:
+        # glTF counts v downwards from the top of the picture
+        flipped = np.asarray(surface.uv, np.float32) * [1, -1] + [0, 1]
+        attributes["TEXCOORD_0"] = file.add(flipped.astype("<f4"), "VEC2", target=ARRAY_BUFFER)
+    joints, weights = (array[surface.weld] for array in joint_weights(rig, motion, notes))
+    for first in range(0, joints.shape[1], 4):
+        part = slice(first, first + 4)
+        n = first // 4
+        attributes[f"JOINTS_{n}"] = file.add(joints[:, part].astype("<u2"), "VEC4", target=ARRAY_BUFFER)
+        attributes[f"WEIGHTS_{n}"] = file.add(weights[:, part].astype("<f4"), "VEC4", target=ARRAY_BUFFER)
+    corners = surface.source_faces.astype("<u4").reshape(-1)
+    return {
+        "attributes": attributes,
+        "indices": file.add(corners, "SCALAR", target=ELEMENT_ARRAY_BUFFER),
+        "material": 0,
+    }
