@@ -13,6 +13,8 @@ from warpjld.skeleton.recognise.tree import SourceTree
 
 __all__ = ["JointAnimation"]
 
+_Z_TO_Y = np.array([[1.0, 0, 0, 0], [0, 0, 1.0, 0], [0, -1.0, 0, 0], [0, 0, 0, 1.0]])
+
 
 @dataclass(frozen=True, eq=False)
 class JointAnimation:
@@ -25,6 +27,8 @@ class JointAnimation:
         rate: Frames a second.
         title: The animation's name; "" where the file gives none.
         notes: What a reader of the result should know.
+        warnings: What of the file cannot be followed.
+        up: The file's up axis, ``y`` or ``z``, where it says so.
     """
 
     tree: SourceTree
@@ -32,17 +36,23 @@ class JointAnimation:
     rate: float
     title: str = ""
     notes: tuple[str, ...] = ()
+    warnings: tuple[str, ...] = ()
+    up: str | None = None
 
     def __len__(self) -> int:
         return len(self.worlds)
 
     def clip(self) -> Clip:
-        """The same as positions and rotations from rest, parents first: what another skeleton is driven by."""
+        """The same as positions and rotations from rest, parents first: what another skeleton is driven by.
+
+        Of a file that says it has Z up it is turned to Y.
+        """
         order = np.array(sorted(range(len(self.tree)), key=lambda j: (self.tree.depth(j), j)))
         place = np.empty_like(order)
         place[order] = np.arange(len(order))
         parents = self.tree.parents[order]
-        rest, worlds = self.tree.frames[order], self.worlds[:, order]
+        turn = _Z_TO_Y if self.up == "z" else np.eye(4)
+        rest, worlds = turn @ self.tree.frames[order], turn @ self.worlds[:, order]
         turned = worlds[..., :3, :3] @ np.linalg.inv(rest[:, :3, :3])
         return Clip(
             names=tuple(self.tree.names[j] for j in order),

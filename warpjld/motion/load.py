@@ -21,6 +21,10 @@ MOTION_FORMATS = {
     ".bvh": "motion capture",
     ".glb": "an animation in a binary glTF file",
     ".gltf": "an animation in a glTF file",
+    ".usd": "a UsdSkel animation",
+    ".usda": "a UsdSkel animation in USD as text",
+    ".usdc": "a UsdSkel animation in binary USD",
+    ".usdz": "a UsdSkel animation in a USD package",
     ".json": "a tracked hand: WebXR poses or a Leap Motion recording",
 }
 """What each suffix is, for help texts."""
@@ -105,7 +109,7 @@ def _animation(animation: JointAnimation, rig: Rig) -> LoadedMotion:
     poses = own_poses(animation, rig)
     if poses is None:
         poses = retarget(animation.clip(), rig.skeleton)
-    return LoadedMotion(poses, animation.rate, animation.notes)
+    return LoadedMotion(poses, animation.rate, animation.notes, animation.warnings)
 
 
 def _read_gltf(path: Path, rate: float | None, name: str | None) -> JointAnimation:
@@ -114,9 +118,19 @@ def _read_gltf(path: Path, rate: float | None, name: str | None) -> JointAnimati
     return read_gltf_animation(path, rate=rate, name=name)
 
 
+def _read_usd(path: Path, rate: float | None, name: str | None) -> JointAnimation:
+    from warpjld.motion.usd_animation import read_usd_animation
+
+    return read_usd_animation(path, rate=rate, name=name)
+
+
 _ANIMATIONS: dict[str, Callable[[Path, float | None, str | None], JointAnimation]] = {
     ".glb": _read_gltf,
     ".gltf": _read_gltf,
+    ".usd": _read_usd,
+    ".usda": _read_usd,
+    ".usdc": _read_usd,
+    ".usdz": _read_usd,
 }
 """What reads the animations of each suffix: the file, frames a second or None, the animation's name or None."""
 

@@ -90,9 +90,6 @@ def read_skeletons(file: UsdFile) -> UsdSkeletons | None:
         return None
     parents = [np.where(one.parents < 0, -1, one.parents + one.first) for one in skeletons]
     frames = np.concatenate([one.frames for one in skeletons])
-    if not np.isfinite(frames).all():
-        joint = int(np.argwhere(~np.isfinite(frames))[0][0])
-        raise InputError(f"joint '{_names(skeletons)[joint]}': its bind transform is not finite", path=file.path)
     tree = SourceTree(tuple(_names(skeletons)), np.concatenate(parents), frames)
     return UsdSkeletons(tree, tuple(skeletons))
 
@@ -136,7 +133,11 @@ def _skeleton(file: UsdFile, prim: Any, meshes: tuple[Any, ...], first: int) -> 
     parents = _parents(tokens)
     bind = matrices(skeleton.GetBindTransformsAttr().Get() or np.zeros((0, 4, 4)))
     local = matrices(skeleton.GetRestTransformsAttr().Get() or np.zeros((0, 4, 4)))
-    rest = concatenated(local, parents) if len(local) == len(tokens) else None
+    rest = None
+    if len(local) == len(tokens) and _regular(local).all():
+        rest = concatenated(local, parents)
+    elif len(local):
+        file.notes.append(f"skeleton '{path}': its restTransforms are no transforms of its joints: not used")
     if len(bind) != len(tokens):
         if rest is None:
             raise InputError(
@@ -145,11 +146,26 @@ def _skeleton(file: UsdFile, prim: Any, meshes: tuple[Any, ...], first: int) -> 
         file.notes.append(f"skeleton '{path}' has no bindTransforms for its joints: restTransforms are taken")
         bind = rest
     to_world = matrices(UsdGeom.XformCache(Usd.TimeCode.EarliestTime()).GetLocalToWorldTransform(prim))
-    if rest is None:
-        local = np.where((parents < 0)[:, None, None], bind, np.linalg.pinv(bind[parents]) @ bind)
-    elif _is_placed(bind, rest, to_world):  # bound in the world, as USD's documentation words it
+    if rest is not None and _is_placed(bind, rest, to_world):  # bound in the world, as USD's documentation words it
         to_world = np.eye(4)
+    with np.errstate(invalid="ignore"):
+        regular = _regular(to_world @ bind)
+    if not regular.all():
+        name = tokens[int(np.argmin(regular))]
+        raise InputError(
+            f"skeleton '{path}': the bind transform of joint '{name}' is not finite, or flattens space (scale 0)",
+            path=file.path,
+        )
+    if rest is None:
+        local = np.where((parents < 0)[:, None, None], bind, np.linalg.inv(bind[parents]) @ bind)
     return UsdSkeleton(prim, tokens, parents, bind, local, to_world, first, meshes)
+
+
+def _regular(transforms: NDArray[np.float64]) -> NDArray[np.bool_]:
+    """Which transforms (J, 4, 4) are finite and can be inverted."""
+    finite = np.isfinite(transforms).all(axis=(1, 2))
+    linear = np.where(finite[:, None, None], transforms, 0.0)[:, :3, :3]
+    return np.asarray(np.abs(np.linalg.det(linear)) > 1e-12 * np.linalg.norm(linear, axis=(1, 2)) ** 3)
 
 
 def _parents(tokens: tuple[str, ...]) -> NDArray[np.int64]:

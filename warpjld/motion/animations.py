@@ -1,0 +1,69 @@
+"""The animations of a file, by name."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from pathlib import Path
+
+from warpjld.errors import InputError
+from warpjld.suggest import one_of
+
+__all__ = ["animation_names", "choose_animation", "unique_names"]
+
+
+def animation_names(path: str | Path) -> tuple[str, ...]:
+    """Names of the animations of a file, as ``open_motion`` takes them; none of a kind that holds a single motion.
+
+    Raises:
+        InputError: It cannot be read.
+    """
+    path = Path(path)
+    lister = _LISTERS.get(path.suffix.lower())
+    return () if lister is None else lister(path)
+
+
+def choose_animation(wanted: str | None, names: tuple[str, ...], path: Path) -> tuple[str, tuple[str, ...]]:
+    """One of a file's animations, and a note where nobody said which of several.
+
+    Args:
+        wanted: A name in any case; None for the first.
+        names: All of them, at least one, each different.
+        path: The file, for messages.
+
+    Raises:
+        InputError: There is none of that name.
+    """
+    if wanted is None:
+        if len(names) == 1:
+            return names[0], ()
+        return names[0], (f"animation '{names[0]}', the first of {len(names)}: {', '.join(names)}",)
+    if wanted in names:
+        return wanted, ()
+    alike = [name for name in names if name.lower() == wanted.lower()]
+    if len(alike) == 1:
+        return alike[0], ()
+    if alike:
+        raise InputError(f"animation '{wanted}' may be {' or '.join(alike)}", path=path)
+    raise InputError(f"no animation '{wanted}' in this file{one_of(wanted, names)}", path=path)
+
+
+def unique_names(names: Sequence[str]) -> list[str]:
+    """Names of which the second of a kind is called ``name#2``."""
+    out: list[str] = []
+    for name in names:
+        chosen, number = name, 1
+        while chosen in out:
+            number += 1
+            chosen = f"{name}#{number}"
+        out.append(chosen)
+    return out
+
+
+def _usd(path: Path) -> tuple[str, ...]:
+    from warpjld.motion.usd_animation import usd_animation_names
+
+    return usd_animation_names(path)
+
+
+_LISTERS: dict[str, Callable[[Path], tuple[str, ...]]] = dict.fromkeys((".usd", ".usda", ".usdc", ".usdz"), _usd)
+"""What lists the animations of each suffix."""
