@@ -28,24 +28,31 @@ def place(
     Args:
         source: What the file says.
         roles: What was recognised in its joints.
-        unit: ``m``, ``cm``, ``mm`` or None: the one with which hand or body has a plausible size.
+        unit: ``m``, ``cm``, ``mm`` or None: what the file says, else the one with which hand or body has a plausible
+            size.
         scale: Factor by which all lengths are multiplied besides; where it is given and ``unit`` is not, nothing is
-            guessed: the file is taken to be in metres.
-        up: ``y``, ``z`` or None: Z only where a body's head lies that way from its hips.
+            guessed: a file that does not say is taken to be in metres.
+        up: ``y``, ``z`` or None: what the file says, else Z only where a body's head lies that way from its hips.
     """
-    notes = []
-    doubts = []
-    factor = (1.0 if unit is None else METRES[unit]) * (1.0 if scale is None else scale)
+    notes: list[str] = []
+    doubts: list[str] = []
+    own = 1.0 if source.metres is None else source.metres
+    factor = (own if unit is None else METRES[unit]) * (1.0 if scale is None else scale)
     size, plausible, what = _size(source.tree, roles)
     possible = (_SMALLER * plausible[0], _LARGER * plausible[1])
-    if unit is None and scale is None and size and not possible[0] <= size <= possible[1]:
+    guess = unit is None and scale is None and source.metres is None
+    if guess and size and not possible[0] <= size <= possible[1]:
         fits = [u for u, f in METRES.items() if possible[0] <= size * f <= possible[1]]
         if fits:
             factor = METRES[fits[0]]
             notes.append(f"unit: a {what} of {size:.4g} units is taken to be in {fits[0]}")
     if size and not plausible[0] <= size * factor <= plausible[1]:
         doubts.append(_implausible(size * factor, plausible, what, (scale or 1.0)))
-    if up is None and _lies_on_z(source.tree, roles):
+    if up is None and source.up is not None:
+        up = source.up
+        if up == "y" and _lies_on_z(source.tree, roles):
+            doubts.append("up axis: the file says Y, yet the body lies along Z: give --up z if it is wrong")
+    elif up is None and _lies_on_z(source.tree, roles):
         up = "z"
         notes.append("up axis: the body stands along Z, turned to Y")
     turn = np.array([[1.0, 0, 0], [0, 0, 1.0], [0, -1.0, 0]]) if up == "z" else np.eye(3)

@@ -23,15 +23,16 @@ def load_rig(
     up: str | None = None,
     joint_map: str | Path | Mapping[str, Any] | None = None,
 ) -> Rig:
-    """Load a rig: a skinned .glb, .gltf, .fbx or .vrm, or any surface (OBJ, PLY, STL, …) with a skeleton file.
+    """Load a rig: a skinned glTF, FBX, VRM or USD file, or any surface (OBJ, PLY, STL, …) with a skeleton file.
 
     Args:
         path: The file.
         skeleton: Skeleton file (JSON, see :mod:`warpjld.io.skeleton_file`); needed where the surface has no joints.
         side: ``left`` or ``right`` for a single hand, where the file leaves it open or is wrong.
-        unit: ``m``, ``cm`` or ``mm``; by default guessed from a hand's or body's plausible size, with a note.
+        unit: ``m``, ``cm`` or ``mm``; by default what the file says, else guessed from a hand's or body's plausible
+            size, with a note.
         scale: Factor by which all lengths are multiplied besides; without ``unit`` nothing is guessed then.
-        up: ``y`` or ``z``: the file's up axis; turned to Y.
+        up: ``y`` or ``z``: the file's up axis; by default what it says, else guessed; turned to Y.
         joint_map: Joints stated by hand, which win over what is recognised: a JSON file (see
             :mod:`warpjld.io.joint_map_file`), or what it holds: ``{"left.knee": "LeftShin", "ignore": ["Socket"]}``.
 
@@ -85,9 +86,19 @@ def _read_fbx(path: Path) -> SourceRig:
     return read_fbx_rig(path)
 
 
+def _read_usd(path: Path) -> SourceRig:
+    from warpjld.io.usd.skin import read_usd_rig
+
+    return read_usd_rig(path)
+
+
 _READERS: dict[str, Callable[[Path], SourceRig]] = {
     ".glb": _read_gltf,
     ".gltf": _read_gltf,
     ".fbx": _read_fbx,
+    ".usd": _read_usd,
+    ".usda": _read_usd,
+    ".usdc": _read_usd,
+    ".usdz": _read_usd,
 }
 """What reads the rigs of each suffix; libraries are imported when a file of their kind is opened."""

@@ -32,6 +32,8 @@ class SourceRig:
         placing: Similarity that brought vertices and joints from the file's units and axes to these, shape (4, 4).
         rigid: Joint of ``tree`` that a vertex follows rigidly (a mesh that hangs on a joint), -1 for flesh, shape
             (W,); None where all is flesh.
+        metres: Metres a unit of length is, where the file says so.
+        up: The file's up axis, ``y`` or ``z``, where it says so.
         notes: What was mended on the way.
         suspicious: What is probably wrong, and what to do about it.
     """
@@ -48,5 +50,7 @@ class SourceRig:
     limits: dict[int, dict[str, tuple[float, float]]] = field(default_factory=dict)
     placing: NDArray[np.float64] = field(default_factory=lambda: np.eye(4))
     rigid: NDArray[np.int64] | None = None
+    metres: float | None = None
+    up: str | None = None
     notes: tuple[str, ...] = ()
     suspicious: tuple[str, ...] = ()

@@ -65,5 +65,22 @@ def _gltf(path: Path) -> tuple[str, ...]:
     return gltf_animation_names(path)
 
 
-_LISTERS: dict[str, Callable[[Path], tuple[str, ...]]] = {".glb": _gltf, ".gltf": _gltf}
+def _fbx(path: Path) -> tuple[str, ...]:
+    from warpjld.motion.fbx_animation import fbx_animation_names
+
+    return fbx_animation_names(path)
+
+
+def _usd(path: Path) -> tuple[str, ...]:
+    from warpjld.motion.usd_animation import usd_animation_names
+
+    return usd_animation_names(path)
+
+
+_LISTERS: dict[str, Callable[[Path], tuple[str, ...]]] = {
+    ".glb": _gltf,
+    ".gltf": _gltf,
+    ".fbx": _fbx,
+    **dict.fromkeys((".usd", ".usda", ".usdc", ".usdz"), _usd),
+}
 """What lists the animations of each suffix."""

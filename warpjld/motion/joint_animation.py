@@ -14,6 +14,8 @@ from warpjld.skeleton.recognise.tree import SourceTree
 
 __all__ = ["JointAnimation"]
 
+_Z_TO_Y = np.array([[1.0, 0, 0, 0], [0, 0, 1.0, 0], [0, -1.0, 0, 0], [0, 0, 0, 1.0]])
+
 
 @dataclass(frozen=True, eq=False)
 class JointAnimation:
@@ -28,6 +30,7 @@ class JointAnimation:
         title: The animation's name; "" where the file gives none.
         notes: What a reader of the result should know.
         warnings: What of the file cannot be followed.
+        up: The file's up axis, ``y`` or ``z``, where it says so.
     """
 
     tree: SourceTree
@@ -36,17 +39,22 @@ class JointAnimation:
     title: str = ""
     notes: tuple[str, ...] = ()
     warnings: tuple[str, ...] = ()
+    up: str | None = None
 
     def __len__(self) -> int:
         return len(self.worlds)
 
     def clip(self) -> Clip:
-        """The same as positions and rotations from rest, parents first: what another skeleton is driven by."""
+        """The same as positions and rotations from rest, parents first: what another skeleton is driven by.
+
+        Of a file that says it has Z up it is turned to Y.
+        """
         order = np.array(sorted(range(len(self.tree)), key=lambda j: (self.tree.depth(j), j)))
         place = np.empty_like(order)
         place[order] = np.arange(len(order))
         parents = self.tree.parents[order]
-        rest, worlds = self.tree.frames[order], self.worlds[:, order]
+        turn = _Z_TO_Y if self.up == "z" else np.eye(4)
+        rest, worlds = turn @ self.tree.frames[order], turn @ self.worlds[:, order]
         turned, _ = polar(worlds[..., :3, :3] @ np.linalg.inv(rest[:, :3, :3]))
         return Clip(
             names=tuple(self.tree.names[j] for j in order),

@@ -23,6 +23,10 @@ MOTION_FORMATS = {
     ".glb": "an animation in a binary glTF file",
     ".gltf": "an animation in a glTF file",
     ".fbx": "an animation in an FBX file",
+    ".usd": "a UsdSkel animation",
+    ".usda": "a UsdSkel animation in USD as text",
+    ".usdc": "a UsdSkel animation in binary USD",
+    ".usdz": "a UsdSkel animation in a USD package",
     ".json": "tracked hands: WebXR poses, a Leap Motion recording, MediaPipe landmarks, MANO poses",
     ".npz": "tracked hands: MANO poses or MediaPipe landmarks as NumPy arrays",
     ".npy": "a tracked hand: MANO poses or MediaPipe landmarks as one NumPy array",
@@ -147,10 +151,20 @@ def _read_fbx(path: Path, rate: float | None, name: str | None) -> JointAnimatio
     return read_fbx_animation(path, rate=rate, name=name)
 
 
+def _read_usd(path: Path, rate: float | None, name: str | None) -> JointAnimation:
+    from warpjld.motion.usd_animation import read_usd_animation
+
+    return read_usd_animation(path, rate=rate, name=name)
+
+
 _ANIMATIONS: dict[str, Callable[[Path, float | None, str | None], JointAnimation]] = {
     ".glb": _read_gltf,
     ".gltf": _read_gltf,
     ".fbx": _read_fbx,
+    ".usd": _read_usd,
+    ".usda": _read_usd,
+    ".usdc": _read_usd,
+    ".usdz": _read_usd,
 }
 """What reads the animations of each suffix: the file, frames a second or None, the animation's name or None."""
 

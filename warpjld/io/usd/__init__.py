@@ -1,0 +1,1 @@
+"""Reading OpenUSD: stages (:mod:`stage`), joint trees (:mod:`skeletons`), meshes (:mod:`mesh`), rigs (:mod:`skin`)."""

@@ -1,0 +1,228 @@
+"""UsdSkel skeletons → one joint tree, the same for rigs and animations.
+
+Skeletons that skin a mesh count; where none does, all do. USD names joints by their path in the skeleton
+(``Hips/Spine/Neck``): a joint's name is the last element, preceded by those above it where that is not unique.
+"""
+
+from __future__ import annotations
+
+from collections import Counter
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from warpjld.errors import InputError
+from warpjld.io.usd.stage import UsdFile, matrices
+from warpjld.skeleton.recognise.tree import SourceTree
+
+__all__ = ["UsdSkeleton", "UsdSkeletons", "concatenated", "read_skeletons"]
+
+_SAME = 1e-4
+"""Transforms that differ by less, relative to the skeleton's size, are the same."""
+
+
+@dataclass(frozen=True, eq=False)
+class UsdSkeleton:
+    """One skeleton of J joints of a stage.
+
+    Attributes:
+        prim: Its prim.
+        tokens: USD's names of its joints: their paths.
+        parents: Parent of every joint, -1 for none, shape (J,).
+        bind: Joint transforms at which the skin was bound, in the space of ``to_world``, shape (J, 4, 4).
+        local_rest: Joint-to-parent transforms of joints that no animation moves, shape (J, 4, 4).
+        to_world: What brings ``bind`` and bound vertices to the stage's world, shape (4, 4).
+        first: Number of its first joint in the whole tree.
+        meshes: ``UsdSkel.SkinningQuery`` of every mesh it skins.
+    """
+
+    prim: Any
+    tokens: tuple[str, ...]
+    parents: NDArray[np.int64]
+    bind: NDArray[np.float64]
+    local_rest: NDArray[np.float64]
+    to_world: NDArray[np.float64]
+    first: int
+    meshes: tuple[Any, ...]
+
+    @property
+    def path(self) -> str:
+        """Its prim's path."""
+        return str(self.prim.GetPath())
+
+    @property
+    def animation(self) -> Any:
+        """The ``SkelAnimation`` prim bound to it, invalid where there is none."""
+        from pxr import UsdSkel
+
+        return UsdSkel.BindingAPI(self.prim).GetInheritedAnimationSource()
+
+    @property
+    def frames(self) -> NDArray[np.float64]:
+        """Joint-to-world transforms at rest, shape (J, 4, 4)."""
+        return self.to_world @ self.bind
+
+
+@dataclass(frozen=True, eq=False)
+class UsdSkeletons:
+    """The skeletons of a stage, and their joints as one tree."""
+
+    tree: SourceTree
+    skeletons: tuple[UsdSkeleton, ...]
+
+
+def read_skeletons(file: UsdFile) -> UsdSkeletons | None:
+    """The stage's skeletons; None where there are none.
+
+    Raises:
+        InputError: A skeleton without joints, or without transforms for them.
+    """
+    found = _bindings(file)
+    if any(meshes for _, meshes in found):
+        found = [one for one in found if one[1]]
+    skeletons: list[UsdSkeleton] = []
+    for prim, meshes in found:
+        first = skeletons[-1].first + len(skeletons[-1].tokens) if skeletons else 0
+        skeletons.append(_skeleton(file, prim, tuple(meshes), first))
+    if not skeletons:
+        return None
+    parents = [np.where(one.parents < 0, -1, one.parents + one.first) for one in skeletons]
+    frames = np.concatenate([one.frames for one in skeletons])
+    tree = SourceTree(tuple(_names(skeletons)), np.concatenate(parents), frames)
+    return UsdSkeletons(tree, tuple(skeletons))
+
+
+def _bindings(file: UsdFile) -> list[tuple[Any, list[Any]]]:
+    """Every skeleton's prim and the meshes it skins, in the stage's order."""
+    from pxr import Usd, UsdSkel
+
+    cache = UsdSkel.Cache()
+    prims = file.prims()
+    found: dict[str, tuple[Any, list[Any]]] = {
+        str(prim.GetPath()): (prim, []) for prim in prims if prim.IsA(UsdSkel.Skeleton)
+    }
+    seen: set[str] = set()
+    for prim in prims:
+        if not prim.IsA(UsdSkel.Root):
+            continue
+        root = UsdSkel.Root(prim)
+        cache.Populate(root, Usd.TraverseInstanceProxies())
+        for binding in cache.ComputeSkelBindings(root, Usd.TraverseInstanceProxies()):
+            path = str(binding.GetSkeleton().GetPath())
+            for mesh in binding.GetSkinningTargets():
+                target = str(mesh.GetPrim().GetPath())
+                if path in found and target not in seen:  # roots may lie inside one another
+                    found[path][1].append(mesh)
+                seen.add(target)
+    return list(found.values())
+
+
+def _skeleton(file: UsdFile, prim: Any, meshes: tuple[Any, ...], first: int) -> UsdSkeleton:
+    from pxr import Usd, UsdGeom, UsdSkel
+
+    path = prim.GetPath()
+    skeleton = UsdSkel.Skeleton(prim)
+    tokens = tuple(str(token) for token in skeleton.GetJointsAttr().Get() or ())
+    if not tokens:
+        raise InputError(f"skeleton '{path}' has no joints", path=file.path)
+    if len(set(tokens)) != len(tokens):
+        twice = next(token for token, count in Counter(tokens).items() if count > 1)
+        raise InputError(f"skeleton '{path}' has two joints '{twice}'", path=file.path)
+    parents = _parents(tokens)
+    bind = matrices(skeleton.GetBindTransformsAttr().Get() or np.zeros((0, 4, 4)))
+    local = matrices(skeleton.GetRestTransformsAttr().Get() or np.zeros((0, 4, 4)))
+    rest = None
+    if len(local) == len(tokens) and _regular(local).all():
+        rest = concatenated(local, parents)
+    elif len(local):
+        file.notes.append(f"skeleton '{path}': its restTransforms are no transforms of its joints: not used")
+    if len(bind) != len(tokens):
+        if rest is None:
+            raise InputError(
+                f"skeleton '{path}': {len(tokens)} joints need as many bindTransforms, got {len(bind)}", path=file.path
+            )
+        file.notes.append(f"skeleton '{path}' has no bindTransforms for its joints: restTransforms are taken")
+        bind = rest
+    to_world = matrices(UsdGeom.XformCache(Usd.TimeCode.EarliestTime()).GetLocalToWorldTransform(prim))
+    if rest is not None and _is_placed(bind, rest, to_world):  # bound in the world, as USD's documentation words it
+        to_world = np.eye(4)
+    with np.errstate(invalid="ignore"):
+        regular = _regular(to_world @ bind)
+    if not regular.all():
+        name = tokens[int(np.argmin(regular))]
+        raise InputError(
+            f"skeleton '{path}': the bind transform of joint '{name}' is not finite, or flattens space (scale 0)",
+            path=file.path,
+        )
+    if rest is None:
+        local = np.where((parents < 0)[:, None, None], bind, np.linalg.inv(bind[parents]) @ bind)
+    return UsdSkeleton(prim, tokens, parents, bind, local, to_world, first, meshes)
+
+
+def _regular(transforms: NDArray[np.float64]) -> NDArray[np.bool_]:
+    """Which transforms (J, 4, 4) are finite and can be inverted."""
+    finite = np.isfinite(transforms).all(axis=(1, 2))
+    linear = np.where(finite[:, None, None], transforms, 0.0)[:, :3, :3]
+    return np.asarray(np.abs(np.linalg.det(linear)) > 1e-12 * np.linalg.norm(linear, axis=(1, 2)) ** 3)
+
+
+def _parents(tokens: tuple[str, ...]) -> NDArray[np.int64]:
+    """The nearest joint above each in its path, -1 for none: as ``UsdSkel.Topology``, for names it refuses too."""
+    number = {token: j for j, token in enumerate(tokens)}
+    out = np.full(len(tokens), -1, dtype=np.int64)
+    for j, token in enumerate(tokens):
+        above = token
+        while out[j] < 0 and "/" in above:
+            above = above.rpartition("/")[0]
+            out[j] = number.get(above, -1)
+    return out
+
+
+def concatenated(local: NDArray[np.float64], parents: NDArray[np.int64]) -> NDArray[np.float64]:
+    """Joint-to-parent transforms, shape (…, J, 4, 4) → joint-to-skeleton transforms, joints in any order."""
+    out = local.copy()
+    done = parents < 0
+    while not done.all():
+        ready = np.flatnonzero(~done & done[parents])
+        out[..., ready, :, :] = out[..., parents[ready], :, :] @ local[..., ready, :, :]
+        done[ready] = True
+    return out
+
+
+def _is_placed(bind: NDArray[np.float64], rest: NDArray[np.float64], to_world: NDArray[np.float64]) -> bool:
+    """Whether the bind pose is the rest pose with the skeleton's own place in the world already applied."""
+    size = float(np.ptp(bind[:, :3, 3], axis=0).max()) or 1.0
+    scale = np.array([[1.0, 1.0, 1.0, size]] * 3)
+
+    def close(other: NDArray[np.float64]) -> bool:
+        return bool((np.abs(bind - other)[:, :3] <= _SAME * scale).all())
+
+    return close(to_world @ rest) and not close(rest)
+
+
+def _names(skeletons: list[UsdSkeleton]) -> list[str]:
+    own = [_shortest(one.tokens) for one in skeletons]
+    if len(set().union(*own)) == sum(map(len, own)):
+        return [name for names in own for name in names]
+    paths = [one.path.strip("/").split("/") for one in skeletons]
+    while len({path[0] for path in paths}) == 1 and min(map(len, paths)) > 1:
+        paths = [path[1:] for path in paths]
+    while len({path[-1] for path in paths}) == 1 and min(map(len, paths)) > 1:
+        paths = [path[:-1] for path in paths]
+    return ["/".join([*path, name]) for path, names in zip(paths, own, strict=True) for name in names]
+
+
+def _shortest(tokens: tuple[str, ...]) -> list[str]:
+    """The shortest ends of joint paths that tell the joints of a skeleton apart."""
+    paths = [token.split("/") for token in tokens]
+    length = [1] * len(paths)
+    while True:
+        names = ["/".join(path[-n:]) for path, n in zip(paths, length, strict=True)]
+        count = Counter(names)
+        longer = [j for j, name in enumerate(names) if count[name] > 1 and length[j] < len(paths[j])]
+        if not longer:
+            return names
+        for j in longer:
+            length[j] += 1

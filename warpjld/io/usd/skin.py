@@ -1,0 +1,153 @@
+"""UsdSkel rigs → :class:`SourceRig`: joints of all skeletons, skinned meshes where they were bound."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from warpjld.errors import InputError
+from warpjld.io.source import SourceRig
+from warpjld.io.usd.influences import blended_points, read_influences
+from warpjld.io.usd.mesh import read_usd_mesh
+from warpjld.io.usd.skeletons import UsdSkeleton, UsdSkeletons, read_skeletons
+from warpjld.io.usd.stage import UsdFile, matrices, open_usd
+from warpjld.surface import Part
+
+__all__ = ["read_usd_rig"]
+
+
+@dataclass
+class _Skinned:
+    """One mesh at its place in the world, joints numbered as in the tree."""
+
+    name: str
+    vertices: NDArray[np.float64]
+    faces: NDArray[np.int64]
+    corner_uv: NDArray[np.float32] | None
+    joints: NDArray[np.int64]
+    weights: NDArray[np.float64]
+    rigid: int
+
+
+def read_usd_rig(path: str | Path) -> SourceRig:
+    """Read the skinned meshes of a USD stage at their bind pose.
+
+    A vertex lies at to-world · geomBindTransform · point, with the skeleton's place as to-world: a skinned mesh's own
+    transform does not count. Blend shapes are at the weights the animation holds by default. Meshes without joints,
+    invisible ones and guides are left out, with a note.
+
+    Raises:
+        InputError: No USD file, no skeleton, or broken skin data.
+        MissingExtraError: OpenUSD is not installed.
+    """
+    with open_usd(path) as file:
+        found = read_skeletons(file)
+        if found is None:
+            raise InputError("has no joints: give a skeleton file for this surface", path=file.path)
+        meshes = _meshes(file, found)
+    if not meshes:
+        raise InputError("no mesh uses its skeleton: this is an animation, or a skeleton alone", path=file.path)
+    vertex = np.cumsum([0, *(len(mesh.vertices) for mesh in meshes)])
+    face = np.cumsum([0, *(len(mesh.faces) for mesh in meshes)])
+    parts = tuple(
+        Part(mesh.name, slice(int(vertex[m]), int(vertex[m + 1])), slice(int(face[m]), int(face[m + 1])))
+        for m, mesh in enumerate(meshes)
+    )
+    width = max(mesh.joints.shape[1] for mesh in meshes)
+    return SourceRig(
+        path=file.path,
+        tree=found.tree,
+        vertices=np.concatenate([mesh.vertices for mesh in meshes]),
+        faces=np.concatenate([mesh.faces + vertex[m] for m, mesh in enumerate(meshes)]),
+        uv=_vertex_uv(file, meshes),
+        parts=parts,
+        joints=np.concatenate([_widen(mesh.joints, width) for mesh in meshes]),
+        weights=np.concatenate([_widen(mesh.weights, width) for mesh in meshes]),
+        rigid=np.concatenate([np.full(len(mesh.vertices), mesh.rigid) for mesh in meshes]),
+        metres=file.metres,
+        up=file.up,
+        notes=tuple(dict.fromkeys(file.notes)),
+    )
+
+
+def _meshes(file: UsdFile, found: UsdSkeletons) -> list[_Skinned]:
+    from pxr import UsdGeom
+
+    out = []
+    skinned: set[str] = set()
+    for skeleton in found.skeletons:
+        for query in skeleton.meshes:
+            prim = query.GetPrim()
+            skinned.add(str(prim.GetPath()))
+            if not prim.IsA(UsdGeom.Mesh):
+                file.notes.append(f"'{prim.GetPath()}' is skinned, but no mesh: left out")
+            elif reason := _hidden(prim):
+                file.notes.append(f"mesh '{prim.GetPath()}' {reason}: left out")
+            elif not query.HasJointInfluences():
+                file.notes.append(f"mesh '{prim.GetPath()}' has no joint weights: left out")
+            elif (mesh := _skinned(file, skeleton, query)) is not None:
+                out.append(mesh)
+    for prim in file.prims():
+        if prim.IsA(UsdGeom.Mesh) and str(prim.GetPath()) not in skinned:
+            file.notes.append(f"mesh '{prim.GetPath()}' is bound to no joint: left out")
+    return out
+
+
+def _hidden(prim: Any) -> str:
+    """Why a mesh does not belong to what the stage shows; "" where it does."""
+    from pxr import Usd, UsdGeom
+
+    imageable = UsdGeom.Imageable(prim)
+    purpose = imageable.ComputePurpose()
+    if purpose in (UsdGeom.Tokens.guide, UsdGeom.Tokens.proxy):
+        return f"is there as {purpose} only"
+    if imageable.ComputeVisibility(Usd.TimeCode.EarliestTime()) == UsdGeom.Tokens.invisible:
+        return "is invisible"
+    return ""
+
+
+def _skinned(file: UsdFile, skeleton: UsdSkeleton, query: Any) -> _Skinned | None:
+    prim = query.GetPrim()
+    where = f"mesh '{prim.GetPath()}'"
+    mesh = read_usd_mesh(file, prim)
+    if not len(mesh.faces):
+        file.notes.append(f"{where} has no faces: left out")
+        return None
+    place = skeleton.to_world @ matrices(query.GetGeomBindTransform())
+    joints, weights, rigid = read_influences(file, skeleton, query, mesh.points, where)
+    points = blended_points(file, skeleton, query, mesh.points)
+    turned_inside_out = np.linalg.det(place[:3, :3]) < 0.0
+    order = slice(None, None, -1 if turned_inside_out else 1)
+    return _Skinned(
+        name=prim.GetName(),
+        vertices=points @ place[:3, :3].T + place[:3, 3],
+        faces=mesh.faces[:, order],
+        corner_uv=None if mesh.uv is None else mesh.uv[:, order],
+        joints=joints,
+        weights=weights,
+        rigid=rigid,
+    )
+
+
+def _vertex_uv(file: UsdFile, meshes: list[_Skinned]) -> NDArray[np.float32] | None:
+    """Texture coordinates by vertex, shape (W, 2), where all corners at a vertex have the same."""
+    if all(mesh.corner_uv is None for mesh in meshes):
+        return None
+    out = []
+    for mesh in meshes:
+        uv = np.zeros((len(mesh.vertices), 2), dtype=np.float32)
+        if mesh.corner_uv is not None:
+            uv[mesh.faces] = mesh.corner_uv
+            if not np.array_equal(uv[mesh.faces], mesh.corner_uv):
+                file.notes.append(f"mesh '{mesh.name}': its texture has seams within vertices: left out")
+                return None
+        out.append(uv)
+    return np.concatenate(out)
+
+
+def _widen(array: NDArray[Any], width: int) -> NDArray[Any]:
+    return np.pad(array, ((0, 0), (0, width - array.shape[1])))

@@ -1,0 +1,96 @@
+"""Opening USD stages: what OpenUSD complains of becomes one error, or notes."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from warpjld.errors import InputError, MissingExtraError
+
+__all__ = ["UsdFile", "matrices", "open_usd"]
+
+_MOST_WARNINGS = 5
+_PLACE = re.compile(r"Error in '[^']*' at line \d+ in file \S+ : '(.*)'$")
+
+
+@dataclass
+class UsdFile:
+    """An open stage.
+
+    Attributes:
+        path: The file.
+        stage: Its ``Usd.Stage``, everything loaded, variants as the file selects them.
+        metres: Metres a unit of length is, where the file says so.
+        up: ``y`` or ``z``, where the file says so.
+        notes: What was mended or left out so far.
+    """
+
+    path: Path
+    stage: Any
+    metres: float | None
+    up: str | None
+    notes: list[str] = field(default_factory=list)
+
+    def prims(self) -> list[Any]:
+        """All active, defined, loaded prims, those of instances included."""
+        from pxr import Usd
+
+        return list(Usd.PrimRange.Stage(self.stage, Usd.TraverseInstanceProxies()))
+
+
+@contextmanager
+def open_usd(path: str | Path) -> Iterator[UsdFile]:
+    """A stage to read within the statement; OpenUSD's warnings become notes instead of text on stderr.
+
+    Raises:
+        InputError: No USD file, a reference that cannot be found, or what OpenUSD refuses while it is read.
+        MissingExtraError: OpenUSD is not installed.
+    """
+    path = Path(path)
+    if not path.is_file():
+        raise InputError("is a folder" if path.is_dir() else "no such file", path=path)
+    try:
+        from pxr import Tf, Usd, UsdGeom, UsdUtils
+    except ImportError as error:
+        raise MissingExtraError("USD", "usd") from error
+    told = UsdUtils.CoalescingDiagnosticDelegate()
+    try:
+        stage = Usd.Stage.Open(str(path))
+        broken = stage.GetCompositionErrors()
+        told.TakeUncoalescedDiagnostics()
+        if broken:
+            raise InputError(f"its parts do not come together: {_line(str(broken[0]))}", path=path)
+        metres = UsdGeom.GetStageMetersPerUnit(stage) if UsdGeom.StageHasAuthoredMetersPerUnit(stage) else None
+        if metres is not None and not 0.0 < metres < float("inf"):
+            raise InputError(f"metersPerUnit: want a length above 0, got {metres:g}", path=path)
+        up = UsdGeom.GetStageUpAxis(stage).lower() if stage.HasAuthoredMetadata("upAxis") else None
+        file = UsdFile(path, stage, metres, up)
+        yield file
+        warned = dict.fromkeys(_line(one.commentary) for one in told.TakeUncoalescedDiagnostics())
+        file.notes += [f"OpenUSD: {line}" for line in list(warned)[:_MOST_WARNINGS]]
+    except Tf.ErrorException as error:
+        raise InputError(f"OpenUSD cannot read it: {_reason(str(error))}", path=path) from None
+    finally:
+        told.TakeUncoalescedDiagnostics()
+
+
+def matrices(values: Any) -> NDArray[np.float64]:
+    """One Gf.Matrix4d or an array of them, vectors as columns (USD: rows), shape (4, 4) or (N, 4, 4)."""
+    return np.array(values, dtype=np.float64).swapaxes(-1, -2)
+
+
+def _reason(text: str) -> str:
+    lines = [line.strip() for line in text.strip().splitlines()]
+    found = _PLACE.search(lines[0]) if lines else None
+    return _line(found.group(1) if found else text)
+
+
+def _line(text: str) -> str:
+    return " ".join(text.split())[:300]

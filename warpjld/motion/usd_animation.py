@@ -1,0 +1,262 @@
+"""UsdSkel animations, sampled at frames.
+
+A skeleton moves by the SkelAnimation bound to it, or by the one chosen by name. Joints that the animation does not
+name rest; where the skeleton itself, or what it hangs on, moves, its joints go with it.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial.transform import Rotation
+
+from warpjld.errors import InputError
+from warpjld.motion.animations import choose_animation, unique_names
+from warpjld.motion.frame_times import frame_times
+from warpjld.motion.joint_animation import JointAnimation
+
+if TYPE_CHECKING:
+    from warpjld.io.usd.skeletons import UsdSkeleton
+    from warpjld.io.usd.stage import UsdFile
+
+__all__ = ["read_usd_animation", "usd_animation_names"]
+
+_TINY = 1e-7  # stands for zero scale, which has no rotation
+_FASTEST = 240.0
+"""Time codes a second up to which a time code is a frame; more are ticks."""
+
+
+def usd_animation_names(path: str | Path) -> tuple[str, ...]:
+    """Names of a stage's SkelAnimations, those bound to its skeletons first.
+
+    Raises:
+        InputError: No USD file.
+        MissingExtraError: OpenUSD is not installed.
+    """
+    from warpjld.io.usd.skeletons import read_skeletons
+    from warpjld.io.usd.stage import open_usd
+
+    with open_usd(path) as file:
+        found = read_skeletons(file)
+        return tuple(_animations(file, () if found is None else found.skeletons))
+
+
+def read_usd_animation(path: str | Path, *, rate: float | None = None, name: str | None = None) -> JointAnimation:
+    """An animation of a USD stage, over the stage's time codes, or over the animation's where it states none.
+
+    Args:
+        path: A .usd, .usda, .usdc or .usdz file with a skeleton and an animation.
+        rate: Frames a second; None for the stage's time codes a second (its frames, where those are ticks).
+        name: Which animation, in any case; None for those that are bound to the skeletons.
+
+    Raises:
+        InputError: No USD file, no skeleton, no animation or none of that name, or broken samples.
+        MissingExtraError: OpenUSD is not installed.
+    """
+    from warpjld.io.usd.skeletons import read_skeletons
+    from warpjld.io.usd.stage import open_usd
+
+    with open_usd(path) as file:
+        found = read_skeletons(file)
+        if found is None:
+            raise InputError(_no_skeleton(file), path=file.path)
+        title, chosen, notes = _chosen(file, found.skeletons, name)
+        codes, rate, told = _time_codes(file, found.skeletons, chosen, rate)
+        warnings = [*told, *_shapes(chosen)]
+        worlds = np.concatenate(
+            [_worlds(file, *each, codes, warnings) for each in zip(found.skeletons, chosen, strict=True)], axis=1
+        )
+    if not np.isfinite(worlds).all():
+        frame, joint = np.argwhere(~np.isfinite(worlds))[0][:2]
+        raise InputError(f"joint '{found.tree.names[joint]}' is not finite at frame {frame}", path=file.path)
+    notes = (*notes, *dict.fromkeys(file.notes))
+    return JointAnimation(found.tree, worlds, rate, title, notes, tuple(warnings), file.up)
+
+
+def _no_skeleton(file: UsdFile) -> str:
+    from pxr import UsdGeom
+
+    if any(prim.IsA(UsdGeom.PointBased) and UsdGeom.PointBased(prim).GetPointsAttr().GetNumTimeSamples() > 1
+           for prim in file.prims()):  # fmt: skip
+        return "is a vertex cache, a mesh whose points move: it has no skeleton to move a rig by"
+    return "no animation in this file: it has no skeleton"
+
+
+def _animations(file: UsdFile, skeletons: tuple[UsdSkeleton, ...]) -> dict[str, set[str]]:
+    """Paths of the SkelAnimations by name, those of a prototype's instances together, bound ones first."""
+    from pxr import UsdSkel
+
+    bound = {str(one.animation.GetPath()) for one in skeletons if one.animation}
+    kinds: dict[str, tuple[str, set[str]]] = {}
+    prims = [prim for prim in file.prims() if prim.IsA(UsdSkel.Animation)]
+    for prim in sorted(prims, key=lambda p: str(p.GetPath()) not in bound):
+        path = str(prim.GetPath())
+        kind = str(prim.GetPrimInPrototype().GetPath()) if prim.IsInstanceProxy() else path
+        kinds.setdefault(kind, (prim.GetName(), set()))[1].add(path)
+    names = unique_names([name for name, _ in kinds.values()])
+    return dict(zip(names, (paths for _, paths in kinds.values()), strict=True))
+
+
+def _chosen(
+    file: UsdFile, skeletons: tuple[UsdSkeleton, ...], name: str | None
+) -> tuple[str, list[Any], tuple[str, ...]]:
+    """Title, the SkelAnimation of every skeleton or None, and notes."""
+    animations = _animations(file, skeletons)
+    if not animations:
+        raise InputError("no animation in this file: its skeleton rests", path=file.path)
+    bound = [one.animation for one in skeletons]
+    played = {title: paths for title, paths in animations.items() if {str(p.GetPath()) for p in bound if p} & paths}
+    if name is None and len(played) > 1:
+        together = ", ".join(played)
+        return together, bound, (f"animations {together}: each moves the skeleton it is bound to",)
+    title, notes = choose_animation(name, tuple(animations), file.path)
+    if title in played:
+        return title, [p if p and str(p.GetPath()) in played[title] else None for p in bound], notes
+    prim = file.stage.GetPrimAtPath(sorted(animations[title])[0])
+    joints = set(_joints(prim))
+    fitting = [prim if joints & set(one.tokens) else None for one in skeletons]
+    if not any(fitting):
+        raise InputError(f"animation '{title}' moves no joint of its skeleton", path=file.path)
+    return title, fitting, (*notes, f"animation '{title}' is bound to no skeleton: it is taken by its joints' names")
+
+
+def _joints(animation: Any) -> list[str]:
+    from pxr import UsdSkel
+
+    return [str(token) for token in UsdSkel.Animation(animation).GetJointsAttr().Get() or ()]
+
+
+def _shapes(chosen: list[Any]) -> list[str]:
+    from pxr import UsdSkel
+
+    moving = [p for p in chosen if p and UsdSkel.Animation(p).GetBlendShapeWeightsAttr().GetNumTimeSamples() > 1]
+    return ["the animation of blend shapes is not followed"] if moving else []
+
+
+def _time_codes(
+    file: UsdFile, skeletons: tuple[UsdSkeleton, ...], chosen: list[Any], rate: float | None
+) -> tuple[NDArray[np.float64], float, list[str]]:
+    """Time codes of the frames, frames a second, and warnings."""
+    stage = file.stage
+    per_second = float(stage.GetTimeCodesPerSecond())
+    if not 0.0 < per_second < float("inf"):
+        raise InputError(f"timeCodesPerSecond: want a rate above 0, got {per_second:g}", path=file.path)
+    if rate is None:
+        rate = per_second if per_second <= _FASTEST else float(stage.GetFramesPerSecond())
+    attributes = [attribute for prim in chosen if prim for attribute in _attributes(prim)]
+    moved = [_moves_at(one.prim) for one in skeletons]
+    keys = sorted({time for times in ([one.GetTimeSamples() for one in attributes] + moved) for time in times})
+    warnings = []
+    first, last = stage.GetStartTimeCode(), stage.GetEndTimeCode()
+    if not (stage.HasAuthoredTimeCodeRange() and first < last):
+        first, last = (keys[0], keys[-1]) if keys else (0.0, 0.0)
+    elif keys and not (first <= keys[0] and keys[-1] <= last):
+        warnings.append(
+            f"keys from time code {keys[0]:g} to {keys[-1]:g}, of which the stage plays {first:g} to {last:g}"
+        )
+    if not np.isfinite([first, last]).all():
+        raise InputError(f"time codes: want finite ones, got {first:g} to {last:g}", path=file.path)
+    times = frame_times(0.0, (last - first) / per_second, rate)
+    return first + np.round(times * per_second, 9), rate, warnings  # a held sample must not be missed by rounding
+
+
+def _attributes(animation: Any) -> list[Any]:
+    from pxr import UsdSkel
+
+    schema = UsdSkel.Animation(animation)
+    return [schema.GetTranslationsAttr(), schema.GetRotationsAttr(), schema.GetScalesAttr()]
+
+
+def _moves_at(prim: Any) -> list[float]:
+    """Time codes at which a prim, or what it hangs on, is placed anew."""
+    from pxr import UsdGeom
+
+    times: list[float] = []
+    while prim and not prim.IsPseudoRoot():
+        if xform := UsdGeom.Xformable(prim):
+            times += xform.GetTimeSamples()
+        prim = prim.GetParent()
+    return times
+
+
+def _worlds(
+    file: UsdFile, skeleton: UsdSkeleton, animation: Any, codes: NDArray[np.float64], warnings: list[str]
+) -> NDArray[np.float64]:
+    """Joint-to-world transforms of a skeleton, shape (F, J, 4, 4), as ``JointAnimation.worlds`` has them."""
+    from pxr import UsdGeom
+
+    from warpjld.io.usd.skeletons import concatenated
+    from warpjld.io.usd.stage import matrices
+
+    at = codes if len(_moves_at(skeleton.prim)) > 1 else codes[:1]
+    places = np.stack([matrices(UsdGeom.XformCache(t).GetLocalToWorldTransform(skeleton.prim)) for t in at.tolist()])
+    local, unmirrored = _locals(file, skeleton, animation, codes)
+    worlds = places[:, None] @ concatenated(local, skeleton.parents)
+    changed = (unmirrored != local).any(axis=(2, 3))
+    if changed.any():
+        frame, joint = np.argwhere(changed)[0]
+        warnings.append(
+            f"joint '{skeleton.tokens[joint]}': its scale turns negative at frame {frame}: "
+            "joints are placed as the file says, but no flesh is mirrored"
+        )
+        worlds[..., :3, :3] = (places[:, None] @ concatenated(unmirrored, skeleton.parents))[..., :3, :3]
+    return np.asarray(worlds)
+
+
+def _locals(
+    file: UsdFile, skeleton: UsdSkeleton, animation: Any, codes: NDArray[np.float64]
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Joint-to-parent transforms, shape (F, J, 4, 4), and the same with axes that are not mirrored."""
+    out = np.repeat(skeleton.local_rest[None], len(codes), axis=0)
+    if not animation:
+        return out, out
+    number = {token: j for j, token in enumerate(skeleton.tokens)}
+    own = np.array([number.get(token, -1) for token in _joints(animation)], dtype=np.int64)
+    known = own >= 0
+    rest = skeleton.local_rest[own]
+    side = np.where(np.linalg.det(rest[:, :3, :3]) < 0.0, -1.0, 1.0)
+    lengths = side[:, None] * np.linalg.norm(rest[:, :3, :3], axis=1)
+    still = (rest[:, :3, 3], Rotation.from_matrix(rest[:, :3, :3] / lengths[:, None]).as_quat(), lengths)
+    moves, turns, scales = (
+        _samples(file, animation, attribute, codes, values)
+        for attribute, values in zip(_attributes(animation), still, strict=True)
+    )
+    norm = np.linalg.norm(turns, axis=-1)
+    if not (norm[:, known] > 0.0).all():
+        frame, joint = np.argwhere(~(norm > 0.0) & known)[0]
+        raise InputError(
+            f"animation '{animation.GetName()}': joint '{_joints(animation)[joint]}' has no rotation at frame {frame}",
+            path=file.path,
+        )
+    linear = Rotation.from_quat(turns[:, known].reshape(-1, 4)).as_matrix().reshape(len(codes), -1, 3, 3)
+    amount = scales[:, known]
+    amount = np.where(np.abs(amount) < _TINY, _TINY, amount)[..., None, :]
+    out[..., :3, 3][:, own[known]] = moves[:, known]
+    unmirrored = out.copy()
+    out[..., :3, :3][:, own[known]] = linear * amount
+    side = side[known, None, None]
+    same = side * np.prod(amount, axis=-1, keepdims=True) >= 0.0
+    unmirrored[..., :3, :3][:, own[known]] = linear * np.where(same, amount, side * np.abs(amount))
+    return out, unmirrored
+
+
+def _samples(
+    file: UsdFile, animation: Any, attribute: Any, codes: NDArray[np.float64], still: NDArray[np.float64]
+) -> NDArray[np.float64]:
+    """Values of an attribute at time codes, shape (F, J, 3) or (F, J, 4); ``still`` where it has none."""
+    at = codes.tolist() if attribute.ValueMightBeTimeVarying() else codes[:1].tolist()
+    values = []
+    for code in at:
+        value = attribute.Get(code)
+        array = still if value is None else np.array(value, dtype=np.float64)
+        if array.shape != still.shape:
+            raise InputError(
+                f"animation '{animation.GetName()}': want {len(still)} {attribute.GetName()}, one for each of its "
+                f"joints, got {len(array)}",
+                path=file.path,
+            )
+        values.append(array)
+    return np.repeat(np.stack(values), len(codes) // len(at), axis=0)
