@@ -186,6 +186,10 @@ def test_flickering_labels_are_one_hand(tmp_path: Path) -> None:
         ({"fps": -1, "frames": [{"landmarks": [[0, 0, 0]] * 21}]}, "want frames a second"),
         ({"image_size": [0, 1], "frames": [{"landmarks": [[0, 0, 0]] * 21}]}, "image_size: want width and height"),
         (
+            {"frames": [{"landmarks": [[1e99, 0, 0]] * 21}]},
+            "'wrist' lies absurdly far away at frame 0",
+        ),
+        (
             {"frames": [{"landmarks": [[0, 0, 0]] * 21, "time": t} for t in (1, 0)]},
             "frame 1: its timestamp is not a time after",
         ),
@@ -194,6 +198,12 @@ def test_flickering_labels_are_one_hand(tmp_path: Path) -> None:
 def test_mistakes_are_named(tmp_path: Path, content: object, message: str) -> None:
     with pytest.raises(InputError, match=f"hand.json: {message}"):
         read_hands(save(tmp_path, content))
+
+
+def test_hands_of_one_point_are_refused(tmp_path: Path) -> None:
+    path = save(tmp_path, {"landmarks": [[[0.5, 0.5, 0.0]] * 21], "handedness": "left"})
+    with pytest.raises(InputError, match="palm lie in a line or a point at frame 0"):
+        open_motion(path, rig(hand("left")))
 
 
 def test_arrays_that_are_no_landmarks_are_refused(tmp_path: Path) -> None:

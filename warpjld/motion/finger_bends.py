@@ -54,6 +54,7 @@ def finger_bends(points: Mapping[str, NDArray[np.float64]]) -> NDArray[np.float6
         if len(chain) < len(FINGER_JOINTS):
             continue
         before = unit(chain[0] - points.get(f"{finger}.carpometacarpal", heel))
+        before = np.where(np.any(before != 0.0, axis=-1, keepdims=True), before, np.array([1.0, 0.0, 0.0]))
         axis = unit(radial - before * (before * radial).sum(axis=-1, keepdims=True))
         for k, (joint, following) in enumerate(pairwise(chain)):
             bone = unit(following - joint)

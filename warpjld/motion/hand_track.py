@@ -20,6 +20,10 @@ from warpjld.skeleton.hand import FINGER_JOINTS
 __all__ = ["HandTrack"]
 
 _PALM = ("wrist", *(f"{digit}.{joint}" for digit in DIGITS for joint in ("carpometacarpal", "base")))
+_FARTHEST = 1e9
+"""Coordinates beyond this in any unit of length are mistakes, and their squares too large for sums."""
+_THIN = 0.01
+"""Width of a palm relative to its length below which it does not tell how the hand is turned."""
 _MOBILE = ("ring.base", "pinky.base")
 """Palm points that the mobile metacarpals carry (R8): left out of the palm's fit where enough others are known."""
 
@@ -43,6 +47,15 @@ class HandTrack:
     moves: bool = True
     may_be_mirrored: bool = False
     labels: tuple[str, ...] = ()
+
+    def __post_init__(self) -> None:
+        for name, place in self.points.items():
+            far = np.abs(place).max(axis=1) > _FARTHEST
+            if far.any():
+                raise InputError(f"'{name}' lies absurdly far away at {self._label(int(far.argmax()))}")
+
+    def _label(self, time: int) -> str:
+        return self.labels[time] if self.labels else f"frame {time}"
 
     @cached_property
     def bends(self) -> NDArray[np.float64]:
@@ -83,6 +96,10 @@ class HandTrack:
         palm = fixed if len(fixed) > 4 else palm
         rest = skeleton.rest[[own[name] for name in palm]]
         places = np.stack([self.points[name] for name in palm], axis=1)
+        spans = np.linalg.svd(places - places.mean(axis=1, keepdims=True), compute_uv=False)
+        thin = spans[:, 1] <= _THIN * spans[:, 0]
+        if thin.any():
+            raise InputError(f"the joints of the palm lie in a line or a point at {self._label(int(thin.argmax()))}")
         palm_turn, scale = _fit(rest, places)
         local = np.tile(IDENTITY, (len(self.times), len(skeleton), 1))
         for digit in DIGITS:

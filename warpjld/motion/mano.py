@@ -27,6 +27,8 @@ _SIDE = ("side", "handedness", "hand", "is_right", "is_rhand", "right")
 _WIDTHS = (45, 48, 51)
 _BODIES = {156: (66, "SMPL-H"), 165: (75, "SMPL-X")}
 """Width of a body's pose → where its left hand begins, the right one following, and the model's name."""
+_MOST_TURN = 4.0 * np.pi
+"""Axis-angle vectors are π long at most, sums with a mean a little longer; degrees are soon beyond this."""
 _JOINT = re.compile(r"(index|middle|pinky|little|ring|thumb)[ _.-]?(?:finger)?[ _.-]?([123])$", re.IGNORECASE)
 
 Fields = Mapping[str, Any]
@@ -165,7 +167,10 @@ def _pose(values: Any, key: str) -> NDArray[np.float64]:
             f"'{key}': want 45, 48 or 51 numbers a frame (axis-angle; MANO's principal components are not read), "
             f"got shape {array.shape}"
         )
-    return array.reshape(-1, width)
+    array = array.reshape(-1, width)
+    if (largest := np.abs(array[:, :48]).max()) > _MOST_TURN:
+        raise InputError(f"'{key}': {largest:.4g} is no rotation in radians (degrees?)")
+    return array
 
 
 def _width(array: NDArray[np.float64]) -> int | None:
@@ -180,8 +185,8 @@ def _numbers(values: Any, key: str) -> NDArray[np.float64]:
         array = np.asarray(values, dtype=np.float64)
     except (TypeError, ValueError):
         raise InputError(f"'{key}': want numbers, as many in every frame") from None
-    if not array.size:
-        raise InputError(f"'{key}' is empty")
+    if not array.size or not array.ndim:
+        raise InputError(f"'{key}': want rows of numbers, got {'one' if array.size else 'none'}")
     if not np.isfinite(array).all():
         raise InputError(f"'{key}': not finite in frame {np.argwhere(~np.isfinite(array))[0][0]}")
     return array
@@ -243,7 +248,7 @@ def _order(found: Fields) -> tuple[list[int], bool]:
     names = next((found[key] for key in ("joint_order", "joint_names", "joints_order") if key in found), None)
     if names is None:
         return list(range(15)), False
-    listed = [str(name) for name in np.asarray(names).ravel().tolist()]
+    listed = [str(name) for name in _listed(names)]
     keys = [f"{m[1].lower().replace('little', 'pinky')}{m[2]}" for name in listed if (m := _JOINT.search(name))]
     if sorted(keys) != sorted(MANO_JOINTS):
         raise InputError(
@@ -256,7 +261,7 @@ def _side(found: Fields) -> str | None:
     for key in _SIDE:
         if key not in found or isinstance(found[key], Mapping):
             continue
-        values = {str(value).lower() for value in np.asarray(found[key]).ravel().tolist()}
+        values = {str(value).lower() for value in _listed(found[key])}
         if key in ("is_right", "is_rhand", "right"):
             values = {{"true": "right", "1": "right", "1.0": "right"}.get(value, "left") for value in values}
         values = {{"l": "left", "r": "right"}.get(value, value) for value in values}
@@ -270,5 +275,13 @@ def _side(found: Fields) -> str | None:
 
 def _plain(value: Any) -> Any:
     """A single value out of an array of one."""
-    array = np.asarray(value)
-    return array.reshape(-1)[0].item() if array.size == 1 and array.dtype.kind in "biufU" else value
+    listed = _listed(value)
+    return listed[0] if len(listed) == 1 else value
+
+
+def _listed(values: Any) -> list[Any]:
+    """The values of an array of any shape, or of a list, or a single one."""
+    try:
+        return list(np.asarray(values).ravel().tolist())
+    except ValueError:  # a ragged list
+        return [str(values)]
