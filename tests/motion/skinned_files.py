@@ -105,7 +105,7 @@ def _distances(points: np.ndarray, start: np.ndarray, end: np.ndarray) -> np.nda
 
 def _flesh(bones: list[tuple[int, np.ndarray, np.ndarray, float]]) -> tuple[np.ndarray, np.ndarray]:
     """Marching cubes of capsules about the bones."""
-    step = 0.016
+    step = 0.022
     ends = np.array([[start, end] for _, end, start, _ in bones]).reshape(-1, 3)
     low, high = ends.min(axis=0) - 0.15, ends.max(axis=0) + 0.15
     grid = pv.ImageData(dimensions=np.ceil((high - low) / step).astype(int) + 1, spacing=(step,) * 3, origin=low)

@@ -365,3 +365,67 @@ def test_animated_morph_targets_are_told(tmp_path: Path) -> None:
     channels.append(pygltflib.AnimationChannel(sampler=0, target=target))
     gltf.save_binary(str(path))
     assert any("morph targets" in warning for warning in open_motion(path, load_rig(path)).warnings)
+
+
+@pytest.fixture(scope="module")
+def faults() -> Path:
+    """Folder of small files that once went wrong."""
+    folder = Path(__file__).resolve().parents[3] / "shared" / "faults"
+    if not folder.is_dir():
+        pytest.skip("the project's faults (../shared/faults) are not here")
+    return folder
+
+
+@pytest.mark.parametrize(
+    ("name", "frames"),
+    [
+        ("own_animation_in_cm/hand_m.glb", 31),
+        ("own_animation_in_cm/hand_cm.glb", 31),
+        ("leaf_joint/leaf.glb", 31),
+        ("last_frame_lost/fps_30_100.glb", 100),
+        ("several_animations/twoanims.glb", 31),
+        ("dup_names/dupnames.glb", 31),
+        ("other_scene/scene2.glb", 31),
+        ("scale_zero/scale0_rest.glb", 31),
+    ],
+)
+def test_faults_move_as_plain_skinning_says(faults: Path, name: str, frames: int) -> None:
+    rig = load_rig(faults / name)
+    loaded = open_motion(faults / name, rig)
+    assert len(loaded.poses) == frames
+    assert worst(rig, loaded, Skinning(faults / name), [frames // 2, frames - 1]) < CLOSE
+    assert loaded.warnings == ()
+
+
+def test_faults_of_scale_are_told_in_one_line_each(faults: Path) -> None:
+    for name, message in (
+        ("scale0_anim.glb", "scales 'j0' to 0 at frame 30"),
+        ("scaleneg_anim.glb", "node 'J1': its scale turns negative at frame 16"),
+    ):
+        rig = load_rig(faults / "scale_zero" / name)
+        loaded = open_motion(faults / "scale_zero" / name, rig)
+        assert message in "\n".join(loaded.warnings)
+        assert np.isfinite(loaded.poses.positions).all()
+        assert np.isfinite(loaded.poses.rotations).all()
+
+
+def test_the_fault_of_the_leaf_moves_as_far_as_the_file_says(faults: Path) -> None:
+    path = faults / "leaf_joint" / "leaf.glb"
+    rig = load_rig(path)
+    loaded = open_motion(path, rig)
+    got, oracle = covered(rig, loaded, 30), Skinning(path)
+    want, rest = oracle.vertices(1.0), oracle.vertices(None)
+    tip = int(np.argmax(np.linalg.norm(want - rest, axis=1)))
+    assert np.linalg.norm(got[tip] - rest[tip]) / rig.surface.size == pytest.approx(0.332, abs=1e-3)
+    assert np.linalg.norm(got[tip] - want[tip]) < CLOSE * rig.surface.size
+
+
+def test_the_covered_hand_moves_alike_in_metres_and_centimetres(faults: Path) -> None:
+    """Middles of phalanges, where one bone's flesh is rigid in both."""
+    for name in ("hand_m.glb", "hand_cm.glb"):
+        path = faults / "own_animation_in_cm" / name
+        rig = load_rig(path)
+        oracle = Skinning(path)
+        want = oracle.vertices(1.0) @ rig.placing[:3, :3].T + rig.placing[:3, 3]
+        off = np.linalg.norm(covered(rig, open_motion(path, rig), 30) - want, axis=1)[one_bone(oracle)]
+        assert off.max() < CLOSE * rig.surface.size
