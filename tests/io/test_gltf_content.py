@@ -144,7 +144,7 @@ def test_transforms_that_mirror_turn_faces_over(tmp_path: Path) -> None:
 def test_meshes_that_hang_on_a_joint_are_rigid(plain: Path, tmp_path: Path) -> None:
     def horn(content: dict) -> None:
         content["nodes"].append({"name": "horn", "mesh": 1})
-        content["meshes"].append({"name": "horn", "primitives": [{"attributes": {"POSITION": 0}, "indices": 1}]})
+        content["meshes"].append({"name": "horn", "primitives": [{"attributes": {"POSITION": 0}, "indices": 3}]})
         content["nodes"][3]["children"].append(len(content["nodes"]) - 1)
 
     rig = load_rig(edit(plain, tmp_path / "a.glb", horn))
