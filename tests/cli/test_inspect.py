@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 
+import numpy as np
 import pytest
 from click.testing import CliRunner
 
@@ -61,3 +62,13 @@ def test_the_skeleton_can_be_written_for_editing(hand, tmp_path):
     joints = json.loads((tmp_path / "s.json").read_text())["joints"]
     assert joints[0]["name"] == "left.wrist"
     assert len(joints) == 25
+
+
+def test_animations_are_listed(tmp_path):
+    from tests.motion.skinned_files import animal, write
+
+    times, turns = np.array([0.0, 1.0]), np.tile(animal().turns[1], (2, 1))
+    still = {(1, "rotation"): (times, turns, "LINEAR")}
+    path = write(tmp_path / "a.glb", animal(), {"Idle": still, "Walk": still})
+    assert "animations: Idle, Walk" in run(path, "--no-picture").stdout
+    assert json.loads(run(path, "--no-picture", "--json").stdout)["animations"] == ["Idle", "Walk"]

@@ -36,7 +36,7 @@ def command(
     quiet: bool,
     **how: Any,
 ) -> None:
-    """Report what was recognised in RIG: joints, domains, limits, and joints that look misplaced.
+    """Report what was recognised in RIG: joints, domains, limits, animations, and joints that look misplaced.
 
     RIG is a rig file (.glb, .gltf), a surface with --skeleton, or builtin:left, builtin:right. A picture of the
     surface's wire-frame with the named skeleton in it is written beside, unless --no-picture.
@@ -68,6 +68,7 @@ def command(
 
 
 def _report(rig: Rig) -> dict[str, Any]:
+    from warpjld.motion.animations import animation_names
     from warpjld.skeleton.recognise.placing import check_placing
 
     skeleton, surface = rig.skeleton, rig.surface
@@ -100,6 +101,7 @@ def _report(rig: Rig) -> dict[str, Any]:
             "size": _round(np.ptp(surface.vertices, axis=0), 4),
         },
         "joints": joints,
+        "animations": [] if rig.path is None else list(animation_names(rig.path)),
         "palms": [[[skeleton.names[a], skeleton.names[b]] for a, b in palm] for palm in skeleton.palms],
         "placing": [
             vars(finding) | {"message": finding.message}
@@ -135,6 +137,8 @@ def _print(report: dict[str, Any], quiet: bool) -> None:
         for name, source, count, limits in rows:
             click.echo(f"{name:<{widths[0]}}  {source:<{widths[1]}}  {count:>{widths[2]}}  {limits}".rstrip())
         click.echo()
+        if report["animations"]:
+            click.echo(f"animations: {', '.join(report['animations'])}")
         for note in report["notes"]:
             click.echo(f"note: {note}")
     for finding in report["placing"]:

@@ -89,20 +89,21 @@ def _placed(
     out = np.tile(own.frames, (len(animation), 1, 1, 1))
     placing = same_rest(animation.tree.frames[match[sources]], own.frames[sources])
     if placing is not None:
-        out[:, known] = placing @ animation.worlds[:, match[known]]
+        world, frame = placing
+        out[:, known] = world @ animation.worlds[:, match[known]] @ frame
         return out, []
     number = {int(j): k for k, j in enumerate(known)}
     parents = np.array([next((number[a] for a in own.ancestors(int(j)) if a in number), -1) for j in known])
     bones = same_bones(animation.tree.frames[match[known]], own.frames[known], parents)
     if bones is None:
         return None
-    placing, factor = bones
+    world, factor = bones
     theirs = animation.worlds[:, match[known]]
     for k in sorted(range(len(known)), key=lambda k: own.depth(int(known[k]))):
         if parents[k] < 0:
-            out[:, known[k]] = placing @ theirs[:, k]
+            out[:, known[k]] = world @ theirs[:, k]
             # the scale of the file's joint frames stays that of the rig's
-            shown = placing @ animation.tree.frames[match[known[k]]]
+            shown = world @ animation.tree.frames[match[known[k]]]
             out[:, known[k], :3, :3] *= _size(own.frames[known[k]]) / _size(shown)
             continue
         local = np.linalg.inv(theirs[:, parents[k]]) @ theirs[:, k]
@@ -140,7 +141,7 @@ def _widened(rig: Rig, stretch: NDArray[np.float64]) -> list[str]:
             told.append((rig.skeleton.names[j], frame, float(size[frame, j, np.argmax(np.abs(size[frame, j] - 1.0))])))
     if not told:
         return []
-    shown = _some([f"'{name}' to {factor:.3g} at frame {frame}" for name, frame, factor in told])
+    shown = _some([f"'{name}' to {round(factor, 6):.3g} at frame {frame}" for name, frame, factor in told])
     return [f"the animation scales {shown}: joints are placed as the file says, but the flesh keeps its size"]
 
 

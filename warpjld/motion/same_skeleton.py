@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Sequence
+from collections import Counter
 from itertools import product
 
 import numpy as np
@@ -24,67 +24,90 @@ def match_joints(theirs: SourceTree, own: SourceTree) -> NDArray[np.int64]:
     """Joint of ``theirs`` for each of ``own``, -1 where there is none, shape (N,).
 
     Names are compared as they are; where no joint is found so, without case, name space and punctuation, which
-    exporters change. Doubled names are told apart by the names above them and by the order of siblings.
+    exporters change. Doubled names are told apart by their place in the tree and the order of siblings.
     """
     if theirs.names == own.names and np.array_equal(theirs.parents, own.parents):
         return np.arange(len(own))
-    found = _match(theirs, own, str)
-    return found if (found >= 0).any() else _match(theirs, own, _plain)
+    for plain in (str, _plain):
+        found = _match([plain(n) for n in theirs.names], [plain(n) for n in own.names], theirs, own)
+        if (found >= 0).any():
+            break
+    return found
 
 
-def _match(theirs: SourceTree, own: SourceTree, key: Callable[[str], str]) -> NDArray[np.int64]:
-    names = [key(name) for name in theirs.names]
-    paths = [_path(theirs, j, key) for j in range(len(theirs))]
-    out = np.full(len(own), -1)
-    for j, name in enumerate(own.names):
-        called = [k for k, other in enumerate(names) if other == key(name)]
-        if len(called) > 1:
-            called = _longest_match(_path(own, j, key), called, paths)
-        if len(called) == 1:
-            out[j] = called[0]
-    used, counts = np.unique(out[out >= 0], return_counts=True)
-    out[np.isin(out, used[counts > 1])] = -1
+def _match(their_names: list[str], own_names: list[str], theirs: SourceTree, own: SourceTree) -> NDArray[np.int64]:
+    count, their_count = Counter(own_names), Counter(their_names)
+    out = np.array([their_names.index(n) if count[n] == 1 == their_count[n] else -1 for n in own_names])
+    if (out >= 0).all() or not any(their_count[n] for n in own_names):
+        return out
+    below: list[list[int]] = [[] for _ in range(len(theirs) + 1)]  # the last holds the roots
+    for k, parent in enumerate(theirs.parents):
+        below[parent].append(k)
+
+    def children(node: int) -> dict[str, list[int]]:
+        """Nearest nodes below one of ``theirs`` that have a name of the rig's, by name."""
+        found: dict[str, list[int]] = {}
+        todo = list(below[node])
+        while todo:
+            k = todo.pop(0)
+            if their_names[k] in count:
+                found.setdefault(their_names[k], []).append(k)
+            else:
+                todo = below[k] + todo
+        return found
+
+    roots = [j for j, parent in enumerate(own.parents) if parent < 0]
+    best: dict[int, int] = {}
+    for start in (-1, *range(len(theirs))):  # under which node the rig's roots are the same tree
+        pairs: dict[int, int] = {}
+        todo = [(roots, start)]
+        while todo:
+            siblings, node = todo.pop()
+            there = children(node)
+            taken: Counter[str] = Counter()
+            for j in siblings:
+                name = own_names[j]
+                if taken[name] < len(there.get(name, [])):
+                    pairs[j] = there[name][taken[name]]
+                    todo.append((list(own.children[j]), pairs[j]))
+                taken[name] += 1
+        if len(pairs) > len(best):
+            best = pairs
+    used = set(out.tolist())
+    for j, k in best.items():
+        if out[j] < 0 and k not in used:
+            out[j] = k
     return out
-
-
-def _path(tree: SourceTree, joint: int, key: Callable[[str], str]) -> list[tuple[str, int]]:
-    """A joint and those above it: name, and number among its siblings of that name."""
-    out = []
-    for j in (joint, *tree.ancestors(joint)):
-        siblings = [k for k in range(len(tree)) if tree.parents[k] == tree.parents[j]]
-        alike = [k for k in siblings if key(tree.names[k]) == key(tree.names[j])]
-        out.append((key(tree.names[j]), alike.index(j)))
-    return out
-
-
-def _longest_match(
-    path: Sequence[tuple[str, int]], candidates: list[int], paths: Sequence[Sequence[tuple[str, int]]]
-) -> list[int]:
-    """The candidates whose path is this one; nodes above the root of either do not count."""
-
-    def common(other: Sequence[tuple[str, int]]) -> int:
-        parted = (n for n, (a, b) in enumerate(zip(path, other, strict=False)) if a != b)
-        return next(parted, min(len(path), len(other)))
-
-    lengths = [common(paths[k]) for k in candidates]
-    best = [k for k, length in zip(candidates, lengths, strict=True) if length == max(lengths)]
-    # of a chain of one name several may reach as far: the one at the same depth below where they part
-    whole = [k for k in best if len(paths[k]) == len(path)]
-    return whole if len(best) > 1 and whole else best
 
 
 def _plain(name: str) -> str:
     return re.sub(r"[^a-z0-9]", "", re.split(r"[:|/]", name)[-1].lower()).removeprefix("mixamorig")
 
 
-def same_rest(theirs: NDArray[np.float64], own: NDArray[np.float64]) -> NDArray[np.float64] | None:
-    """What brings rest transforms of matched joints (K, 4, 4) on those of a rig, (4, 4); None where nothing does."""
-    reference = int(np.argmax(np.linalg.norm(own[:, :3, :3], axis=(1, 2)) > 1e-3 * np.abs(own[:, :3, :3]).max()))
-    placing = own[reference] @ np.linalg.inv(theirs[reference])
-    off = np.abs(placing @ theirs - own)
+def same_rest(
+    theirs: NDArray[np.float64], own: NDArray[np.float64]
+) -> tuple[NDArray[np.float64], NDArray[np.float64]] | None:
+    """What brings rest transforms of matched joints (K, 4, 4) on those of a rig; None where nothing does.
+
+    Returns:
+        Maps (4, 4) of the world and of joint frames: ``world @ theirs @ frame`` is ``own``. One exporter scales joints'
+        places, another the node above them, which scales their frames too; so the second is a scale.
+    """
+    middle = [frames[:, :3, 3] - frames[:, :3, 3].mean(axis=0) for frames in (theirs, own)]
+    spread = [float(np.linalg.norm(places)) for places in middle]
+    sizes = np.abs(np.linalg.det(own[:, :3, :3]))
+    reference = int(np.argmax(sizes > 1e-3 * sizes.max()))  # none that is collapsed
+    linear = own[reference, :3, :3] @ np.linalg.inv(theirs[reference, :3, :3])
+    factor = float(np.abs(np.linalg.det(linear)) ** (1.0 / 3.0))
+    scale = spread[1] / spread[0] if len(own) > 1 and min(spread) > 0.0 else factor
+    world, frame = np.eye(4), np.eye(4)
+    world[:3, :3] = scale / factor * linear
+    world[:3, 3] = own[reference, :3, 3] - world[:3, :3] @ theirs[reference, :3, 3]
+    frame[:3, :3] *= factor / scale
+    off = np.abs(world @ theirs @ frame - own)
     size = float(np.linalg.norm(np.ptp(own[:, :3, 3], axis=0))) or 1.0
     near = off[:, :3, 3].max() <= _SAME * size and off[:, :3, :3].max() <= 10 * _SAME * np.abs(own[:, :3, :3]).max()
-    return placing if near else None
+    return (world, frame) if near else None
 
 
 def same_bones(

@@ -52,7 +52,7 @@ def test_a_tail_keeps_its_names_in_lower_case(tube):
 
 def test_doubled_names_are_told_apart(tube):
     found = canonical_skeleton(tree(["a", "A", "b"], [-1, 0, 1], np.outer(np.arange(3), [0, 0, 0.03])), *tube)
-    assert found.skeleton.names == ("a#1", "a#2", "b")
+    assert found.skeleton.names == ("a#1", "a#2", "b", "b.end")
 
 
 def built(side: str, keep=lambda name: True) -> tuple[SourceTree, np.ndarray, np.ndarray]:

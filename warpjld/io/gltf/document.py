@@ -239,6 +239,6 @@ def _data_uri(uri: str, what: str, path: Path) -> bytes:
     if not head.endswith(";base64"):
         return unquote_to_bytes(content)
     try:
-        return base64.b64decode(unquote(content))
+        return base64.b64decode("".join(unquote(content).split()), validate=True)
     except binascii.Error as error:
         raise InputError(f"{what}: its data URI is not base64: {error}", path=path) from None
