@@ -72,7 +72,7 @@ LEGS = ("hip", "knee", "ankle", "ball")
         ("Thigh", "Leg", "Foot"),
         ("Thigh", "Calf", "Ankle"),
         ("Leg1", "Leg2", "Foot"),
-        ("UpperLeg", "LowerLeg", "Leg End Foot"),
+        ("UpperLeg", "LowerLeg", "Ankle"),
         ("Hueftgelenk", "Leg", "Foot"),
         ("x1", "x2", "Foot"),
         ("Thigh", "x2", "x3"),
