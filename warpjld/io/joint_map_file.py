@@ -54,7 +54,7 @@ def write_joint_map(path: str | Path, rig: Rig) -> None:
     """
     tree = rig.source
     if tree is None:
-        raise InputError("a built-in hand has no joints of a file: there is nothing to map")
+        raise InputError("a generated rig has no joints of a file: there is nothing to map")
     content: dict[str, str | None] = {}
     for name, joint in zip(rig.skeleton.names, rig.sources, strict=True):
         if is_canonical(name):

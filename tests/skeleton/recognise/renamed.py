@@ -9,8 +9,8 @@ from warpjld.skeleton.recognise.tree import SourceTree
 DIGITS = ("thumb", "index", "middle", "ring", "pinky")
 KNUCKLES = ("base", "knuckle2", "knuckle3", "tip")
 
-# canonical part → name; {s} is the side's word, {n} and {d} number and word of a spine joint or digit, {k} the place of
-# a joint in its digit; parts a convention lacks are left out and keep a name that means nothing
+# canonical part → name; {s} is the side's word, {n} and {d} number and word of a spine joint or digit, {k} the place
+# of a joint in its digit; parts a convention lacks are left out and keep a name that means nothing
 CONVENTIONS: dict[str, dict[str, str | tuple[str, str]]] = {
     "Mixamo": {
         "sides": ("Left", "Right"),

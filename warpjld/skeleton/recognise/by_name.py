@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from collections import defaultdict
 
+import numpy as np
+
 from warpjld.skeleton.hand import DIGITS, FINGER_JOINTS
 from warpjld.skeleton.recognise.digit_chain import digit_chain
 from warpjld.skeleton.recognise.digits import HandDigits, assign_hands
@@ -32,9 +34,12 @@ def roles_by_name(tree: SourceTree, flesh: Flesh | None = None) -> Roles:
     """
     flesh = flesh or Flesh(tree, None)
     meanings = [Meaning() if flesh.dead[j] else read_name(name) for j, name in enumerate(tree.names)]
+    for j in map(int, np.flatnonzero(flesh.passing)):  # what goes on is no end
+        if meanings[j].rank == 4 or (meanings[j].kind or "").endswith(" end"):
+            meanings[j] = Meaning()
     roles = Roles(how="names")
     kinds: dict[tuple[str | None, str], list[int]] = defaultdict(list)
-    for j in sorted(range(len(tree)), key=lambda j: (flesh.bare[j], tree.depth(j), meanings[j].number or 0, j)):
+    for j in sorted(range(len(tree)), key=lambda j: (bool(flesh.bare[j]), tree.depth(j), meanings[j].number or 0, j)):
         if meanings[j].kind:
             kinds[meanings[j].side, str(meanings[j].kind)].append(j)
     sides: list[str | None] = [*sorted({side for side, _ in kinds if side})] or [None]
@@ -50,7 +55,7 @@ def roles_by_name(tree: SourceTree, flesh: Flesh | None = None) -> Roles:
         if side:
             _limbs(kinds, side, roles)
             _forearm_stub(tree, side, roles)
-            if kinds[side, "hand end"]:
+            if kinds[side, "hand end"] and f"{side}.wrist" in roles.body:
                 roles.body[f"{side}.hand.tip"] = kinds[side, "hand end"][0]
             _toes(tree, kinds, side, roles, flesh)
     roles.hands = assign_hands(tree, hands, flesh)
@@ -76,8 +81,10 @@ def _hand(
     if tree.flat and len(carpals) == len(_PALM):  # counted from the index finger (MakeHuman, DAZ, Rigify)
         for digit, j in zip(_PALM, sorted(carpals, key=lambda j: meanings[j].number or 0), strict=True):
             digits[digit].append(j)
-    wrists = kinds[side, "wrist"] or kinds[side, "hand"] or (kinds[None, "wrist"] or kinds[None, "hand"])
-    wrist = wrists[-1] if kinds[side, "wrist"] else (wrists[0] if wrists else None)
+    named = kinds[side, "wrist"]
+    named = [j for j in named if not flesh.bare[j]] or sorted(named, key=lambda j: -len(tree.names[j]))
+    wrists = named or kinds[side, "hand"] or (kinds[None, "wrist"] or kinds[None, "hand"])
+    wrist = wrists[-1] if named else (wrists[0] if wrists else None)
     if wrist is None and digits:
         wrist = _common_ancestor(tree, [joints[0] for joints in digits.values()])
     chains = {digit: digit_chain(tree, digits[digit], meanings, flesh, wrist) for digit in DIGITS if digits[digit]}

@@ -29,6 +29,7 @@ __all__ = ["check_limbs"]
 
 _MAP = "state it with --map (inspect --write-map writes what was recognised, for editing)"
 _PLAUSIBLE = np.log(2.0)  # lower per upper segment may be half or twice the usual
+_CLEARLY = np.log(1.3)  # by which one division of a limb fits better than another
 _AT_TRUNK = 0.03  # of the limb: a joint nearer than this to where limbs part is none of the limb's
 _TOES = 3  # chains below an ankle from which they are toes
 _UNEQUAL = 1.25  # left per right length from which one is doubtful
@@ -126,11 +127,18 @@ def _end(tree: SourceTree, roles: Roles, flesh: Flesh, kind: _Kind, side: str) -
     leg = [known[0]]
     while len(below := [c for c in tree.children[leg[-1]] if flesh.live[c]]) == 1:
         leg.append(below[0])
-    if len(leg) < 2:
+    ball = roles.body.get(f"{side}.ball")
+    if ball in leg[2:]:
+        ankle = leg[leg.index(ball) - 1]
+    elif len(leg) > 1:
+        above = [j for j in (int(tree.parents[leg[0]]),) if j >= 0]  # the leg's turns are looked for in its lower half
+        whole = [*above, *leg]
+        ankle = whole[ankle_of(tree, whole)]
+    else:
         return None
-    ankle = leg[ankle_of(tree, leg)]
+    _release(roles, ankle)
     roles.body[f"{side}.ankle"] = ankle
-    roles.notes.append(f"{side}.ankle: '{tree.names[ankle]}', by the leg's shape")
+    roles.notes.append(f"{side}.ankle '{tree.names[ankle]}': by the leg's shape")
     return ankle
 
 
@@ -148,7 +156,7 @@ def _divide(tree: SourceTree, limbs: list[_Limb], kind: _Kind) -> None:
     for limb in limbs:
         first, second = limb.named
         if first is not None and second is not None and _is_plausible(tree, limb, (first, second), kind):
-            limb.found = (first, second)
+            limb.found = _less_vague(tree, limb, first, second, kind)
     open_ = [limb for limb in limbs if limb.found is None]
     for limb in open_:
         other = next((o for o in limbs if o is not limb and o.found and len(o.chain) == len(limb.chain)), None)
@@ -161,6 +169,15 @@ def _divide(tree: SourceTree, limbs: list[_Limb], kind: _Kind) -> None:
                 limb.found = mirrored
                 continue
         limb.found = _by_geometry(tree, limb, kind)
+
+
+def _less_vague(tree: SourceTree, limb: _Limb, first: int, second: int, kind: _Kind) -> tuple[int, int]:
+    """``Shoulder`` may be the joint or the clavicle, ``Hip`` the joint or the side of the pelvis: lengths tell."""
+    if 0 in limb.fixed or read_name(tree.names[first]).kind not in ("shoulder", "hip"):
+        return first, second
+    own = divide_limb(tree, limb.chain, kind.ratio, {0: (first,), 1: (second,)})[2]
+    other, _, misfit = divide_limb(tree, limb.chain, kind.ratio, {1: (second,)})
+    return (other if misfit + _CLEARLY < own else first), second
 
 
 def _by_geometry(tree: SourceTree, limb: _Limb, kind: _Kind) -> tuple[int, int] | None:

@@ -52,7 +52,7 @@ def _is_hand(tree: SourceTree, hand: HandRoles) -> bool:
         return hand.side is not None and max((len(chain) for chain in chains.values()), default=0) >= 2
     fingers = [chain for digit, chain in chains.items() if digit != "thumb" and len(chain) >= 2]
     if len(fingers) < 2:
-        return True
+        return hand.side is not None
     lengths = [_length(chain) for chain in fingers]
     mean = float(np.mean(lengths))
     heads = np.array([chain[0] for chain in fingers])

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Sequence
 from functools import cached_property
 
@@ -74,34 +75,36 @@ class Flesh:
     def ends(self) -> dict[int, int]:
         """The joint, without flesh, at which the flesh of a last joint ends → that last joint.
 
-        Of several the one whose name says so, else the one straightest on; sockets aside and targets far off are none.
+        Of several the one with a name of its own (``index_tip``, not ``index_03_helper`` below ``index_03``), then the
+        one whose name says so, the shortest (not ``tip_end`` below ``tip``), then the furthest on; sockets aside and
+        targets far off are none.
         """
         tree, out = self._tree, {}
         if not self.known or tree.flat:
             return {}
         for j in np.flatnonzero(~self.bare):
-            kids = tree.children[j]
-            if kids and not self.live[list(kids)].any():
-                found = [(self._end_score(int(j), c), -c) for c in kids]
-                score, end = max(found)
-                if score > 0:
+            if not self.live[list(tree.children[j])].any():
+                found = [(self._end_score(int(j), c), -c) for c in tree.subtree(int(j))[1:]]
+                score, end = max(found, default=((), 0))
+                if score:
                     out[-end] = int(j)
         return out
 
-    def _end_score(self, joint: int, end: int) -> float:
-        """Above 0 where ``end`` may end the bone of ``joint``; the larger the likelier."""
+    def _end_score(self, joint: int, end: int) -> tuple[float, ...]:
+        """The larger the likelier does ``end`` end the bone of ``joint``; empty where it does not."""
         at, above = self._tree.positions, int(self._tree.parents[joint])
         bone = at[end] - at[joint]
         before = at[joint] - at[above] if above >= 0 else bone
         length, usual = float(np.linalg.norm(bone)), float(np.linalg.norm(before))
         meaning = read_name(self._tree.names[end])
         if length <= _COINCIDENT * usual or length == 0.0 or meaning.kind == "helper":
-            return 0.0
+            return ()
+        derived = re.match(re.escape(self._tree.names[joint]) + r"(?![a-z0-9])", self._tree.names[end])
         named = meaning.rank == 4 or (meaning.kind or "").endswith(" end")
         straight = float(unit(bone) @ unit(before)) if usual > 0 else 1.0
         if not named and (length > _LONGEST_END * usual or straight < _MOST_TURNED):
-            return 0.0
-        return 2.0 + straight + 4.0 * named
+            return ()
+        return float(derived is None), float(named), -float(named) * len(self._tree.names[end]), straight * length
 
     @cached_property
     def dead(self) -> NDArray[np.bool_]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
+from numpy.typing import NDArray
 
 from warpjld.rotations import unit
 from warpjld.skeleton.recognise.digits import Digit, HandDigits
@@ -11,6 +12,10 @@ from warpjld.skeleton.recognise.tree import SourceTree
 __all__ = ["digit_chains", "hand_by_shape", "hand_roots"]
 
 _TOE_RATIO = 0.45  # chain length per distance from the common joint: 0.25 for toes, 0.6 or more for fingers
+
+_LONGEST = 4.0  # finger per shortest
+_TOGETHER = 0.6  # length of the mean of four fingers' directions
+_DEEPEST = 0.5  # of a row of knuckles, per its width
 
 
 def hand_roots(tree: SourceTree) -> list[int]:
@@ -29,7 +34,26 @@ def _is_wrist(tree: SourceTree, joint: int) -> bool:
     for chain in chains:
         away = np.linalg.norm(at[chain[0]] - at[joint])
         ratios.append(np.linalg.norm(np.diff(at[chain], axis=0), axis=1).sum() / max(float(away), 1e-12))
-    return bool(np.median(ratios) > _TOE_RATIO)
+    return bool(np.median(ratios) > _TOE_RATIO) and _are_fingers([at[chain] for chain in chains])
+
+
+def _are_fingers(chains: list[NDArray[np.float64]]) -> bool:
+    """Four of five chains lie side by side and point one way; rays of a star and folds of a skirt do not.
+
+    Their second joints are looked at: metacarpals may begin in one place.
+    """
+    lengths = [float(np.linalg.norm(np.diff(chain, axis=0), axis=1).sum()) for chain in chains]
+    if min(lengths) == 0 or max(lengths) > _LONGEST * min(lengths):
+        return False
+    headings = unit([chain[-1] - chain[0] for chain in chains])
+    for thumb in range(5):
+        fingers = [c for c in range(5) if c != thumb]
+        row = np.array([chains[c][1] for c in fingers])
+        wide, deep, _ = np.linalg.svd(row - row.mean(axis=0))[1]
+        together = np.linalg.norm(headings[fingers].mean(axis=0))
+        if together > _TOGETHER and deep < _DEEPEST * wide:
+            return True
+    return False
 
 
 def digit_chains(tree: SourceTree, joint: int) -> list[list[int]]:
