@@ -44,19 +44,21 @@ def with_usable_rest(clip: Clip, *, side: str | None = None) -> tuple[Clip, Land
     marks = landmarks_of_clip(clip, side=side)
     ways = _ways(marks, clip.positions)
     if ways is None:
-        return clip, marks, ()
+        return clip, marks, marks.notes
     why = _arbitrary(clip, marks)
     if why:
         up = _signed_axis(ways.mean(axis=0))
         frame = _most_like_standing(marks, clip.positions, up)
         clip = clip.rebased(frame, _turns(marks, clip.positions[frame], up))
         notes = (f"the motion's rest says nothing of the body ({why}): its frame {frame} is taken as the rest",)
-        return clip, landmarks_of_clip(clip, side=side), notes
+        marks = landmarks_of_clip(clip, side=side)
+        return clip, marks, (*marks.notes, *notes)
     turn, told = _whole_turn(clip, marks, ways)
     if turn is None:
-        return clip, marks, told
+        return clip, marks, (*marks.notes, *told)
     clip = clip.turned_rest(turn)
-    return clip, landmarks_of_clip(clip, side=side), told
+    marks = landmarks_of_clip(clip, side=side)
+    return clip, marks, (*marks.notes, *told)
 
 
 def _ways(marks: Landmarks, places: NDArray[np.float64]) -> NDArray[np.float64] | None:
