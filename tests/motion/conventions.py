@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Mapping
 from dataclasses import dataclass
 
@@ -46,6 +47,9 @@ JOINTS: dict[str, tuple[str | None, np.ndarray]] = {n: (p, np.array(at, float)) 
     for name, (parent, at) in _SIDE.items()
 }
 """Canonical joint → parent and place [cm] in a T-pose."""
+
+_OWN_AXES = {"X": (1, 0, 0), "-X": (-1, 0, 0), "Y": (0, 1, 0), "Z": (0, 0, 1), "mirrored X": (1, 0, 0)}
+"""Along which of its own axes every bone lies; ``mirrored``: against it on the right side."""
 
 # rotation vectors [degrees] of joints to their parents, frame after frame; {s}: mirrored for the right side
 FRAMES: tuple[dict[str, tuple[float, float, float]], ...] = (
@@ -128,7 +132,7 @@ def record(
 
     Args:
         convention: Names.
-        rest: ``T``, ``A`` (arms hang by 50°), or ``X`` (every bone along its own X).
+        rest: ``T``, ``A`` (arms hang by 50°), or one of ``_OWN_AXES`` (every bone along its own X, …).
         offsets: ``usual``, ``zero`` (positions for all joints, no OFFSETs), ``both`` (positions that repeat OFFSETs)
             or ``added`` (positions that add nothing to OFFSETs).
         up: ``y``, ``z`` (rest and frames) or ``root`` (the root turns a Y-up rest into Z-up frames).
@@ -198,7 +202,9 @@ def record(
                     row += list(offset(node))
                 elif offsets == "added":
                     row += [0.0, 0.0, 0.0]
-            row += list(mine.as_euler("ZXY", degrees=True))
+            with warnings.catch_warnings():  # where two axes fall together any pair of angles will do
+                warnings.filterwarnings("ignore", message="Gimbal lock")
+                row += list(mine.as_euler("ZXY", degrees=True))
         lines.append(" ".join(f"{value:.9f}" for value in row))
     first = {node.joint: node.name for node in reversed(nodes)}
     return Recording(
@@ -268,12 +274,14 @@ def _rest_axes(node: _Node, nodes: list[_Node], rest: str) -> Rotation:
         side, _, part = node.joint.partition(".")
         if part not in ("clavicle", "hip", "knee", "ankle", "ball"):
             return Rotation.from_euler("z", 50 if side == "left" else -50, degrees=True)
-    if rest == "X":
+    if rest in _OWN_AXES:
         ends = [n.at - node.at for n in nodes if n.parent == node.name]
         bone = ends[-1] if ends else node.end
         bone = np.array([0.0, 1.0, 0.0]) if node.joint in ("pelvis", "spine3") else bone
-        x = bone / np.linalg.norm(bone)
-        y = np.cross([0.0, 0.0, 1.0] if abs(x[2]) < 0.9 else [0.0, 1.0, 0.0], x)
-        y /= np.linalg.norm(y)
-        return Rotation.from_matrix(np.column_stack([x, y, np.cross(x, y)]))
+        along = np.array(_OWN_AXES[rest])
+        if rest == "mirrored X" and node.joint.startswith("right."):
+            along = -along
+        across = np.array([0.0, 0.0, 1.0] if abs(bone[2]) < 0.9 * np.linalg.norm(bone) else [0.0, 1.0, 0.0])
+        turned, _ = Rotation.align_vectors([bone, across], [along, np.roll(along, 1)], weights=[1e6, 1.0])
+        return turned
     return Rotation.identity()

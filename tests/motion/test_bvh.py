@@ -81,8 +81,12 @@ def test_another_rate_keeps_the_ends(tmp_path: Path) -> None:
         ("    End Site", "    Offset 1 1 1\n    Site", 11, "unexpected 'Site'"),
         ("ROOT Hips", "JOINT Hips", 2, "JOINT stands outside a ROOT"),
         ("Frames: 3", "Frames: many", 17, "want 'Frames:'"),
-        ("Frames: 3", "Frames: 2", 21, "more than the 2 frames"),
-        ("Frames: 3", "Frames: 4", 21, "frame 3 of 4"),
+        ("Frames: 3", "Frames: 0", 17, "want 'Frames:'"),
+        ("Frames: 3", "Frames: ²", 17, "want 'Frames:'"),
+        ("Frames: 3", f"Frames: {'9' * 5000}", 17, "want 'Frames:'"),
+        ("Frames: 3", "Number: 3", 17, "want 'Frames:' and its value, not 'Number: 3'"),
+        ("CHANNELS 3 Yrotation", "CHANNELS ³ Yrotation", 9, "want their number"),
+        ("CHANNELS 3 Yrotation", f"CHANNELS {'3' * 5000} Yrotation", 9, "want their number"),
         ("Frame Time: 0.0333333", "Frame Time: 0", 18, "above 0"),
         ("1 2 3 90 0 0 0 0 0", "1 2 3 90 0 0 0 0", 20, "frame 1: want 9 numbers, got 8"),
         ("1 2 3 90 0 0 0 0 0", "1 2 3 nan 0 0 0 0 0", 20, "'nan' is not finite"),
@@ -94,6 +98,49 @@ def test_mistakes_are_named_with_their_line(tmp_path: Path, old: str, new: str, 
     with pytest.raises(InputError, match=message) as caught:
         read_bvh(write(tmp_path, ARM.replace(old, new, 1)))
     assert caught.value.line == line
+
+
+@pytest.mark.parametrize(("announced", "note"), [(2, "3 frames, not the 2"), (4, "3 frames, not the 4"), (3, "")])
+def test_the_frames_that_are_there_are_read(tmp_path: Path, announced: int, note: str) -> None:
+    clip = read_bvh(write(tmp_path, ARM.replace("Frames: 3", f"Frames: {announced}")))
+    assert len(clip) == 3
+    np.testing.assert_array_equal(clip.positions, read_bvh(write(tmp_path, ARM)).positions)
+    assert (len(clip.notes) == 1 and note in clip.notes[0]) if note else clip.notes == ()
+
+
+def test_a_frame_cut_off_is_left_out_with_a_note_and_a_missing_motion_is_refused(tmp_path: Path) -> None:
+    clip = read_bvh(write(tmp_path, ARM.replace("30 20 -40\n", "30 20")))
+    assert len(clip) == 2
+    assert "the last frame is cut off and left out: 8 of 9 numbers" in clip.notes[0]
+    with pytest.raises(InputError, match="frame 0: want 9 numbers, got 8"):
+        read_bvh(write(tmp_path, ARM.partition("0 0 0 0 0 0 0 0 0")[0] + "0 0 0 0 0 0 0 0"))
+    with pytest.raises(InputError, match="expected frame 0 of 3"):
+        read_bvh(write(tmp_path, ARM.partition("0 0 0 0 0 0 0 0 0")[0]))
+
+
+def test_marks_tabs_comments_and_missing_blanks_do_not_matter(tmp_path: Path) -> None:
+    text = ARM.replace("Frames: 3", "Frames:3").replace("Frame Time: 0.0333333", "Frame Time:0.0333333 // 30/s")
+    text = text.replace("  OFFSET 10 0 0", "\tOFFSET\t10\t0\t0 # to the elbow").replace("ROOT", "// by hand\n\nROOT")
+    path = tmp_path / "motion.bvh"
+    path.write_bytes(b"\xef\xbb\xbf" + text.replace("\n", "\r\n").encode())
+    clip, plain = read_bvh(path), read_bvh(write(tmp_path, ARM))
+    assert (clip.names, clip.rate, clip.notes) == (plain.names, plain.rate, ())
+    np.testing.assert_array_equal(clip.positions, plain.positions)
+
+
+def test_positions_below_the_root_replace_offsets_or_add_to_them(tmp_path: Path) -> None:
+    text = ARM.replace("CHANNELS 3 Y", "CHANNELS 6 Xposition Yposition Zposition Y")
+
+    def moved(x: float) -> str:
+        rows = text.replace("0 0 0 0 0 0 0 0 0", f"0 0 0 0 0 0 {x} 0 0 0 0 0")
+        rows = rows.replace("1 2 3 90 0 0 0 0 0", f"1 2 3 90 0 0 {x} 0 0 0 0 0")
+        return rows.replace("0 0 0 0 0 90 30 20 -40", f"0 0 0 0 0 90 {x} 0 0 30 20 -40")
+
+    replacing, adding = read_bvh(write(tmp_path, moved(9.5))), read_bvh(write(tmp_path, moved(-0.5)))
+    np.testing.assert_allclose(replacing.positions[0, 1], [9.5, 0, 0], atol=1e-12)
+    np.testing.assert_allclose(replacing.positions, adding.positions, atol=1e-12)
+    assert replacing.notes == ()
+    assert "additions to their OFFSETs" in adding.notes[0]
 
 
 def test_empty_and_missing_files(tmp_path: Path) -> None:

@@ -402,6 +402,10 @@ VARIANTS: dict[str, dict[str, object]] = {
     "bones along X": {"rest": "X"},
     "bones along X, Z up": {"rest": "X", "up": "z"},
     "bones along X, metres": {"rest": "X", "scale": 0.01},
+    "bones along -X": {"rest": "-X"},
+    "bones along Y": {"rest": "Y"},
+    "bones along Z": {"rest": "Z"},
+    "bones along X, against it on the right": {"rest": "mirrored X"},
     "no offsets": {"offsets": "zero"},
     "no offsets, bones along X": {"offsets": "zero", "rest": "X"},
     "offsets and positions": {"offsets": "both"},
@@ -414,6 +418,14 @@ VARIANTS: dict[str, dict[str, object]] = {
 @pytest.mark.parametrize("name", ["LAFAN1", "Mixamo", "MakeHuman"])
 def test_rest_axes_and_units_do_not_matter(tmp_path: Path, name: str, variant: str) -> None:
     recording = record(CONVENTIONS[name], **VARIANTS[variant])  # type: ignore[arg-type]
+    assert_followed(play(tmp_path, recording), recording)
+
+
+@pytest.mark.parametrize("heading", [90.0, 140.0, 180.0, -60.0])
+@pytest.mark.parametrize("variant", ["bones along X", "bones along X, Z up", "Z up by the root", "no offsets"])
+def test_headings_are_kept(tmp_path: Path, variant: str, heading: float) -> None:
+    frames = tuple({**frame, "pelvis": (0.0, heading, 0.0)} for frame in FRAMES)
+    recording = record(CONVENTIONS["LAFAN1"], frames=frames, **VARIANTS[variant])  # type: ignore[arg-type]
     assert_followed(play(tmp_path, recording), recording)
 
 

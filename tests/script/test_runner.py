@@ -182,3 +182,17 @@ def test_an_interpreter_can_run_a_second_script_on_the_same_scene(scene) -> None
     interpreter.run_text("MACRO BEND degrees\nWRIST LEFT FLEXION AT 0 $degrees\nEND")
     interpreter.run_text("BEND 10")
     assert scene.actor().key_frames == [0]
+
+
+def test_frames_past_the_motions_end_are_named(run, scene, tmp_path, monkeypatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    told: list[str] = []
+    scene.warn = told.append
+    (tmp_path / "m.csv").write_text("frame,left.index.base.flexion\n0,0\n2,60\n")
+    run("RATE 24\nMOTION 'm.csv'\nFRAMES 0 2\nEXPORT 'a.npz'")
+    assert run_scene(scene, tmp_path / "out")["warnings"] == [] == told
+    run("FRAMES 0 5")
+    wanted = "LEFT: its motion goes from frame 0 to 2: frames 3 to 5 hold its last pose"
+    assert run_scene(scene, tmp_path / "out", dry=True)["warnings"] == [wanted]
+    run_scene(scene, tmp_path / "out", dry=True)
+    assert told == [wanted], "once"

@@ -149,7 +149,7 @@ def _hierarchy(lines: _Lines) -> list[_Joint]:
 
 
 def _channels(lines: _Lines, words: list[str], joint: str) -> list[tuple[str, int]]:
-    if not words or not words[0].isdigit() or int(words[0]) != len(words) - 1:
+    if not words or words[0] != str(len(words) - 1):
         raise lines.error(f"CHANNELS of '{joint}': want their number, then as many names")
     for word in words[1:]:
         if word.lower() not in _CHANNELS:
@@ -203,9 +203,9 @@ def _clip(joints: list[_Joint], values: NDArray[np.float64], rate: float, notes:
                 turns[:, j] = multiply(turns[:, j], _about(axis, values[:, column]))
             column += 1
     if _add_to_offsets(joints, places, offsets):
-        moved = [(j, axis) for j, joint in enumerate(joints) for kind, axis in joint.channels if kind == "position"]
-        for j, axis in moved:
-            places[:, j, axis] += offsets[j, axis]
+        for j, joint in enumerate(joints):
+            for axis in (axis for kind, axis in joint.channels if kind == "position" and joint.parent >= 0):
+                places[:, j, axis] += offsets[j, axis]
         notes = [*notes, "positions of joints are taken as additions to their OFFSETs"]
     positions, rotations = places.copy(), turns.copy()
     for j, parent in enumerate(parents):

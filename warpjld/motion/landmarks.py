@@ -19,6 +19,9 @@ _NEXT = {"clavicle": "shoulder", "shoulder": "elbow", "elbow": "wrist", "hip": "
     for joint, following in (("base", "knuckle2"), ("knuckle2", "knuckle3"), ("knuckle3", "tip"))
 }
 _TOWARDS_FINGERS = ("middle.base", "ring.base", "index.base", "pinky.base")
+_LIMBS = (".clavicle", ".shoulder", ".elbow", ".wrist", ".hip", ".knee", ".ankle", ".ball")
+_NO_LENGTH = 1e-6
+"""Of the figure's size."""
 _ONE_LINE = 0.02
 """Sine up to which offsets count as parallel: such a rest says nothing of where joints lie."""
 
@@ -31,11 +34,13 @@ class Landmarks:
         joints: Canonical name, such as ``left.elbow`` or ``right.index.base``, → joint number.
         parents: Parent of every joint, -1 for a root.
         rest: Joint positions at rest, shape (J, 3).
+        notes: What was doubtful in recognising them.
     """
 
     joints: dict[str, int]
     parents: NDArray[np.signedinteger]
     rest: NDArray[np.float64]
+    notes: tuple[str, ...] = ()
 
     @property
     def pelvis(self) -> int | None:
@@ -143,22 +148,42 @@ def landmarks_of_skeleton(skeleton: Skeleton) -> Landmarks:
 
 
 def landmarks_of_clip(clip: Clip, *, side: str | None = None) -> Landmarks:
-    """Landmarks of a recording, recognised by its joints' names in any of the common conventions.
+    """Landmarks of a recording, recognised as a rig's joints are: by names in any of the common conventions, or shape.
 
     Args:
         clip: The recording.
         side: Side of a hand whose joints' names do not say it.
     """
     from warpjld.skeleton.recognise.by_name import roles_by_name
+    from warpjld.skeleton.recognise.recognise import recognise
     from warpjld.skeleton.recognise.tree import SourceTree
 
-    frames = np.tile(np.eye(4), (len(clip.names), 1, 1))
-    frames[:, :3, 3] = clip.positions[0] if _says_nothing(clip) else clip.rest
-    roles = roles_by_name(SourceTree(clip.names, clip.parents, frames))
+    places = _most_stretched(clip) if _says_nothing(clip) else clip.rest
+    kept = _with_bones(clip, places)
+    number = {j: k for k, j in enumerate(kept)} | {-1: -1}
+    frames = np.tile(np.eye(4), (len(kept), 1, 1))
+    frames[:, :3, 3] = places[kept]
+    parents = np.array([number[int(clip.parents[j])] for j in kept], dtype=np.int64)
+    tree = SourceTree(tuple(clip.names[j] for j in kept), parents, frames)
+    roles = recognise(tree)
     joints = dict(roles.body)
     for hand in roles.hands:
         joints |= {f"{hand.side or side}.{name}": joint for name, joint in hand.joints.items()}
-    return Landmarks(joints, clip.parents, clip.rest)
+    for name, joint in roles_by_name(tree).body.items():
+        # a wrist whose fingers make no hand is a wrist nevertheless: recordings often only hint at fingers
+        if name.endswith(_LIMBS) and name not in joints and joint not in joints.values():
+            joints[name] = joint
+    by_shape = ("the recording's joints are recognised by shape, not by name",) if roles.how == "shape" else ()
+    joints = {name: kept[joint] for name, joint in joints.items()}
+    return Landmarks(joints, clip.parents, clip.rest, (*by_shape, *roles.notes))
+
+
+def _with_bones(clip: Clip, places: NDArray[np.float64]) -> list[int]:
+    """Joints but for those at the end of a bone without length: End Sites that state none would be taken for tips."""
+    above = np.maximum(clip.parents, 0)
+    short = np.linalg.norm(places - places[above], axis=1) <= _NO_LENGTH * np.linalg.norm(np.ptp(places, axis=0))
+    ends = ~np.isin(np.arange(len(places)), clip.parents) & (clip.parents >= 0)
+    return [int(j) for j in np.flatnonzero(~(short & ends))]
 
 
 def _says_nothing(clip: Clip) -> bool:
@@ -171,3 +196,13 @@ def _says_nothing(clip: Clip) -> bool:
     longest = bones[lengths.argmax()] / lengths.max()
     along = np.linalg.norm(np.cross(longest, unit(bones)), axis=1) < _ONE_LINE
     return bool(along.mean() > 0.75)
+
+
+def _most_stretched(clip: Clip) -> NDArray[np.float64]:
+    """Joint positions in the first frame in which ends lie about as far from their roots as in any, shape (B, 3)."""
+    roots = np.arange(len(clip.names))
+    for j, parent in enumerate(clip.parents):
+        roots[j] = j if parent < 0 else roots[parent]
+    ends = np.setdiff1d(np.arange(len(clip.names)), clip.parents)
+    reach = np.linalg.norm(clip.positions[:, ends] - clip.positions[:, roots[ends]], axis=-1).sum(axis=1)
+    return np.asarray(clip.positions[int(np.argmax(reach >= 0.98 * reach.max()))])

@@ -2,9 +2,9 @@
 
 Several mocap systems write every OFFSET along the bone's own X, or none at all and a position for every joint: the
 rest pose is then no pose. Where bones point in the *frames* holds whatever the rest is, so the frame that is most like
-somebody standing straight takes its place, told so that the body stands upright there and faces an axis; its lean and
-heading stay in the motion. A rest that is a pose may still stand along another axis than the figure does in the
-frames, where a root carries all frames from one to the other; the floor tells that from somebody who lies down.
+somebody standing straight takes its place, told so that the body stands upright there and faces the file's front; its
+lean and heading stay in the motion. A rest that is a pose may still stand along another axis than the figure does in
+the frames, where a root carries all of them from one to the other; the floor tells that from somebody who lies down.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ from scipy.spatial.transform import Rotation
 
 from warpjld.motion.clip import Clip
 from warpjld.motion.landmarks import Landmarks, landmarks_of_clip
-from warpjld.rotations import rotate, slerp, unit
+from warpjld.rotations import minimal_rotation, rotate, slerp, unit
 
 __all__ = ["with_usable_rest"]
 
@@ -44,19 +44,21 @@ def with_usable_rest(clip: Clip, *, side: str | None = None) -> tuple[Clip, Land
     marks = landmarks_of_clip(clip, side=side)
     ways = _ways(marks, clip.positions)
     if ways is None:
-        return clip, marks, ()
+        return clip, marks, marks.notes
     why = _arbitrary(clip, marks)
     if why:
         up = _signed_axis(ways.mean(axis=0))
         frame = _most_like_standing(marks, clip.positions, up)
         clip = clip.rebased(frame, _turns(marks, clip.positions[frame], up))
         notes = (f"the motion's rest says nothing of the body ({why}): its frame {frame} is taken as the rest",)
-        return clip, landmarks_of_clip(clip, side=side), notes
+        marks = landmarks_of_clip(clip, side=side)
+        return clip, marks, (*marks.notes, *notes)
     turn, told = _whole_turn(clip, marks, ways)
     if turn is None:
-        return clip, marks, told
+        return clip, marks, (*marks.notes, *told)
     clip = clip.turned_rest(turn)
-    return clip, landmarks_of_clip(clip, side=side), told
+    marks = landmarks_of_clip(clip, side=side)
+    return clip, marks, (*marks.notes, *told)
 
 
 def _ways(marks: Landmarks, places: NDArray[np.float64]) -> NDArray[np.float64] | None:
@@ -135,7 +137,7 @@ def _most_like_standing(marks: Landmarks, places: NDArray[np.float64], up: NDArr
 
 
 def _turns(marks: Landmarks, places: NDArray[np.float64], up: NDArray[np.float64]) -> NDArray[np.float64]:
-    """How a pose is turned from somebody who stands upright and faces an axis, for every bone, shape (B, 4)."""
+    """How a pose is turned from somebody who stands upright and faces the front, for every bone, shape (B, 4)."""
     trunk = marks.trunk(places)
     rises = up if trunk is None or _degrees(trunk, up) < _LEAN else unit(trunk)
     lines = [marks.across(part, places) for part in ("hip", "shoulder")]
@@ -143,8 +145,7 @@ def _turns(marks: Landmarks, places: NDArray[np.float64], up: NDArray[np.float64
     known = next((frame for frame in frames if frame is not None), None)
     if known is None:
         return np.tile([0.0, 0.0, 0.0, 1.0], (len(places), 1))
-    standing = [g for g in Rotation.create_group("O").as_matrix() if g[:, 1] @ up > 0.5]
-    upright = max(standing, key=lambda g: float((g * known).sum()))
+    upright = _standing(up, known)
     ends = np.array([Rotation.from_matrix((known if f is None else f) @ upright.T).as_quat() for f in frames])
     pelvis, chest = marks.pelvis, marks.chest
     spine = () if pelvis is None or chest is None else marks.path(pelvis, chest)
@@ -153,6 +154,19 @@ def _turns(marks: Landmarks, places: NDArray[np.float64], up: NDArray[np.float64
     for j, parent in enumerate(marks.parents):
         turns[j] = spread[spine.index(j)] if j in spine else (ends[0] if parent < 0 else turns[parent])
     return turns
+
+
+def _standing(up: NDArray[np.float64], body: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Left, up and forward, as columns, of somebody in the file's axes who faces its front.
+
+    That is +z where y is up, as in BVH files, and -y where z is up, as in Blender; elsewhere the axis a body faces.
+    """
+    if up[1] > 0.5:
+        return np.eye(3)
+    if up[2] > 0.5:
+        return np.array([[1.0, 0.0, 0.0], [0.0, 0.0, -1.0], [0.0, 1.0, 0.0]])
+    standing = [g for g in Rotation.create_group("O").as_matrix() if g[:, 1] @ up > 0.5]
+    return np.asarray(max(standing, key=lambda g: float((g * body).sum())))
 
 
 def _frame(across: NDArray[np.float64], up: NDArray[np.float64]) -> NDArray[np.float64] | None:
@@ -178,10 +192,12 @@ def _whole_turn(
     told = f"stands along {_axis_name(own)} in its rest and along {_axis_name(found)} in its frames"
     if not _stands(clip.positions, found, own):
         return None, (f"the recorded figure {told}: it is taken to lie, not to stand",)
-    fitting = [g for g in Rotation.create_group("O") if g.apply(own) @ found > 0.5]
-    mean_turn = Rotation.from_quat(clip.rotations[:, pelvis]).mean()
-    best = min(fitting, key=lambda g: float((mean_turn * g.inv()).magnitude()))
-    return np.asarray(best.as_quat()), (f"the recorded figure {told}: the latter is taken as up",)
+    turn = minimal_rotation(own, found)
+    if own @ found < -0.5:  # head down: which way round, only the frames tell
+        mean_turn = Rotation.from_quat(clip.rotations[:, pelvis]).mean()
+        fitting = [g for g in Rotation.create_group("O") if g.apply(own) @ found > 0.5]
+        turn = np.asarray(min(fitting, key=lambda g: float((mean_turn * g.inv()).magnitude())).as_quat())
+    return turn, (f"the recorded figure {told}: the latter is taken as up",)
 
 
 def _stands(places: NDArray[np.float64], up: NDArray[np.float64], other: NDArray[np.float64]) -> bool:

@@ -22,7 +22,7 @@ from warpjld.script.pictures import draw_contact_sheet, draw_picture, film_studi
 from warpjld.script.press_files import check_press, write_press
 from warpjld.script.props import Prop, prop_surface
 from warpjld.script.scene import Actor, Scene
-from warpjld.script.staging import frame_numbers, notes, stage
+from warpjld.script.staging import frame_numbers, held, notes, stage
 from warpjld.script.summary import Summary
 
 __all__ = ["Report", "cast", "run_scene"]
@@ -80,6 +80,7 @@ def run_scene(
     for actor in scene.actors.values():
         stage(actor, frames[:1], scene.rate)  # keys beyond limits are found here
         summary.notes += notes(actor, frames)
+        scene.warned(line for line in held(actor, frames, scene.rate) if line not in scene.warnings)
     if dry:
         return summary.content([{"name": name} for name in _names(scene, outputs)], folder)
     with OutputFolder(folder) as out:

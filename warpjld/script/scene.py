@@ -52,6 +52,7 @@ class Actor:
         method: The covering's.
         domains: Whether domains come from the geometry or from the rig's painted weights.
         recorded: Poses of a motion file and their rate [1/s], which the keys then do not override.
+        motion_notes: What a reader of the result should know of that file.
         placement: Keys of the actor as a whole.
         covering: The surface as bound last; ``covered`` is the method and the domains it was bound with.
     """
@@ -64,6 +65,7 @@ class Actor:
     method: Literal["smooth", "paper"] = "smooth"
     domains: Literal["geometry", "skin"] = "geometry"
     recorded: tuple[Poses, float] | None = None
+    motion_notes: tuple[str, ...] = ()
     placement: Placement = field(default_factory=Placement)
     covering: Covering | None = None
     covered: tuple[str, str] = ("", "")

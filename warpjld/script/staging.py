@@ -10,7 +10,7 @@ from warpjld.rotations import unit
 from warpjld.script.scene import Actor, Scene
 from warpjld.skeleton import Poses
 
-__all__ = ["frame_numbers", "notes", "stage"]
+__all__ = ["frame_numbers", "held", "notes", "stage"]
 
 _MOST_FRAMES = 1_000_000
 
@@ -58,9 +58,23 @@ def stage(actor: Actor, frames: NDArray[np.float64], rate: float) -> Poses:
 
 def notes(actor: Actor, frames: NDArray[np.float64]) -> list[str]:
     """What a reader of the result should know of an actor's rig and motion."""
-    found = [f"{actor.name}: {note}" for note in actor.rig.notes]
+    found = [f"{actor.name}: {note}" for note in (*actor.rig.notes, *actor.motion_notes)]
     if actor.recorded is None:
         found += [f"{actor.name}: {held}" for held in actor.motion.clamped(frames, actor.skeleton)]
+    return found
+
+
+def held(actor: Actor, frames: NDArray[np.float64], rate: float) -> list[str]:
+    """Warnings of frames that a motion file does not reach, in which its first or last pose is held."""
+    if actor.recorded is None:
+        return []
+    recorded, own_rate = actor.recorded
+    last = (len(recorded) - 1) * rate / own_rate
+    found = []
+    for name, out in (("first", frames[frames < -1e-6]), ("last", frames[frames > last + 1e-6])):
+        if len(out):
+            which = f"frame {out[0]:g} holds" if len(out) == 1 else f"frames {out[0]:g} to {out[-1]:g} hold"
+            found.append(f"{actor.name}: its motion goes from frame 0 to {last:g}: {which} its {name} pose")
     return found
 
 

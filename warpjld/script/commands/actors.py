@@ -117,7 +117,7 @@ def motion(scene: Scene, arguments: Arguments) -> None:
     )
     rig = replace(chosen.rig, skeleton=chosen.skeleton)  # with the script's axes and limits
     moved = open_motion(path, rig, rate=scene.rate, **options)  # type: ignore[arg-type]
-    chosen.recorded = moved.poses, moved.rate
+    chosen.recorded, chosen.motion_notes = (moved.poses, moved.rate), moved.notes
     scene.warned(f"{chosen.name}: {warning}" for warning in moved.warnings)
 
 
