@@ -188,14 +188,14 @@ def _single(wanted: _Wanted, job: ClipJob) -> None:
     from warpjld.batch import deform_clip
     from warpjld.cli.progress import progress
     from warpjld.io.caches import check_cache
-    from warpjld.io.motion_out import check_motion
+    from warpjld.io.motion_out import check_motion_out
 
     began = time.perf_counter()
     surfaces = () if wanted.out is None else (wanted.out,)
     for path in surfaces:  # an unknown suffix or a missing library must not cost the work of binding
         check_cache(path)
     for path in wanted.motions_out:
-        check_motion(path)
+        check_motion_out(path)
     how = _deforming(wanted)
     with progress(wanted.quiet) as report:
         made = deform_clip(
@@ -231,13 +231,13 @@ def _batch(wanted: _Wanted, jobs: list[ClipJob]) -> None:
     from warpjld.batch import run_batch
     from warpjld.cli.progress import progress
     from warpjld.io.caches import check_cache
-    from warpjld.io.motion_out import check_motion
+    from warpjld.io.motion_out import check_motion_out
 
     assert wanted.out is not None
     for suffix in wanted.formats:
         check_cache(f"clip{suffix}")
     for suffix in wanted.motion_formats:
-        check_motion(f"clip{suffix}")
+        check_motion_out(f"clip{suffix}")
     settings = wanted.settings()
     how = _deforming(replace(wanted, threads=wanted.threads or 1))
     with progress(wanted.quiet) as report:

@@ -14,7 +14,7 @@ from warpjld.rig import Rig
 from warpjld.skeleton import Poses
 from warpjld.whole_file import whole_file
 
-__all__ = ["MOTION_OUT", "Timing", "Writer", "WrittenMotion", "check_motion", "write_motion"]
+__all__ = ["MOTION_OUT", "Timing", "Writer", "WrittenMotion", "check_motion_out", "write_motion"]
 
 MOTION_OUT = {
     ".bvh": "BVH: the rig's own joints, metres, Y up",
@@ -68,6 +68,18 @@ class Writer(Protocol):
         """Write all frames; OSError is told by the caller."""
 
 
+def check_motion_out(path: str | Path) -> None:
+    """Raise what ``write_motion`` would for a file's name: to be called before any long work.
+
+    Raises:
+        InputError: Unknown suffix.
+    """
+    path = Path(path)
+    if path.suffix.lower() not in _WRITERS:
+        listed = "\n".join(f"  {suffix:6} {what}" for suffix, what in MOTION_OUT.items())
+        raise InputError(f"unknown kind of motion file '{path.suffix}'; known are\n{listed}", path=path)
+
+
 def write_motion(
     path: str | Path, rig: Rig, poses: Poses, *, rate: float, start_frame: int = 0, name: str | None = None
 ) -> WrittenMotion:
@@ -88,8 +100,10 @@ def write_motion(
         MissingExtraError: The format needs an optional dependency.
     """
     path = Path(path)
-    write = check_motion(path)
+    check_motion_out(path)
     timing = Timing(rate, start_frame, path.stem if name is None else name)
+    module, function = _WRITERS[path.suffix.lower()]
+    write: Writer = getattr(import_module(f"warpjld.io.motion_out.{module}"), function)
     make_folder(path.parent)
     try:
         with whole_file(path) as part:
@@ -100,18 +114,3 @@ def write_motion(
         if error.path is not None:
             raise
         raise InputError(error.message, path=path) from error
-
-
-def check_motion(path: str | Path) -> Writer:
-    """What writes this kind of motion file, before anything else is computed.
-
-    Raises:
-        InputError: Unknown suffix.
-    """
-    path = Path(path)
-    known = _WRITERS.get(path.suffix.lower())
-    if known is None:
-        listed = "\n".join(f"  {suffix:6} {what}" for suffix, what in MOTION_OUT.items())
-        raise InputError(f"unknown kind of motion file '{path.suffix}'; known are\n{listed}", path=path)
-    writer: Writer = getattr(import_module(f"warpjld.io.motion_out.{known[0]}"), known[1])
-    return writer
