@@ -1,78 +1,67 @@
-"""Polygons of any number of corners, convex or not → triangles."""
+"""Polygons → triangles, whatever their number of corners, convex or not."""
 
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
-__all__ = ["triangulate"]
+__all__ = ["triangulate_polygons"]
 
-_CONVEX = -1e-9
-"""Sine, as areas, from which a corner counts as one that turns inwards."""
+_STRAIGHT = 1e-9
+"""A corner that turns back by less than this, of the polygon's area, counts as straight."""
 
 
-def triangulate(points: NDArray[np.float64], corners: ArrayLike, counts: ArrayLike) -> NDArray[np.int64]:
-    """Triangles of polygons, as numbers of corners, shape (S, 3); polygon after polygon, with their winding.
+def triangulate_polygons(
+    points: NDArray[np.float64], counts: NDArray[np.int64]
+) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """Triangles that cover polygons and keep their winding.
 
-    Convex polygons become a fan about their first corner; others lose one ear after the other. Polygons of fewer than
-    three corners are left out.
+    Convex polygons are cut into the fan of their first corner, concave ones by VTK's ear clipping.
 
     Args:
-        points: Vertices, shape (W, 3).
-        corners: Vertex of every corner, shape (C,).
-        counts: Corners of every polygon, shape (P,), adding up to C.
+        points: Positions of all corners, polygon after polygon, shape (C, 3).
+        counts: Corners of every polygon, shape (P,), summing to C; polygons of fewer than three give nothing.
+
+    Returns:
+        Corners of every triangle, as numbers of rows of ``points``, shape (S, 3), and its polygon, shape (S,); in the
+        polygons' order.
     """
-    corners, counts = np.asarray(corners, dtype=np.int64), np.asarray(counts, dtype=np.int64)
+    counts = np.asarray(counts, dtype=np.int64)
     starts = np.cumsum(counts) - counts
-    order, triangles = [], []
+    triangles, owners = [np.zeros((0, 3), dtype=np.int64)], [np.zeros(0, dtype=np.int64)]
     for count in np.unique(counts[counts >= 3]):
-        which = np.flatnonzero(counts == count)
-        local = np.arange(count)
-        mine = starts[which][:, None] + local
-        fan = np.stack([np.zeros(count - 2, np.int64), local[1:-1], local[2:]], axis=1)
-        found = np.tile(fan, (len(which), 1, 1))
-        if count > 3:
-            outlines = points[corners[mine]]
-            for p in np.flatnonzero(~_convex(outlines)):
-                found[p] = _ears(outlines[p], fan)
-        order.append(np.repeat(which, count - 2))
-        triangles.append((mine[:, :1, None] + found).reshape(-1, 3))
-    if not triangles:
-        return np.zeros((0, 3), np.int64)
-    return np.concatenate(triangles)[np.argsort(np.concatenate(order), kind="stable")]
+        polygons = np.flatnonzero(counts == count)
+        corners = starts[polygons, None] + np.arange(count)
+        convex = np.ones(len(polygons), dtype=bool) if count == 3 else _convex(points[corners])
+        steps = np.arange(1, count - 1)
+        fan = np.stack([np.zeros_like(steps), steps, steps + 1], axis=1)
+        triangles.append(corners[convex][:, fan].reshape(-1, 3))
+        owners.append(np.repeat(polygons[convex], count - 2))
+        if not convex.all():
+            cut, owner = _clip_ears(points[corners[~convex]], fan)
+            triangles.append(corners[~convex][owner[:, None], cut])
+            owners.append(polygons[~convex][owner])
+    order = np.argsort(np.concatenate(owners), kind="stable")
+    return np.concatenate(triangles)[order], np.concatenate(owners)[order]
 
 
-def _convex(outlines: NDArray[np.float64]) -> NDArray[np.bool_]:
-    """Whether no corner turns inwards, of P polygons of one size, shape (P, n, 3)."""
-    ahead = np.roll(outlines, -1, axis=1)
-    normals = np.cross(outlines, ahead).sum(axis=1)  # Newell: twice the area
-    turns = np.cross(ahead - outlines, np.roll(ahead, -1, axis=1) - ahead)
-    size = np.square(ahead - outlines).sum(axis=2).max(axis=1)
-    inward = np.einsum("pna,pa->pn", turns, normals) < _CONVEX * (size * np.linalg.norm(normals, axis=1))[:, None]
-    return np.asarray(~inward.any(axis=1))
+def _convex(polygons: NDArray[np.float64]) -> NDArray[np.bool_]:
+    """Whether every corner turns the way the polygon does as a whole, shape (P,), of polygons (P, n, 3)."""
+    edges = np.roll(polygons, -1, axis=1) - polygons
+    normal = np.cross(polygons - polygons[:, :1], np.roll(polygons, -1, axis=1) - polygons[:, :1]).sum(axis=1)  # Newell
+    turns = np.einsum("pnk,pk->pn", np.cross(np.roll(edges, 1, axis=1), edges), normal)
+    return np.asarray((turns >= -_STRAIGHT * np.einsum("pk,pk->p", normal, normal)[:, None]).all(axis=1))
 
 
-def _ears(outline: NDArray[np.float64], fan: NDArray[np.int64]) -> NDArray[np.int64]:
-    """Triangles of one polygon, shape (n - 2, 3); a fan where it crosses itself."""
-    from vtkmodules.vtkCommonCore import vtkIdList
-    from vtkmodules.vtkCommonDataModel import vtkPolygon
+def _clip_ears(polygons: NDArray[np.float64], fan: NDArray[np.int64]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """Triangles as corner numbers 0…n-1, and the polygon of each, of polygons (P, n, 3)."""
+    import pyvista
 
-    polygon = vtkPolygon()
-    centred = outline - outline.mean(axis=0)
-    for n, point in enumerate(centred / max(np.abs(centred).max(), 1e-300)):
-        polygon.GetPointIds().InsertNextId(n)
-        polygon.GetPoints().InsertNextPoint(point)
-    ids = vtkIdList()
-    good = polygon.TriangulateLocalIds(0, ids)
-    if not good or ids.GetNumberOfIds() != fan.size:
-        return fan
-    triangles = np.array([ids.GetId(i) for i in range(fan.size)]).reshape(-1, 3)
-    return _as_wound(triangles, outline)
-
-
-def _as_wound(triangles: NDArray[np.int64], outline: NDArray[np.float64]) -> NDArray[np.int64]:
-    """The same triangles, each turning the way its polygon does."""
-    normal = np.cross(outline, np.roll(outline, -1, axis=0)).sum(axis=0)
-    a, b, c = outline[triangles].swapaxes(0, 1)
-    back = np.cross(b - a, c - a) @ normal < 0.0
-    return np.where(back[:, None], triangles[:, ::-1], triangles)
+    number, count = polygons.shape[:2]
+    cells = np.column_stack([np.full(number, count), np.arange(number * count).reshape(number, count)])
+    mesh = pyvista.PolyData(polygons.reshape(-1, 3), cells.ravel()).triangulate()
+    corners = np.asarray(mesh.faces, dtype=np.int64).reshape(-1, 4)[:, 1:]
+    owner = corners[:, 0] // count
+    missing = np.setdiff1d(np.arange(number), owner)  # crosses itself, so that it has no ear
+    corners = np.concatenate([corners % count, np.tile(fan, (len(missing), 1))])
+    return corners, np.concatenate([owner, np.repeat(missing, len(fan))])

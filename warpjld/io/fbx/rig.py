@@ -12,7 +12,7 @@ from scipy.spatial import cKDTree
 from warpjld.errors import InputError
 from warpjld.io.fbx.scene import FbxMesh, FbxScene, FbxSkin, read_scene
 from warpjld.io.fbx.skeleton import FbxSkeleton, find_skeleton
-from warpjld.io.polygons import triangulate
+from warpjld.io.polygons import triangulate_polygons
 from warpjld.io.source import SourceRig
 from warpjld.surface import Part
 
@@ -113,7 +113,7 @@ def _place(scene: FbxScene, skeleton: FbxSkeleton, mesh: FbxMesh, notes: list[st
             notes.append(f"mesh '{mesh.name}' was bound in another pose than the other meshes: brought to theirs")
     blended = np.einsum("vk,vkij->vij", weights, transforms[cluster])
     vertices = np.einsum("vij,vj->vi", blended[:, :3, :3], mesh.points) + blended[:, :3, 3]
-    triangles = triangulate(mesh.points, mesh.corners, mesh.counts)
+    triangles, _ = triangulate_polygons(mesh.points[mesh.corners], mesh.counts)
     if np.linalg.det(transforms[0, :3, :3]) < 0.0:  # a mirrored mesh turns its triangles inside out
         triangles = triangles[:, ::-1]
     return _Placed(mesh.name, vertices, triangles, mesh.corners, mesh.uv, joints[cluster], weights, rigid)
