@@ -46,7 +46,13 @@ def _assemble(source: SourceRig, side: str | None, unit: str | None, scale: floa
     source = place(source, unit=unit, scale=scale, up=up)
     surface = weld_surface(source.vertices, source.faces, uv=source.uv, parts=source.parts)
     found = canonical_skeleton(
-        source.tree, surface.vertices, surface.faces, side=side, axes=source.axes, limits=source.limits
+        source.tree,
+        surface.vertices,
+        surface.faces,
+        side=side,
+        axes=source.axes,
+        limits=source.limits,
+        stated=source.stated_names(),
     )
     skin = None
     if source.joints is not None and source.weights is not None:

@@ -33,7 +33,7 @@ def place(
     """
     notes = []
     factor = (1.0 if unit is None else METRES[unit]) * (1.0 if scale is None else scale)
-    roles = recognise(source.tree) if unit is None or up is None else Roles()
+    roles = recognise(source.tree, source.stated_names()) if unit is None or up is None else Roles()
     if unit is None and scale is None:
         size, plausible, what = _size(source.tree, roles)
         if size and not plausible[0] <= size <= plausible[1]:

@@ -77,9 +77,16 @@ def _read_fbx(path: Path) -> SourceRig:
     return read_fbx_rig(path)
 
 
+def _read_vrm(path: Path) -> SourceRig:
+    from warpjld.io.vrm import read_vrm_rig
+
+    return read_vrm_rig(path)
+
+
 _READERS: dict[str, Callable[[Path], SourceRig]] = {
     ".glb": _read_gltf,
     ".gltf": _read_gltf,
     ".fbx": _read_fbx,
+    ".vrm": _read_vrm,
 }
 """What reads the rigs of each suffix; libraries are imported when a file of their kind is opened."""

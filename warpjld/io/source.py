@@ -32,6 +32,7 @@ class SourceRig:
         placing: Similarity that brought vertices and joints from the file's units and axes to these, shape (4, 4).
         rigid: Joint of ``tree`` that a vertex follows rigidly (a mesh that hangs on a joint), -1 for flesh, shape
             (W,); None where all is flesh.
+        stated: Joints of ``tree`` by canonical name, where the file itself says which is which.
         notes: What was mended on the way.
         suspicious: What is probably wrong, and what to do about it.
     """
@@ -48,5 +49,15 @@ class SourceRig:
     limits: dict[int, dict[str, tuple[float, float]]] = field(default_factory=dict)
     placing: NDArray[np.float64] = field(default_factory=lambda: np.eye(4))
     rigid: NDArray[np.int64] | None = None
+    stated: dict[str, int] = field(default_factory=dict)
     notes: tuple[str, ...] = ()
     suspicious: tuple[str, ...] = ()
+
+    def stated_names(self) -> dict[str, str]:
+        """``stated`` by the file's own names, of several joints of one name the second as ``name#2``."""
+        names = self.tree.names
+        out = {}
+        for canonical, joint in self.stated.items():
+            same = [j for j, name in enumerate(names) if name == names[joint]]
+            out[canonical] = names[joint] if len(same) == 1 else f"{names[joint]}#{same.index(joint) + 1}"
+        return out

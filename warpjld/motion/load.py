@@ -22,6 +22,7 @@ MOTION_FORMATS = {
     ".glb": "an animation in a binary glTF file",
     ".gltf": "an animation in a glTF file",
     ".fbx": "an animation in an FBX file",
+    ".vrma": "a VRM animation",
     ".json": "a tracked hand: WebXR poses or a Leap Motion recording",
 }
 """What each suffix is, for help texts."""
@@ -121,10 +122,17 @@ def _read_fbx(path: Path, rate: float | None, name: str | None) -> JointAnimatio
     return read_fbx_animation(path, rate=rate, name=name)
 
 
+def _read_vrma(path: Path, rate: float | None, name: str | None) -> JointAnimation:
+    from warpjld.motion.vrma import read_vrma
+
+    return read_vrma(path, rate=rate, name=name)
+
+
 _ANIMATIONS: dict[str, Callable[[Path, float | None, str | None], JointAnimation]] = {
     ".glb": _read_gltf,
     ".gltf": _read_gltf,
     ".fbx": _read_fbx,
+    ".vrma": _read_vrma,
 }
 """What reads the animations of each suffix: the file, frames a second or None, the animation's name or None."""
 

@@ -171,9 +171,7 @@ def stacks(scene: Any, number: dict[int, int]) -> list[dict[str, Any]]:
     return out
 
 
-def sample(
-    scene: Any, nodes: list[Any], parents: list[int], stack: int, moved: list[int], times: Array
-) -> Array:
+def sample(scene: Any, nodes: list[Any], parents: list[int], stack: int, moved: list[int], times: Array) -> Array:
     """Node-to-world transforms by frame, shape (F, N, 4, 4)."""
     anim = taken(taken(scene.anim_stacks[stack]).anim)
     local = np.empty((len(times), len(nodes), 4, 4))

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 from itertools import pairwise
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -55,6 +56,7 @@ def canonical_skeleton(
     side: str | None = None,
     axes: Mapping[int, NDArray[np.float64]] | None = None,
     limits: Mapping[int, Mapping[str, tuple[float, float]]] | None = None,
+    stated: Mapping[str, Any] | None = None,
 ) -> Canonical:
     """Recognise a tree inside its surface.
 
@@ -65,8 +67,9 @@ def canonical_skeleton(
         side: Side of a single hand, overriding what names and shape say.
         axes: Flexion axes the file states, by its joint numbers.
         limits: Channel limits [rad] the file states, likewise.
+        stated: Canonical joints → names of the file's joints that it states itself.
     """
-    roles = recognise(tree)
+    roles = recognise(tree, stated)
     notes: list[str] = []
     hand_points: dict[str, dict[str, NDArray[np.float64]]] = {}
     _release_partial_hands(roles, side)
