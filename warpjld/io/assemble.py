@@ -60,7 +60,7 @@ def _assemble(
         raise InputError(f"vertices or joints lie at {reach:.3g}: beyond anything that can be computed with")
     file_tree = source.tree
     shares = flesh_shares(len(source.tree), source.joints, source.weights, source.rigid)
-    roles = recognise(source.tree, shares, joint_map)
+    roles = recognise(source.tree, shares, _stated(source, joint_map or {}))
     source = place(source, roles, unit=unit, scale=scale, up=up)
     surface = weld_surface(source.vertices, source.faces, uv=source.uv, parts=source.parts)
     painted = None
@@ -107,6 +107,13 @@ def _movers(source: SourceRig, found: Canonical) -> NDArray[np.int64]:
     recognised = set(found.sources)
     hangs = [not recognised.isdisjoint((j, *tree.ancestors(j))) for j in range(len(tree))]
     return np.where(carries | hangs, found.owner, -1)
+
+
+def _stated(source: SourceRig, by_hand: Mapping[str, Any]) -> dict[str, Any]:
+    """Joints that are stated: by hand, and for the rest by the file itself, as VRM does."""
+    taken = {*by_hand.get("ignore", ()), *(name for name in by_hand.values() if isinstance(name, str))}
+    own = {name: joint for name, joint in source.stated_names().items() if joint not in taken}
+    return own | dict(by_hand)
 
 
 def _skin(

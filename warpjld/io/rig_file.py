@@ -92,6 +92,12 @@ def _read_usd(path: Path) -> SourceRig:
     return read_usd_rig(path)
 
 
+def _read_vrm(path: Path) -> SourceRig:
+    from warpjld.io.vrm import read_vrm_rig
+
+    return read_vrm_rig(path)
+
+
 _READERS: dict[str, Callable[[Path], SourceRig]] = {
     ".glb": _read_gltf,
     ".gltf": _read_gltf,
@@ -100,5 +106,6 @@ _READERS: dict[str, Callable[[Path], SourceRig]] = {
     ".usda": _read_usd,
     ".usdc": _read_usd,
     ".usdz": _read_usd,
+    ".vrm": _read_vrm,
 }
 """What reads the rigs of each suffix; libraries are imported when a file of their kind is opened."""

@@ -34,6 +34,7 @@ class SourceRig:
             (W,); None where all is flesh.
         metres: Metres a unit of length is, where the file says so.
         up: The file's up axis, ``y`` or ``z``, where it says so.
+        stated: Joints of ``tree`` by canonical name, where the file itself says which is which.
         notes: What was mended on the way.
         suspicious: What is probably wrong, and what to do about it.
     """
@@ -52,5 +53,15 @@ class SourceRig:
     rigid: NDArray[np.int64] | None = None
     metres: float | None = None
     up: str | None = None
+    stated: dict[str, int] = field(default_factory=dict)
     notes: tuple[str, ...] = ()
     suspicious: tuple[str, ...] = ()
+
+    def stated_names(self) -> dict[str, str]:
+        """``stated`` by the file's own names, of several joints of one name the second as ``name#2``."""
+        names = self.tree.names
+        out = {}
+        for canonical, joint in self.stated.items():
+            same = [j for j, name in enumerate(names) if name == names[joint]]
+            out[canonical] = names[joint] if len(same) == 1 else f"{names[joint]}#{same.index(joint) + 1}"
+        return out

@@ -23,6 +23,7 @@ MOTION_FORMATS = {
     ".glb": "an animation in a binary glTF file",
     ".gltf": "an animation in a glTF file",
     ".fbx": "an animation in an FBX file",
+    ".vrma": "a VRM animation",
     ".usd": "a UsdSkel animation",
     ".usda": "a UsdSkel animation in USD as text",
     ".usdc": "a UsdSkel animation in binary USD",
@@ -157,6 +158,12 @@ def _read_usd(path: Path, rate: float | None, name: str | None) -> JointAnimatio
     return read_usd_animation(path, rate=rate, name=name)
 
 
+def _read_vrma(path: Path, rate: float | None, name: str | None) -> JointAnimation:
+    from warpjld.motion.vrma import read_vrma
+
+    return read_vrma(path, rate=rate, name=name)
+
+
 _ANIMATIONS: dict[str, Callable[[Path, float | None, str | None], JointAnimation]] = {
     ".glb": _read_gltf,
     ".gltf": _read_gltf,
@@ -165,6 +172,7 @@ _ANIMATIONS: dict[str, Callable[[Path, float | None, str | None], JointAnimation
     ".usda": _read_usd,
     ".usdc": _read_usd,
     ".usdz": _read_usd,
+    ".vrma": _read_vrma,
 }
 """What reads the animations of each suffix: the file, frames a second or None, the animation's name or None."""
 

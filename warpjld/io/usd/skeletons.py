@@ -157,7 +157,7 @@ def _skeleton(file: UsdFile, prim: Any, meshes: tuple[Any, ...], first: int) -> 
             path=file.path,
         )
     if rest is None:
-        local = np.where((parents < 0)[:, None, None], bind, np.linalg.inv(bind[parents]) @ bind)
+        local = np.where(parents.reshape(-1, 1, 1) < 0, bind, np.linalg.inv(bind[parents]) @ bind)
     return UsdSkeleton(prim, tokens, parents, bind, local, to_world, first, meshes)
 
 
