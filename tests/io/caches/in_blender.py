@@ -36,6 +36,23 @@ def shown(frame: int, subframe: float = 0.0) -> np.ndarray:
     return local.reshape(-1, 3) @ world[:3, :3].T + world[:3, 3]
 
 
+def texture() -> tuple[np.ndarray, np.ndarray]:
+    """Texture coordinates of every corner, and its vertex."""
+    mesh = the_mesh().data
+    corners = np.array([item.vector for item in mesh.uv_layers[0].uv], np.float32)
+    return corners, np.array([loop.vertex_index for loop in mesh.loops])
+
+
+def volume(frame: int) -> np.ndarray:
+    """Volume that the mesh encloses: positive where Blender takes its faces to look outwards."""
+    bpy.context.scene.frame_set(frame)
+    mesh = the_mesh().evaluated_get(bpy.context.evaluated_depsgraph_get()).to_mesh()
+    mesh.calc_loop_triangles()
+    middle = sum((vertex.co for vertex in mesh.vertices), start=mesh.vertices[0].co * 0.0) / len(mesh.vertices)
+    corners = [[mesh.vertices[v].co - middle for v in triangle.vertices] for triangle in mesh.loop_triangles]
+    return np.array(sum(a.dot(b.cross(c)) for a, b, c in corners) / 6.0)
+
+
 def point_cache(folder: Path, suffix: str, start: int) -> None:
     bpy.ops.wm.obj_import(filepath=str(folder / f"{suffix}.rest.obj"))
     cache = the_mesh().modifiers.new("cache", "MESH_CACHE")
@@ -65,12 +82,16 @@ def main() -> None:
         pictures.append(shown(number))
     results["obj"] = np.stack(pictures)
     empty_scene(start, frames, rate)
+    bpy.ops.wm.alembic_import(filepath=str(folder / "abc.abc"), as_background_job=False, set_frame_range=False)
+    results["abc"] = np.stack([shown(number) for number in numbers])
+    results["abc_outside"] = volume(start)
+    results["abc_uv"], results["abc_corner"] = texture()
+    empty_scene(start, frames, rate)
     bpy.ops.import_scene.gltf(filepath=str(folder / "glb.glb"))
     # its time starts at zero, and Blender counts that as frame 0
     results["glb"] = np.stack([shown(number - start) for number in numbers])
-    uv = the_mesh().data.uv_layers[0].uv
-    corners = np.array([item.vector for item in uv], np.float32)
-    np.savez(out, **results, glb_uv=corners, corner=[loop.vertex_index for loop in the_mesh().data.loops])
+    results["glb_uv"], results["glb_corner"] = texture()
+    np.savez(out, **results)
 
 
 main()

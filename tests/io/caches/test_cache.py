@@ -102,8 +102,8 @@ def test_refuses_block(surface: Surface, tmp_path: Path, block: np.ndarray, mess
 
 
 def test_unknown_suffix_lists_the_known(surface: Surface, tmp_path: Path) -> None:
-    with pytest.raises(InputError, match=r"\.abc") as caught:
-        open_cache(tmp_path / "a.abc", surface, frames=1, rate=25)
+    with pytest.raises(InputError, match=r"\.xyz") as caught:
+        open_cache(tmp_path / "a.xyz", surface, frames=1, rate=25)
     assert all(suffix in str(caught.value) for suffix in FORMATS)
 
 

@@ -20,6 +20,7 @@ FORMATS = {
     ".usd": "USD, binary: a mesh with time-sampled points",
     ".usda": "USD as text",
     ".usdc": "USD, binary",
+    ".abc": "Alembic: a polygon mesh with a sample of points a frame",
     ".pc2": "point cache 2 (Blender, Maya, 3ds Max), with its rest mesh as OBJ",
     ".mdd": "MDD point cache (Blender, Maya, LightWave), with its rest mesh as OBJ",
     ".obj": "one Wavefront OBJ a frame, numbered",
@@ -31,6 +32,7 @@ _WRITERS = {
     ".usd": ("usd", "UsdCache"),
     ".usda": ("usd_text", "UsdTextCache"),
     ".usdc": ("usd", "UsdCache"),
+    ".abc": ("alembic", "AlembicCache"),
     ".pc2": ("pc2", "Pc2Cache"),
     ".mdd": ("mdd", "MddCache"),
     ".obj": ("obj", "ObjCache"),
@@ -72,7 +74,7 @@ def open_cache(
 
     Raises:
         InputError: Unknown suffix, no frames, a clip too long for the format, or a place that cannot be written.
-        MissingExtraError: USD without the extra ``usd``.
+        MissingExtraError: USD without the extra ``usd``, Alembic without ``abc``.
     """
     path = Path(path)
     cache: Cache = _kind(path)(path, surface, Clip(frames=frames, rate=rate, start=start_frame, name=name))

@@ -19,12 +19,18 @@ __all__ = ["MOTION_OUT", "Timing", "Writer", "WrittenMotion", "check_motion_out"
 MOTION_OUT = {
     ".bvh": "BVH: the rig's own joints, metres, Y up",
     ".glb": "binary glTF: the skinned rig with its joints animated",
+    ".usd": "UsdSkel, binary: the skinned rig and a SkelAnimation, in the rig's own file's units and axes",
+    ".usda": "UsdSkel as text",
+    ".usdc": "UsdSkel, binary",
 }
 """What each suffix is, for help texts."""
 
 _WRITERS = {
     ".bvh": ("bvh", "write_bvh"),
     ".glb": ("glb", "write_glb"),
+    ".usd": ("usd", "write_usd"),
+    ".usda": ("usd", "write_usd"),
+    ".usdc": ("usd", "write_usd"),
 }
 """Module in this package and function, a :class:`Writer`, of each suffix: libraries are imported when needed."""
 

@@ -1,7 +1,8 @@
 """UsdSkel skeletons → one joint tree, the same for rigs and animations.
 
 Skeletons that skin a mesh count; where none does, all do. USD names joints by their path in the skeleton
-(``Hips/Spine/Neck``): a joint's name is the last element, preceded by those above it where that is not unique.
+(``Hips/Spine/Neck``): a joint's name is the last element, preceded by those above it where that is not unique, unless
+the skeleton has ``jointNames``.
 """
 
 from __future__ import annotations
@@ -149,9 +150,9 @@ def _skeleton(file: UsdFile, prim: Any, meshes: tuple[Any, ...], first: int) -> 
     if rest is not None and _is_placed(bind, rest, to_world):  # bound in the world, as USD's documentation words it
         to_world = np.eye(4)
     with np.errstate(invalid="ignore"):
-        regular = _regular(to_world @ bind)
+        regular = _regular(np.asarray(to_world @ bind))
     if not regular.all():
-        name = tokens[int(np.argmin(regular))]
+        name = tokens[regular.tolist().index(False)]
         raise InputError(
             f"skeleton '{path}': the bind transform of joint '{name}' is not finite, or flattens space (scale 0)",
             path=file.path,
@@ -163,7 +164,7 @@ def _skeleton(file: UsdFile, prim: Any, meshes: tuple[Any, ...], first: int) -> 
 
 def _regular(transforms: NDArray[np.float64]) -> NDArray[np.bool_]:
     """Which transforms (J, 4, 4) are finite and can be inverted."""
-    finite = np.isfinite(transforms).all(axis=(1, 2))
+    finite = np.asarray(np.isfinite(transforms).all(axis=(1, 2)))
     linear = np.where(finite[:, None, None], transforms, 0.0)[:, :3, :3]
     return np.asarray(np.abs(np.linalg.det(linear)) > 1e-12 * np.linalg.norm(linear, axis=(1, 2)) ** 3)
 
@@ -203,7 +204,7 @@ def _is_placed(bind: NDArray[np.float64], rest: NDArray[np.float64], to_world: N
 
 
 def _names(skeletons: list[UsdSkeleton]) -> list[str]:
-    own = [_shortest(one.tokens) for one in skeletons]
+    own = [_own_names(one) for one in skeletons]
     if len(set().union(*own)) == sum(map(len, own)):
         return [name for names in own for name in names]
     paths = [one.path.strip("/").split("/") for one in skeletons]
@@ -212,6 +213,16 @@ def _names(skeletons: list[UsdSkeleton]) -> list[str]:
     while len({path[-1] for path in paths}) == 1 and min(map(len, paths)) > 1:
         paths = [path[:-1] for path in paths]
     return ["/".join([*path, name]) for path, names in zip(paths, own, strict=True) for name in names]
+
+
+def _own_names(skeleton: UsdSkeleton) -> list[str]:
+    """``jointNames``, which hold what USD's paths cannot, where there is a different one for every joint."""
+    from pxr import UsdSkel
+
+    given = [str(name) for name in UsdSkel.Skeleton(skeleton.prim).GetJointNamesAttr().Get() or ()]
+    if len(given) == len(skeleton.tokens) == len(set(given)) and all(given):
+        return given
+    return _shortest(skeleton.tokens)
 
 
 def _shortest(tokens: tuple[str, ...]) -> list[str]:

@@ -1,0 +1,82 @@
+"""Alembic: a polygon mesh under a transform, one sample of positions a frame.
+
+Alembic knows neither units nor an up axis; programs take Y up. Its faces are clockwise seen from outside, so their
+corners, and the texture coordinates with them, are in the reverse order. Frame n stands at n / rate seconds.
+"""
+
+from __future__ import annotations
+
+import contextlib
+from collections.abc import Iterator
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from warpjld.errors import MissingExtraError
+from warpjld.io.caches.cache import Cache
+
+__all__ = ["AlembicCache"]
+
+
+class AlembicCache(Cache):
+    """Alembic in its Ogawa form, which is written sample by sample."""
+
+    note = "Y up, metres, points in the source's vertex order, faces wound clockwise as Alembic has them"
+
+    _archive: Any = None
+    _mesh: Any = None
+
+    def _begin(self) -> None:
+        try:
+            from alembic3d import Abc, AbcGeom
+            from alembic3d.AbcCoreAbstract import TimeSampling
+        except ImportError as error:
+            raise MissingExtraError("Alembic", "abc") from error
+        name = self.clip.name.replace("/", "_") or "surface"
+        with _refusals():
+            self._archive = Abc.OArchive(str(self._part(self.path)))
+            rate = self.clip.rate
+            sampling = self._archive.addTimeSampling(TimeSampling(1.0 / rate, self.clip.start / rate))
+            transform = AbcGeom.OXform(self._archive.getTop(), name)
+            self._mesh = AbcGeom.OPolyMesh(transform, f"{name}Shape", sampling)
+
+    def _append(self, vertices: NDArray[np.float32]) -> None:
+        import imath
+        from alembic3d import AbcGeom
+
+        sample = AbcGeom.OPolyMeshSchemaSample()
+        kept = [_array(imath.V3fArray, vertices)]  # samples refer to arrays, they do not hold them
+        sample.setPositions(kept[0])
+        if self.written == 0:
+            faces = self.surface.source_faces[:, ::-1]
+            kept += [_array(imath.IntArray, faces.ravel()), _array(imath.IntArray, np.full(len(faces), 3))]
+            sample.setFaceIndices(kept[1])
+            sample.setFaceCounts(kept[2])
+            if self.surface.uv is not None:
+                kept.append(_array(imath.V2fArray, self.surface.uv[faces.ravel()]))
+                sample.setUVs(AbcGeom.OV2fGeomParamSample(kept[3], AbcGeom.GeometryScope.kFacevaryingScope))
+        with _refusals():
+            self._mesh.getSchema().set(sample)
+
+    def _finish(self) -> None:
+        self._close()
+
+    def _close(self) -> None:
+        # the file is complete when nothing refers to the archive any more
+        self._mesh = None
+        self._archive = None
+
+
+def _array(kind: Any, values: NDArray[Any]) -> Any:
+    array = kind(len(values))
+    np.asarray(memoryview(array))[...] = values
+    return array
+
+
+@contextlib.contextmanager
+def _refusals() -> Iterator[None]:
+    try:
+        yield
+    except RuntimeError as error:
+        raise OSError(str(error).strip().splitlines()[-1]) from error
