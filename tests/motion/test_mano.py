@@ -14,10 +14,10 @@ from tests.motion.hand_files import POSTURES, postures, save
 from tests.motion.skeletons import hand, rig, with_forearm
 from warpjld.errors import InputError
 from warpjld.io import load_rig
+from warpjld.io.motion_out import write_motion
 from warpjld.motion import open_motion
 from warpjld.motion.hand_file import read_hands
-from warpjld.motion.mano_out import write_mano
-from warpjld.skeleton import Skeleton, default_limits, hand_joint_names
+from warpjld.skeleton import Poses, Skeleton, default_limits, hand_joint_names, rest_poses
 from warpjld.skeleton.hand import HAND_PARENTS
 
 ORDER = ("index", "middle", "pinky", "ring", "thumb")
@@ -155,7 +155,7 @@ def test_hands_that_rest_bent_or_askew_become_flat(data: Path, tmp_path: Path) -
 def test_writing_and_reading_give_the_same_rotations(tmp_path: Path, side: str) -> None:
     for skeleton in (hand(side), with_forearm(hand(side)), mano_rig(side, turned(np.array([0.4, 0.9, -0.3])))):
         wanted = postures(skeleton, side, POSTURES)
-        write_mano(tmp_path / "out.npz", skeleton, wanted, 25.0)
+        write_motion(tmp_path / "out.npz", rig(skeleton), wanted, rate=25.0)
         assert list(tmp_path.iterdir()) == [tmp_path / "out.npz"]
         loaded = open_motion(tmp_path / "out.npz", rig(skeleton))
         assert (loaded.rate, loaded.warnings, loaded.notes) == (25.0, (), ())
@@ -171,7 +171,7 @@ def test_real_hands_come_back(data: Path, tmp_path: Path) -> None:
         driven = load_rig(data / file)
         side = driven.skeleton.names[0].partition(".")[0]
         wanted = postures(driven.skeleton, side, POSTURES)
-        write_mano(tmp_path / "out.npz", driven.skeleton, wanted, 30.0)
+        write_motion(tmp_path / "out.npz", driven, wanted, rate=30.0)
         got = open_motion(tmp_path / "out.npz", driven).poses
         np.testing.assert_allclose(got.positions, wanted.positions, atol=1e-8)
 
@@ -181,7 +181,7 @@ def test_what_is_written_is_manos(tmp_path: Path) -> None:
     for side in ("left", "right"):
         skeleton = mano_rig(side, TURNS["axes"])
         wanted = postures(skeleton, side, POSTURES)
-        write_mano(tmp_path / "out.npz", skeleton, wanted, 30.0)
+        write_motion(tmp_path / "out.npz", rig(skeleton), wanted, rate=30.0)
         with np.load(tmp_path / "out.npz", allow_pickle=False) as file:
             fields = {name: file[name] for name in file.files}
         assert fields["hand_pose"].shape == (len(POSTURES), 45)
@@ -195,13 +195,35 @@ def test_what_is_written_is_manos(tmp_path: Path) -> None:
         assert (np.sign(curl) == (1 if side == "right" else -1)).all()
 
 
-def test_writing_wants_a_hand_and_npz(tmp_path: Path) -> None:
-    skeleton = hand("left")
-    poses = postures(skeleton, "left", ("flat",))
-    with pytest.raises(InputError, match="side: want one that the rig has"):
-        write_mano(tmp_path / "out.npz", skeleton, poses, 30.0, "right")
-    with pytest.raises(InputError, match=r"written as .npz"):
-        write_mano(tmp_path / "out.json", skeleton, poses, 30.0)
+def test_a_rig_with_two_hands_is_written_with_both(tmp_path: Path) -> None:
+    left, right = (mano_rig(side, np.eye(3)) for side in ("left", "right"))
+    count = len(left)
+    both = Skeleton(
+        left.names + right.names,
+        np.concatenate([left.parents, np.where(right.parents < 0, -1, right.parents + count)]).astype(np.int32),
+        np.vstack([left.rest, right.rest + np.array([0.0, 0.5, 0.0])]),
+        np.vstack([left.axes, right.axes]),
+        default_limits(left.names + right.names),
+    )
+    halves = [postures(one, side, POSTURES) for one, side in ((left, "left"), (right, "right"))]
+    wanted = Poses(
+        np.concatenate([halves[0].positions, halves[1].positions + np.array([0.0, 0.5, 0.0])], axis=1),
+        np.concatenate([half.rotations for half in halves], axis=1),
+        np.concatenate([half.flexion for half in halves], axis=1),
+    )
+    write_motion(tmp_path / "out.npz", rig(both), wanted, rate=30.0)
+    got = open_motion(tmp_path / "out.npz", rig(both)).poses
+    fingers = [j for j, name in enumerate(both.names) if not name.endswith(".wrist")]
+    same = np.abs((got.rotations * wanted.rotations).sum(axis=-1))[:, fingers]
+    assert np.degrees(2 * np.arccos(np.clip(same, 0, 1))).max() < 1e-4
+
+
+def test_a_rig_without_hands_is_refused(tmp_path: Path) -> None:
+    skeleton = Skeleton(
+        ("a", "b"), np.array([-1, 0], dtype=np.int32), np.eye(3)[:2], np.eye(3)[1:], default_limits("ab")
+    )
+    with pytest.raises(InputError, match="this rig has none"):
+        write_motion(tmp_path / "out.npz", rig(skeleton), rest_poses(skeleton), rate=30.0)
 
 
 def test_ways_of_writing_the_same(tmp_path: Path) -> None:

@@ -56,6 +56,11 @@ __all__ = ["command"]
 @options.rig
 @click.option("--animation", help="Which animation of the motion file, by name, or all; the first by default.")
 @click.option("--motion-side", type=click.Choice(["left", "right"]), help="Which hand a recording is of.")
+@click.option(
+    "--flat-hand-mean/--no-flat-hand-mean",
+    default=None,
+    help="Whether no rotation in MANO poses is the flat hand, or MANO's mean pose, where the file does not say.",
+)
 @click.option("--frames", "span", metavar="A:B", help="Only frames A to B, both included, the motion's first being 0.")
 @click.option("--rate", type=float, help="Frames a second; the motion's own by default, 30 for CSV.")
 @click.option(
@@ -123,6 +128,7 @@ class _Wanted:
     out: Path | None
     animation: str | None
     motion_side: str | None
+    flat_hand_mean: bool | None
     span: str | None
     rate: float | None
     limits: str
@@ -139,7 +145,12 @@ class _Wanted:
     @property
     def reading(self) -> dict[str, Any]:
         """How motions are read."""
-        return {"rate": self.rate, "limits": self.limits, "side": self.motion_side}
+        return {
+            "rate": self.rate,
+            "limits": self.limits,
+            "side": self.motion_side,
+            "flat_hand_mean": self.flat_hand_mean,
+        }
 
     def settings(self) -> dict[str, Any]:
         """All that determines a batch's files besides the motions."""
@@ -154,7 +165,7 @@ class _Wanted:
             "rig": hashes.pop("rig", self.rig),
             **hashes,
             **plain,
-            **self.reading,
+            **{f"motion_{name}": value for name, value in self.reading.items()},
             "frames": self.span,
             "formats": [*self.formats, *(f".motion{suffix}" for suffix in self.motion_formats)],
             "domains": self.domains,

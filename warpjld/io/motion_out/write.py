@@ -22,6 +22,7 @@ MOTION_OUT = {
     ".usd": "UsdSkel, binary: the skinned rig and a SkelAnimation, in the rig's own file's units and axes",
     ".usda": "UsdSkel as text",
     ".usdc": "UsdSkel, binary",
+    ".npz": "MANO-family parameters of the rig's hands, as NumPy arrays",
 }
 """What each suffix is, for help texts."""
 
@@ -31,6 +32,7 @@ _WRITERS = {
     ".usd": ("usd", "write_usd"),
     ".usda": ("usd", "write_usd"),
     ".usdc": ("usd", "write_usd"),
+    ".npz": ("mano", "write_mano"),
 }
 """Module in this package and function, a :class:`Writer`, of each suffix: libraries are imported when needed."""
 

@@ -100,7 +100,7 @@ def actor(scene: Scene, arguments: Arguments) -> None:
 
 @command(
     "MOTION",
-    syntax='MOTION "<motion file>" [SIDE <LEFT/RIGHT>] [ANIMATION "<name>"]',
+    syntax='MOTION "<motion file>" [SIDE <LEFT/RIGHT>] [ANIMATION "<name>"] [FLAT_HAND_MEAN <ON/OFF>]',
     help="Drive the current actor by a motion file instead of keys, at the RATE set before.",
     group="Actors",
 )
@@ -113,7 +113,9 @@ def motion(scene: Scene, arguments: Arguments) -> None:
     if chosen.keyed:
         raise arguments.error(f"actor {chosen.name} has keys already: it cannot be driven by a file as well")
     options = arguments.options(
-        side=lambda: arguments.choice("the side", SIDES).lower(), animation=lambda: arguments.text("an animation")
+        side=lambda: arguments.choice("the side", SIDES).lower(),
+        animation=lambda: arguments.text("an animation"),
+        flat_hand_mean=lambda: arguments.choice("whether no rotation is the flat hand", ("ON", "OFF")) == "ON",
     )
     rig = replace(chosen.rig, skeleton=chosen.skeleton)  # with the script's axes and limits
     moved = open_motion(path, rig, rate=scene.rate, **options)  # type: ignore[arg-type]
