@@ -198,6 +198,11 @@ def test_twist_bones_give_their_weights_to_the_limb(rigs):
     assert on_elbow[near].min() > 0.95
 
 
+@pytest.mark.parametrize("name", HANDS + BODIES)
+def test_nothing_is_suspicious_in_good_rigs(rigs, name):
+    assert rigs[name].suspicious == ()
+
+
 def test_a_given_side_wins_and_doubt_is_told(data):
     rig = load_rig(data / HANDS[0], side="right")
     assert rig.skeleton.names[0] == "right.wrist"

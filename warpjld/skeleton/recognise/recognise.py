@@ -13,6 +13,7 @@ from warpjld.skeleton.recognise.by_shape import roles_by_shape
 from warpjld.skeleton.recognise.check_hands import check_hands
 from warpjld.skeleton.recognise.check_limbs import check_limbs
 from warpjld.skeleton.recognise.evidence import reject_unfounded
+from warpjld.skeleton.recognise.fill_body import fill_body
 from warpjld.skeleton.recognise.fill_hands import fill_hands
 from warpjld.skeleton.recognise.flesh import Flesh
 from warpjld.skeleton.recognise.joint_map import JointMap
@@ -61,6 +62,7 @@ def _checked(tree: SourceTree, roles: Roles, flesh: Flesh, by_hand: JointMap) ->
     by_hand.apply(roles)
     fill_hands(tree, roles, flesh, by_hand.names)
     check_limbs(tree, roles, flesh, by_hand.names)
+    fill_body(tree, roles, flesh, by_hand.names)
     reject_unfounded(tree, roles, by_hand.names)
     by_hand.apply(roles)
     return roles

@@ -1,0 +1,86 @@
+"""Parts of bodies that names leave out, where the limbs leave no doubt: pelvis, spine, feet, and ends of bones."""
+
+from __future__ import annotations
+
+from collections.abc import Collection
+
+import numpy as np
+
+from warpjld.skeleton.recognise.flesh import Flesh
+from warpjld.skeleton.recognise.limbs import path_below, toes_by_place
+from warpjld.skeleton.recognise.names import read_name
+from warpjld.skeleton.recognise.roles import Roles
+from warpjld.skeleton.recognise.tree import SourceTree
+
+__all__ = ["fill_body"]
+
+_TOES = 3  # chains below an ankle from which they are toes
+
+
+def fill_body(tree: SourceTree, roles: Roles, flesh: Flesh, stated: Collection[str] = ()) -> None:
+    """Add to ``roles`` what lies between and beyond limbs; joints ``stated`` stay as they are."""
+    if tree.flat or not roles.body:
+        return
+    _pelvis(tree, roles, stated)
+    _trunk_between(tree, roles, stated)
+    _feet(tree, roles, flesh, stated)
+    _ends(roles, flesh, stated)
+
+
+def _pelvis(tree: SourceTree, roles: Roles, stated: Collection[str]) -> None:
+    """Where the legs part, if no name says it."""
+    hips = [roles.body[f"{side}.hip"] for side in ("left", "right") if f"{side}.hip" in roles.body]
+    if "pelvis" in roles.body or "pelvis" in stated or len(hips) < 2:
+        return
+    both = set(tree.ancestors(hips[1]))
+    parting = next((j for j in tree.ancestors(hips[0]) if j in both), None)
+    if parting is not None and parting not in roles.body.values():
+        roles.body["pelvis"] = parting
+        roles.notes.append(f"pelvis '{tree.names[parting]}': where the legs part")
+
+
+def _trunk_between(tree: SourceTree, roles: Roles, stated: Collection[str]) -> None:
+    """The spine's joints, from pelvis to where the arms part, if no name says them."""
+    if any(name.startswith("spine") for name in (*roles.body, *stated)) or "pelvis" not in roles.body:
+        return
+    arms = [roles.body[f"{side}.shoulder"] for side in ("left", "right") if f"{side}.shoulder" in roles.body]
+    if len(arms) < 2:
+        return
+    both = set(tree.ancestors(arms[1]))
+    chest = next((j for j in tree.ancestors(arms[0]) if j in both), None)
+    if chest is None or roles.body["pelvis"] not in tree.ancestors(chest):
+        return
+    spine = [j for j in path_below(tree, roles.body["pelvis"], chest) if j not in roles.body.values()]
+    roles.body |= {f"spine{n}": j for n, j in enumerate(spine, start=1)}
+    if spine:
+        roles.notes.append(f"spine {', '.join(repr(tree.names[j]) for j in spine)}: between pelvis and arms")
+
+
+def _feet(tree: SourceTree, roles: Roles, flesh: Flesh, stated: Collection[str]) -> None:
+    """The only joint below an ankle, or its toes, if no name says them."""
+    ankles = {side: roles.body[f"{side}.ankle"] for side in ("left", "right") if f"{side}.ankle" in roles.body}
+    middle = tree.positions[list(ankles.values())].mean(axis=0) if ankles else np.zeros(3)
+    for side, ankle in ankles.items():
+        known = {n for n in (*roles.body, *stated) if n.startswith((f"{side}.ball", f"{side}.toe"))}
+        below = [c for c in tree.children[ankle] if flesh.live[c] and read_name(tree.names[c]).kind != "helper"]
+        if known or not flesh.known or set(below) & set(roles.body.values()):
+            continue
+        if len(below) == 1 and not flesh.bare[below[0]]:
+            roles.body[f"{side}.ball"] = below[0]
+            roles.notes.append(f"{side}.ball '{tree.names[below[0]]}': the only joint below the ankle")
+        elif len(below) >= _TOES and len(ankles) == 2:
+            roles.body |= toes_by_place(tree, below, side, tree.positions[ankle] - middle)
+            roles.notes.append(f"{side} toes: {len(below)} chains below the ankle, the innermost is the big one")
+
+
+def _ends(roles: Roles, flesh: Flesh, stated: Collection[str]) -> None:
+    """Joints without flesh that end toes, head and handless arms."""
+    taken = set(roles.body.values())
+    for end, last in flesh.ends.items():
+        name = next((name for name, j in roles.body.items() if j == last), None)
+        if name is None or end in taken:
+            continue
+        side, _, part = name.rpartition(".")
+        tip = {"head": "head.top", "ball": f"{side}.toe.tip", "wrist": f"{side}.hand.tip"}.get(part)
+        if tip and tip not in roles.body and tip not in stated:
+            roles.body[tip] = end
