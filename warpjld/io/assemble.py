@@ -10,7 +10,7 @@ from warpjld.io.placement import place
 from warpjld.io.source import SourceRig
 from warpjld.rig import Rig, Skin
 from warpjld.skeleton.recognise.canonical import canonical_skeleton
-from warpjld.skeleton.recognise.leaf_ends import Painted
+from warpjld.skeleton.recognise.painted import Painted
 from warpjld.surface import Surface, weld_surface
 
 __all__ = ["assemble_rig"]

@@ -19,7 +19,8 @@ from warpjld.skeleton.recognise.complete_body import find_extremities, merge_pel
 from warpjld.skeleton.recognise.complete_hand import complete_hand
 from warpjld.skeleton.recognise.hand_frame import chirality
 from warpjld.skeleton.recognise.layout import Layout, lay_out
-from warpjld.skeleton.recognise.leaf_ends import Painted, add_leaf_ends
+from warpjld.skeleton.recognise.leaf_ends import add_leaf_ends
+from warpjld.skeleton.recognise.painted import Painted, let_flesh_lead
 from warpjld.skeleton.recognise.recognise import recognise
 from warpjld.skeleton.recognise.roles import HandRoles, Roles
 from warpjld.skeleton.recognise.tree import SourceTree
@@ -85,6 +86,8 @@ def canonical_skeleton(
     layout = lay_out(tree, roles, hand_points)
     if place is not None:
         layout.positions[layout.names.index("pelvis")] = place
+    if painted is not None:
+        let_flesh_lead(layout, tree, painted)
     if roles.body:
         _extremities(layout, vertices, faces)
     add_leaf_ends(layout, vertices, faces, painted, branches=not (roles.body or roles.hands))
