@@ -367,6 +367,44 @@ def test_animated_morph_targets_are_told(tmp_path: Path) -> None:
     assert any("morph targets" in warning for warning in open_motion(path, load_rig(path)).warnings)
 
 
+QUADRUPED = ["_rootJoint", "b_Root_00", "b_Hip_01", "b_Spine01_02", "b_Neck_04", "b_Head_05", "b_Ear_a", "b_Ear_b"] + [
+    f"b_{name}" for name in ("Tail01", "Tail02", "LeftUpperArm", "LeftForeArm", "RightLeg01", "RightLeg02")
+]
+
+
+def test_the_joint_with_the_flesh_stands_for_roots_above_it(tmp_path: Path) -> None:
+    """An animal named as a body is: its flesh hangs on the hips, two roots above them carry none."""
+    what = animal()
+    rooted = Skinned(
+        QUADRUPED,
+        [-1, 0, *(p + 2 if p >= 0 else 1 for p in what.parents)],
+        np.vstack([np.zeros((2, 3)), what.offsets]),
+        np.vstack([[[0.0, 0.0, 0.0, 1.0]] * 2, what.turns]),
+        what.vertices,
+        what.faces,
+        what.joints + 2,
+        what.weights,
+    )
+    path = write(tmp_path / "a.glb", rooted, {"walk": gait(rooted)})
+    rig = load_rig(path)
+    pelvis = rig.skeleton.index("pelvis")
+    assert rig.source_joints[pelvis] == "b_Hip_01"
+    np.testing.assert_allclose(rig.skeleton.rest[pelvis], what.offsets[0], atol=1e-6)
+    loaded, oracle = open_motion(path, rig), Skinning(path)
+    assert worst(rig, loaded, oracle, [5, 12]) < CLOSE
+    hips = one_bone(oracle) & (oracle.joints[:, 0] == 2)
+    assert np.isfinite(follow(rig, loaded, oracle, 5)[hips]).all()
+
+
+def test_flesh_of_joints_that_are_part_of_another_is_told(tmp_path: Path) -> None:
+    names = ["Hips", "Spine", "Neck", "Head", "Jaw", "Brow", *(f"tail{n}" for n in range(6))]
+    what = replace(animal(), names=names)
+    path = write(tmp_path / "a.glb", what, {"walk": gait(what, moving=("Spine", "Jaw"))})
+    rig = load_rig(path)
+    told = any("Jaw (" in warning and "part of head" in warning for warning in open_motion(path, rig).warnings)
+    assert told == ("jaw" not in rig.skeleton.names)
+
+
 @pytest.fixture(scope="module")
 def faults() -> Path:
     """Folder of small files that once went wrong."""

@@ -14,7 +14,7 @@ from warpjld.io.source import SourceRig
 from warpjld.rig import Rig, Skin
 from warpjld.skeleton.recognise.canonical import Canonical, canonical_skeleton
 from warpjld.skeleton.recognise.flesh import flesh_shares
-from warpjld.skeleton.recognise.leaf_ends import Painted
+from warpjld.skeleton.recognise.painted import Painted
 from warpjld.skeleton.recognise.recognise import recognise
 from warpjld.surface import Surface, weld_surface
 

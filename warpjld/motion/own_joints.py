@@ -18,6 +18,7 @@ from scipy.spatial.transform import Rotation
 from warpjld.motion.joint_animation import JointAnimation
 from warpjld.motion.same_skeleton import match_joints, same_bones, same_rest
 from warpjld.rig import Rig
+from warpjld.rotations import unit
 from warpjld.scales import polar
 from warpjld.skeleton import Poses, poses_from_world
 from warpjld.skeleton.recognise.names import read_name
@@ -152,11 +153,17 @@ def _merged(rig: Rig, worlds: NDArray[np.float64], match: NDArray[np.int64], tur
     told: list[tuple[float, str]] = []
     for s, name in enumerate(rig.source.names):
         over = next((of_source[a] for a in rig.source.ancestors(s) if a in of_source), None)
-        inside = any(below in of_source for below in rig.source.subtree(s))
-        if over is None or inside or match[s] < 0 or read_name(name).kind == "helper":
+        if over is None or s in of_source or match[s] < 0 or read_name(name).kind == "helper":
             continue
         own, _ = polar(_flesh(rig, worlds[:, [s]], np.array([s]))[:, 0, :3, :3])
-        apart = float(Rotation.from_matrix(np.swapaxes(turned[:, over], 1, 2) @ own).magnitude().max())
+        relative = Rotation.from_matrix(np.swapaxes(turned[:, over], 1, 2) @ own)
+        below = next((of_source[k] for k in rig.source.subtree(s) if k in of_source), None)
+        if below is None:
+            apart = float(relative.magnitude().max())
+        else:  # a limb's twist is spread along its segment anyhow
+            place = (rig.placing @ rig.source.frames[s])[:3, 3]
+            bone = unit(rig.skeleton.rest[below] - place)
+            apart = float(np.arccos(np.clip(relative.apply(bone) @ bone, -1.0, 1.0)).max())
         if apart > _TURNED:
             told.append((apart, f"{name} ({np.degrees(apart):.0f}°, part of {rig.skeleton.names[over]})"))
     if not told:

@@ -20,7 +20,8 @@ from warpjld.skeleton.recognise.complete_hand import complete_hand
 from warpjld.skeleton.recognise.flesh import Flesh, without_flesh
 from warpjld.skeleton.recognise.hand_frame import chirality
 from warpjld.skeleton.recognise.layout import Layout, lay_out
-from warpjld.skeleton.recognise.leaf_ends import Painted, add_leaf_ends
+from warpjld.skeleton.recognise.leaf_ends import add_leaf_ends
+from warpjld.skeleton.recognise.painted import Painted, let_flesh_lead
 from warpjld.skeleton.recognise.recognise import recognise
 from warpjld.skeleton.recognise.roles import HandRoles, Roles
 from warpjld.skeleton.recognise.tree import SourceTree
@@ -96,6 +97,8 @@ def canonical_skeleton(
     doubts.extend(without_flesh(tree, layout.names, layout.sources, layout.owner, flesh))
     if place is not None:
         layout.positions[layout.names.index("pelvis")] = place
+    if painted is not None:
+        let_flesh_lead(layout, tree, painted)
     if roles.body:
         _extremities(layout, vertices, faces)
     add_leaf_ends(layout, vertices, faces, painted, branches=not (roles.body or roles.hands))

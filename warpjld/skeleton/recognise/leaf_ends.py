@@ -7,7 +7,6 @@ the segment before it, and the joint's own rotation would be lost.
 from __future__ import annotations
 
 import re
-from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,9 +14,10 @@ from numpy.typing import NDArray
 from warpjld.rotations import unit
 from warpjld.skeleton.recognise.extremity import find_extremity
 from warpjld.skeleton.recognise.layout import Layout
+from warpjld.skeleton.recognise.painted import Painted
 from warpjld.skeleton.recognise.section import nearby
 
-__all__ = ["Painted", "add_leaf_ends"]
+__all__ = ["add_leaf_ends"]
 
 _IS_END = re.compile(r"((left|right)\.)?(thumb|index|middle|ring|pinky|hand|toe\d*)\.tip|head\.top")
 """Canonical extremities: they end a bone and carry nothing."""
@@ -27,21 +27,6 @@ _ONE_SIDED = 0.2  # of its reach: centroid of the flesh, relative to the joint, 
 _GOES_ON = 0.4  # of the bone before: how far a surface without weights must go on beyond its last joint
 _SHORTEST, _LONGEST = 0.3, 0.9  # of the flesh's reach: length of the added bone
 _UNSERVED = 0.6  # share of a joint's flesh that lies on none of its bones, from which it needs one more
-
-
-@dataclass(frozen=True, eq=False)
-class Painted:
-    """A file's skin weights.
-
-    Attributes:
-        points: Vertices [m], shape (W, 3).
-        joints: Influencing joints of the file, shape (W, K).
-        weights: Their weights, rows summing to one, shape (W, K).
-    """
-
-    points: NDArray[np.float64]
-    joints: NDArray[np.int64]
-    weights: NDArray[np.float64]
 
 
 def add_leaf_ends(

@@ -1,0 +1,63 @@
+"""A file's skin weights, and what they say of joints that recognition made one."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from warpjld.skeleton.recognise.layout import Layout
+from warpjld.skeleton.recognise.tree import SourceTree
+
+__all__ = ["Painted", "let_flesh_lead"]
+
+_NONE = 0.02  # share of the skin of joints that are one, below which a joint has none
+
+
+@dataclass(frozen=True, eq=False)
+class Painted:
+    """A file's skin weights.
+
+    Attributes:
+        points: Vertices [m], shape (W, 3).
+        joints: Influencing joints of the file, shape (W, K).
+        weights: Their weights, rows summing to one, shape (W, K).
+    """
+
+    points: NDArray[np.float64]
+    joints: NDArray[np.int64]
+    weights: NDArray[np.float64]
+
+    def amounts(self, count: int) -> NDArray[np.float64]:
+        """Sum of every joint's weights, shape (N,)."""
+        return np.asarray(np.bincount(self.joints.ravel(), self.weights.ravel(), minlength=count), dtype=np.float64)
+
+
+def let_flesh_lead(layout: Layout, tree: SourceTree, painted: Painted) -> None:
+    """Let the joint that carries the flesh stand for those that recognition made one with it.
+
+    Files put roots above the hips: joints without skin, at the origin maybe, that no flesh turns with. Where such a
+    one was taken for a joint of the skeleton, the one below it that has the skin takes its place.
+    """
+    amounts = painted.amounts(len(tree))
+    for joint, source in enumerate(layout.sources):
+        if source < 0:
+            continue
+        one = np.flatnonzero(layout.owner == joint)
+        if not amounts[source] <= _NONE * amounts[one].sum():
+            continue
+        below = {
+            a
+            for k, parent in enumerate(layout.parents)
+            if parent == joint and layout.sources[k] >= 0
+            for a in tree.ancestors(layout.sources[k])
+        }
+        leading = [int(s) for s in one if amounts[s] > 0.0 and int(s) in below and source in tree.ancestors(int(s))]
+        if leading:
+            lead = max(leading, key=lambda s: (amounts[s], -s))
+            layout.sources[joint] = lead
+            layout.positions[joint] = tree.positions[lead]
+            layout.notes.append(
+                f"{layout.names[joint]}: '{tree.names[source]}' carries no skin, '{tree.names[lead]}' stands for it"
+            )
