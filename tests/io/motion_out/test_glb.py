@@ -17,6 +17,7 @@ from tests.io.motion_out.gltf_reader import chunks, evaluate, skinned
 from warpjld.errors import InputError
 from warpjld.io import load_rig
 from warpjld.io.motion_out import source_motion, write_motion
+from warpjld.io.skeleton_file import write_skeleton_file
 from warpjld.motion import open_motion
 from warpjld.rig import Rig, Skin
 from warpjld.skeleton import Poses, poses_from_rotations, poses_from_world
@@ -222,6 +223,21 @@ def test_a_rig_from_elsewhere_becomes_a_file_of_its_own(hands: dict[str, Rig], t
     back = open_motion(tmp_path / "out.glb", again)
     own = [rig.skeleton.names.index(name) for name in again.skeleton.names]
     np.testing.assert_allclose(back.poses.positions, poses.positions[:, own], atol=CLOSE)
+
+
+def test_a_skeleton_file_in_a_rigged_surface_is_not_the_surfaces(
+    write_glb: Callable[..., Path], hand_glb: Callable[..., Any], hands: dict[str, Rig], tmp_path: Path
+) -> None:
+    path = write_glb(hand_glb(), tmp_path / "rig.glb")
+    write_skeleton_file(tmp_path / "rig.json", hands["left"].skeleton)
+    rig = load_rig(path, skeleton=tmp_path / "rig.json")
+    poses = turning(rig, 3)
+    written = write_motion(tmp_path / "out.glb", rig, poses, rate=25.0)
+    assert "the rig's joints are not those of rig.glb: written as a file of its own" in written.notes
+    content, _, worlds = evaluate(tmp_path / "out.glb")
+    names = [node["name"] for node in content["nodes"]]
+    at = [names.index(name) for name in rig.skeleton.names]
+    np.testing.assert_allclose(worlds[:, at][..., :3, 3], poses.positions, atol=CLOSE)
 
 
 def test_flesh_follows_the_bone_it_lies_on(hands: dict[str, Rig], tmp_path: Path) -> None:
