@@ -32,15 +32,13 @@ from scipy.spatial.transform import Rotation
 
 from warpjld.errors import InputError
 from warpjld.motion.clip import Clip
-from warpjld.motion.landmarks import Landmarks, landmarks_of_skeleton
-from warpjld.motion.rest_pose import with_usable_rest
+from warpjld.motion.landmarks import Landmarks
+from warpjld.motion.pairs import limb_names, pair_joints
 from warpjld.rotations import conjugate, minimal_rotation, multiply, rotate, slerp, unit
-from warpjld.skeleton import DIGITS, Poses, Skeleton, poses_from_rotations
+from warpjld.skeleton import Poses, Skeleton, poses_from_rotations
 
 __all__ = ["Retargeted", "correspondence", "retarget", "retarget_and_tell"]
 
-_LIMBS = ("clavicle", "shoulder", "elbow", "wrist", "hip", "knee", "ankle", "ball")
-_DIGIT_JOINTS = ("base", "knuckle2", "knuckle3")
 _IDENTITY = np.array([0.0, 0.0, 0.0, 1.0])
 _GROUND_PERCENTILE = 10.0
 """Feet are tracked with noise: the height they come down to is a low percentile over the clip, not its minimum."""
@@ -66,7 +64,7 @@ class Retargeted:
 
 def correspondence(clip: Clip, skeleton: Skeleton) -> dict[str, str]:
     """Which joint of a recording drives which joint of a rig, besides the trunk: rig's name → recording's name."""
-    return {skeleton.names[own]: clip.names[joint] for own, joint in _pairs(clip, skeleton)[3].values()}
+    return {skeleton.names[own]: clip.names[joint] for own, joint in pair_joints(clip, skeleton)[3].values()}
 
 
 def retarget(clip: Clip, skeleton: Skeleton) -> Poses:
@@ -83,7 +81,7 @@ def retarget(clip: Clip, skeleton: Skeleton) -> Poses:
 
 def retarget_and_tell(clip: Clip, skeleton: Skeleton) -> Retargeted:
     """As ``retarget``, with what a reader of the result should know."""
-    clip, source, target, pairs, notes = _pairs(clip, skeleton)
+    clip, source, target, pairs, notes = pair_joints(clip, skeleton)
     if not pairs and (source.pelvis is None or target.pelvis is None):
         raise InputError(
             f"no joint of the motion ({_some(clip.names)}) was recognised as one of the rig ({_some(skeleton.names)})"
@@ -141,55 +139,10 @@ def _told(
     besides = "besides the trunk " if trunk else ""
     driven = ", ".join(f"{skeleton.names[own]} ← {clip.names[bone]}" for own, bone in pairs.values())
     notes = [f"{besides}these joints follow the recording: {driven}"] if driven else []
-    idle = [name for name in _limb_names() if name in target.joints and name not in pairs]
+    idle = [name for name in limb_names() if name in target.joints and name not in pairs]
     if idle:
         notes.append(f"not in the recording, these follow the joint above them: {', '.join(idle)}")
     return notes
-
-
-def _limb_names() -> list[str]:
-    return [
-        f"{side}.{part}"
-        for side in ("left", "right")
-        for part in (*_LIMBS, *(f"{digit}.{joint}" for digit in DIGITS for joint in _DIGIT_JOINTS))
-    ]
-
-
-def _pairs(
-    clip: Clip, skeleton: Skeleton
-) -> tuple[Clip, Landmarks, Landmarks, dict[str, tuple[int, int]], tuple[str, ...]]:
-    """The clip with a usable rest, landmarks of both, and per canonical name its joint in the rig and in the clip."""
-    sides = {name.partition(".")[0] for name in skeleton.names if name.endswith(".wrist")}
-    clip, source, notes = with_usable_rest(clip, side=sides.pop() if len(sides) == 1 else None)
-    target = landmarks_of_skeleton(skeleton)
-    both = source.joints.keys() & target.joints.keys()
-    # a single bone for a whole finger is a mitten: it would bend this finger and not its neighbours
-    mittens = {
-        f"{side}.{digit}"
-        for side in ("left", "right")
-        for digit in DIGITS
-        if not {f"{side}.{digit}.base", f"{side}.{digit}.knuckle2"} <= both
-    }
-    names = [n for n in _limb_names() if n in both and n.rpartition(".")[0] not in mittens]
-    pairs = {n: (target.joints[n], source.joints[n]) for n in names}
-    return clip, source, target, pairs | _toes(source, target), notes
-
-
-def _toes(source: Landmarks, target: Landmarks) -> dict[str, tuple[int, int]]:
-    """Toes by number; where one has five and the other only a ball, its ball goes with all of them."""
-    out = {}
-    for side in ("left", "right"):
-        toes = [name for name in target.joints if name.startswith(f"{side}.toe") and not name.endswith(".tip")]
-        ball = source.joints.get(f"{side}.ball")
-        for name in toes:
-            if name in source.joints:
-                out[name] = target.joints[name], source.joints[name]
-            elif name.endswith(".base") and ball is not None and f"{side}.ball" not in target.joints:
-                out[name] = target.joints[name], ball
-        middle = next((source.joints[k] for n in (3, 2, 1) if (k := f"{side}.toe{n}.base") in source.joints), None)
-        if f"{side}.ball" in target.joints and ball is None and middle is not None:
-            out[f"{side}.ball"] = target.joints[f"{side}.ball"], middle
-    return out
 
 
 def _turned(clip: Clip, source: Landmarks, name: str, bone: int) -> NDArray[np.float64]:
