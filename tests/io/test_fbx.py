@@ -323,6 +323,19 @@ def test_joints_that_do_not_inherit_scale_keep_their_names(tmp_path: Path, inher
     np.testing.assert_allclose(animation.worlds, worlds, atol=SINGLE)
 
 
+def test_a_joint_scaled_to_nothing_keeps_its_rotation(tmp_path: Path) -> None:
+    fbx = chain()
+    worlds = np.tile(fbx.frames, (4, 1, 1, 1))
+    worlds[2, 2, :3, :3] *= 1e-60  # nothing, as a single float
+    path = replace(fbx, stacks={"x": worlds}).write(tmp_path / "flat.fbx")
+    animation = read_fbx_animation(path)
+    assert any("'c' is scaled to nothing at frame 2" in note for note in animation.notes)
+    turned_by = Rotation.from_matrix(
+        animation.worlds[2, 2, :3, :3] / np.cbrt(np.linalg.det(animation.worlds[2, 2, :3, :3]))
+    )
+    np.testing.assert_allclose(turned_by.as_matrix(), fbx.frames[2, :3, :3], atol=TURN)
+
+
 BROKEN: dict[str, Callable[[str], bytes]] = {
     "empty": lambda text: b"",
     "no FBX": lambda text: b"solid\nfacet normal 0 0 1\n",
