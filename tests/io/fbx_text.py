@@ -81,6 +81,7 @@ class Fbx:
         pose: Whether a bind pose is written besides the clusters' matrices.
         spans: Other start and stop [s] than the animations', by name.
         version: The format's version.
+        inherit: How joints inherit scale: FBX's ``InheritType``, 1 for as matrices do.
     """
 
     names: Sequence[str]
@@ -101,6 +102,7 @@ class Fbx:
     pose: bool = True
     spans: dict[str, tuple[float, float]] = field(default_factory=dict)
     version: int = 7400
+    inherit: int = 1
 
     def write(self, path: Path) -> Path:
         """Write it."""
@@ -182,7 +184,7 @@ class _Writer:
                 _vector("Lcl Translation", place[0]),
                 _vector("Lcl Rotation", turn[0]),
                 _vector("Lcl Scaling", size[0]),
-                'P: "InheritType", "enum", "", "",1',
+                f'P: "InheritType", "enum", "", "",{fbx.inherit}',
                 f'P: "RotationOrder", "enum", "", "",{self.order(j)}',
             ]
             if pre.any() or post.any():

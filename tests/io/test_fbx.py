@@ -312,6 +312,30 @@ def test_plain_nodes_are_joints_where_there_are_no_bones(tmp_path: Path) -> None
     np.testing.assert_allclose(animation.worlds[1], worlds[1], atol=SINGLE)
 
 
+@pytest.mark.parametrize("inherit", [0, 2])
+def test_joints_that_do_not_inherit_scale_keep_their_names(tmp_path: Path, inherit: int) -> None:
+    fbx = chain(inherit=inherit)
+    worlds = np.stack([fbx.frames, turned(fbx.frames)])
+    path = replace(fbx, stacks={"x": worlds}).write(tmp_path / "maya.fbx")
+    rig, animation = read_fbx_rig(path), read_fbx_animation(path)
+    assert rig.tree.names == animation.tree.names == ("a", "b", "c")
+    np.testing.assert_allclose(rig.vertices, fbx.meshes[0].vertices, atol=PLACE)
+    np.testing.assert_allclose(animation.worlds, worlds, atol=SINGLE)
+
+
+def test_a_joint_scaled_to_nothing_keeps_its_rotation(tmp_path: Path) -> None:
+    fbx = chain()
+    worlds = np.tile(fbx.frames, (4, 1, 1, 1))
+    worlds[2, 2, :3, :3] *= 1e-60  # nothing, as a single float
+    path = replace(fbx, stacks={"x": worlds}).write(tmp_path / "flat.fbx")
+    animation = read_fbx_animation(path)
+    assert any("'c' is scaled to nothing at frame 2" in note for note in animation.notes)
+    turned_by = Rotation.from_matrix(
+        animation.worlds[2, 2, :3, :3] / np.cbrt(np.linalg.det(animation.worlds[2, 2, :3, :3]))
+    )
+    np.testing.assert_allclose(turned_by.as_matrix(), fbx.frames[2, :3, :3], atol=TURN)
+
+
 BROKEN: dict[str, Callable[[str], bytes]] = {
     "empty": lambda text: b"",
     "no FBX": lambda text: b"solid\nfacet normal 0 0 1\n",

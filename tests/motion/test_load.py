@@ -38,8 +38,8 @@ def test_slips_of_the_pen_do_not_fill_the_memory(tmp_path: Path) -> None:
 
 
 def test_unknown_suffixes_list_the_known_ones(tmp_path: Path) -> None:
-    with pytest.raises(InputError, match=r"unknown kind of motion '.fbx'; known: .csv"):
-        load_motion(tmp_path / "walk.fbx", rig(hand()))
+    with pytest.raises(InputError, match=r"unknown kind of motion '.abc'; known: .csv"):
+        load_motion(tmp_path / "walk.abc", rig(hand()))
     with pytest.raises(InputError, match="rate"):
         load_motion(tmp_path / "walk.bvh", rig(hand()), rate=-1)
 

@@ -4,10 +4,18 @@ from __future__ import annotations
 
 from pathlib import Path
 
+import numpy as np
+from numpy.typing import NDArray
+
 from warpjld.errors import InputError
 from warpjld.motion.joint_animation import JointAnimation
+from warpjld.skeleton.recognise.tree import SourceTree
 
 __all__ = ["fbx_animation_names", "read_fbx_animation"]
+
+_FLAT = 1e-12
+_TINY = 1e-7
+"""What stands for zero scale."""
 
 
 def fbx_animation_names(path: str | Path) -> tuple[str, ...]:
@@ -54,4 +62,20 @@ def read_fbx_animation(path: str | Path, *, rate: float | None = None, name: str
         others = ", ".join(f"'{n}'" for n in moving if n != scene.title)
         notes.append(f"animation '{scene.title}' is played; the file also has {others}")
     worlds = scene.worlds[:, skeleton.nodes] @ skeleton.squared
+    notes += _turn_flat_ones(worlds, skeleton.tree)
     return JointAnimation(skeleton.tree, worlds, scene.rate, title=scene.title, notes=(*notes, *skeleton.notes))
+
+
+def _turn_flat_ones(worlds: NDArray[np.float64], tree: SourceTree) -> list[str]:
+    """Give joints that are scaled to nothing the rotation they had before, in place; which, for people to read."""
+    linear = worlds[..., :3, :3]
+    flat = np.abs(np.linalg.det(linear)) <= _FLAT * np.abs(linear).max(axis=(-1, -2)) ** 3
+    notes: dict[int, str] = {}
+    for frame, joint in np.argwhere(flat):
+        before = tree.frames[joint] if frame == 0 else worlds[frame - 1, joint]
+        u, _, v = np.linalg.svd(before[:3, :3])
+        linear[frame, joint] = _TINY * u @ v
+        notes.setdefault(
+            int(joint), f"joint '{tree.names[joint]}' is scaled to nothing at frame {frame}: not turned then"
+        )
+    return list(notes.values())

@@ -62,8 +62,6 @@ def load(path: str) -> Any:
             ignore_embedded=True,
             # an index beyond its array is told by what it is used for, not moved to another vertex in silence
             index_error_handling=ufbx.IndexErrorHandling.NO_INDEX,
-            # after this every node is its parent's transform times its own
-            inherit_mode_handling=ufbx.InheritModeHandling.COMPENSATE,
         )
     except (ufbx.UfbxError, RuntimeError, ValueError) as error:
         fail(error)
@@ -171,32 +169,18 @@ def stacks(scene: Any, number: dict[int, int]) -> list[dict[str, Any]]:
     return out
 
 
-def sample(scene: Any, nodes: list[Any], parents: list[int], stack: int, moved: list[int], times: Array) -> Array:
-    """Node-to-world transforms by frame, shape (F, N, 4, 4)."""
+def sample(scene: Any, stack: int, times: Array) -> Array:
+    """Node-to-world transforms by frame, shape (F, N, 4, 4): all that moves nodes is ufbx's to compose."""
     anim = taken(taken(scene.anim_stacks[stack]).anim)
-    local = np.empty((len(times), len(nodes), 4, 4))
-    local[:] = [matrix(node.node_to_parent) for node in nodes]
-    for n in moved:
-        evaluate = nodes[n].evaluate_transform
-        shown = [evaluate(anim, float(t)) for t in times]
-        place, turn, size = (np.array([s[i] for s in shown], dtype=float) for i in range(3))
-        local[:, n, :3, :3] = rotations(turn) * size[:, None, :]
-        local[:, n, :3, 3] = place
-    worlds = local
-    for n, parent in enumerate(parents):  # parents come first
-        if parent >= 0:
-            worlds[:, n] = worlds[:, parent] @ local[:, n]
+    worlds = np.tile(np.eye(4), (len(times), len(scene.nodes), 1, 1))
+    for world, time in zip(worlds, times, strict=True):
+        shown = scene.evaluate(anim, float(time))
+        KEPT.append(shown)
+        nodes = shown.nodes
+        for n in range(len(nodes)):
+            world[n, :3] = np.array(taken(nodes[n]).node_to_world).T
+        shown.free()  # its memory; what stands for its nodes here stays
     return worlds
-
-
-def rotations(quaternions: Array) -> Array:
-    x, y, z, w = quaternions.T
-    rows = [
-        [1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)],
-        [2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w)],
-        [2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)],
-    ]
-    return np.moveaxis(np.array(rows), 2, 0)
 
 
 def main(path: str, out: str, animated: str, name: str, rate: str) -> None:
@@ -242,7 +226,7 @@ def main(path: str, out: str, animated: str, name: str, rate: str) -> None:
         if not 0.0 <= count < 1e6:
             fail(f"animation '{stack['name']}' would have {count:.3g} frames: at most 1000000")
         times = stack["begin"] + np.arange(int(np.floor(count + 1e-6)) + 1) / rate_
-        arrays["worlds"] = sample(scene, nodes, parents, chosen, stack["moved"], times)
+        arrays["worlds"] = sample(scene, chosen, times)
         told |= {"chosen": stack["name"], "rate": rate_}
     np.savez(out, told=np.array(json.dumps(told)), **arrays)  # type: ignore[arg-type]
 
