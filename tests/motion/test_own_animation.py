@@ -253,6 +253,25 @@ def test_an_end_lies_in_the_flesh_that_its_joint_owns(tmp_path: Path) -> None:
         assert np.linalg.norm(rig.skeleton.rest[j] - place) < 0.03
 
 
+def test_a_joint_gets_an_end_for_flesh_that_none_of_its_bones_reaches(tmp_path: Path) -> None:
+    """A head whose children are ears carries its snout, too."""
+    what = animal(snout=True)
+    j = what.names.index("skull")
+    turned = Rotation.from_quat(what.turns[j]) * Rotation.from_rotvec([0, 0, np.radians(40)])
+    track: Track = (np.array([0.0, 1.0]), np.array([what.turns[j], turned.as_quat()]), "LINEAR")
+    path = write(tmp_path / "a.glb", what, {"nod": {(j, "rotation"): track}})
+    rig = load_rig(path)
+    end = rig.skeleton.rest[rig.skeleton.index("skull.end")]
+    assert np.linalg.norm(end - [0.0, 0.72, 0.95]) < 0.05
+    oracle = Skinning(path)
+    want, rest = oracle.vertices(1.0), oracle.vertices(None)
+    snout = one_bone(oracle) & (rest[:, 2] > 0.88)
+    off = np.linalg.norm(covered(rig, open_motion(path, rig), 30) - want, axis=1)[snout] / rig.surface.size
+    assert snout.sum() > 20
+    assert off.max() < 1e-3
+    assert np.median(off) < CLOSE
+
+
 def test_scale_zero_and_negative_are_told_with_node_and_frame(tmp_path: Path) -> None:
     what = animal()
     ear, tail = what.names.index("flap.a"), what.names.index("brush1")
