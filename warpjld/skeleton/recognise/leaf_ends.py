@@ -26,7 +26,7 @@ _SMALLEST = 5e-3  # of the skeleton's size: flesh that reaches less far needs no
 _ONE_SIDED = 0.2  # of its reach: centroid of the flesh, relative to the joint, that tells a direction
 _GOES_ON = 0.4  # of the bone before: how far a surface without weights must go on beyond its last joint
 _SHORTEST, _LONGEST = 0.3, 0.9  # of the flesh's reach: length of the added bone
-_UNSERVED = 0.6  # share of a joint's flesh that lies on none of its bones, from which it needs one more
+_FAR, _MUCH = 2.0, 0.15  # times the thickness, and share, of flesh far from all bones of its joint, that needs one more
 
 
 def add_leaf_ends(
@@ -105,14 +105,10 @@ def _own_flesh(
     start = layout.positions[joint]
     flesh = painted.points[own] - start
     if kids:
-        bones = [layout.positions[k] - start for k in kids]
-        served = np.zeros(len(flesh), dtype=bool)
-        for bone in bones:
-            along = flesh @ bone / max(float(bone @ bone), 1e-30)
-            served |= (along > 0.0) & (along < 1.2)
-        if np.mean(~served) < _UNSERVED:
+        far = _far_from(flesh, [layout.positions[k] - start for k in kids])
+        if far.mean() < _MUCH:
             return None
-        flesh = flesh[~served]
+        flesh = flesh[far]
     reach = float(np.quantile(np.linalg.norm(flesh, axis=1), 0.98))
     if reach < smallest:
         return None
@@ -129,6 +125,16 @@ def _own_flesh(
         if _SHORTEST * beyond <= length <= beyond and np.linalg.norm(end - start) < 1.2 * length:
             return end
     return start + _middle(flesh, direction, beyond)
+
+
+def _far_from(flesh: NDArray[np.float64], bones: list[NDArray[np.float64]]) -> NDArray[np.bool_]:
+    """Which flesh, relative to its joint, is about as far from the joint's bones as from the joint itself."""
+    away = np.full(len(flesh), np.inf)
+    for bone in bones:
+        along = np.clip(flesh @ bone / max(float(bone @ bone), 1e-30), 0.0, 1.0)
+        away = np.minimum(away, np.linalg.norm(flesh - along[:, None] * bone, axis=1))
+    thickness = float(np.quantile(away, 0.25))
+    return np.asarray((away > _FAR * thickness) & (away > 0.8 * np.linalg.norm(flesh, axis=1)))
 
 
 def _direction(layout: Layout, joint: int, flesh: NDArray[np.float64], reach: float) -> NDArray[np.float64]:
