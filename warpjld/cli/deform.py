@@ -21,7 +21,7 @@ _BLOCK = 16  # frames deformed at once: memory does not grow with the length of 
 
 @click.command("deform")
 @click.argument("rig")
-@click.option("--motion", required=True, type=click.Path(path_type=Path), help="Motion: CSV, BVH, glTF/GLB, JSON.")
+@click.option("--motion", required=True, type=click.Path(path_type=Path), help="Motion: CSV, BVH, glTF/GLB, USD, JSON.")
 @click.option(
     "-o",
     "--out",

@@ -66,9 +66,10 @@ def read_usd_animation(path: str | Path, *, rate: float | None = None, name: str
         title, chosen, notes = _chosen(file, found.skeletons, name)
         codes, rate, told = _time_codes(file, found.skeletons, chosen, rate)
         warnings = [*told, *_shapes(chosen)]
-        worlds = np.concatenate(
-            [_worlds(file, *each, codes, warnings) for each in zip(found.skeletons, chosen, strict=True)], axis=1
-        )
+        with np.errstate(invalid="ignore", over="ignore"):
+            worlds = np.concatenate(
+                [_worlds(file, *each, codes, warnings) for each in zip(found.skeletons, chosen, strict=True)], axis=1
+            )
     if not np.isfinite(worlds).all():
         frame, joint = np.argwhere(~np.isfinite(worlds))[0][:2]
         raise InputError(f"joint '{found.tree.names[joint]}' is not finite at frame {frame}", path=file.path)

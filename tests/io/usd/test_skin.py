@@ -274,8 +274,8 @@ def test_what_does_not_belong_is_left_out(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("broken", "message"),
     [
-        (bar(joints=None), "no mesh uses its skeleton"),
-        (bar(with_mesh=False), "no mesh uses its skeleton"),
+        (bar(joints=None), "no visible mesh uses its skeleton"),
+        (bar(with_mesh=False), "no visible mesh uses its skeleton"),
         (bar(joints=np.tile([0, 7], (8, 1))), "vertex 4 follows joint 7, there are 2"),
         (bar(joints=np.tile([0, -7], (8, 1))), "vertex 4 follows joint"),
         (bar(weights=np.full((8, 2), -1.0)), "negative or non-finite weight"),
@@ -307,6 +307,8 @@ def test_broken_stages_are_named(tmp_path: Path, capfd: pytest.CaptureFixture, b
         ("#usda 1.0\ndef \"a\" (references = @nowhere.usda@) {}\n", "nowhere.usda"),
         ("#usda 1.0\ndef Mesh \"a\" {}\n", "has no joints: give a skeleton file"),
         ("", "OpenUSD cannot read it"),
+        ("#usda 1.0\ndef Skeleton \"a\" { nonsense[] joints = [] }\n", "OpenUSD cannot read it"),
+        ("#usda 1.0\ndef Skeleton \"a\" {\n uniform int joints = 3\n}\n", "not of the type that UsdSkel wants"),
     ],
 )  # fmt: skip
 def test_what_is_no_stage_is_one_line(tmp_path: Path, capfd: pytest.CaptureFixture, text: str, message: str) -> None:

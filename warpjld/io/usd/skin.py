@@ -50,7 +50,7 @@ def read_usd_rig(path: str | Path) -> SourceRig:
             raise InputError("has no joints: give a skeleton file for this surface", path=file.path)
         meshes = _meshes(file, found)
     if not meshes:
-        raise InputError("no mesh uses its skeleton: this is an animation, or a skeleton alone", path=file.path)
+        raise InputError("no visible mesh uses its skeleton: this is an animation, or a skeleton alone", path=file.path)
     vertex = np.cumsum([0, *(len(mesh.vertices) for mesh in meshes)])
     face = np.cumsum([0, *(len(mesh.faces) for mesh in meshes)])
     parts = tuple(
@@ -117,14 +117,19 @@ def _skinned(file: UsdFile, skeleton: UsdSkeleton, query: Any) -> _Skinned | Non
     if not len(mesh.faces):
         file.notes.append(f"{where} has no faces: left out")
         return None
-    place = skeleton.to_world @ matrices(query.GetGeomBindTransform())
+    with np.errstate(invalid="ignore"):
+        place = skeleton.to_world @ matrices(query.GetGeomBindTransform())
     joints, weights, rigid = read_influences(file, skeleton, query, mesh.points, where)
     points = blended_points(file, skeleton, query, mesh.points)
+    with np.errstate(invalid="ignore", over="ignore"):
+        vertices = points @ place[:3, :3].T + place[:3, 3]
+    if not np.isfinite(vertices).all():
+        raise InputError(f"{where}: its geomBindTransform or a blend shape is not finite", path=file.path)
     turned_inside_out = np.linalg.det(place[:3, :3]) < 0.0
     order = slice(None, None, -1 if turned_inside_out else 1)
     return _Skinned(
         name=prim.GetName(),
-        vertices=points @ place[:3, :3].T + place[:3, 3],
+        vertices=vertices,
         faces=mesh.faces[:, order],
         corner_uv=None if mesh.uv is None else mesh.uv[:, order],
         joints=joints,

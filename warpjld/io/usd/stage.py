@@ -17,7 +17,7 @@ from warpjld.errors import InputError, MissingExtraError
 __all__ = ["UsdFile", "matrices", "open_usd"]
 
 _MOST_WARNINGS = 5
-_PLACE = re.compile(r"Error in '[^']*' at line \d+ in file \S+ : '(.*)'$")
+_PLACE = re.compile(r"^Error in '[^']*' at line \d+ in file \S+ : '(.*?)'?$")
 
 
 @dataclass
@@ -77,6 +77,11 @@ def open_usd(path: str | Path) -> Iterator[UsdFile]:
         file.notes += [f"OpenUSD: {line}" for line in list(warned)[:_MOST_WARNINGS]]
     except Tf.ErrorException as error:
         raise InputError(f"OpenUSD cannot read it: {_reason(str(error))}", path=path) from None
+    except (AttributeError, IndexError, KeyError, OverflowError, TypeError, ValueError) as error:
+        # a stage may declare any attribute as any type: what the schema forbids shows only where it is used
+        raise InputError(
+            f"an attribute is not of the type that UsdSkel wants: {_line(str(error))}", path=path
+        ) from error
     finally:
         told.TakeUncoalescedDiagnostics()
 
