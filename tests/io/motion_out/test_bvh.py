@@ -13,7 +13,6 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation, Slerp
 
 from tests.io.motion_out.bvh_reader import evaluate
-from warpjld.hand import build_hand
 from warpjld.io import load_rig
 from warpjld.io.motion_out import write_motion
 from warpjld.io.motion_out.euler import ContinuousEuler
@@ -25,8 +24,8 @@ SHARED = Path(__file__).resolve().parents[4] / "shared" / "data"
 
 
 @pytest.fixture(scope="module")
-def hand() -> Rig:
-    return build_hand("left", resolution=2000)
+def hand(hands: dict[str, Rig]) -> Rig:
+    return hands["left"]
 
 
 def turning(rig: Rig, frames: int, seed: int = 0) -> Poses:

@@ -13,7 +13,6 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from warpjld.errors import InputError
-from warpjld.hand import build_hand
 from warpjld.io import load_rig
 from warpjld.io.motion_out import source_motion
 from warpjld.motion.joint_animation import JointAnimation
@@ -66,9 +65,9 @@ def by_hand(rig: Rig, joint: int, position: NDArray[np.float64], rotation: NDArr
 
 
 @settings(max_examples=15, deadline=None, derandomize=True)
-@given(st.integers(0, 10_000))
-def test_joints_move_with_their_flesh(seed: int) -> None:
-    rig = placed(build_hand("left", resolution=2000))
+@given(seed=st.integers(0, 10_000))
+def test_joints_move_with_their_flesh(hands: dict[str, Rig], seed: int) -> None:
+    rig = placed(hands["left"])
     positions, rotations = wild(rig, 3, seed)
     motion = source_motion(rig, poses_from_world(rig.skeleton, positions, rotations))
     worlds = motion.worlds()
@@ -82,8 +81,8 @@ def test_joints_move_with_their_flesh(seed: int) -> None:
     np.testing.assert_allclose(motion.positions(), positions, atol=1e-12)  # all joints are the skeleton's own
 
 
-def test_own_animations_come_back() -> None:
-    rig = placed(build_hand("right", resolution=2000))
+def test_own_animations_come_back(hands: dict[str, Rig]) -> None:
+    rig = placed(hands["right"])
     poses = poses_from_world(rig.skeleton, *wild(rig, 4, 1))
     motion = source_motion(rig, poses)
     back = own_poses(JointAnimation(motion.tree, motion.worlds(), 30.0), rig)
@@ -118,14 +117,14 @@ def test_merged_joints_are_named(body: Rig) -> None:
     assert body.skeleton.names[body.owner[jaw]] == "head"
 
 
-def test_blocks_cover_the_clip() -> None:
-    rig = build_hand("left", resolution=2000)
+def test_blocks_cover_the_clip(hands: dict[str, Rig]) -> None:
+    rig = hands["left"]
     motion = source_motion(rig, rest_poses(rig.skeleton, 11))
     assert [(b.start, b.stop) for b in motion.blocks(4)] == [(0, 4), (4, 8), (8, 11)]
 
 
-def test_poses_of_another_rig_are_refused() -> None:
-    rig = build_hand("left", resolution=2000)
+def test_poses_of_another_rig_are_refused(hands: dict[str, Rig]) -> None:
+    rig = hands["left"]
     with pytest.raises(InputError, match="at least one frame"):
         source_motion(rig, rest_poses(rig.skeleton)[:0])
     poses = rest_poses(rig.skeleton)

@@ -3,6 +3,6 @@
 from __future__ import annotations
 
 from warpjld.io.motion_out.source_motion import SourceMotion, source_motion
-from warpjld.io.motion_out.write import MOTION_OUT, Timing, WrittenMotion, write_motion
+from warpjld.io.motion_out.write import MOTION_OUT, Timing, WrittenMotion, check_motion_out, write_motion
 
-__all__ = ["MOTION_OUT", "SourceMotion", "Timing", "WrittenMotion", "source_motion", "write_motion"]
+__all__ = ["MOTION_OUT", "SourceMotion", "Timing", "WrittenMotion", "check_motion_out", "source_motion", "write_motion"]

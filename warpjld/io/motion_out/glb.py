@@ -35,7 +35,7 @@ def write_glb(path: Path, rig: Rig, poses: Poses, timing: Timing) -> WrittenMoti
     motion = source_motion(rig, poses)
     notes = list(motion.notes)
     warnings: list[str] = []
-    file, nodes = own_document(rig, motion, warnings) or new_document(rig, motion, notes)
+    file, nodes = own_document(rig, motion, notes, warnings) or new_document(rig, motion, notes)
     _animate(file, nodes, motion, timing, warnings)
     if timing.start_frame:
         notes.append(f"time starts at 0, which is frame {timing.start_frame}")

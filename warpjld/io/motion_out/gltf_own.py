@@ -30,7 +30,9 @@ _MEDIA = {
 _SAME = 1e-6  # of the largest number: transforms of the joints that were loaded
 
 
-def own_document(rig: Rig, motion: SourceMotion, warnings: list[str]) -> tuple[GlbFile, NodeTree] | None:
+def own_document(
+    rig: Rig, motion: SourceMotion, notes: list[str], warnings: list[str]
+) -> tuple[GlbFile, NodeTree] | None:
     """The rig's own file and its nodes; None for a rig whose joints are not a glTF file's."""
     if rig.path is None or rig.path.suffix.lower() not in (".glb", ".gltf"):
         return None
@@ -45,6 +47,7 @@ def own_document(rig: Rig, motion: SourceMotion, warnings: list[str]) -> tuple[G
     if len(tree) != len(motion.tree) or not np.allclose(
         tree.frames, motion.tree.frames, rtol=0.0, atol=_SAME * np.abs(motion.tree.frames).max()
     ):
+        notes.append(f"the rig's joints are not those of {rig.path.name}: written as a file of its own")
         return None
     content = read_gltf_json(rig.path.read_bytes())
     lengths = [buffer["byteLength"] for buffer in content.get("buffers", ())]

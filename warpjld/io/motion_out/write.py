@@ -14,7 +14,7 @@ from warpjld.rig import Rig
 from warpjld.skeleton import Poses
 from warpjld.whole_file import whole_file
 
-__all__ = ["MOTION_OUT", "Timing", "Writer", "WrittenMotion", "write_motion"]
+__all__ = ["MOTION_OUT", "Timing", "Writer", "WrittenMotion", "check_motion_out", "write_motion"]
 
 MOTION_OUT = {
     ".bvh": "BVH: the rig's own joints, metres, Y up",
@@ -74,6 +74,18 @@ class Writer(Protocol):
         """Write all frames; OSError is told by the caller."""
 
 
+def check_motion_out(path: str | Path) -> None:
+    """Raise what ``write_motion`` would for a file's name: to be called before any long work.
+
+    Raises:
+        InputError: Unknown suffix.
+    """
+    path = Path(path)
+    if path.suffix.lower() not in _WRITERS:
+        listed = "\n".join(f"  {suffix:6} {what}" for suffix, what in MOTION_OUT.items())
+        raise InputError(f"unknown kind of motion file '{path.suffix}'; known are\n{listed}", path=path)
+
+
 def write_motion(
     path: str | Path, rig: Rig, poses: Poses, *, rate: float, start_frame: int = 0, name: str | None = None
 ) -> WrittenMotion:
@@ -94,12 +106,10 @@ def write_motion(
         MissingExtraError: The format needs an optional dependency.
     """
     path = Path(path)
-    known = _WRITERS.get(path.suffix.lower())
-    if known is None:
-        listed = "\n".join(f"  {suffix:6} {what}" for suffix, what in MOTION_OUT.items())
-        raise InputError(f"unknown kind of motion file '{path.suffix}'; known are\n{listed}", path=path)
+    check_motion_out(path)
     timing = Timing(rate, start_frame, path.stem if name is None else name)
-    write: Writer = getattr(import_module(f"warpjld.io.motion_out.{known[0]}"), known[1])
+    module, function = _WRITERS[path.suffix.lower()]
+    write: Writer = getattr(import_module(f"warpjld.io.motion_out.{module}"), function)
     make_folder(path.parent)
     try:
         with whole_file(path) as part:
