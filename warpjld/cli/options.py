@@ -33,7 +33,7 @@ json: Decorator = click.option("--json", "as_json", is_flag=True, help="Write th
 quiet: Decorator = click.option("-q", "--quiet", is_flag=True, help="Say nothing but errors.")
 
 
-RIG = ("skeleton", "side", "unit", "scale", "up")
+RIG = ("skeleton", "side", "unit", "scale", "up", "joint_map")
 """Names of the options that ``rig`` adds: keyword arguments of ``load_rig``."""
 
 

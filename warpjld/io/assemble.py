@@ -60,7 +60,7 @@ def _assemble(
         raise InputError(f"vertices or joints lie at {reach:.3g}: beyond anything that can be computed with")
     file_tree = source.tree
     shares = flesh_shares(len(source.tree), source.joints, source.weights, source.rigid)
-    roles = recognise(source.tree, shares, _stated(source, joint_map or {}))
+    roles = recognise(source.tree, shares, _stated(source, joint_map or {}), by_shape=not source.stated)
     source = place(source, roles, unit=unit, scale=scale, up=up)
     surface = weld_surface(source.vertices, source.faces, uv=source.uv, parts=source.parts)
     painted = None

@@ -81,6 +81,7 @@ _LISTERS: dict[str, Callable[[Path], tuple[str, ...]]] = {
     ".glb": _gltf,
     ".gltf": _gltf,
     ".fbx": _fbx,
+    ".vrma": _gltf,
     **dict.fromkeys((".usd", ".usda", ".usdc", ".usdz"), _usd),
 }
 """What lists the animations of each suffix."""

@@ -27,6 +27,8 @@ def recognise(
     tree: SourceTree,
     shares: NDArray[np.float64] | None = None,
     stated: Mapping[str, Any] | None = None,
+    *,
+    by_shape: bool = True,
 ) -> Roles:
     """Parts of a joint tree; an empty result where it is neither a hand nor a body.
 
@@ -38,6 +40,8 @@ def recognise(
         shares: Share of the surface that each joint moves, shape (N,), as from
             :func:`~warpjld.skeleton.recognise.flesh.flesh_shares`; None where no skin tells.
         stated: Canonical joints → the file's joints, stated by hand (see :mod:`.joint_map`): wins over everything.
+        by_shape: Whether the tree's shape is asked where names say nothing: not where a file's own table states what
+            is what, and hair would only be taken for limbs.
 
     Raises:
         InputError: ``stated`` names joints that are not there.
@@ -45,13 +49,13 @@ def recognise(
     flesh = Flesh(tree, shares)
     by_hand = JointMap(tree, stated or {})
     roles = roles_by_name(tree, flesh)
-    if not (roles.hands or roles.body):
+    if by_shape and not (roles.hands or roles.body):
         roles = roles_by_shape(tree, flesh)
     roles = _checked(tree, roles, flesh, by_hand)
-    if roles.how == "names" and not (roles.hands or roles.body):
-        by_shape = _checked(tree, roles_by_shape(tree, flesh), flesh, by_hand)
-        if by_shape.hands or by_shape.body:
-            roles = by_shape
+    if by_shape and roles.how == "names" and not (roles.hands or roles.body):
+        shaped = _checked(tree, roles_by_shape(tree, flesh), flesh, by_hand)
+        if shaped.hands or shaped.body:
+            roles = shaped
     check_hands(tree, roles)
     roles.left_out = frozenset(by_hand.ignored)
     return roles
