@@ -70,7 +70,7 @@ def test_held_in_betweens_are_noted(place: Path, capsys: pytest.CaptureFixture[s
     [
         (("--motion", "curl.csv", "-o", "curl.xyz"), "unknown kind of cache '.xyz'"),
         (("--motion", "none.csv", "-o", "curl.npz"), "none.csv: cannot be read"),
-        (("--motion", "curl.fbx", "-o", "curl.npz"), "unknown kind of motion '.fbx'"),
+        (("--motion", "curl.max", "-o", "curl.npz"), "unknown kind of motion '.max'"),
         (("--motion", "curl.csv", "-o", "curl.npz", "--frames", "5:50"), "the motion has frames 0 to 20"),
         (("--motion", "curl.csv", "-o", "curl.npz", "--frames", "a:b"), "want two frame numbers"),
         (("--motion", "curl.csv", "-o", "curl.npz", "--rate", "0"), "rate: want frames a second"),

@@ -285,9 +285,10 @@ def test_numbers_that_point_elsewhere_are_named(plain: Path, tmp_path: Path, cha
         load_rig(edit(plain, tmp_path / "a.glb", change))
 
 
-def test_a_mirrored_hand_is_the_other_one(write_glb, hand_glb, tmp_path: Path) -> None:
-    """A right hand under a node that mirrors, whose names tell no side, is a left hand and bends as one."""
-    glb = hand_glb("right", names=lambda name: name.replace("right.", ""))
+@pytest.mark.parametrize("sided", [False, True])
+def test_a_mirrored_hand_is_the_other_one(write_glb, hand_glb, tmp_path: Path, sided: bool) -> None:
+    """A right hand under a node that mirrors is a left hand and bends as one, whatever its names say."""
+    glb = hand_glb("right", names=lambda name: name if sided else name.replace("right.", ""))
     right = load_rig(write_glb(glb, tmp_path / "right.glb"))
     left = load_rig(
         edit(

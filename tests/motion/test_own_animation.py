@@ -210,10 +210,14 @@ def test_joints_that_the_animations_file_lacks_follow_and_are_told(tmp_path: Pat
     np.testing.assert_allclose(np.abs(alike), 1, atol=1e-12)
 
 
-def covered(rig: Rig, loaded: LoadedMotion, frame: int) -> np.ndarray:
-    from warpjld.covering import bind
+def covered(rig: Rig, loaded: LoadedMotion, frame: int, muscles: bool = True) -> np.ndarray:
+    """The deformed surface in the file's order; without the muscles that bulge on every bone where it bends."""
+    from warpjld.covering import bind, default_parameters
 
-    covering = bind(rig.skeleton, rig.surface)
+    chosen = default_parameters(rig.skeleton)
+    if not muscles:
+        chosen = replace(chosen, muscle=0 * chosen.muscle, inflation=0 * chosen.inflation)
+    covering = bind(rig.skeleton, rig.surface, parameters=chosen)
     return rig.surface.to_source(covering.deform(loaded.poses[frame : frame + 1])[0])
 
 
@@ -232,7 +236,7 @@ def test_a_leaf_turns_whole(tmp_path: Path, leaf: str) -> None:
     moved = np.linalg.norm(want - rest, axis=1)
     far = one_bone(oracle) & (oracle.joints[np.arange(len(moved)), oracle.weights.argmax(axis=1)] == j)
     far &= moved > 0.7 * moved.max()  # beyond what the joint's rounding reaches
-    got = covered(rig, loaded, len(loaded.poses) - 1)
+    got = covered(rig, loaded, len(loaded.poses) - 1, muscles=False)
     off = np.linalg.norm(got - want, axis=1)[far] / rig.surface.size
     assert far.sum() > 20
     assert moved.max() > 0.05 * rig.surface.size
@@ -265,11 +269,14 @@ def test_a_joint_gets_an_end_for_flesh_that_none_of_its_bones_reaches(tmp_path: 
     assert np.linalg.norm(end - [0.0, 0.72, 0.95]) < 0.05
     oracle = Skinning(path)
     want, rest = oracle.vertices(1.0), oracle.vertices(None)
-    snout = one_bone(oracle) & (rest[:, 2] > 0.88)
-    off = np.linalg.norm(covered(rig, open_motion(path, rig), 30) - want, axis=1)[snout] / rig.surface.size
+    snout = one_bone(oracle) & (rest[:, 2] > 0.8)
+    got = covered(rig, open_motion(path, rig), 30, muscles=False)
+    off, moved = (np.linalg.norm(got - x, axis=1) / rig.surface.size for x in (want, rest))
+    # the rounding of the neck fades out along the snout; its front is rigid
     assert snout.sum() > 20
-    assert off.max() < 1e-3
-    assert np.median(off) < CLOSE
+    assert moved[snout].min() > 0.05
+    assert off[snout].max() < 3e-3
+    assert off[one_bone(oracle) & (rest[:, 2] > 0.94)].max() < CLOSE
 
 
 def test_scale_zero_and_negative_are_told_with_node_and_frame(tmp_path: Path) -> None:
@@ -409,8 +416,7 @@ def test_the_joint_with_the_flesh_stands_for_roots_above_it(tmp_path: Path) -> N
     )
     path = write(tmp_path / "a.glb", rooted, {"walk": gait(rooted)})
     rig = load_rig(path)
-    pelvis = rig.skeleton.index("pelvis")
-    assert rig.source_joints[pelvis] == "b_Hip_01"
+    pelvis = rig.source_joints.index("b_Hip_01")
     np.testing.assert_allclose(rig.skeleton.rest[pelvis], what.offsets[0], atol=1e-6)
     loaded, oracle = open_motion(path, rig), Skinning(path)
     assert worst(rig, loaded, oracle, [5, 12]) < CLOSE

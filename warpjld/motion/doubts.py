@@ -7,7 +7,6 @@ from collections.abc import Collection, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.spatial.transform import Rotation
 
 from warpjld.motion.clip import Clip
 from warpjld.motion.joint_animation import JointAnimation
@@ -69,14 +68,14 @@ def doubts_of_animation(animation: JointAnimation, followed: Collection[str]) ->
         animation: The animation.
         followed: Names of its joints that are joints of the rig.
     """
-    tree, worlds = animation.tree, animation.worlds
-    rotations, at_rest = _nearest_rotations(worlds[..., :3, :3]), _nearest_rotations(tree.frames[:, :3, :3])
-    used = {k for j, name in enumerate(tree.names) if name in followed for k in (j, *tree.ancestors(j))}
-    rest = tree.positions, at_rest
-    return [
-        *jumps(tree.names, _to_parents(tree.parents, rotations)),
-        *_unfollowed(tree.names, tree.parents, worlds[..., :3, 3], rotations, rest, used),
-    ]
+    clip = animation.clip()
+    used: set[int] = set()
+    for j, name in enumerate(clip.names):
+        k = j if name in followed else -1
+        while k >= 0 and k not in used:
+            used.add(k)
+            k = int(clip.parents[k])
+    return [*jumps(clip.names, clip.locals()), *doubts_of_clip(clip, used)]
 
 
 def _unfollowed(
@@ -117,14 +116,6 @@ def _to_parents(parents: NDArray[np.int64], rotations: NDArray[np.float64]) -> N
 def _degrees_between(a: NDArray[np.float64], b: NDArray[np.float64]) -> NDArray[np.float64]:
     apart = multiply(conjugate(a), b)
     return np.asarray(2.0 * np.degrees(np.arctan2(np.linalg.norm(apart[..., :3], axis=-1), np.abs(apart[..., 3]))))
-
-
-def _nearest_rotations(matrices: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Quaternions of matrices that may also scale, mirror or flatten."""
-    left, _, right = np.linalg.svd(matrices)
-    left[..., -1] *= np.sign(np.linalg.det(left @ right))[..., None]
-    turned = Rotation.from_matrix((left @ right).reshape(-1, 3, 3)).as_quat()
-    return np.asarray(turned.reshape(*matrices.shape[:-2], 4))
 
 
 def _listed(names: Sequence[str]) -> str:

@@ -30,6 +30,7 @@ from warpjld.skeleton.tree import CHANNELS, Skeleton
 __all__ = ["Canonical", "canonical_skeleton"]
 
 _STRAIGHT = np.sin(np.radians(10.0))
+_OTHER = {"left": "right", "right": "left"}
 _SURE = 0.15  # chirality from which rest pose and thumb tell left from right
 
 
@@ -83,6 +84,7 @@ def canonical_skeleton(
     doubts = list(roles.suspicious)
     hand_points: dict[str, dict[str, NDArray[np.float64]]] = {}
     _release_partial_hands(roles, side)
+    _swap_mirrored_sides(tree, roles)
     for hand in roles.hands:
         found = {name: tree.positions[j] for name, j in hand.joints.items()}
         hand.side = _side(hand, found, side if len(roles.hands) == 1 else None, doubts)
@@ -116,9 +118,35 @@ def _release_partial_hands(roles: Roles, side: str | None) -> None:
         roles.notes.append(f"{', '.join(digits)}: part of a hand only, nothing was added")
 
 
-def _side(hand: HandRoles, points: Mapping[str, NDArray[np.float64]], given: str | None, doubts: list[str]) -> str:
+def _swap_mirrored_sides(tree: SourceTree, roles: Roles) -> None:
+    """Under a node that mirrors, what names call a right hand is a left one, and so with all of a body."""
+    sided = [hand for hand in roles.hands if hand.side is not None]
+    mirrored = [
+        hand
+        for hand in sided
+        if np.linalg.det(tree.frames[hand.joints.get("wrist", hand.joints["index.base"]), :3, :3]) < 0.0
+        and _seen({name: tree.positions[j] for name, j in hand.joints.items()}) == _OTHER[hand.side or "left"]
+    ]
+    if not sided or len(mirrored) < len(sided):
+        return
+    for hand in sided:
+        hand.side = _OTHER[hand.side or "left"]
+    swapped = {}
+    for name, joint in roles.body.items():
+        side, dot, rest = name.partition(".")
+        swapped[f"{_OTHER[side]}{dot}{rest}" if dot and side in _OTHER else name] = joint
+    roles.body = swapped
+    roles.notes.append("mirrored by its nodes: left and right of its names are exchanged")
+
+
+def _seen(points: Mapping[str, NDArray[np.float64]]) -> str | None:
+    """The side that rest pose and thumb tell."""
     turn = chirality(points) if {"wrist", "index.base", "pinky.base"} <= set(points) else 0.0
-    seen = None if abs(turn) < _SURE else ("right" if turn > 0 else "left")
+    return None if abs(turn) < _SURE else ("right" if turn > 0 else "left")
+
+
+def _side(hand: HandRoles, points: Mapping[str, NDArray[np.float64]], given: str | None, doubts: list[str]) -> str:
+    seen = _seen(points)
     chosen = given or hand.side or seen
     if chosen is None:
         raise InputError("neither names nor shape tell whether this is a left or a right hand: give its side")
