@@ -30,6 +30,8 @@ SIDE_BAND = 0.75
 # what lies in between then shears over a broad strip
 LATERAL = 0.6
 FLOOR = 2e-2  # weight below which an operator is dropped, faded so that nothing jumps
+_ALIKE = 1e-3  # of the largest weight: operators that differ by less from one left out are not faded any further
+_TIES = 1e-9  # weights that differ by less, as sums in another order do, are equal
 
 
 @dataclass(frozen=True, eq=False)
@@ -209,15 +211,19 @@ def _share_in_fan(
 
 
 def _strongest(weight: NDArray[np.float64]) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
-    """The ``OPERATORS`` largest weights of every row, faded to zero where another would take their place."""
+    """The ``OPERATORS`` largest weights of every row, faded to zero where another would take their place.
+
+    Equal ones go to the first segments; where five and more share a vertex alike, nothing can fade, and the first four
+    share it.
+    """
     keep = min(OPERATORS, weight.shape[1])
-    order = np.argpartition(-weight, keep - 1, axis=1)[:, :keep]
-    order = np.take_along_axis(order, np.argsort(-np.take_along_axis(weight, order, axis=1), axis=1), axis=1)
-    largest = np.take_along_axis(weight, order, axis=1)
-    rest = np.partition(weight, -keep - 1, axis=1)[:, -keep - 1] if weight.shape[1] > keep else 0.0
-    threshold = np.maximum(rest, FLOOR)
-    faded = np.maximum(largest - np.reshape(threshold, (-1, 1)), 0.0)
+    order = np.argsort(-_TIES * np.round(weight / _TIES), axis=1, kind="stable")
+    largest = np.take_along_axis(weight, order[:, :keep], axis=1)
+    rest = np.take_along_axis(weight, order[:, keep : keep + 1], axis=1) if weight.shape[1] > keep else 0.0
+    threshold = np.minimum(np.maximum(rest, FLOOR), (1.0 - _ALIKE) * largest[:, :1])
+    faded = np.maximum(largest - threshold, 0.0)
     faded /= faded.sum(axis=1, keepdims=True)
+    order = order[:, :keep]
     if keep < OPERATORS:
         pad = ((0, 0), (0, OPERATORS - keep))
         order, faded = np.pad(order, pad, mode="edge"), np.pad(faded, pad)

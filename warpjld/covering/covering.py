@@ -261,7 +261,7 @@ def bind(
     elif domains == "skin":
         if skin is None:
             raise InputError("domains 'skin': this rig has no painted weights")
-        weights = domains_from_skin(surface.vertices, skeleton, groups, skin)
+        weights = domains_from_skin(surface.vertices, surface.faces, skeleton, groups, skin)
     else:
         raise InputError(f"domains: want 'geometry' or 'skin', got {domains!r}")
     anchors = anchor(surface.vertices, skeleton, groups, weights, chosen)
