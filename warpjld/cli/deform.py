@@ -74,7 +74,7 @@ def command(
     """
     from warpjld.cli.progress import progress
     from warpjld.cli.rig_argument import open_rig
-    from warpjld.covering import bind, load_parameters
+    from warpjld.covering import bind_rig, load_parameters
     from warpjld.io.caches import open_cache
     from warpjld.motion import open_motion
     from warpjld.quiet import silence_warp
@@ -91,11 +91,9 @@ def command(
     writing = open_cache(out, driven.surface, frames=len(poses), rate=moved.rate, start_frame=first, name=driven.name)
     with progress(quiet) as report, writing as cache:
         report("binding", 0, len(poses))
-        covering = bind(
-            driven.skeleton,
-            driven.surface,
+        covering = bind_rig(
+            driven,
             parameters=chosen,
-            skin=driven.skin,
             domains=domains,  # type: ignore[arg-type]
             method=method,  # type: ignore[arg-type]
         )

@@ -52,6 +52,8 @@ class Anchors:
         pair: Palm pairs between which a vertex lies, shape (V, 2), and
         between: how much it lies in between, 0 on either segment, 1 in the middle, shape (V, 2) (R44, R49);
         station: where along the pair, 0 … STATIONS − 1, shape (V, 2).
+        rigid: Joint that a vertex without flesh follows with its bone, -1 for all others, shape (V,). Such a vertex has
+            no weight on any segment.
     """
 
     ends: NDArray[np.int32]
@@ -66,6 +68,7 @@ class Anchors:
     pair: NDArray[np.int32]
     between: NDArray[np.float64]
     station: NDArray[np.float64]
+    rigid: NDArray[np.int32]
 
     def __len__(self) -> int:
         return len(self.rest)
@@ -78,6 +81,7 @@ def anchor(
     domains: NDArray[np.float64],
     parameters: Parameters,
     *,
+    rigid: NDArray[np.int32] | None = None,
     chunk: int = 100_000,
 ) -> Anchors:
     """Place vertices on the segments of their domains.
@@ -88,6 +92,7 @@ def anchor(
         groups: Operators, from :func:`~warpjld.covering.operators.fans`.
         domains: Weight of every fan, shape (V, fans).
         parameters: Their proximities set how wide the palm's in-between areas are (A Fig. 7).
+        rigid: Joint that a vertex follows rigidly, -1 for flesh, shape (V,); all is flesh by default.
         chunk: Vertices placed at a time, which bounds memory.
     """
     ends = segment_ends(groups)
@@ -100,7 +105,10 @@ def anchor(
     joined = [np.concatenate(column) for column in zip(*rows, strict=True)]
     segment, weight, ratio, side, lift, pair, between, station = joined
     muscle = np.array([fan.muscle for fan in groups for _ in fan.segments])
-    return Anchors(ends, muscle, vertices, segment, weight, ratio, side, lift, pairs, pair, between, station)
+    rigid = np.full(len(vertices), -1, dtype=np.int32) if rigid is None else rigid
+    flesh = (rigid < 0)[:, None]
+    weight, between = weight * flesh, between * flesh
+    return Anchors(ends, muscle, vertices, segment, weight, ratio, side, lift, pairs, pair, between, station, rigid)
 
 
 def _neighbour_pairs(groups: tuple[Fan, ...]) -> tuple[NDArray[np.int32], dict[int, int]]:

@@ -29,6 +29,7 @@ class PaperPlaces:
         across: Its projection on the virtual segment from the one to the other, shape (V,) (R53).
         between: Whether it lies in areas 2, 5, 8 of the palm, shape (V,) (R49).
         external: Whether it lies on the external side, shape (V,) (R45).
+        rigid: Joint that a vertex follows with its bone, -1 for those that the rest is about, shape (V,).
     """
 
     ends: NDArray[np.int32]
@@ -38,6 +39,7 @@ class PaperPlaces:
     across: NDArray[np.float64]
     between: NDArray[np.bool_]
     external: NDArray[np.bool_]
+    rigid: NDArray[np.int32]
 
 
 def paper_places(
@@ -46,6 +48,7 @@ def paper_places(
     groups: tuple[Fan, ...],
     domains: NDArray[np.float64],
     parameters: Parameters,
+    rigid: NDArray[np.int32] | None = None,
 ) -> PaperPlaces:
     """Give every vertex to its strongest operator, and inside the palm to one of the nine areas (A Fig. 7).
 
@@ -63,6 +66,7 @@ def paper_places(
         groups: Operators, from :func:`~warpjld.covering.operators.fans`.
         domains: Weight of every fan, shape (V, fans).
         parameters: Their proximities bound the areas.
+        rigid: Joint that a vertex follows rigidly, -1 for flesh, shape (V,); all is flesh by default.
     """
     ends = segment_ends(groups)
     table = SegmentTable.build(skeleton, ends)
@@ -85,7 +89,8 @@ def paper_places(
     both = np.take_along_axis(ratio, segment, axis=1)
     external = _height(vertices, table, segment, both, np.where(between, across, 0.0)) >= -tie
     muscle = np.array([fan.muscle for fan in groups for _ in fan.segments])
-    return PaperPlaces(ends, muscle, segment, both, across, between, external)
+    rigid = np.full(count, -1, dtype=np.int32) if rigid is None else rigid
+    return PaperPlaces(ends, muscle, segment, both, across, between, external, rigid)
 
 
 def _palm_place(
