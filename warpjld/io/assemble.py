@@ -7,6 +7,7 @@ from numpy.typing import NDArray
 
 from warpjld.errors import InputError
 from warpjld.io.placement import place
+from warpjld.io.rigid_parts import rigid_parts
 from warpjld.io.source import SourceRig
 from warpjld.rig import Rig, Skin
 from warpjld.skeleton.recognise.canonical import canonical_skeleton
@@ -53,6 +54,7 @@ def _assemble(source: SourceRig, side: str | None, unit: str | None, scale: floa
     skin, bare = None, 0
     if source.joints is not None and source.weights is not None:
         skin, bare = _skin(source.joints, source.weights, found.owner, len(found.skeleton), surface)
+    rigid, rigid_notes = rigid_parts(surface, found.skeleton, skin, _rigid(source, found.owner, surface))
     return Rig(
         name=source.path.stem,
         skeleton=found.skeleton,
@@ -62,8 +64,8 @@ def _assemble(source: SourceRig, side: str | None, unit: str | None, scale: floa
         source=file_tree,
         sources=found.sources,
         placing=source.placing,
-        rigid=_rigid(source, found.owner, surface),
-        notes=(*source.notes, *found.notes, *_bare(bare, skin)),
+        rigid=rigid,
+        notes=(*source.notes, *found.notes, *_bare(bare, skin), *rigid_notes),
         suspicious=source.suspicious,
     )
 
