@@ -24,6 +24,7 @@ class Anchors:
     pair: wp.array2d(dtype=wp.int32)
     between: wp.array2d(dtype=float)
     station: wp.array2d(dtype=float)
+    rigid: wp.array(dtype=wp.int32)
 
 
 @wp.struct
@@ -42,6 +43,8 @@ class Parameters:
 def rest_offset(anchors: Anchors, v: int) -> wp.vec3:
     """Offset of a vertex from the affine combination of joints it hangs on."""
     foot = wp.vec3(0.0)
+    if anchors.rigid[v] >= 0:
+        foot = anchors.rest_joints[anchors.rigid[v]]
     for k in range(anchors.weight.shape[1]):
         s = anchors.segment[v, k]
         start = anchors.rest_joints[anchors.ends[s, 0]]
@@ -106,6 +109,8 @@ def pack_coefficients(
 def hang(anchors: Anchors, positions: wp.array2d(dtype=wp.vec3), f: int, v: int) -> wp.vec3:
     """Σ c_j J_j': the place on the segments from which a vertex is offset."""
     foot = wp.vec3(0.0)
+    if anchors.rigid[v] >= 0:
+        foot = positions[f, anchors.rigid[v]]
     for k in range(anchors.weight.shape[1]):
         s = anchors.segment[v, k]
         start = positions[f, anchors.ends[s, 0]]
@@ -130,6 +135,8 @@ def turn(
 ) -> wp.quat:
     """Σ w_k q_k, not normalised."""
     total = wp.quat(0.0, 0.0, 0.0, 0.0)
+    if anchors.rigid[v] >= 0:
+        total = rotations[f, anchors.rigid[v]]
     for k in range(anchors.weight.shape[1]):
         s = anchors.segment[v, k]
         p = anchors.ends[s, 0]

@@ -34,6 +34,7 @@ class Skin:
     pairs: wp.array2d(dtype=wp.int32)
     across: wp.array2d(dtype=float)
     palm: wp.array2d(dtype=float)
+    rigid: wp.array(dtype=wp.int32)
     vertices: int
 
 
@@ -197,6 +198,10 @@ def mapped(skin: Skin, posture: Posture, drives: Drives, r: int, v: int, s: floa
     q = wp.quat(0.0, 0.0, 0.0, 0.0)
     scale = 1.0 + palm_share(skin, posture, drives, chain, r, v)
     added = wp.vec3(0.0)
+    hard = skin.rigid[v]
+    if hard >= 0:
+        foot = joint_place(posture, drives, chain, r, hard)
+        q = rotation_at(chain, drives.depth[r, hard], posture.rotations[f, hard])
     for k in range(skin.weight.shape[1]):
         weight = skin.weight[v, k]
         if weight > 0.0:

@@ -24,6 +24,7 @@ class Places:
     across: wp.array(dtype=float)
     between: wp.array(dtype=wp.int32)
     external: wp.array(dtype=wp.int32)
+    rigid: wp.array(dtype=wp.int32)
 
 
 @wp.func
@@ -120,6 +121,10 @@ def express(
 ):
     """Coordinates of vertices in their initial bases (§5.5, R57), and initial lengths of their virtual segments."""
     v = wp.tid()
+    if places.rigid[v] >= 0:
+        coordinates_out[v] = rest[v] - positions[0, places.rigid[v]]
+        virtual_out[v] = 1.0
+        return
     axes = basis(v, places, parameters, positions, original, modified, 0)
     coordinates_out[v] = wp.inverse(axes) * (rest[v] - origin(v, places, positions, 0))
     virtual_out[v] = wp.length(foot(v, 1, places, positions, 0) - foot(v, 0, places, positions, 0))
@@ -187,13 +192,21 @@ def deform_paper(
     original: wp.array3d(dtype=wp.vec3),
     modified: wp.array2d(dtype=wp.vec3),
     flexion_ratio: wp.array2d(dtype=float),
+    rotations: wp.array2d(dtype=wp.quat),
     # out
     points_out: wp.array2d(dtype=wp.vec3),
 ):
-    """Inflated coordinates, re-emitted in the final basis from the final projection (R57)."""
+    """Inflated coordinates, re-emitted in the final basis from the final projection (R57).
+
+    What is rigid goes with the bone that begins at its joint.
+    """
     f, i = wp.tid()
     v = chosen[i]
     local = coordinates[v]
+    hard = places.rigid[v]
+    if hard >= 0:
+        points_out[f, i] = positions[f, hard] + wp.quat_rotate(wp.normalize(rotations[f, hard]), local)
+        return
     if places.between[v] != 0:
         # approaching neighbours: the scale factor's inflation (§4, R44, C3)
         apart = wp.length(foot(v, 1, places, positions, f) - foot(v, 0, places, positions, f))

@@ -4,6 +4,10 @@ import warp as wp
 
 wp.set_module_options({"enable_backward": False})
 
+# part of the way to a segment that must be free: one that ends on the surface, as at a wrist, is seen all the same,
+# and not as float32 happens to put it before or behind
+SHORT_OF = wp.constant(0.98)
+
 
 @wp.func
 def closest_on_segment(point: wp.vec3, start: wp.vec3, end: wp.vec3) -> wp.vec3:
@@ -19,6 +23,7 @@ def nearest_visible_segment(
     points: wp.array(dtype=wp.vec3),
     normals: wp.array(dtype=wp.vec3),
     inset: float,
+    tie: float,
     # segments
     starts: wp.array(dtype=wp.vec3),
     ends: wp.array(dtype=wp.vec3),
@@ -26,26 +31,40 @@ def nearest_visible_segment(
     nearest_out: wp.array(dtype=wp.int32),
     distance_out: wp.array(dtype=float),
 ):
-    """Nearest segment whose closest point is seen without crossing the surface; the nearest of all where none is."""
+    """Nearest segment whose closest point is seen without crossing the surface; the nearest of all where none is.
+
+    Of segments whose distances differ by less than ``tie`` the first one counts as nearest: at a joint two are equally
+    near, and rounding, which is the processor's, must not choose.
+    """
     tid = wp.tid()
     point = points[tid]
     origin = point - inset * normals[tid]
-    passed = float(-1.0)
     first = int(-1)
     first_distance = float(0.0)
     found = int(-1)
     found_distance = float(0.0)
-    for _ in range(starts.shape[0]):
-        # the nearest among those further than the ones already refused
+    level = float(-1.0e30)  # distance of those that are equally near, and
+    last = int(starts.shape[0])  # the last of them that was refused
+    for _ in range(2 * starts.shape[0]):
         best = int(-1)
-        best_distance = float(1.0e30)
-        for s in range(starts.shape[0]):
+        best_distance = float(0.0)
+        for s in range(last + 1, starts.shape[0]):
             distance = wp.length(point - closest_on_segment(point, starts[s], ends[s]))
-            if distance > passed and distance < best_distance:
+            if best < 0 and distance >= level and distance <= level + tie:
                 best = s
                 best_distance = distance
-        if best < 0:
-            break
+        if best < 0:  # all of them refused: on to the nearest of those further away
+            further = float(1.0e30)
+            for s in range(starts.shape[0]):
+                distance = wp.length(point - closest_on_segment(point, starts[s], ends[s]))
+                if distance > level + tie and distance < further:
+                    further = distance
+            if further == 1.0e30:
+                break
+            level = further
+            last = -1
+            continue
+        last = best
         if first < 0:
             first = best
             first_distance = best_distance
@@ -56,14 +75,12 @@ def nearest_visible_segment(
             found = best
             found_distance = best_distance
             break
-        query = wp.mesh_query_ray(mesh, origin, towards / reach, reach * 0.999)
-        if not query.result:
+        if not wp.mesh_query_ray_anyhit(mesh, origin, towards / reach, reach * SHORT_OF):
             found = best
             found_distance = best_distance
             break
-        passed = best_distance
     if found < 0:
-        found = first
+        found = wp.max(first, 0)
         found_distance = first_distance
     nearest_out[tid] = found
     distance_out[tid] = found_distance

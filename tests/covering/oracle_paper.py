@@ -13,6 +13,8 @@ from scipy.spatial.transform import Rotation
 from warpjld.covering import Covering, Parameters
 from warpjld.skeleton import CHANNELS, Poses, Skeleton
 
+SLACK = 1e-9  # of the size, or of a ratio: a vertex that near a border lies on it, and what differs so little is equal
+
 
 @dataclass
 class Pose:
@@ -69,14 +71,16 @@ class Area:
 def places(covering: Covering, vertices: list[int]) -> list[Area]:
     """The area of every vertex."""
     out = []
+    slack = SLACK * covering.surface.size
     for v in vertices:
-        fan = covering.fans[int(covering.domains[v].argmax())]
+        weights = covering.domains[v].tolist()
+        fan = covering.fans[next(f for f, w in enumerate(weights) if w >= max(weights) - 1e-6)]
         segments = [(s.proximal, s.distal) for s in fan.segments]
         vertex = covering.surface.vertices[v]
         if len(segments) == 1:
-            out.append(_alone(covering.skeleton, segments[0], vertex, fan.muscle))
+            out.append(_alone(covering.skeleton, segments[0], vertex, fan.muscle, slack))
         else:
-            out.append(_palm(covering.skeleton, segments, vertex, covering.parameters))
+            out.append(_palm(covering.skeleton, segments, vertex, covering.parameters, slack))
     return out
 
 
@@ -154,26 +158,29 @@ def _inflated(area: Area, local: np.ndarray, still: Pose, pose: Pose, parameters
     return np.array([x, y * (1 + parameters.muscle[p] * profile * (pose.ratio[p] + pose.ratio[d]) / 2), z])
 
 
-def _alone(skeleton: Skeleton, segment: tuple[int, int], vertex: np.ndarray, muscle: bool) -> Area:
+def _alone(skeleton: Skeleton, segment: tuple[int, int], vertex: np.ndarray, muscle: bool, slack: float) -> Area:
     ratio = _ratio(skeleton, segment, vertex)
     side = (vertex - _foot(skeleton.rest, segment, ratio)) @ _straight_normal(skeleton, segment, ratio)
-    return Area(vertex, [segment], [ratio], 0.0, bool(side >= 0.0), muscle)
+    return Area(vertex, [segment], [ratio], 0.0, bool(side > -slack), muscle)
 
 
-def _palm(skeleton: Skeleton, segments: list[tuple[int, int]], vertex: np.ndarray, parameters: Parameters) -> Area:
+def _palm(
+    skeleton: Skeleton, segments: list[tuple[int, int]], vertex: np.ndarray, parameters: Parameters, slack: float
+) -> Area:
     """The nine external and three internal areas of the nearest segment and the neighbour on the vertex's side."""
     ratios = [_ratio(skeleton, s, vertex) for s in segments]
     feet = [_foot(skeleton.rest, s, t) for s, t in zip(segments, ratios, strict=True)]
-    k = int(np.argmin([np.linalg.norm(vertex - foot) for foot in feet]))
+    apart = [float(np.linalg.norm(vertex - foot)) for foot in feet]
+    k = next(i for i, distance in enumerate(apart) if distance <= min(apart) + slack)
     longest = max(np.linalg.norm(skeleton.rest[d] - skeleton.rest[p]) for p, d in segments)
     best, across = None, -np.inf
     for n in (k + 1, k - 1):
         if 0 <= n < len(segments) and np.linalg.norm(feet[n] - feet[k]) > 1e-3 * longest:
             virtual = feet[n] - feet[k]
             r = (vertex - feet[k]) @ virtual / (virtual @ virtual)
-            if r > across:
+            if r > across + SLACK:
                 best, across = n, r
-    own = _alone(skeleton, segments[k], vertex, muscle=False)
+    own = _alone(skeleton, segments[k], vertex, muscle=False, slack=slack)
     if best is None:
         return own
     low, high = 0.0, 1.0
@@ -181,10 +188,10 @@ def _palm(skeleton: Skeleton, segments: list[tuple[int, int]], vertex: np.ndarra
         low, high_width = (_width(segments[i], ratios[i], parameters) for i in (k, best))
         total = max(low + high_width, 1.0)
         low, high = low / total, 1.0 - high_width / total
-    if across <= low:
+    if across <= low + SLACK:
         return own
-    if across >= high:
-        return _alone(skeleton, segments[best], vertex, muscle=False)
+    if across >= high - SLACK:
+        return _alone(skeleton, segments[best], vertex, muscle=False, slack=slack)
     return Area(vertex, [segments[k], segments[best]], [ratios[k], ratios[best]], across, True, False)
 
 
@@ -203,6 +210,9 @@ def _ratio(skeleton: Skeleton, segment: tuple[int, int], vertex: np.ndarray) -> 
     p, d = segment
     along = skeleton.rest[d] - skeleton.rest[p]
     t = float((vertex - skeleton.rest[p]) @ along / (along @ along))
+    for end in (0.0, 1.0):
+        if abs(t - end) < SLACK:
+            return end
     if t < 0.0 and skeleton.parents[p] >= 0:
         return 0.0
     if t > 1.0 and d in skeleton.parents:

@@ -180,8 +180,9 @@ def _place(
             between.append(Between(pair, pa, pb, amount, min(max((ta + tb) / 2, 0.0), 1.0)))
             pair += 1
     # the strongest four, faded by what the fifth has, so that an exchange is not seen
-    candidates.sort(key=lambda c: -c[0])
+    candidates.sort(key=lambda c: -round(c[0], 9))
     threshold = max(candidates[4][0] if len(candidates) > 4 else 0.0, FLOOR)
+    threshold = min(threshold, 0.999 * candidates[0][0])
     total = sum(max(c[0] - threshold, 0.0) for c in candidates[:4])
     operators = [
         _operator(skeleton, p, d, muscle, (weight - threshold) / total, vertex)

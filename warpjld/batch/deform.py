@@ -46,17 +46,9 @@ class Deforming:
     @cached_property
     def covering(self) -> Covering:
         """The rig's surface, bound when it is first wanted; copies sent to other processes take it along."""
-        from warpjld.covering import bind
+        from warpjld.covering import bind_rig
 
-        rig = self.rig
-        return bind(
-            rig.skeleton,
-            rig.surface,
-            parameters=self.parameters,
-            skin=rig.skin,
-            domains=self.domains,
-            method=self.method,
-        )
+        return bind_rig(self.rig, parameters=self.parameters, domains=self.domains, method=self.method)
 
 
 @dataclass(frozen=True, eq=False)

@@ -55,7 +55,7 @@ def command(
     written with PARAMETERS. The result is never worse than the start."""
     from warpjld.cli.progress import progress
     from warpjld.cli.rig_argument import open_rig
-    from warpjld.covering import bind
+    from warpjld.covering import bind_rig
     from warpjld.covering.calibrate import calibrate
     from warpjld.covering.parameters import load_parameters, save_parameters
     from warpjld.covering.pose_sets import calibration_poses
@@ -68,7 +68,7 @@ def command(
     opened = open_rig(rig, **how)
     begin = None if start is None else load_parameters(start, opened.skeleton)
     with progress(quiet) as report:
-        covering = bind(opened.skeleton, opened.surface, parameters=begin, skin=opened.skin, domains=domains)
+        covering = bind_rig(opened, parameters=begin, domains=domains)
         chosen = calibration_poses(opened.skeleton, poses)
         found = calibrate(covering, chosen, iterations=iterations, progress=report)
     save_parameters(out, opened.skeleton, found.parameters)

@@ -114,9 +114,9 @@ def _report(rig: Rig) -> dict[str, Any]:
 
 def _domains(rig: Rig) -> NDArray[np.int64]:
     """Vertices in the domain of each segment, counted at the joint the segment ends at, shape (J,) (R16)."""
-    from warpjld.covering import bind
+    from warpjld.covering import bind_rig
 
-    anchors = bind(rig.skeleton, rig.surface).anchors
+    anchors = bind_rig(rig).anchors
     strongest = anchors.segment[np.arange(len(anchors)), anchors.weight.argmax(axis=1)]
     return np.bincount(anchors.ends[strongest, 1], minlength=len(rig.skeleton))
 

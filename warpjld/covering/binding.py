@@ -30,6 +30,8 @@ SIDE_BAND = 0.75
 # what lies in between then shears over a broad strip
 LATERAL = 0.6
 FLOOR = 2e-2  # weight below which an operator is dropped, faded so that nothing jumps
+_ALIKE = 1e-3  # of the largest weight: operators that differ by less from one left out are not faded any further
+_TIES = 1e-9  # weights that differ by less, as sums in another order do, are equal
 
 
 @dataclass(frozen=True, eq=False)
@@ -50,6 +52,8 @@ class Anchors:
         pair: Palm pairs between which a vertex lies, shape (V, 2), and
         between: how much it lies in between, 0 on either segment, 1 in the middle, shape (V, 2) (R44, R49);
         station: where along the pair, 0 … STATIONS − 1, shape (V, 2).
+        rigid: Joint that a vertex without flesh follows with its bone, -1 for all others, shape (V,). Such a vertex has
+            no weight on any segment.
     """
 
     ends: NDArray[np.int32]
@@ -64,6 +68,7 @@ class Anchors:
     pair: NDArray[np.int32]
     between: NDArray[np.float64]
     station: NDArray[np.float64]
+    rigid: NDArray[np.int32]
 
     def __len__(self) -> int:
         return len(self.rest)
@@ -76,6 +81,7 @@ def anchor(
     domains: NDArray[np.float64],
     parameters: Parameters,
     *,
+    rigid: NDArray[np.int32] | None = None,
     chunk: int = 100_000,
 ) -> Anchors:
     """Place vertices on the segments of their domains.
@@ -86,6 +92,7 @@ def anchor(
         groups: Operators, from :func:`~warpjld.covering.operators.fans`.
         domains: Weight of every fan, shape (V, fans).
         parameters: Their proximities set how wide the palm's in-between areas are (A Fig. 7).
+        rigid: Joint that a vertex follows rigidly, -1 for flesh, shape (V,); all is flesh by default.
         chunk: Vertices placed at a time, which bounds memory.
     """
     ends = segment_ends(groups)
@@ -98,7 +105,10 @@ def anchor(
     joined = [np.concatenate(column) for column in zip(*rows, strict=True)]
     segment, weight, ratio, side, lift, pair, between, station = joined
     muscle = np.array([fan.muscle for fan in groups for _ in fan.segments])
-    return Anchors(ends, muscle, vertices, segment, weight, ratio, side, lift, pairs, pair, between, station)
+    rigid = np.full(len(vertices), -1, dtype=np.int32) if rigid is None else rigid
+    flesh = (rigid < 0)[:, None]
+    weight, between = weight * flesh, between * flesh
+    return Anchors(ends, muscle, vertices, segment, weight, ratio, side, lift, pairs, pair, between, station, rigid)
 
 
 def _neighbour_pairs(groups: tuple[Fan, ...]) -> tuple[NDArray[np.int32], dict[int, int]]:
@@ -209,15 +219,19 @@ def _share_in_fan(
 
 
 def _strongest(weight: NDArray[np.float64]) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
-    """The ``OPERATORS`` largest weights of every row, faded to zero where another would take their place."""
+    """The ``OPERATORS`` largest weights of every row, faded to zero where another would take their place.
+
+    Equal ones go to the first segments; where five and more share a vertex alike, nothing can fade, and the first four
+    share it.
+    """
     keep = min(OPERATORS, weight.shape[1])
-    order = np.argpartition(-weight, keep - 1, axis=1)[:, :keep]
-    order = np.take_along_axis(order, np.argsort(-np.take_along_axis(weight, order, axis=1), axis=1), axis=1)
-    largest = np.take_along_axis(weight, order, axis=1)
-    rest = np.partition(weight, -keep - 1, axis=1)[:, -keep - 1] if weight.shape[1] > keep else 0.0
-    threshold = np.maximum(rest, FLOOR)
-    faded = np.maximum(largest - np.reshape(threshold, (-1, 1)), 0.0)
+    order = np.argsort(-_TIES * np.round(weight / _TIES), axis=1, kind="stable")
+    largest = np.take_along_axis(weight, order[:, :keep], axis=1)
+    rest = np.take_along_axis(weight, order[:, keep : keep + 1], axis=1) if weight.shape[1] > keep else 0.0
+    threshold = np.minimum(np.maximum(rest, FLOOR), (1.0 - _ALIKE) * largest[:, :1])
+    faded = np.maximum(largest - threshold, 0.0)
     faded /= faded.sum(axis=1, keepdims=True)
+    order = order[:, :keep]
     if keep < OPERATORS:
         pad = ((0, 0), (0, OPERATORS - keep))
         order, faded = np.pad(order, pad, mode="edge"), np.pad(faded, pad)

@@ -136,8 +136,10 @@ def calibrate(
     poses = calibration_poses(covering.skeleton) if poses is None else poses
     if not len(poses):
         raise InputError("poses: want at least one to calibrate on")
+    if not len(covering.flesh.faces):
+        raise InputError("calibrate: all of this surface is rigid, nothing is deformed")
     started = time.perf_counter()
-    loss = DeformationLoss(covering.surface, weights)
+    loss = DeformationLoss(covering.flesh, weights)
     variables = _Variables(covering.parameters, default_parameters(covering.skeleton))
     before = pose_quality(covering, poses, loss)
     best, best_quality, best_x = covering.parameters, before, variables.start
@@ -192,11 +194,11 @@ def calibrate(
 
 def pose_quality(covering: Covering, poses: Poses, loss: DeformationLoss | None = None) -> PoseQuality:
     """Quality of a covering over a set of poses; crossings are looked for in as many as are quickly tested."""
-    surface = covering.surface
-    loss = loss or DeformationLoss(surface)
+    surface, flesh = covering.surface, covering.flesh
+    loss = loss or DeformationLoss(flesh)
     points = covering.deform(poses)
-    error = enclosed_volume(points, surface.faces) / enclosed_volume(surface.vertices, surface.faces) - 1.0
-    ratios = edge_stretch(surface.vertices, points, unique_edges(surface.faces))
+    error = enclosed_volume(points, flesh.faces) / enclosed_volume(surface.vertices, flesh.faces) - 1.0
+    ratios = edge_stretch(surface.vertices, points, unique_edges(flesh.faces))
     parts = surface_parts(covering)
     crossings = [crossing_faces(v, surface.faces) for v in points[: max(_FACES_CHECKED // len(surface.faces), 1)]]
     return PoseQuality(

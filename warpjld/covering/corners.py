@@ -17,6 +17,8 @@ _REACH = 0.02  # radius around a corner, relative to the surface's size, within 
 _MARGIN = 1.3  # more than the exponent asks for: cotangents of obtuse triangles are clipped, which spoils it a little
 _SHARP = 1.03  # θ / 2π from which a corner counts: slopes grow by less than this at each halving of the edges otherwise
 _MOST = 4_000  # corners considered, sharpest first: a surface with more of them is noise
+_MOST_PAIRS = 4_000_000  # and triangles near them, all together: where everything lies in one place there is no corner
+_BEST = np.log(1e4)  # conductivity at most, as a logarithm: corners side by side must not add up beyond all numbers
 
 
 def corner_conductivity(vertices: NDArray[np.float64], faces: NDArray[np.int32]) -> NDArray[np.float64]:
@@ -34,12 +36,15 @@ def corner_conductivity(vertices: NDArray[np.float64], faces: NDArray[np.int32])
         return np.exp(exponent)
     reach = _REACH * float(np.linalg.norm(np.ptp(vertices, axis=0)))
     centroids = vertices[faces].mean(axis=1)
-    near = cKDTree(centroids).query_ball_point(vertices[corners], reach)
+    tree = cKDTree(centroids)
+    crowd = np.cumsum(tree.query_ball_point(vertices[corners], reach, return_length=True))
+    corners = corners[crowd <= _MOST_PAIRS]
+    near = tree.query_ball_point(vertices[corners], reach)
     for corner, triangles in zip(corners, near, strict=True):
         distance = np.linalg.norm(centroids[triangles] - vertices[corner], axis=1)
         beta = _MARGIN * (turns[corner] ** -2.0 - 1.0)
         exponent[triangles] += beta * np.log(np.maximum(distance, 1e-6 * reach) / reach)
-    return np.exp(exponent)
+    return np.exp(np.minimum(exponent, _BEST))
 
 
 def _angle_sums(vertices: NDArray[np.float64], faces: NDArray[np.int32]) -> NDArray[np.float64]:

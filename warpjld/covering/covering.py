@@ -15,15 +15,16 @@ from warpjld.covering.domains import domains_from_geometry, domains_from_skin
 from warpjld.covering.drivers import drive
 from warpjld.covering.operators import Fan, fans
 from warpjld.covering.parameters import Parameters, default_parameters
+from warpjld.covering.rigid import domains_of_rigid, flesh_of, part_of_surface
 from warpjld.covering.runs import Runs, pack_runs, palette
 from warpjld.errors import InputError
-from warpjld.rig import Skin
+from warpjld.rig import Rig, Skin
 from warpjld.skeleton.kinematics import Poses
 from warpjld.skeleton.tree import Skeleton
 from warpjld.surface import Surface
 from warpjld.threads import in_threads, threads_for
 
-__all__ = ["Covering", "bind"]
+__all__ = ["Covering", "bind", "bind_rig"]
 
 _SPLIT_BELOW = 200_000  # vertex-frames a thread must have before splitting pays
 
@@ -36,7 +37,7 @@ class Covering:
         surface: The rest surface.
         parameters: The animator's parameters in use.
         fans: The operators.
-        domains: Weight of every operator at every vertex, shape (V, fans).
+        domains: Weight of every operator at every vertex, shape (V, fans); of what is rigid, which it is counted with.
         anchors: Places of the vertices on their segments.
     """
 
@@ -60,8 +61,15 @@ class Covering:
     def with_parameters(self, parameters: Parameters) -> Covering:
         """The same binding with other parameters; domains are not computed again."""
         parameters.check(self.skeleton)
-        anchors = anchor(self.surface.vertices, self.skeleton, self.fans, self.domains, parameters)
+        anchors = anchor(
+            self.surface.vertices, self.skeleton, self.fans, self.domains, parameters, rigid=self.anchors.rigid
+        )
         return type(self)(self.skeleton, self.surface, parameters, self.fans, self.domains, anchors)
+
+    @cached_property
+    def flesh(self) -> Surface:
+        """The rest surface without what is rigid: what keeps its volume or not. Vertices keep their numbers."""
+        return flesh_of(self.surface, self.anchors.rigid)
 
     @cached_property
     def runs(self) -> Runs:
@@ -231,6 +239,7 @@ def bind(
     *,
     parameters: Parameters | None = None,
     skin: Skin | None = None,
+    rigid: NDArray[np.int32] | None = None,
     domains: Literal["geometry", "skin"] | NDArray[np.float64] = "geometry",
     method: Literal["smooth", "paper"] = "smooth",
 ) -> Covering:
@@ -241,6 +250,8 @@ def bind(
         surface: The rest surface, in the skeleton's frame.
         parameters: The animator's parameters; by default those that keep volume.
         skin: Painted weights, wanted by ``domains="skin"``.
+        rigid: Joint that a vertex without flesh follows with its bone, -1 for flesh, shape (V,). What is rigid takes no
+            part in domains: eyes in a head neither hide bones from its skin nor heat it.
         domains: "geometry" (bone heat), "skin" (painted weights), or weights of every operator, shape (V, fans).
         method: "smooth" (soft borders, rotations) or "paper" (its own hard-edged operators, to compare).
 
@@ -254,19 +265,60 @@ def bind(
         raise InputError("skeleton: it has no segment to cover")
     chosen = default_parameters(skeleton) if parameters is None else parameters
     chosen.check(skeleton)
+    hard = _checked_rigid(rigid, len(surface.vertices), len(skeleton))
     if isinstance(domains, np.ndarray):
         weights = domains
-    elif domains == "geometry":
-        weights = domains_from_geometry(surface.vertices, surface.faces, skeleton, groups)
-    elif domains == "skin":
-        if skin is None:
-            raise InputError("domains 'skin': this rig has no painted weights")
-        weights = domains_from_skin(surface.vertices, skeleton, groups, skin)
-    else:
+    elif domains not in ("geometry", "skin"):
         raise InputError(f"domains: want 'geometry' or 'skin', got {domains!r}")
-    anchors = anchor(surface.vertices, skeleton, groups, weights, chosen)
+    elif domains == "skin" and skin is None:
+        raise InputError("domains 'skin': this rig has no painted weights")
+    else:
+        weights = domains_of_rigid(hard, skeleton, groups)
+        if (flesh := np.flatnonzero(hard < 0)).size:
+            vertices, faces = part_of_surface(surface.vertices, surface.faces, flesh)
+            if domains == "geometry" or skin is None:
+                weights[flesh] = domains_from_geometry(vertices, faces, skeleton, groups)
+            else:
+                painted = Skin(skin.joints[flesh], skin.weights[flesh])
+                weights[flesh] = domains_from_skin(vertices, faces, skeleton, groups, painted)
+    anchors = anchor(surface.vertices, skeleton, groups, weights, chosen, rigid=hard)
     if method == "paper":
         from warpjld.covering.paper import PaperCovering
 
         return PaperCovering(skeleton, surface, chosen, groups, weights, anchors)
     return Covering(skeleton, surface, chosen, groups, weights, anchors)
+
+
+def bind_rig(
+    rig: Rig,
+    *,
+    skeleton: Skeleton | None = None,
+    parameters: Parameters | None = None,
+    domains: Literal["geometry", "skin"] = "geometry",
+    method: Literal["smooth", "paper"] = "smooth",
+) -> Covering:
+    """Bind a rig with all that it knows: its painted weights, and what of it is rigid. Arguments as of :func:`bind`.
+
+    Args:
+        rig: The rig.
+        skeleton: In place of the rig's own, where limits were changed.
+    """
+    return bind(
+        rig.skeleton if skeleton is None else skeleton,
+        rig.surface,
+        parameters=parameters,
+        skin=rig.skin,
+        rigid=rig.rigid,
+        domains=domains,
+        method=method,
+    )
+
+
+def _checked_rigid(rigid: NDArray[np.int32] | None, vertices: int, joints: int) -> NDArray[np.int32]:
+    if rigid is None:
+        return np.full(vertices, -1, dtype=np.int32)
+    if rigid.shape != (vertices,):
+        raise InputError(f"rigid: want a joint for each of {vertices} vertices, got shape {rigid.shape}")
+    if rigid.min(initial=-1) < -1 or rigid.max(initial=-1) >= joints:
+        raise InputError(f"rigid: joints must lie in -1…{joints - 1}")
+    return np.asarray(rigid, dtype=np.int32)

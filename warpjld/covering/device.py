@@ -48,6 +48,7 @@ def anchors_on(device: wp.Device, anchors: Anchors, rest_joints: np.ndarray) -> 
         ("pair", wp.int32),
         ("between", float),
         ("station", float),
+        ("rigid", wp.int32),
     ):
         setattr(out, name, array_on(device, getattr(anchors, name), kind))
     out.rest_joints = array_on(device, rest_joints, wp.vec3)

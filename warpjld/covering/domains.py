@@ -9,18 +9,20 @@ from __future__ import annotations
 import numpy as np
 import scipy.sparse as sp
 from numpy.typing import NDArray
-from scipy.sparse.linalg import splu
 
-from warpjld.covering.corners import corner_conductivity
-from warpjld.covering.operators import Fan
+from warpjld.covering.heat import cotangent_laplacian, solve, uniform_laplacian
+from warpjld.covering.operators import Fan, segment_ends
 from warpjld.errors import InputError
 from warpjld.normals import vertex_normals
 from warpjld.rig import Skin
 from warpjld.skeleton.tree import Skeleton
+from warpjld.spread import spread
 
 __all__ = ["domains_from_geometry", "domains_from_skin"]
 
-_DIRECT_LIMIT = 20_000  # vertices up to which a sparse factorisation is quicker than multigrid
+_LARGEST = 10.0  # skeletons: what lies further out says nothing of how large a surface is
+_NOTHING = 1e-6  # painted weight below which a vertex counts as bare
+_TIE = 1e-5  # of the surface's size: segments whose distances differ by less, as float32 does, are equally near
 
 
 def domains_from_geometry(
@@ -34,34 +36,60 @@ def domains_from_geometry(
     """Weight of every fan at every vertex, rows summing to one, shape (V, fans).
 
     Solves (L + A H) w = A H p: L the cotangent Laplacian, A vertex areas, p the nearest visible fan,
-    H = contrast / distance². A larger contrast gives sharper borders.
+    H = contrast / distance². A larger contrast gives sharper borders. Where angles and areas of a broken mesh give no
+    solution, all its edges conduct alike.
+
+    Raises:
+        InputError: Not even so.
     """
-    owner, distance = _nearest_visible(vertices, faces, skeleton, groups)
-    size = float(np.linalg.norm(np.ptp(vertices, axis=0)))
-    laplacian, area = _cotangent_laplacian(vertices, faces)
-    heat = area * contrast / np.maximum(distance, 1e-4 * size) ** 2
-    matrix = (laplacian + sp.diags_array(heat)).tocsc()
+    # lengths count relative to the skeleton's: neither a unit nor a place far from the origin may cost digits
+    centre, unit = skeleton.rest.mean(axis=0), float(np.linalg.norm(np.ptp(skeleton.rest, axis=0)))
+    points = (vertices - centre) / unit
+    faces = _distinct(faces)
+    size = min(float(np.linalg.norm(np.ptp(points, axis=0))), _LARGEST)
+    owner, distance = _nearest_visible(points, faces, (skeleton.rest - centre) / unit, groups, size)
+    size = max(size, 1e-3)
+    # far from every segment heat is not let run further than over the whole surface
+    demand = contrast / np.clip(distance, 1e-4 * size, size) ** 2
     source = np.zeros((len(vertices), len(groups)))
-    source[np.arange(len(vertices)), owner] = heat
+    source[np.arange(len(vertices)), owner] = 1.0
     present = np.flatnonzero(source.any(axis=0))
-    weights = np.zeros_like(source)
-    weights[:, present] = _solve(matrix, source[:, present])
-    weights = np.maximum(weights, 0.0)
-    return weights / weights.sum(axis=1, keepdims=True)
+    laplacian, area = cotangent_laplacian(points, faces)
+    for conducting, cover in (
+        (lambda: laplacian, area),
+        (lambda: uniform_laplacian(faces, len(vertices)), np.full(len(vertices), area.mean())),
+    ):
+        heat = cover * demand
+        weights = np.zeros_like(source)
+        found = solve(conducting() + sp.diags_array(heat), heat[:, None] * source[:, present])
+        if found is not None and (total := np.maximum(found, 0.0).sum(axis=1)).min() > 0.5:
+            weights[:, present] = np.maximum(found, 0.0) / total[:, None]
+            return weights
+    raise InputError(
+        "domains: heat does not settle on this surface; try --domains skin if the rig has painted weights, or mend the "
+        "mesh (merge vertices that coincide, remove faces without area and vertices far from all others)"
+    )
 
 
 def domains_from_skin(
-    vertices: NDArray[np.float64], skeleton: Skeleton, groups: tuple[Fan, ...], skin: Skin
+    vertices: NDArray[np.float64],
+    faces: NDArray[np.int32],
+    skeleton: Skeleton,
+    groups: tuple[Fan, ...],
+    skin: Skin,
 ) -> NDArray[np.float64]:
     """Painted weights as domains, shape (V, fans): the weight of a joint goes to the segments its bone carries.
 
     Where a bone carries segments of several fans the nearer ones get more, by inverse fourth power of the distance.
+    A vertex without weight on any segment takes its neighbours'.
 
     Raises:
-        InputError: Painted weights of another surface.
+        InputError: Painted weights of another surface, weights that are not finite, or none on any segment.
     """
     if skin.joints.shape != skin.weights.shape or len(skin.joints) != len(vertices):
         raise InputError(f"skin: want joints and weights of shape ({len(vertices)}, K), got {skin.weights.shape}")
+    if not np.isfinite(skin.weights).all():
+        raise InputError(f"skin: the weights of vertex {np.argwhere(~np.isfinite(skin.weights))[0][0]} are not finite")
     painted = np.zeros((len(vertices), len(skeleton)))
     np.add.at(painted, (np.arange(len(vertices))[:, None], skin.joints), skin.weights)
     carried = [
@@ -76,12 +104,14 @@ def domains_from_skin(
         touched = np.flatnonzero(painted[:, j])
         if not targets or not touched.size:
             continue
-        closeness = np.column_stack([_fan_distance(vertices[touched], skeleton, groups[f]) ** -4.0 for f in targets])
+        apart = np.column_stack([_fan_distance(vertices[touched], skeleton, groups[f]) for f in targets])
+        closeness = (apart.min(axis=1, keepdims=True) / apart) ** 4
         out[touched[:, None], targets] += painted[touched, j, None] * closeness / closeness.sum(axis=1, keepdims=True)
-    total = out.sum(axis=1, keepdims=True)
-    if (bare := np.flatnonzero(total[:, 0] <= 0.0)).size:
-        raise InputError(f"skin: vertex {bare[0]} has no painted weight on any segment")
-    return out / total
+    known = out.sum(axis=1) > _NOTHING
+    if not known.any():
+        raise InputError("skin: no vertex has painted weight on any segment; use --domains geometry")
+    out[known] /= out[known].sum(axis=1, keepdims=True)
+    return spread(out, known, vertices, faces)
 
 
 def _fan_distance(points: NDArray[np.float64], skeleton: Skeleton, fan: Fan) -> NDArray[np.float64]:
@@ -93,81 +123,42 @@ def _fan_distance(points: NDArray[np.float64], skeleton: Skeleton, fan: Fan) -> 
     return np.maximum(np.min(distances, axis=0), 1e-9)
 
 
+def _distinct(faces: NDArray[np.int32]) -> NDArray[np.int32]:
+    """Faces whose corners differ, each once whichever way round: doubled ones conduct twice."""
+    corners = np.sort(faces, axis=1)
+    solid = np.flatnonzero((corners[:, 0] < corners[:, 1]) & (corners[:, 1] < corners[:, 2]))
+    first = np.unique(corners[solid], axis=0, return_index=True)[1]
+    if not first.size:
+        return faces
+    kept: NDArray[np.int32] = faces[solid[np.sort(first)]]
+    return kept
+
+
 def _nearest_visible(
-    vertices: NDArray[np.float64], faces: NDArray[np.int32], skeleton: Skeleton, groups: tuple[Fan, ...]
+    points: NDArray[np.float64],
+    faces: NDArray[np.int32],
+    joints: NDArray[np.float64],
+    groups: tuple[Fan, ...],
+    size: float,
 ) -> tuple[NDArray[np.int32], NDArray[np.float64]]:
+    """Fan of the nearest segment that each point sees from inside, and its distance."""
     import warp as wp
     from warpjld_kernels.visibility import nearest_visible_segment
 
-    centre = vertices.mean(axis=0)  # float32 rays stay exact far from the origin
-    segments = [s for fan in groups for s in fan.segments]
+    ends = segment_ends(groups)
     fan_of = np.array([f for f, fan in enumerate(groups) for _ in fan.segments])
     device = "cpu"
-    points = wp.array((vertices - centre).astype(np.float32), dtype=wp.vec3, device=device)
-    mesh = wp.Mesh(points, wp.array(faces.ravel(), dtype=wp.int32, device=device))
-    starts, ends = (
-        wp.array(
-            (skeleton.rest[[getattr(s, e) for s in segments]] - centre).astype(np.float32),
-            dtype=wp.vec3,
-            device=device,
-        )
-        for e in ("proximal", "distal")
-    )
-    normals = wp.array(vertex_normals(vertices, faces), dtype=wp.vec3, device=device)
-    nearest = wp.empty(len(vertices), dtype=wp.int32, device=device)
-    distance = wp.empty(len(vertices), dtype=float, device=device)
-    inset = 1e-4 * float(np.linalg.norm(np.ptp(vertices, axis=0)))
+    places = wp.array(points.astype(np.float32), dtype=wp.vec3, device=device)
+    mesh = wp.Mesh(places, wp.array(faces.ravel(), dtype=wp.int32, device=device))
+    tips = [wp.array(joints[ends[:, k]].astype(np.float32), dtype=wp.vec3, device=device) for k in (0, 1)]
+    normals = wp.array(vertex_normals(points, faces), dtype=wp.vec3, device=device)
+    nearest = wp.empty(len(points), dtype=wp.int32, device=device)
+    distance = wp.empty(len(points), dtype=float, device=device)
     wp.launch(
         nearest_visible_segment,
-        dim=len(vertices),
-        inputs=[mesh.id, points, normals, inset, starts, ends],
+        dim=len(points),
+        inputs=[mesh.id, places, normals, 1e-4 * size, _TIE * size, *tips],
         outputs=[nearest, distance],
         device=device,
     )
     return fan_of[nearest.numpy()], distance.numpy().astype(np.float64)
-
-
-def _cotangent_laplacian(
-    vertices: NDArray[np.float64], faces: NDArray[np.int32]
-) -> tuple[sp.csr_array, NDArray[np.float64]]:
-    """Positive semidefinite cotangent Laplacian and barycentric vertex areas.
-
-    Cotangents are kept within (0, 1e3): a weight of the wrong sign would let heat run uphill. Around saddle corners
-    heat is conducted better, so that weights have no spike there.
-    """
-    count = len(vertices)
-    conductivity = corner_conductivity(vertices, faces)
-    rows, columns, values = [], [], []
-    area = np.zeros(count)
-    for k in range(3):
-        apex, i, j = faces[:, k], faces[:, (k + 1) % 3], faces[:, (k + 2) % 3]
-        u, v = vertices[i] - vertices[apex], vertices[j] - vertices[apex]
-        twice = np.linalg.norm(np.cross(u, v), axis=1)
-        cotangent = np.clip((u * v).sum(axis=1) / np.maximum(twice, 1e-30), 1e-3, 1e3) / 2.0
-        cotangent *= conductivity
-        rows += [i, j]
-        columns += [j, i]
-        values += [-cotangent, -cotangent]
-        np.add.at(area, apex, twice / 6.0)
-    off = sp.coo_array(
-        (np.concatenate(values), (np.concatenate(rows), np.concatenate(columns))), shape=(count, count)
-    ).tocsr()
-    positive = area[area > 0.0]
-    area = np.maximum(area, 1e-6 * positive.mean())  # vertices no face uses still belong somewhere
-    return off + sp.diags_array(-np.asarray(off.sum(axis=1)).ravel()), area
-
-
-def _solve(matrix: sp.csc_array, right: NDArray[np.float64]) -> NDArray[np.float64]:
-    if matrix.shape[0] <= _DIRECT_LIMIT:
-        factors = splu(matrix, permc_spec="MMD_AT_PLUS_A", options={"SymmetricMode": True})
-        solution: NDArray[np.float64] = factors.solve(right)
-        return solution
-    import pyamg
-
-    multigrid = pyamg.smoothed_aggregation_solver(sp.csr_matrix(matrix))
-    out = np.empty_like(right)
-    for k in range(right.shape[1]):
-        out[:, k], info = multigrid.solve(right[:, k], tol=1e-7, accel="cg", maxiter=200, return_info=True)
-        if info:
-            raise InputError(f"domains: heat did not settle in {info} iterations; is the mesh badly broken?")
-    return out

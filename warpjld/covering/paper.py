@@ -72,7 +72,8 @@ class PaperCovering(Covering):
     @cached_property
     def places(self) -> PaperPlaces:
         """Where the vertices lie on their segment or palm pair, and in which area."""
-        return paper_places(self.surface.vertices, self.skeleton, self.fans, self.domains, self.parameters)
+        where = (self.surface.vertices, self.skeleton, self.fans, self.domains, self.parameters)
+        return paper_places(*where, self.anchors.rigid)
 
     def points(self, poses: Poses, vertices: ArrayLike, *, device: str = "cpu") -> NDArray[np.float32]:
         """Final positions of chosen vertices only [m], shape (F, n, 3) (R74)."""
@@ -88,9 +89,8 @@ class PaperCovering(Covering):
     def _palette(self, poses: Poses) -> Any:
         self.check(poses)
         normals = paper_normals(self.skeleton, self.places.ends, poses.rotations)
-        return PaperPose(
-            poses.positions, normals.original, normals.modified, flexion_ratio(self.skeleton, poses.flexion)
-        )
+        ratio = flexion_ratio(self.skeleton, poses.flexion)
+        return PaperPose(poses.positions, normals.original, normals.modified, ratio, poses.rotations)
 
     @property
     def run_surface(self) -> Surface:
@@ -133,7 +133,7 @@ class PaperCovering(Covering):
         normals = paper_normals(self.skeleton, self.places.ends, still)
         count = len(self.surface.vertices)
         outputs = [wp.empty(count, dtype=wp.vec3, device=device), wp.empty(count, dtype=float, device=device)]
-        pose = PaperPose(self.skeleton.rest[None], normals.original, normals.modified, np.zeros((1, 1)))
+        pose = PaperPose(self.skeleton.rest[None], normals.original, normals.modified, np.zeros((1, 1)), still)
         rest = array_on(device, self.surface.vertices, wp.vec3)
         wp.launch(
             paper.express,
@@ -147,12 +147,14 @@ class PaperCovering(Covering):
 
 @dataclass(frozen=True, eq=False)
 class PaperPose:
-    """What F poses give the paper's operators: positions (F, J, 3), normals, and flexion ratios (F, J)."""
+    """What F poses give the paper's operators: positions (F, J, 3), normals, flexion ratios (F, J), and rotations
+    (F, J, 4), which only what is rigid asks for."""
 
     positions: NDArray[np.float64]
     original: NDArray[np.float64]
     modified: NDArray[np.float64]
     flexion_ratio: NDArray[np.float64]
+    rotations: NDArray[np.float64]
 
     def __len__(self) -> int:
         return len(self.positions)
@@ -162,4 +164,8 @@ class PaperPose:
         import warp as wp
 
         vectors = (self.positions, self.original, self.modified)
-        return [*(array_on(device, a, wp.vec3) for a in vectors), array_on(device, self.flexion_ratio, float)]
+        return [
+            *(array_on(device, a, wp.vec3) for a in vectors),
+            array_on(device, self.flexion_ratio, float),
+            array_on(device, self.rotations, wp.quat),
+        ]

@@ -9,10 +9,12 @@ from numpy.typing import NDArray
 
 from warpjld.covering.operators import Fan, segment_ends
 from warpjld.covering.parameters import Parameters
-from warpjld.covering.segment_table import SegmentTable
+from warpjld.covering.segment_table import SNAP, SegmentTable
 from warpjld.skeleton.tree import Skeleton
 
 __all__ = ["PaperPlaces", "paper_places"]
+
+_SAME_DOMAIN = 1e-6  # weights of operators that differ by less, as solvers leave it, are equal
 
 
 @dataclass(frozen=True, eq=False)
@@ -27,6 +29,7 @@ class PaperPlaces:
         across: Its projection on the virtual segment from the one to the other, shape (V,) (R53).
         between: Whether it lies in areas 2, 5, 8 of the palm, shape (V,) (R49).
         external: Whether it lies on the external side, shape (V,) (R45).
+        rigid: Joint that a vertex follows with its bone, -1 for those that the rest is about, shape (V,).
     """
 
     ends: NDArray[np.int32]
@@ -36,6 +39,7 @@ class PaperPlaces:
     across: NDArray[np.float64]
     between: NDArray[np.bool_]
     external: NDArray[np.bool_]
+    rigid: NDArray[np.int32]
 
 
 def paper_places(
@@ -44,6 +48,7 @@ def paper_places(
     groups: tuple[Fan, ...],
     domains: NDArray[np.float64],
     parameters: Parameters,
+    rigid: NDArray[np.int32] | None = None,
 ) -> PaperPlaces:
     """Give every vertex to its strongest operator, and inside the palm to one of the nine areas (A Fig. 7).
 
@@ -51,12 +56,17 @@ def paper_places(
     External vertices within the proximity of either segment belong to it (columns 1-4-7 and 3-6-9), else they lie in
     between. Internal vertices lie in between where they project on the virtual segment: no proximities there (C10).
 
+    Borders and ties are decided with a margin, so that every processor decides alike: of equal operators and segments
+    the first is taken, of equal neighbours the one after; a vertex on the border between outside and inside is
+    external, and one on the border of an area in between belongs to the segment.
+
     Args:
         vertices: Rest positions [m], shape (V, 3).
         skeleton: The rest skeleton.
         groups: Operators, from :func:`~warpjld.covering.operators.fans`.
         domains: Weight of every fan, shape (V, fans).
         parameters: Their proximities bound the areas.
+        rigid: Joint that a vertex follows rigidly, -1 for flesh, shape (V,); all is flesh by default.
     """
     ends = segment_ends(groups)
     table = SegmentTable.build(skeleton, ends)
@@ -64,7 +74,8 @@ def paper_places(
     ratio = table.project(vertices)
     segment = np.zeros((count, 2), dtype=np.int32)
     across, between = np.zeros(count), np.zeros(count, dtype=bool)
-    owner = domains.argmax(axis=1)
+    owner = _first_largest(domains, _SAME_DOMAIN)
+    tie = SNAP * float(np.linalg.norm(np.ptp(vertices, axis=0)))
     first = 0
     for f, fan in enumerate(groups):
         size = len(fan.segments)
@@ -72,13 +83,14 @@ def paper_places(
         segment[mine] = first
         if size > 1 and mine.size:
             inside = slice(first, first + size)
-            chosen = _palm_place(vertices[mine], table, ratio[mine, inside], inside, parameters)
+            chosen = _palm_place(vertices[mine], table, ratio[mine, inside], inside, parameters, tie)
             segment[mine], across[mine], between[mine] = first + chosen[0], chosen[1], chosen[2]
         first += size
     both = np.take_along_axis(ratio, segment, axis=1)
-    external = _height(vertices, table, segment, both, np.where(between, across, 0.0)) >= 0.0
+    external = _height(vertices, table, segment, both, np.where(between, across, 0.0)) >= -tie
     muscle = np.array([fan.muscle for fan in groups for _ in fan.segments])
-    return PaperPlaces(ends, muscle, segment, both, across, between, external)
+    rigid = np.full(count, -1, dtype=np.int32) if rigid is None else rigid
+    return PaperPlaces(ends, muscle, segment, both, across, between, external, rigid)
 
 
 def _palm_place(
@@ -87,12 +99,13 @@ def _palm_place(
     ratio: NDArray[np.float64],
     inside: slice,
     parameters: Parameters,
+    tie: float,
 ) -> tuple[NDArray[np.int64], NDArray[np.float64], NDArray[np.bool_]]:
     """Segment and neighbour counted from the fan's first, the ratio across, and whether in between."""
     rows = np.arange(len(points))
     feet = table.start[inside] + ratio[..., None] * table.along[inside]
     size = feet.shape[1]
-    nearest = np.linalg.norm(points[:, None] - feet, axis=2).argmin(axis=1)
+    nearest = _first_largest(-np.linalg.norm(points[:, None] - feet, axis=2), tie)
 
     def towards(neighbour: NDArray[np.int64]) -> NDArray[np.float64]:
         virtual = feet[rows, neighbour] - feet[rows, nearest]
@@ -103,8 +116,8 @@ def _palm_place(
 
     before, after = np.maximum(nearest - 1, 0), np.minimum(nearest + 1, size - 1)
     back, forth = towards(before), towards(after)
-    neighbour = np.where(back > forth, before, after)
-    across = np.maximum(back, forth)
+    neighbour = np.where(back > forth + SNAP, before, after)
+    across = np.where(back > forth + SNAP, back, forth)
 
     place = np.clip(ratio, 0.0, 1.0)
     joints = table.ends[inside]
@@ -113,14 +126,20 @@ def _palm_place(
     total = np.maximum(here + there, 1.0)  # wide proximities leave nothing in between
     alone = np.isneginf(across)
     normal = _blended(table, inside.start + nearest, place[rows, nearest])
-    external = ((points - feet[rows, nearest]) * normal).sum(axis=1) >= 0.0
+    external = ((points - feet[rows, nearest]) * normal).sum(axis=1) >= -tie
     low = np.where(external, here / total, 0.0)
     high = np.where(external, 1.0 - there / total, 1.0)
-    between = ~alone & (across > low) & (across < high)
-    on_neighbour = ~alone & (across >= high)  # a wrong assignment is mended here (R68)
+    between = ~alone & (across > low + SNAP) & (across < high - SNAP)
+    on_neighbour = ~alone & (across > low + SNAP) & (across >= high - SNAP)  # a wrong assignment is mended here (R68)
     segment = np.where(on_neighbour, neighbour, nearest)
     other = np.where(on_neighbour, nearest, neighbour)
     return np.column_stack([segment, other]), np.where(between, across, 0.0), between
+
+
+def _first_largest(values: NDArray[np.float64], tie: float) -> NDArray[np.int64]:
+    """Column of the first of the values that are largest but for ``tie``, of every row."""
+    first: NDArray[np.int64] = (values >= values.max(axis=1, keepdims=True) - tie).argmax(axis=1)
+    return first
 
 
 def _height(

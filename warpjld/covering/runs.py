@@ -173,6 +173,9 @@ def _scalar_coefficients(
         (columns.flexion_ratio + proximal, rounding[..., 0]),
         (columns.flexion_ratio + distal, rounding[..., 1]),
     ]
+    hard = (anchors.rigid >= 0).astype(np.float64)[:, None]
+    joint = np.maximum(anchors.rigid, 0)[:, None]
+    entries += [(3 * joint, hard), (columns.rotations + 4 * joint, hard)]
     if columns.pairs:
         low = np.minimum(anchors.station.astype(int), STATIONS - 2)
         part = anchors.station - low

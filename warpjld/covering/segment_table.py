@@ -10,7 +10,11 @@ from numpy.typing import NDArray
 from warpjld.rotations import unit
 from warpjld.skeleton.tree import Skeleton
 
-__all__ = ["SegmentTable"]
+__all__ = ["SNAP", "SegmentTable"]
+
+SNAP = 1e-9
+"""Ratios, and heights relative to the surface's size, that differ by less are equal: what rounding, which differs from
+processor to processor, may not decide."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -43,7 +47,8 @@ class SegmentTable:
         lengths = np.linalg.norm(normals, axis=2, keepdims=True)
         # an axis along the segment says nothing of its sides: take the other end's, or any normal
         normals = np.where(lengths > 1e-3, normals / np.maximum(lengths, 1e-30), normals[:, ::-1])
-        fallback = np.cross(direction, np.eye(3)[np.abs(direction).argmin(axis=1)])
+        # of two axes equally far from the segment the first, however the last digits fall
+        fallback = np.cross(direction, np.eye(3)[np.abs(direction).round(6).argmin(axis=1)])
         lengths = np.linalg.norm(normals, axis=2, keepdims=True)
         normals = np.where(lengths > 1e-3, normals / np.maximum(lengths, 1e-30), fallback[:, None, :])
         leaf = np.array([not skeleton.children[d] for d in ends[:, 1]])
@@ -53,5 +58,6 @@ class SegmentTable:
     def project(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
         """Ratio of every point on every segment, shape (V, S), clamped except beyond extremities (R37, C1)."""
         t = (points @ self.along.T - (self.start * self.along).sum(axis=1)) / (self.along**2).sum(axis=1)
+        t = np.where(np.abs(t) < SNAP, 0.0, np.where(np.abs(t - 1.0) < SNAP, 1.0, t))
         t = np.where((t < 0.0) & ~self.open_start, 0.0, t)
         return np.where((t > 1.0) & ~self.open_end, 1.0, t)

@@ -93,6 +93,7 @@ def skin_on(device: Any, coverings: Sequence[Covering]) -> Any:
         ("pair", wp.int32),
         ("between", float),
         ("station", float),
+        ("rigid", wp.int32),
     ):
         setattr(skin, name, array_on(device, np.concatenate([getattr(a, name) for a in anchors]), kind))
     skin.ends = array_on(device, anchors[0].ends, wp.int32)

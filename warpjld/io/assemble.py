@@ -10,17 +10,20 @@ from numpy.typing import NDArray
 
 from warpjld.errors import InputError
 from warpjld.io.placement import place
+from warpjld.io.rigid_parts import rigid_parts
 from warpjld.io.source import SourceRig
 from warpjld.rig import Rig, Skin
 from warpjld.skeleton.recognise.canonical import Canonical, canonical_skeleton
 from warpjld.skeleton.recognise.flesh import flesh_shares
 from warpjld.skeleton.recognise.painted import Painted
 from warpjld.skeleton.recognise.recognise import recognise
+from warpjld.spread import spread
 from warpjld.surface import Surface, weld_surface
 
 __all__ = ["assemble_rig"]
 
 _FURTHEST = 1e12
+_NO_WEIGHT = 1e-6  # sum of painted weights below which a vertex has none
 
 
 def assemble_rig(
@@ -77,9 +80,10 @@ def _assemble(
         axes=source.axes,
         limits=source.limits,
     )
-    skin = None
+    skin, bare = None, 0
     if source.joints is not None and source.weights is not None:
-        skin = _skin(source.joints, source.weights, found.owner, len(found.skeleton), surface)
+        skin, bare = _skin(source.joints, source.weights, found.owner, len(found.skeleton), surface)
+    rigid, rigid_notes = rigid_parts(surface, found.skeleton, skin, _rigid(source, found.owner, surface))
     return Rig(
         name=source.path.stem,
         skeleton=found.skeleton,
@@ -90,8 +94,8 @@ def _assemble(
         sources=found.sources,
         owner=_movers(source, found),
         placing=source.placing,
-        rigid=_rigid(source, found.owner, surface),
-        notes=(*source.notes, *found.notes),
+        rigid=rigid,
+        notes=(*source.notes, *found.notes, *_bare(bare, skin), *rigid_notes),
         suspicious=(*source.suspicious, *found.suspicious),
     )
 
@@ -118,15 +122,31 @@ def _stated(source: SourceRig, by_hand: Mapping[str, Any]) -> dict[str, Any]:
 
 def _skin(
     joints: NDArray[np.int64], weights: NDArray[np.float64], owner: NDArray[np.int64], count: int, surface: Surface
-) -> Skin:
-    """Painted weights over welded vertices and canonical joints; vertices welded into one share their mean."""
+) -> tuple[Skin | None, int]:
+    """Painted weights over welded vertices and canonical joints, and how many vertices had none.
+
+    Vertices welded into one share their mean; those without weight take their neighbours'. None where no vertex has
+    any.
+    """
     dense = np.zeros((len(surface.vertices), count))
     np.add.at(dense, (surface.weld[:, None], owner[joints]), weights)
-    dense /= dense.sum(axis=1, keepdims=True)
+    total = dense.sum(axis=1)
+    known = total > _NO_WEIGHT
+    bare = int((~known).sum())
+    if bare == len(known):
+        return None, bare
+    dense[known] /= total[known, None]
+    dense = spread(dense, known, surface.vertices, surface.faces)
     width = int((dense > 0).sum(axis=1).max())
     strongest = np.argsort(-dense, axis=1, kind="stable")[:, :width]
     chosen = np.take_along_axis(dense, strongest, axis=1)
-    return Skin(np.where(chosen > 0, strongest, strongest[:, :1]).astype(np.int32), chosen)
+    return Skin(np.where(chosen > 0, strongest, strongest[:, :1]).astype(np.int32), chosen), bare
+
+
+def _bare(count: int, skin: Skin | None) -> tuple[str, ...]:
+    if skin is None and count:
+        return ("no vertex has any painted weight: the weights were left out",)
+    return (f"{count} vertices without painted weight take their neighbours'",) if count else ()
 
 
 def _rigid(source: SourceRig, owner: NDArray[np.int64], surface: Surface) -> NDArray[np.int32] | None:

@@ -14,19 +14,17 @@ __all__ = ["cover"]
 
 def cover(actor: Actor) -> Covering:
     """The covering of an actor with its parameters, method and domains."""
-    from warpjld.covering import bind
+    from warpjld.covering import bind_rig
 
     old = actor.covering
     if old is not None and old.skeleton is actor.skeleton and actor.covered == (actor.method, actor.domains):
         if old.parameters is not actor.parameters:
             actor.covering = old.with_parameters(actor.parameters)
     else:
-        rig = actor.rig
-        actor.covering = bind(
-            actor.skeleton,
-            rig.surface,
+        actor.covering = bind_rig(
+            actor.rig,
+            skeleton=actor.skeleton,
             parameters=actor.parameters,
-            skin=rig.skin,
             domains=actor.domains,
             method=actor.method,
         )

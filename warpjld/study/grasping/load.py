@@ -9,7 +9,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from warpjld.covering import Covering, bind
+from warpjld.covering import Covering, bind_rig
 from warpjld.errors import InputError
 from warpjld.grasp import GraspObject, ObjectSet
 from warpjld.grasp.finer import FinerSkin
@@ -92,7 +92,7 @@ def hand_of(choice: HandChoice) -> Hand:
     sides = [side for side in sides if f"{side}.middle.base" in rig.skeleton.names]
     if len(sides) != 1:
         raise InputError(f"hand {choice.name}: want a rig of one hand, this one has {len(sides)}", path=rig.path)
-    covering = bind(rig.skeleton, rig.surface, skin=rig.skin)
+    covering = bind_rig(rig)
     finer = FinerSkin(rig.surface.vertices, rig.surface.faces, _SPACING)
     parts = vertex_segments(covering)[finer.parents]
     return Hand(rig, covering, sides[0], palm_of(rig.skeleton).on_skin(rig.surface.vertices), finer, parts)

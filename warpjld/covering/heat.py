@@ -1,0 +1,130 @@
+"""Heat at rest on a triangulated surface: the equations, and a solver that ends whatever the mesh is like."""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Iterator
+from contextlib import contextmanager
+
+import numpy as np
+import scipy.sparse as sp
+from numpy.typing import NDArray
+from scipy.sparse.linalg import LinearOperator, cg, splu
+
+from warpjld.covering.corners import corner_conductivity
+
+__all__ = ["cotangent_laplacian", "solve", "uniform_laplacian"]
+
+_DIRECT_LIMIT = 20_000  # vertices up to which a sparse factorisation is quicker than multigrid
+_TOLERANCE = 1e-7  # residual of the iterative solvers, and
+_ACCEPTED = 1e-5  # of a solution that is taken, both relative to the right-hand side
+_MULTIGRID_STEPS = 200
+_PLAIN_STEPS = 5_000
+
+
+def cotangent_laplacian(
+    vertices: NDArray[np.float64], faces: NDArray[np.int32]
+) -> tuple[sp.csr_array, NDArray[np.float64]]:
+    """Positive semidefinite cotangent Laplacian and barycentric vertex areas.
+
+    Cotangents are kept within (0, 1e3): a weight of the wrong sign would let heat run uphill. Around saddle corners
+    heat is conducted better, so that weights have no spike there.
+    """
+    count = len(vertices)
+    conductivity = corner_conductivity(vertices, faces)
+    rows, columns, values = [], [], []
+    area = np.zeros(count)
+    for k in range(3):
+        apex, i, j = faces[:, k], faces[:, (k + 1) % 3], faces[:, (k + 2) % 3]
+        u, v = vertices[i] - vertices[apex], vertices[j] - vertices[apex]
+        twice = np.linalg.norm(np.cross(u, v), axis=1)
+        cotangent = np.clip((u * v).sum(axis=1) / np.maximum(twice, 1e-30), 1e-3, 1e3) / 2.0
+        rows += [i, j]
+        columns += [j, i]
+        values += [cotangent * conductivity] * 2
+        np.add.at(area, apex, twice / 6.0)
+    positive = area[area > 0.0]
+    # vertices no face uses, and those among faces without area, still belong somewhere
+    area = np.maximum(area, 1e-6 * positive.mean()) if positive.size else np.full(count, 1.0 / count)
+    return _laplacian(np.concatenate(rows), np.concatenate(columns), np.concatenate(values), count), area
+
+
+def uniform_laplacian(faces: NDArray[np.int32], count: int) -> sp.csr_array:
+    """Every edge conducts alike: what is left where lengths and angles say nothing."""
+    rows = np.concatenate([faces[:, k] for k in (0, 1, 2, 1, 2, 0)])
+    columns = np.concatenate([faces[:, k] for k in (1, 2, 0, 0, 1, 2)])
+    return _laplacian(rows, columns, np.full(len(rows), 0.5), count)
+
+
+def _laplacian(rows: NDArray, columns: NDArray, conducted: NDArray[np.float64], count: int) -> sp.csr_array:
+    between = rows != columns
+    off = sp.coo_array((conducted[between], (rows[between], columns[between])), shape=(count, count)).tocsr()
+    return sp.diags_array(np.asarray(off.sum(axis=1)).ravel()) - off
+
+
+def solve(matrix: sp.sparray, right: NDArray[np.float64]) -> NDArray[np.float64] | None:
+    """X of A X = B for a symmetric, diagonally dominant A with a positive diagonal, shape (V, n).
+
+    Scaled to a diagonal of ones, so that tiny and huge triangles count alike. Small systems are factorised; large ones
+    are left to multigrid, and where that does not settle to conjugate gradients, both with a bounded number of steps.
+
+    Returns:
+        The solution, or None where none was found.
+    """
+    diagonal = matrix.diagonal()
+    if not (np.isfinite(matrix.data).all() and (diagonal > 0.0).all()):
+        return None
+    scale = 1.0 / np.sqrt(diagonal)
+    scaled = (sp.diags_array(scale) @ matrix @ sp.diags_array(scale)).tocsc()
+    goal = scale[:, None] * right
+    ways = (_direct, _plain) if len(scale) <= _DIRECT_LIMIT else (_multigrid, _plain)
+    for way in ways:
+        # what a solver has to say of a broken mesh is no message for who gave it: the residual tells
+        with warnings.catch_warnings(), np.errstate(all="ignore"):
+            warnings.simplefilter("ignore")
+            try:
+                found = way(scaled, goal, scale)
+            except (RuntimeError, ArithmeticError, np.linalg.LinAlgError, ValueError):
+                continue
+            residual = np.linalg.norm(scaled @ found - goal, axis=0)
+        if np.isfinite(found).all() and (residual <= _ACCEPTED * np.linalg.norm(goal, axis=0) + 1e-300).all():
+            return scale[:, None] * found
+    return None
+
+
+@contextmanager
+def _drawn_alike() -> Iterator[None]:
+    """pyamg draws from NumPy's global generator: always the same, and the generator is left as it was."""
+    state = np.random.get_state()  # noqa: NPY002
+    np.random.seed(0)  # noqa: NPY002
+    try:
+        yield
+    finally:
+        np.random.set_state(state)  # noqa: NPY002
+
+
+def _direct(matrix: sp.csc_array, right: NDArray[np.float64], scale: NDArray[np.float64]) -> NDArray[np.float64]:
+    solution: NDArray[np.float64] = splu(matrix, permc_spec="MMD_AT_PLUS_A", options={"SymmetricMode": True}).solve(
+        right
+    )
+    return solution
+
+
+def _multigrid(matrix: sp.csc_array, right: NDArray[np.float64], scale: NDArray[np.float64]) -> NDArray[np.float64]:
+    import pyamg
+
+    # constants, which diffusion leaves alone, are 1 / scale in the scaled unknowns
+    with _drawn_alike():
+        hierarchy = pyamg.smoothed_aggregation_solver(sp.csr_matrix(matrix), B=(1.0 / scale)[:, None])
+    out = np.empty_like(right)
+    for k, b in enumerate(right.T):
+        out[:, k], info = hierarchy.solve(b, tol=_TOLERANCE, accel="cg", maxiter=_MULTIGRID_STEPS, return_info=True)
+        if info:  # one that does not settle is enough: the next way begins at once
+            raise ArithmeticError("multigrid did not settle")
+    return out
+
+
+def _plain(matrix: sp.csc_array, right: NDArray[np.float64], scale: NDArray[np.float64]) -> NDArray[np.float64]:
+    apply = LinearOperator(matrix.shape, matvec=matrix.tocsr().dot, dtype=np.float64)
+    columns = [cg(apply, b, rtol=_TOLERANCE, atol=0.0, maxiter=_PLAIN_STEPS)[0] for b in right.T]
+    return np.column_stack(columns)

@@ -1,0 +1,142 @@
+"""Pieces of a surface without flesh: eyes, teeth, nails, buttons, armour, which go with one bone as they are.
+
+A piece is what hangs together by faces or by vertices at the same place, so that a body cut along its materials is one.
+Without flesh is one inside which no bone lies, and
+
+* which is painted to one joint, or
+* where nothing is painted, which is closed and no larger than the bone it is nearest to.
+
+The largest piece is always flesh. Clothes, which go around several bones, are neither.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+import scipy.sparse as sp
+from numpy.typing import NDArray
+from scipy.sparse.csgraph import connected_components
+from scipy.spatial import cKDTree
+
+from warpjld.rig import Skin
+from warpjld.skeleton.tree import Skeleton
+from warpjld.surface import Surface
+from warpjld.winding import winding_numbers
+
+__all__ = ["rigid_parts"]
+
+_SHARE = 0.9  # of the weight of a piece that one joint has where it is painted to that joint alone
+_SAMPLES = 15  # places along a bone, of which
+_WITHIN = 0.5  # this share lies inside a piece that holds the bone
+_SAME_PLACE = 1e-6  # of the surface's size
+_NAMED = 4  # pieces named in a note
+
+
+def rigid_parts(
+    surface: Surface, skeleton: Skeleton, skin: Skin | None, rigid: NDArray[np.int32] | None
+) -> tuple[NDArray[np.int32] | None, tuple[str, ...]]:
+    """Joint that every vertex follows rigidly, -1 for flesh, shape (V,), or None where all is flesh; and notes.
+
+    Args:
+        surface: The rest surface.
+        skeleton: The rest skeleton.
+        skin: Painted weights, where there are any.
+        rigid: What is rigid already, as the file says, in the same form: it stays.
+    """
+    count = len(surface.vertices)
+    out = np.full(count, -1, dtype=np.int32) if rigid is None else rigid.copy()
+    pieces = [p for p in _pieces(surface) if (out[p[0]] < 0).all()]
+    pieces.sort(key=lambda p: -_area(surface, p[1]))
+    painted = (
+        None
+        if skin is None
+        else sp.coo_array(
+            (skin.weights.ravel(), (np.repeat(np.arange(count), skin.joints.shape[1]), skin.joints.ravel())),
+            shape=(count, len(skeleton)),
+        ).tocsr()
+    )
+    found: dict[int, list[str]] = {}
+    for vertices, faces in pieces[1:]:
+        joint = _nearest_bone(surface, skeleton, vertices, faces) if painted is None else _painted(painted, vertices)
+        if joint < 0 or _holds_a_bone(surface, skeleton, vertices, faces):
+            continue
+        out[vertices] = joint
+        found.setdefault(joint, []).append(_name(surface, int(vertices[0])))
+    notes = tuple(
+        f"{len(names)} separate piece{'s' * (len(names) > 1)} without flesh, rigid to joint "
+        f"'{skeleton.names[joint]}': {_listed(names)}"
+        for joint, names in found.items()
+    )
+    return (out if (out >= 0).any() else None), notes
+
+
+def _pieces(surface: Surface) -> list[tuple[NDArray[np.int64], NDArray[np.int64]]]:
+    """Vertices and faces of every piece."""
+    count = len(surface.vertices)
+    pairs = cKDTree(surface.vertices).query_pairs(_SAME_PLACE * surface.size, output_type="ndarray")
+    links = np.concatenate([surface.faces[:, :2], surface.faces[:, 1:], pairs])
+    graph = sp.coo_array((np.ones(len(links), np.int8), (links[:, 0], links[:, 1])), shape=(count, count))
+    number, label = connected_components(graph, directed=False)
+    of_face = label[surface.faces[:, 0]]
+    vertices = np.split(np.argsort(label, kind="stable"), np.cumsum(np.bincount(label, minlength=number))[:-1])
+    faces = np.split(np.argsort(of_face, kind="stable"), np.cumsum(np.bincount(of_face, minlength=number))[:-1])
+    return [(v, f) for v, f in zip(vertices, faces, strict=True) if len(f)]
+
+
+def _area(surface: Surface, faces: NDArray[np.int64]) -> float:
+    a, b, c = (surface.vertices[surface.faces[faces, k]] for k in range(3))
+    return float(np.linalg.norm(np.cross(b - a, c - a), axis=1).sum()) / 2.0
+
+
+def _painted(painted: sp.csr_array, vertices: NDArray[np.int64]) -> int:
+    """The joint that has nearly all the weight of a piece, or -1."""
+    total = np.asarray(painted[vertices].sum(axis=0)).ravel()
+    joint = int(total.argmax())
+    return joint if total[joint] > _SHARE * total.sum() else -1
+
+
+def _nearest_bone(surface: Surface, skeleton: Skeleton, vertices: NDArray[np.int64], faces: NDArray[np.int64]) -> int:
+    """The joint at which the bone nearest to a closed piece begins, or -1 where the piece is larger than that bone."""
+    triangles = surface.faces[faces]
+    edges = np.sort(np.concatenate([triangles[:, [a, b]] for a, b in ((0, 1), (1, 2), (2, 0))]), axis=1)
+    if (np.unique(edges, axis=0, return_counts=True)[1] != 2).any():
+        return -1
+    points = surface.vertices[vertices]
+    middle = (points.min(axis=0) + points.max(axis=0)) / 2.0
+    start, along = _bones(skeleton)
+    t = np.clip(((middle - start) * along).sum(axis=1) / np.maximum((along**2).sum(axis=1), 1e-30), 0.0, 1.0)
+    nearest = int(np.linalg.norm(middle - start - t[:, None] * along, axis=1).argmin())
+    if np.linalg.norm(np.ptp(points, axis=0)) > np.linalg.norm(along[nearest]):
+        return -1
+    return skeleton.segments[nearest].proximal
+
+
+def _holds_a_bone(surface: Surface, skeleton: Skeleton, vertices: NDArray[np.int64], faces: NDArray[np.int64]) -> bool:
+    start, along = _bones(skeleton)
+    places = (np.arange(_SAMPLES) + 0.5) / _SAMPLES
+    samples = start[:, None] + places[:, None] * along[:, None]
+    points = surface.vertices[vertices]
+    inside = ((samples >= points.min(axis=0)) & (samples <= points.max(axis=0))).all(axis=2)
+    inside[inside.sum(axis=1) < _WITHIN * _SAMPLES] = False
+    if not inside.any():
+        return False
+    around = np.abs(winding_numbers(surface.vertices, surface.faces[faces], samples[inside])) > 0.5
+    inside[inside] = around
+    return bool((inside.sum(axis=1) >= _WITHIN * _SAMPLES).any())
+
+
+def _bones(skeleton: Skeleton) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    ends = np.array([(s.proximal, s.distal) for s in skeleton.segments])
+    start: NDArray[np.float64] = skeleton.rest[ends[:, 0]]
+    return start, skeleton.rest[ends[:, 1]] - start
+
+
+def _name(surface: Surface, vertex: int) -> str:
+    """The source's mesh that a vertex belongs to."""
+    source = int(np.flatnonzero(surface.weld == vertex)[0])
+    return next((p.name for p in surface.parts if p.vertices.start <= source < p.vertices.stop), "surface")
+
+
+def _listed(names: list[str]) -> str:
+    different = list(dict.fromkeys(names))
+    more = len(different) - _NAMED
+    return ", ".join(different[:_NAMED]) + (f" and {more} more" if more > 0 else "")
