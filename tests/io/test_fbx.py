@@ -329,7 +329,7 @@ def test_a_joint_scaled_to_nothing_keeps_its_rotation(tmp_path: Path) -> None:
     worlds[2, 2, :3, :3] *= 1e-60  # nothing, as a single float
     path = replace(fbx, stacks={"x": worlds}).write(tmp_path / "flat.fbx")
     animation = read_fbx_animation(path)
-    assert any("'c' is scaled to nothing at frame 2" in note for note in animation.notes)
+    assert any("'c' is scaled to nothing at frame 2" in note for note in animation.warnings)
     turned_by = Rotation.from_matrix(
         animation.worlds[2, 2, :3, :3] / np.cbrt(np.linalg.det(animation.worlds[2, 2, :3, :3]))
     )

@@ -13,7 +13,7 @@ __all__ = ["ROOT_CHANNELS", "canonical_channels", "resolve_channel"]
 ROOT_CHANNELS = ("root.x", "root.y", "root.z")
 """Displacement of the root from rest [m]."""
 
-_NUMBER = re.compile(r"joint\s*(\d+)")
+_NUMBER = re.compile(r"joint\s*([0-9]{1,4})")
 _METACARPUS = ("ring.carpometacarpal", "pinky.carpometacarpal")
 
 

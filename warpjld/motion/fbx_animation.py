@@ -62,8 +62,9 @@ def read_fbx_animation(path: str | Path, *, rate: float | None = None, name: str
         others = ", ".join(f"'{n}'" for n in moving if n != scene.title)
         notes.append(f"animation '{scene.title}' is played; the file also has {others}")
     worlds = scene.worlds[:, skeleton.nodes] @ skeleton.squared
-    notes += _turn_flat_ones(worlds, skeleton.tree)
-    return JointAnimation(skeleton.tree, worlds, scene.rate, title=scene.title, notes=(*notes, *skeleton.notes))
+    warnings = tuple(_turn_flat_ones(worlds, skeleton.tree))
+    told = (*notes, *skeleton.notes)
+    return JointAnimation(skeleton.tree, worlds, scene.rate, title=scene.title, notes=told, warnings=warnings)
 
 
 def _turn_flat_ones(worlds: NDArray[np.float64], tree: SourceTree) -> list[str]:

@@ -34,13 +34,15 @@ class Landmarks:
         joints: Canonical name, such as ``left.elbow`` or ``right.index.base``, → joint number.
         parents: Parent of every joint, -1 for a root.
         rest: Joint positions at rest, shape (J, 3).
-        notes: What was doubtful in recognising them.
+        notes: What was decided in recognising them.
+        doubts: What in it is probably wrong.
     """
 
     joints: dict[str, int]
     parents: NDArray[np.signedinteger]
     rest: NDArray[np.float64]
     notes: tuple[str, ...] = ()
+    doubts: tuple[str, ...] = ()
 
     @property
     def pelvis(self) -> int | None:
@@ -175,7 +177,9 @@ def landmarks_of_clip(clip: Clip, *, side: str | None = None) -> Landmarks:
             joints[name] = joint
     by_shape = ("the recording's joints are recognised by shape, not by name",) if roles.how == "shape" else ()
     joints = {name: kept[joint] for name, joint in joints.items()}
-    return Landmarks(joints, clip.parents, clip.rest, (*by_shape, *roles.notes))
+    # what recognition advises, a map of joints, is for rigs
+    doubts = tuple(f"in the recording, {doubt.partition('; if ')[0]}" for doubt in roles.suspicious)
+    return Landmarks(joints, clip.parents, clip.rest, (*by_shape, *roles.notes), doubts)
 
 
 def _with_bones(clip: Clip, places: NDArray[np.float64]) -> list[int]:

@@ -136,7 +136,7 @@ def _retargeted(clip: Clip, rig: Rig, rate: float | None) -> LoadedMotion:
     flips = jumps(clip.names, clip.locals())
     clip = clip if rate is None else clip.at_rate(rate)
     moved = retarget_and_tell(clip, rig.skeleton)
-    warnings = (*flips, *doubts_of_clip(clip, moved.used))
+    warnings = (*moved.warnings, *flips, *doubts_of_clip(clip, moved.used))
     return LoadedMotion(moved.poses, clip.rate, (*clip.notes, *moved.notes), warnings)
 
 

@@ -55,11 +55,13 @@ class Retargeted:
         poses: The rig's poses, frame after frame.
         used: Joints of the recording that drive a joint of the rig, or carry one that does.
         notes: What drives what, and what was guessed.
+        warnings: What looks wrong in the recording's joints.
     """
 
     poses: Poses
     used: frozenset[int]
     notes: tuple[str, ...]
+    warnings: tuple[str, ...]
 
 
 def correspondence(clip: Clip, skeleton: Skeleton) -> dict[str, str]:
@@ -125,6 +127,7 @@ def retarget_and_tell(clip: Clip, skeleton: Skeleton) -> Retargeted:
         poses,
         frozenset(j for bone in used for j in source.path(-1, bone)),
         (*notes, *_told(clip, skeleton, pairs, trunk, target), *guessed),
+        source.doubts,
     )
 
 

@@ -23,16 +23,15 @@ _SAME_BONE = 1e-2
 def match_joints(theirs: SourceTree, own: SourceTree) -> NDArray[np.int64]:
     """Joint of ``theirs`` for each of ``own``, -1 where there is none, shape (N,).
 
-    Names are compared as they are; where no joint is found so, without case, name space and punctuation, which
-    exporters change. Doubled names are told apart by their place in the tree and the order of siblings.
+    Names are compared as they are, and without case, name space and punctuation, which exporters change; what finds
+    more joints counts. Doubled names are told apart by their place in the tree and the order of siblings.
     """
     if theirs.names == own.names and np.array_equal(theirs.parents, own.parents):
         return np.arange(len(own))
-    for plain in (str, _plain):
-        found = _match([plain(n) for n in theirs.names], [plain(n) for n in own.names], theirs, own)
-        if (found >= 0).any():
-            break
-    return found
+    ways = (
+        _match([plain(n) for n in theirs.names], [plain(n) for n in own.names], theirs, own) for plain in (str, _plain)
+    )
+    return max(ways, key=lambda found: int((found >= 0).sum()))  # of equals the first: names as they are
 
 
 def _match(their_names: list[str], own_names: list[str], theirs: SourceTree, own: SourceTree) -> NDArray[np.int64]:

@@ -14,6 +14,7 @@ from warpjld.skeleton.recognise.tree import SourceTree
 __all__ = ["kept_joints", "lies_on_bone"]
 
 _LIMBS = ("clavicle", "shoulder", "elbow", "hip", "knee")
+_STRAIGHT = np.cos(np.radians(25.0))  # cosine of the bend at rest up to which a limb's parts are one bone
 _ASIDE = 0.03  # of a bone's length: a joint nearer to it lies on it
 
 
@@ -37,7 +38,8 @@ def kept_joints(
             continue
         over = [of_source[k] for k in tree.ancestors(j) if k in of_source]
         below = [of_source[k] for k in tree.subtree(j) if k in of_source]
-        if j in left_out or _moves_nothing(tree, flesh, j) or (of_source and _belongs(tree, j, over, below, size)):
+        part = of_source and _belongs(tree, j, over, below, size) and not _bends(tree, of_source, flesh, j)
+        if j in left_out or _moves_nothing(tree, flesh, j) or part:
             into = over[0] if over else (below[0] if below else "the joint above")
             merged.setdefault(into, []).append(tree.names[j])
         elif of_source and over and over[0].rpartition(".")[2] in _LIMBS and lies_on_bone(tree, j):
@@ -75,6 +77,20 @@ def _belongs(tree: SourceTree, joint: int, over: list[str], below: list[str], si
     helper = read_name(tree.names[joint]).kind in ("helper", "palm", "root")
     in_hand = bool(over) and over[0].partition(".")[2] in HAND_PARENTS
     return bool(below) or helper or double or in_hand or "head" in over or (not over and tree.flat)
+
+
+def _bends(tree: SourceTree, of_source: Mapping[int, str], flesh: Flesh, joint: int) -> bool:
+    """Whether a joint with flesh of its own bends a limb between two recognised joints, as an animal's hock does."""
+    over = next((k for k in tree.ancestors(joint) if k in of_source), None)
+    below = next((k for k in tree.subtree(joint) if k in of_source), None)
+    if over is None or below is None or of_source[over].rpartition(".")[2] not in _LIMBS[1:]:
+        return False
+    if not flesh.known or flesh.bare[joint]:
+        return False
+    at = tree.positions
+    upper, lower = at[joint] - at[over], at[below] - at[joint]
+    lengths = float(np.linalg.norm(upper) * np.linalg.norm(lower))
+    return lengths > 0.0 and float(upper @ lower) < _STRAIGHT * lengths
 
 
 def lies_on_bone(tree: SourceTree, joint: int) -> bool:
