@@ -230,12 +230,20 @@ def _single(wanted: _Wanted, job: ClipJob) -> None:
         "triangles": len(how.rig.surface.source_faces),
         "seconds": round(time.perf_counter() - began, 3),
         "warnings": [*how.rig.suspicious, *made.warnings],
+        "rig_notes": list(how.rig.notes),
         "notes": [*made.moved.notes, *made.notes],
     }
     if wanted.as_json:
         answer(summary)
     elif not wanted.quiet:
         _tell(summary)
+        _tell_rig(wanted, how)
+
+
+def _tell_rig(wanted: _Wanted, how: Deforming) -> None:
+    count = len(how.rig.notes)
+    if count:
+        click.echo(f"note: {count} on what was recognised and mended in the rig: warpjld inspect {wanted.rig}")
 
 
 def _batch(wanted: _Wanted, jobs: list[ClipJob]) -> None:
@@ -280,9 +288,11 @@ def _batch(wanted: _Wanted, jobs: list[ClipJob]) -> None:
                 "frames": frames,
                 "seconds": round(result.seconds, 3),
                 "warnings": list(how.rig.suspicious),
+                "rig_notes": list(how.rig.notes),
             }
         )
     elif not wanted.quiet:
+        _tell_rig(wanted, how)
         there = len(result.clips) - result.made
         click.echo(
             f"{len(result.clips)} clips, {frames} frames: {result.made - result.failed} made in {result.seconds:.1f} s"

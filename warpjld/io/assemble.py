@@ -23,6 +23,7 @@ from warpjld.surface import Surface, weld_surface
 __all__ = ["assemble_rig"]
 
 _FURTHEST = 1e12
+_SAME_PLACE = 1e-3  # of the skeleton's size
 _NO_WEIGHT = 1e-6  # sum of painted weights below which a vertex has none
 
 
@@ -101,7 +102,10 @@ def _assemble(
 
 
 def _movers(source: SourceRig, found: Canonical) -> NDArray[np.int64]:
-    """Joint of the skeleton that each joint of the file moves with, -1 for bare ones that hang on none of them."""
+    """Joint of the skeleton that each joint of the file moves with.
+
+    -1 for bare ones above all of them, unless they share the place of one, as a root does that the hips lie on.
+    """
     tree = source.tree
     carries = np.zeros(len(tree), dtype=bool)
     if source.joints is not None and source.weights is not None:
@@ -110,7 +114,9 @@ def _movers(source: SourceRig, found: Canonical) -> NDArray[np.int64]:
         carries[source.rigid[source.rigid >= 0]] = True
     recognised = set(found.sources)
     hangs = [not recognised.isdisjoint((j, *tree.ancestors(j))) for j in range(len(tree))]
-    return np.where(carries | hangs, found.owner, -1)
+    away = np.linalg.norm(tree.positions - found.skeleton.rest[found.owner], axis=1)
+    shares = away < _SAME_PLACE * np.linalg.norm(np.ptp(found.skeleton.rest, axis=0))
+    return np.where(carries | hangs | shares, found.owner, -1)
 
 
 def _stated(source: SourceRig, by_hand: Mapping[str, Any]) -> dict[str, Any]:
