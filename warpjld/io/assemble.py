@@ -104,7 +104,8 @@ def _assemble(
 def _movers(source: SourceRig, found: Canonical) -> NDArray[np.int64]:
     """Joint of the skeleton that each joint of the file moves with.
 
-    -1 for bare ones above all of them, unless they share the place of one, as a root does that the hips lie on.
+    -1 for bare ones above all of them, unless they share the place of one, or legs and spine part at them: such a root
+    is a pelvis.
     """
     tree = source.tree
     carries = np.zeros(len(tree), dtype=bool)
@@ -116,7 +117,9 @@ def _movers(source: SourceRig, found: Canonical) -> NDArray[np.int64]:
     hangs = [not recognised.isdisjoint((j, *tree.ancestors(j))) for j in range(len(tree))]
     away = np.linalg.norm(tree.positions - found.skeleton.rest[found.owner], axis=1)
     shares = away < _SAME_PLACE * np.linalg.norm(np.ptp(found.skeleton.rest, axis=0))
-    return np.where(carries | hangs | shares, found.owner, -1)
+    leads = {k for j in recognised if j >= 0 for k in (j, *tree.ancestors(j))}
+    parts = [sum(c in leads for c in tree.children[j]) > 1 for j in range(len(tree))]
+    return np.where(carries | hangs | shares | np.array(parts), found.owner, -1)
 
 
 def _stated(source: SourceRig, by_hand: Mapping[str, Any]) -> dict[str, Any]:

@@ -112,7 +112,7 @@ def test_at_rest_joints_are_where_the_file_has_them(body: Rig) -> None:
 def test_merged_joints_are_named(body: Rig) -> None:
     assert body.source is not None
     note = source_motion(body, rest_poses(body.skeleton)).notes[0]
-    assert note.startswith("joints that move rigidly with the one they belong to: pelvis.L, upperleg02.L")
+    assert note.startswith("joints that move rigidly with the one they belong to: root, pelvis.L, upperleg02.L")
     root = body.source.names.index("root")  # carries no flesh, but lies where the pelvis does: it goes along
     assert body.skeleton.names[body.owner[root]] == "pelvis"
     jaw = body.source.names.index("jaw")
