@@ -77,6 +77,9 @@ def _primitive(file: GlbFile, rig: Rig, motion: SourceMotion, notes: list[str]) 
     surface = rig.surface
     origin, faces, uv = surface.split_at_seams()
     vertex = surface.weld[origin]
+    copies = len(origin) - len(surface.weld)
+    if copies:
+        notes.append(f"after the source's {len(surface.weld)} vertices {copies} copies, one more for each seam")
     rest = surface.vertices.astype("<f4")[vertex]
     normals = vertex_normals(surface.vertices, surface.faces).astype("<f4")[vertex]
     attributes = {
