@@ -81,6 +81,7 @@ def faults() -> Path:
 FORMS = {
     "plain": BOX.encode(),
     "byte order mark": b"\xef\xbb\xbf" + BOX.encode(),
+    "UTF-16": BOX.encode("utf-16"),
     "tabs": BOX.replace(" ", "\t").encode(),
     "tabs and blanks": BOX.replace(" ", " \t ").replace("\n", "\t \n").encode(),
     "comments": ("# head\n" + BOX.replace("\n", " # behind\n").replace("30 #", "30# at once:")).encode(),

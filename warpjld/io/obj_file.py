@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from warpjld.errors import InputError
 from warpjld.io.polygons import triangulate_polygons
 from warpjld.surface import Part
+from warpjld.text_file import read_text
 
 __all__ = ["ObjFile", "read_obj"]
 
@@ -72,11 +73,7 @@ def read_obj(path: str | Path) -> ObjFile:
         InputError: It cannot be read, a line is not as OBJ has it, or there are no faces.
     """
     path = Path(path)
-    try:
-        text = path.read_bytes().decode("utf-8-sig", errors="replace")  # names may be in any encoding
-    except OSError as error:
-        raise InputError(f"cannot be read: {error.strerror}", path=path) from None
-    lines = _split(text, path)
+    lines = _split(read_text(path, errors="replace"), path)  # names may be in any encoding
     vertices = _numbers(lines.vertices, lines.vertex_lines, 3, path)
     corners, counts = np.array(lines.corners, dtype=np.int64), np.array(lines.counts, dtype=np.int64)
     _check(corners, len(vertices), "vertex", lines, path)
@@ -98,7 +95,7 @@ def read_obj(path: str | Path) -> ObjFile:
 def _split(text: str, path: Path) -> _Lines:
     out = _Lines()
     continued, begun = "", 0
-    for number, line in enumerate(text.replace("\r\n", "\n").replace("\r", "\n").split("\n"), 1):
+    for number, line in enumerate(text.split("\n"), 1):
         begun = begun or number
         line = continued + line
         if line.rstrip().endswith("\\") and line.split(None, 1)[0] in _GO_ON:
