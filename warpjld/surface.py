@@ -10,7 +10,7 @@ from scipy.spatial import cKDTree
 
 from warpjld.errors import InputError
 
-__all__ = ["Part", "Surface", "weld_surface"]
+__all__ = ["Part", "Surface", "one_uv_a_vertex", "weld_surface"]
 
 
 @dataclass(frozen=True)
@@ -33,6 +33,8 @@ class Surface:
         source_faces: Triangles over the source vertices, shape (S, 3), in the source's order.
         uv: Texture coordinates of the source vertices, shape (W, 2), or None. Their origin is the picture's lower
             left corner, as OBJ, USD and Blender count; glTF counts from the upper left.
+        corner_uv: Texture coordinates of the source faces' corners, shape (S, 3, 2), instead of ``uv`` where some
+            vertex has several: the texture's seams.
         parts: The source's meshes.
     """
 
@@ -41,6 +43,7 @@ class Surface:
     weld: NDArray[np.int32]
     source_faces: NDArray[np.int32]
     uv: NDArray[np.float32] | None = None
+    corner_uv: NDArray[np.float32] | None = None
     parts: tuple[Part, ...] = ()
 
     @property
@@ -52,6 +55,28 @@ class Surface:
         """Welded positions (…, V, 3) in the source's vertex order (…, W, 3)."""
         return vertices[..., self.weld, :]
 
+    def split_at_seams(self) -> tuple[NDArray[np.int32], NDArray[np.int32], NDArray[np.float32] | None]:
+        """Vertices that have one pair of texture coordinates each, for files that know no others.
+
+        Returns:
+            Source vertex of every split one, shape (N,): the source's W in their order, then copies of those on seams;
+            triangles over them, shape (S, 3); their texture coordinates, shape (N, 2), or None.
+        """
+        count = len(self.weld)
+        if self.corner_uv is None:
+            return np.arange(count, dtype=np.int32), self.source_faces, self.uv
+        corners = self.source_faces.ravel()
+        keyed = np.column_stack([corners, self.corner_uv.reshape(-1, 2)])
+        kinds, first, kind = np.unique(keyed, axis=0, return_index=True, return_inverse=True)
+        vertex = corners[first]
+        # sorted by vertex: the first kind of each stays at its place
+        extra = np.concatenate([[False], vertex[1:] == vertex[:-1]])
+        place = np.where(extra, count + np.cumsum(extra) - 1, vertex).astype(np.int32)
+        origin = np.concatenate([np.arange(count, dtype=np.int32), vertex[extra]])
+        uv = np.zeros((len(origin), 2), dtype=np.float32)
+        uv[place] = kinds[:, 1:]
+        return origin, place[kind.ravel()].reshape(-1, 3), uv
+
     def renumbered(self, order: NDArray[np.int32]) -> Surface:
         """The same surface with vertex ``order[i]`` as its i-th; the source's order does not change."""
         place = np.empty(len(order), dtype=np.int32)
@@ -59,11 +84,27 @@ class Surface:
         return replace(self, vertices=self.vertices[order], faces=place[self.faces], weld=place[self.weld])
 
 
+def one_uv_a_vertex(
+    count: int, faces: NDArray[np.integer], corner_uv: NDArray[np.float32] | None
+) -> tuple[NDArray[np.float32] | None, NDArray[np.float32] | None]:
+    """Texture coordinates of corners (S, 3, 2) as ``uv`` (count, 2) where all at a vertex agree, else as they are.
+
+    Returns:
+        ``uv`` and ``corner_uv`` of a surface, one of which is None; both where there are none.
+    """
+    if corner_uv is None:
+        return None, None
+    uv = np.zeros((count, 2), dtype=np.float32)
+    uv[faces] = corner_uv
+    return (uv, None) if np.array_equal(uv[faces], corner_uv) else (None, corner_uv)
+
+
 def weld_surface(
     vertices: ArrayLike,
     faces: ArrayLike,
     *,
     uv: NDArray[np.float32] | None = None,
+    corner_uv: NDArray[np.float32] | None = None,
     parts: tuple[Part, ...] = (),
     tolerance: float = 1e-7,
 ) -> Surface:
@@ -73,6 +114,7 @@ def weld_surface(
         vertices: Source positions [m], shape (W, 3).
         faces: Source triangles, shape (S, 3).
         uv: Texture coordinates, shape (W, 2).
+        corner_uv: Texture coordinates of the faces' corners, shape (S, 3, 2), instead of ``uv``.
         parts: Source meshes; vertices of different parts are never welded.
         tolerance: Distance below which two vertices are one, relative to the bounding box diagonal.
 
@@ -114,5 +156,6 @@ def weld_surface(
         weld=weld.astype(np.int32),
         source_faces=triangles.astype(np.int32),
         uv=uv,
+        corner_uv=corner_uv,
         parts=parts,
     )

@@ -66,7 +66,7 @@ def _assemble(
     shares = flesh_shares(len(source.tree), source.joints, source.weights, source.rigid)
     roles = recognise(source.tree, shares, _stated(source, joint_map or {}), by_shape=not source.stated)
     source = place(source, roles, unit=unit, scale=scale, up=up)
-    surface = weld_surface(source.vertices, source.faces, uv=source.uv, parts=source.parts)
+    surface = weld_surface(source.vertices, source.faces, uv=source.uv, corner_uv=source.corner_uv, parts=source.parts)
     painted = None
     if source.joints is not None and source.weights is not None:
         painted = Painted(source.vertices, source.joints, source.weights)

@@ -1,4 +1,4 @@
-"""Surfaces without joints: OBJ, PLY, STL, OFF, glTF and whatever else trimesh reads."""
+"""Surfaces without joints: OBJ, and PLY, STL, OFF, glTF and whatever else trimesh reads."""
 
 from __future__ import annotations
 
@@ -9,7 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from warpjld.errors import InputError
-from warpjld.surface import Part
+from warpjld.io.obj_file import read_obj
+from warpjld.surface import Part, one_uv_a_vertex
 
 __all__ = ["MeshFile", "read_mesh"]
 
@@ -23,14 +24,19 @@ class MeshFile:
         vertices: Positions, shape (W, 3).
         faces: Triangles, shape (S, 3); larger polygons are split.
         uv: Texture coordinates, shape (W, 2), or None.
+        corner_uv: Texture coordinates of the triangles' corners, shape (S, 3, 2), instead of ``uv`` where some vertex
+            has several.
         parts: The file's meshes.
+        notes: What was mended on the way.
     """
 
     path: Path
     vertices: NDArray[np.float64]
     faces: NDArray[np.int64]
     uv: NDArray[np.float32] | None
+    corner_uv: NDArray[np.float32] | None
     parts: tuple[Part, ...]
+    notes: tuple[str, ...] = ()
 
 
 def read_mesh(path: str | Path) -> MeshFile:
@@ -44,6 +50,10 @@ def read_mesh(path: str | Path) -> MeshFile:
     path = Path(path)
     if not path.is_file():
         raise InputError("no such file", path=path)
+    if path.suffix.lower() == ".obj":
+        file = read_obj(path)
+        uv, corner_uv = one_uv_a_vertex(len(file.vertices), file.faces, file.corner_uv)
+        return MeshFile(path, file.vertices, file.faces, uv, corner_uv, file.parts, file.notes)
     if path.suffix.lower().lstrip(".") not in trimesh.available_formats():
         raise InputError(f"'{path.suffix}' is not a kind of surface file that can be read", path=path)
     try:
@@ -69,7 +79,7 @@ def read_mesh(path: str | Path) -> MeshFile:
     everything = np.concatenate(vertices).astype(np.float64)
     if not np.isfinite(everything).all():
         raise InputError(f"vertex {int(np.argwhere(~np.isfinite(everything))[0][0])} is not finite", path=path)
-    return MeshFile(path, everything, np.concatenate(faces).astype(np.int64), _uv(uvs, parts), tuple(parts))
+    return MeshFile(path, everything, np.concatenate(faces).astype(np.int64), _uv(uvs, parts), None, tuple(parts))
 
 
 def _uv(uvs: list[NDArray[np.float64] | None], parts: list[Part]) -> NDArray[np.float32] | None:

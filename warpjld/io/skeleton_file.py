@@ -92,10 +92,11 @@ def _rig(path: Path, content: Any, mesh: MeshFile) -> SourceRig:
         vertices=mesh.vertices,
         faces=mesh.faces,
         uv=mesh.uv,
+        corner_uv=mesh.corner_uv,
         parts=mesh.parts,
         axes=axes,
         limits=limits,
-        notes=(f"joints from {path.name}",),
+        notes=(*mesh.notes, f"joints from {path.name}"),
     )
 
 

@@ -24,6 +24,8 @@ class SourceRig:
         vertices: Rest positions, shape (W, 3).
         faces: Triangles, shape (S, 3).
         uv: Texture coordinates, shape (W, 2), or None.
+        corner_uv: Texture coordinates of the triangles' corners, shape (S, 3, 2), instead of ``uv`` where some vertex
+            has several.
         parts: The file's meshes.
         joints: Influencing joints of ``tree`` per vertex, shape (W, K), or None where no skin is painted.
         weights: Their weights, rows summing to one, shape (W, K).
@@ -44,6 +46,7 @@ class SourceRig:
     vertices: NDArray[np.float64]
     faces: NDArray[np.int64]
     uv: NDArray[np.float32] | None = None
+    corner_uv: NDArray[np.float32] | None = None
     parts: tuple[Part, ...] = ()
     joints: NDArray[np.int64] | None = None
     weights: NDArray[np.float64] | None = None

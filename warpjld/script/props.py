@@ -39,6 +39,7 @@ class Prop:
         placement: Keys of the object as a whole: from where the joints leave it, about its own origin.
         shapes: Its shapes over time, where key frames deform it.
         barred: Barr's deformations, where they do.
+        assumed: Unit that its file was taken to be in, since the script says none.
     """
 
     name: str
@@ -48,6 +49,7 @@ class Prop:
     placement: Placement = field(default_factory=Placement)
     shapes: KeyframedShape | None = None
     barred: Barred | None = None
+    assumed: str | None = None
 
     @property
     def deforms(self) -> bool:

@@ -176,7 +176,7 @@ def test_quads_holes_and_concave_faces(tmp_path: Path) -> None:
 
 
 def test_texture_coordinates(tmp_path: Path) -> None:
-    """By vertex, indexed, or by corner where all corners of a vertex agree; seams within a vertex are told."""
+    """By vertex, indexed, or by corner; by vertex in any case where all corners of a vertex agree."""
     uv = np.random.default_rng(1).random((8, 2)).astype(np.float32)
     corners = np.ravel(bar().faces)
     by_vertex = bar(uv=uv)
@@ -187,9 +187,13 @@ def test_texture_coordinates(tmp_path: Path) -> None:
     np.testing.assert_array_equal(read_usd_rig(by_corner.write(tmp_path / "c.usda")).uv, uv)
     indexed = bar(uv=uv, uv_interpolation="faceVarying", uv_indices=corners)
     np.testing.assert_array_equal(read_usd_rig(indexed.write(tmp_path / "d.usda")).uv, uv)
-    torn = read_usd_rig(bar(uv=np.arange(48).reshape(24, 2), uv_interpolation="faceVarying").write(tmp_path / "e.usda"))
-    assert torn.uv is None
-    assert any("seams within vertices" in note for note in torn.notes)
+    torn = bar(uv=np.arange(48).reshape(24, 2), uv_interpolation="faceVarying")
+    rig = read_usd_rig(torn.write(tmp_path / "e.usda"))
+    assert rig.uv is None
+    assert rig.corner_uv is not None
+    assert len(rig.vertices) == 8
+    place = dict(zip(map(tuple, rig.corner_uv.reshape(-1, 2)), rig.faces.ravel(), strict=False))
+    assert place == {(2.0 * c, 2.0 * c + 1.0): corner for c, corner in enumerate(corners)}
 
 
 def test_constant_influences_are_rigid(tmp_path: Path) -> None:

@@ -125,6 +125,17 @@ def test_hashes_of_files_are_part_of_a_studys_identity(tmp_path: Path) -> None:
     assert load_plan(path).identity() != before
 
 
+def test_an_object_in_another_unit_is_suspicious(tmp_path: Path) -> None:
+    import trimesh
+
+    trimesh.creation.cylinder(4.0, 12.0).export(tmp_path / "mug.obj")
+    (line,) = GraspExperiment(load_plan(plan(tmp_path, more='[[objects]]\nfile = "mug.obj"\n'))).doubts()
+    assert line.startswith("mug measures 12 m, 6")
+    assert 'unit = "cm" would make it 0.12 m' in line
+    right = plan(tmp_path, more='[[objects]]\nfile = "mug.obj"\nunit = "cm"\n')
+    assert GraspExperiment(load_plan(right)).doubts() == []
+
+
 def test_an_unusable_object_stops_the_study_before_it_begins(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -53,8 +53,11 @@ class AlembicCache(Cache):
             kept += [_array(imath.IntArray, faces.ravel()), _array(imath.IntArray, np.full(len(faces), 3))]
             sample.setFaceIndices(kept[1])
             sample.setFaceCounts(kept[2])
-            if self.surface.uv is not None:
-                kept.append(_array(imath.V2fArray, self.surface.uv[faces.ravel()]))
+            uv = self.surface.corner_uv
+            if uv is None and self.surface.uv is not None:
+                uv = self.surface.uv[self.surface.source_faces]
+            if uv is not None:
+                kept.append(_array(imath.V2fArray, uv[:, ::-1].reshape(-1, 2)))
                 sample.setUVs(AbcGeom.OV2fGeomParamSample(kept[3], AbcGeom.GeometryScope.kFacevaryingScope))
         with _refusals():
             self._mesh.getSchema().set(sample)

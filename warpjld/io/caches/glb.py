@@ -34,7 +34,11 @@ class GlbCache(Cache):
 
     def __init__(self, path: Path, surface: Surface, clip: Clip) -> None:
         super().__init__(path, surface, clip)
-        size = len(surface.weld) * _BYTES_A_VERTEX * (clip.frames + 1) + 4 * clip.frames**2
+        self._origin, self._faces, self._uv = surface.split_at_seams()
+        copies = len(self._origin) - len(surface.weld)
+        if copies:
+            self.note += f"; after the source's {len(surface.weld)} vertices {copies} copies, one more for each seam"
+        size = len(self._origin) * _BYTES_A_VERTEX * (clip.frames + 1) + 4 * clip.frames**2
         if clip.frames > MAX_FRAMES or size > MAX_BYTES:
             raise InputError(
                 f"{clip.frames} frames of {len(surface.weld)} vertices are {size / 2**20:.0f} MB of morph targets; "
@@ -46,23 +50,25 @@ class GlbCache(Cache):
     def _begin(self) -> None:
         self._part(self.path).touch()
         self._blob = _Blob()
+        rest = self.rest[self._origin]
         self._rest_normals = self._normals(self.rest)
-        source_faces = self.surface.source_faces.astype("<u4").reshape(-1)
+        faces = self._faces.astype("<u4").reshape(-1)
         attributes = gltf.Attributes(
-            POSITION=self._blob.add(self.rest, gltf.VEC3, target=gltf.ARRAY_BUFFER, bounds=True),
+            POSITION=self._blob.add(rest, gltf.VEC3, target=gltf.ARRAY_BUFFER, bounds=True),
             NORMAL=self._blob.add(self._rest_normals, gltf.VEC3, target=gltf.ARRAY_BUFFER),
         )
-        if self.surface.uv is not None:
+        if self._uv is not None:
             # glTF counts v downwards from the top of the picture
-            flipped = np.asarray(self.surface.uv, np.float32) * [1, -1] + [0, 1]
+            flipped = np.asarray(self._uv, np.float32) * [1, -1] + [0, 1]
             attributes.TEXCOORD_0 = self._blob.add(flipped.astype("<f4"), gltf.VEC2, target=gltf.ARRAY_BUFFER)
-        indices = self._blob.add(source_faces, gltf.SCALAR, target=gltf.ELEMENT_ARRAY_BUFFER)
+        indices = self._blob.add(faces, gltf.SCALAR, target=gltf.ELEMENT_ARRAY_BUFFER)
         self._primitive = gltf.Primitive(attributes=attributes, indices=indices, material=0, targets=[])
 
     def _append(self, vertices: NDArray[np.float32]) -> None:
+        moved = (vertices - self.rest)[self._origin]
         self._primitive.targets.append(
             {
-                "POSITION": self._blob.add(vertices - self.rest, gltf.VEC3, target=gltf.ARRAY_BUFFER, bounds=True),
+                "POSITION": self._blob.add(moved, gltf.VEC3, target=gltf.ARRAY_BUFFER, bounds=True),
                 "NORMAL": self._blob.add(
                     self._normals(vertices) - self._rest_normals, gltf.VEC3, target=gltf.ARRAY_BUFFER
                 ),
@@ -105,10 +111,11 @@ class GlbCache(Cache):
         self._blob = _Blob()
 
     def _normals(self, source: NDArray[np.float32]) -> NDArray[np.float32]:
-        """Normals in source order, smooth across texture seams."""
+        """Normals of positions in source order, by vertex of the file: smooth across texture seams."""
         welded = np.empty((len(self.surface.vertices), 3), np.float32)
         welded[self.surface.weld] = source
-        return self.surface.to_source(vertex_normals(welded, self.surface.faces)).astype("<f4")
+        smooth = self.surface.to_source(vertex_normals(welded, self.surface.faces))
+        return smooth[self._origin].astype("<f4")
 
 
 def _material() -> gltf.Material:

@@ -18,7 +18,9 @@ class NpzCache(Cache):
     """Arrays of the archive, all in the source's vertex order (W vertices, S triangles):
 
     - ``vertices`` float32 (frames, W, 3) [m]; ``rest`` float32 (W, 3) [m]
-    - ``faces`` int32 (S, 3); ``uv`` float32 (W, 2), only where the source has texture coordinates
+    - ``faces`` int32 (S, 3)
+    - ``uv`` float32 (W, 2): texture coordinates, only where the source has some; ``corner_uv`` float32 (S, 3, 2)
+      instead, of the faces' corners, where a vertex has several of them
     - ``frames`` int64 (frames,): frame numbers; ``rate`` float64 (): frames per second
     - ``weld`` int32 (W,): vertices with the same number are one point of the surface, split by a texture seam
     """
@@ -39,6 +41,8 @@ class NpzCache(Cache):
         }
         if self.surface.uv is not None:
             constants["uv"] = np.asarray(self.surface.uv, np.float32)
+        if self.surface.corner_uv is not None:
+            constants["corner_uv"] = np.asarray(self.surface.corner_uv, np.float32)
         for name, array in constants.items():
             with self._archive.open(f"{name}.npy", "w") as member:
                 npy.write_array(member, np.asarray(array), allow_pickle=False)

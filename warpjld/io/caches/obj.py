@@ -23,12 +23,17 @@ class ObjText:
         # nine digits give a float32 back unchanged
         self._positions = "v %.9g %.9g %.9g\n" * count
         corners = surface.source_faces + 1
-        if surface.uv is None:
+        uv, index = surface.uv, corners
+        if surface.corner_uv is not None:
+            uv, kind = np.unique(surface.corner_uv.reshape(-1, 2), axis=0, return_inverse=True)
+            index = kind.reshape(corners.shape).astype(np.int32) + 1
+        if uv is None:
             texture = ""
             faces = "f %d %d %d\n" * len(corners) % tuple(corners.ravel().tolist())
         else:
-            texture = "vt %.9g %.9g\n" * count % tuple(np.asarray(surface.uv, float).ravel().tolist())
-            faces = "f %d/%d %d/%d %d/%d\n" * len(corners) % tuple(np.repeat(corners.ravel(), 2).tolist())
+            texture = "vt %.9g %.9g\n" * len(uv) % tuple(np.asarray(uv, float).ravel().tolist())
+            both = np.stack([corners, index], axis=-1).ravel()
+            faces = "f %d/%d %d/%d %d/%d\n" * len(corners) % tuple(both.tolist())
         self._head = f"# metres, Y up\no {name}\n"
         self._tail = f"{texture}s 1\n{faces}"
 

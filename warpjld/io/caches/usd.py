@@ -10,8 +10,9 @@ from numpy.typing import NDArray
 
 from warpjld.errors import MissingExtraError
 from warpjld.io.caches.cache import Cache
+from warpjld.surface import Surface
 
-__all__ = ["UsdCache", "build_stage", "extent_of"]
+__all__ = ["UsdCache", "build_stage", "extent_of", "write_texture_coordinates"]
 
 _FLUSH_BYTES = 32 << 20
 
@@ -66,7 +67,7 @@ def build_stage(cache: Cache, file: Path | None) -> tuple[Any, Any]:
         MissingExtraError: OpenUSD is not installed.
     """
     _pxr()
-    from pxr import Sdf, Tf, Usd, UsdGeom, Vt
+    from pxr import Tf, Usd, UsdGeom, Vt
 
     surface, clip = cache.surface, cache.clip
     stage = Usd.Stage.CreateInMemory() if file is None else _create(file)
@@ -85,12 +86,21 @@ def build_stage(cache: Cache, file: Path | None) -> tuple[Any, Any]:
     mesh.CreateFaceVertexIndicesAttr(Vt.IntArray.FromNumpy(np.ascontiguousarray(surface.source_faces.ravel())))
     mesh.CreatePointsAttr(Vt.Vec3fArray.FromNumpy(cache.rest))
     mesh.CreateExtentAttr(extent_of(cache.rest))
-    if surface.uv is not None:
-        primvar = UsdGeom.PrimvarsAPI(mesh).CreatePrimvar(
-            "st", Sdf.ValueTypeNames.TexCoord2fArray, UsdGeom.Tokens.vertex
-        )
-        primvar.Set(Vt.Vec2fArray.FromNumpy(np.ascontiguousarray(surface.uv, np.float32)))
+    write_texture_coordinates(mesh, surface)
     return stage, mesh
+
+
+def write_texture_coordinates(mesh: Any, surface: Surface) -> None:
+    """Primvar ``st`` of a ``UsdGeom.Mesh``: by vertex, or by corner where the texture has seams."""
+    from pxr import Sdf, UsdGeom, Vt
+
+    by_corner = surface.corner_uv is not None
+    uv = surface.corner_uv if by_corner else surface.uv
+    if uv is None:
+        return
+    kind = UsdGeom.Tokens.faceVarying if by_corner else UsdGeom.Tokens.vertex
+    primvar = UsdGeom.PrimvarsAPI(mesh).CreatePrimvar("st", Sdf.ValueTypeNames.TexCoord2fArray, kind)
+    primvar.Set(Vt.Vec2fArray.FromNumpy(np.ascontiguousarray(uv.reshape(-1, 2), np.float32)))
 
 
 def _pxr() -> None:

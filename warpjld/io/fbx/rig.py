@@ -14,7 +14,7 @@ from warpjld.io.fbx.scene import FbxMesh, FbxScene, FbxSkin, read_scene
 from warpjld.io.fbx.skeleton import FbxSkeleton, find_skeleton
 from warpjld.io.polygons import triangulate_polygons
 from warpjld.io.source import SourceRig
-from warpjld.surface import Part
+from warpjld.surface import Part, one_uv_a_vertex
 
 __all__ = ["read_fbx_rig"]
 
@@ -65,12 +65,14 @@ def read_fbx_rig(path: str | Path) -> SourceRig:
         parts.append(Part(p.name, slice(vertex, ends[0]), slice(face, ends[1])))
         vertex, face = ends
     rigid = np.concatenate([np.full(len(p.vertices), p.rigid) for p in placed])
+    uv, corner_uv = one_uv_a_vertex(len(vertices), np.concatenate(faces), _corner_uv(placed))
     return SourceRig(
         path=scene.path,
         tree=skeleton.tree,
         vertices=vertices,
         faces=np.concatenate(faces),
-        uv=_uv(placed, notes),
+        uv=uv,
+        corner_uv=corner_uv,
         parts=tuple(parts),
         joints=np.concatenate([np.pad(p.joints, ((0, 0), (0, width - p.joints.shape[1]))) for p in placed]),
         weights=np.concatenate([np.pad(p.weights, ((0, 0), (0, width - p.weights.shape[1]))) for p in placed]),
@@ -159,17 +161,9 @@ def _influences(
     return cluster, weights / total[:, None]
 
 
-def _uv(placed: list[_Placed], notes: list[str]) -> NDArray[np.float32] | None:
-    """Texture coordinates by vertex, where every vertex has one pair of them."""
+def _corner_uv(placed: list[_Placed]) -> NDArray[np.float32] | None:
+    """Texture coordinates of all triangles' corners, shape (S, 3, 2)."""
     if all(p.uv is None for p in placed):
         return None
-    out = []
-    for p in placed:
-        own = np.zeros((len(p.vertices), 2), np.float32)
-        if p.uv is not None:
-            own[p.corners] = p.uv
-            seams = np.unique(p.corners[(own[p.corners] != p.uv).any(axis=1)])
-            if len(seams):
-                notes.append(f"mesh '{p.name}': {len(seams)} vertices on seams keep one of their texture coordinates")
-        out.append(own)
-    return np.concatenate(out)
+    blank = [np.zeros((*p.triangles.shape, 2), np.float32) if p.uv is None else p.uv[p.triangles] for p in placed]
+    return np.concatenate(blank)

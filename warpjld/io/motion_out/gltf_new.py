@@ -73,25 +73,30 @@ def _node(name: str, rest: NDArray[np.float64], children: tuple[int, ...]) -> di
 
 
 def _primitive(file: GlbFile, rig: Rig, motion: SourceMotion, notes: list[str]) -> dict[str, Any]:
-    """The surface in its source's vertex order, as many sets of four influences as its weights want."""
+    """The surface in its source's vertex order, copies for texture seams behind it, with all its influences."""
     surface = rig.surface
-    rest = surface.to_source(surface.vertices.astype("<f4"))
-    normals = surface.to_source(vertex_normals(surface.vertices, surface.faces)).astype("<f4")
+    origin, faces, uv = surface.split_at_seams()
+    vertex = surface.weld[origin]
+    copies = len(origin) - len(surface.weld)
+    if copies:
+        notes.append(f"after the source's {len(surface.weld)} vertices {copies} copies, one more for each seam")
+    rest = surface.vertices.astype("<f4")[vertex]
+    normals = vertex_normals(surface.vertices, surface.faces).astype("<f4")[vertex]
     attributes = {
         "POSITION": file.add(rest, "VEC3", target=ARRAY_BUFFER, bounds=True),
         "NORMAL": file.add(normals, "VEC3", target=ARRAY_BUFFER),
     }
-    if surface.uv is not None:
+    if uv is not None:
         # glTF counts v downwards from the top of the picture
-        flipped = np.asarray(surface.uv, np.float32) * [1, -1] + [0, 1]
+        flipped = np.asarray(uv, np.float32) * [1, -1] + [0, 1]
         attributes["TEXCOORD_0"] = file.add(flipped.astype("<f4"), "VEC2", target=ARRAY_BUFFER)
-    joints, weights = (array[surface.weld] for array in joint_weights(rig, motion, notes))
+    joints, weights = (array[vertex] for array in joint_weights(rig, motion, notes))
     for first in range(0, joints.shape[1], 4):
         part = slice(first, first + 4)
         n = first // 4
         attributes[f"JOINTS_{n}"] = file.add(joints[:, part].astype("<u2"), "VEC4", target=ARRAY_BUFFER)
         attributes[f"WEIGHTS_{n}"] = file.add(weights[:, part].astype("<f4"), "VEC4", target=ARRAY_BUFFER)
-    corners = surface.source_faces.astype("<u4").reshape(-1)
+    corners = faces.astype("<u4").reshape(-1)
     return {
         "attributes": attributes,
         "indices": file.add(corners, "SCALAR", target=ELEMENT_ARRAY_BUFFER),

@@ -20,6 +20,7 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from warpjld.errors import MissingExtraError
+from warpjld.io.caches.usd import write_texture_coordinates
 from warpjld.io.motion_out.local_motion import local_motion, rest_scales
 from warpjld.io.motion_out.skin_weights import joint_weights
 from warpjld.io.motion_out.source_motion import SourceMotion, source_motion
@@ -216,7 +217,7 @@ def _surface(
     stage: Any, root: Any, skeleton: Any, rig: Rig, motion: SourceMotion, space: _Space, notes: list[str]
 ) -> None:
     """The surface at rest in its source's vertex order, bound to the joints."""
-    from pxr import Gf, Sdf, UsdGeom, UsdSkel, Vt
+    from pxr import Gf, UsdGeom, UsdSkel, Vt
 
     surface = rig.surface
     back = np.linalg.inv(space.to_rig)
@@ -229,9 +230,7 @@ def _surface(
     mesh.CreateFaceVertexIndicesAttr(Vt.IntArray.FromNumpy(np.ascontiguousarray(surface.source_faces.ravel())))
     mesh.CreatePointsAttr(Vt.Vec3fArray.FromNumpy(points))
     mesh.CreateExtentAttr(Vt.Vec3fArray.FromNumpy(np.stack([points.min(axis=0), points.max(axis=0)])))
-    if surface.uv is not None:
-        st = UsdGeom.PrimvarsAPI(mesh).CreatePrimvar("st", Sdf.ValueTypeNames.TexCoord2fArray, UsdGeom.Tokens.vertex)
-        st.Set(Vt.Vec2fArray.FromNumpy(np.ascontiguousarray(surface.uv, np.float32)))
+    write_texture_coordinates(mesh, surface)
     joints, weights = joint_weights(rig, motion, notes)
     joints, weights = np.argsort(space.order)[joints][surface.weld], weights[surface.weld]
     binding = UsdSkel.BindingAPI.Apply(mesh.GetPrim())

@@ -15,7 +15,7 @@ from warpjld.io.usd.influences import blended_points, read_influences
 from warpjld.io.usd.mesh import read_usd_mesh
 from warpjld.io.usd.skeletons import UsdSkeleton, UsdSkeletons, read_skeletons
 from warpjld.io.usd.stage import UsdFile, matrices, open_usd
-from warpjld.surface import Part
+from warpjld.surface import Part, one_uv_a_vertex
 
 __all__ = ["read_usd_rig"]
 
@@ -57,13 +57,17 @@ def read_usd_rig(path: str | Path) -> SourceRig:
         Part(mesh.name, slice(int(vertex[m]), int(vertex[m + 1])), slice(int(face[m]), int(face[m + 1])))
         for m, mesh in enumerate(meshes)
     )
+    vertices = np.concatenate([mesh.vertices for mesh in meshes])
+    faces = np.concatenate([mesh.faces + vertex[m] for m, mesh in enumerate(meshes)])
+    uv, corner_uv = one_uv_a_vertex(len(vertices), faces, _corner_uv(meshes))
     width = max(mesh.joints.shape[1] for mesh in meshes)
     return SourceRig(
         path=file.path,
         tree=found.tree,
-        vertices=np.concatenate([mesh.vertices for mesh in meshes]),
-        faces=np.concatenate([mesh.faces + vertex[m] for m, mesh in enumerate(meshes)]),
-        uv=_vertex_uv(file, meshes),
+        vertices=vertices,
+        faces=faces,
+        uv=uv,
+        corner_uv=corner_uv,
         parts=parts,
         joints=np.concatenate([_widen(mesh.joints, width) for mesh in meshes]),
         weights=np.concatenate([_widen(mesh.weights, width) for mesh in meshes]),
@@ -138,20 +142,12 @@ def _skinned(file: UsdFile, skeleton: UsdSkeleton, query: Any) -> _Skinned | Non
     )
 
 
-def _vertex_uv(file: UsdFile, meshes: list[_Skinned]) -> NDArray[np.float32] | None:
-    """Texture coordinates by vertex, shape (W, 2), where all corners at a vertex have the same."""
+def _corner_uv(meshes: list[_Skinned]) -> NDArray[np.float32] | None:
+    """Texture coordinates of all triangles' corners, shape (S, 3, 2)."""
     if all(mesh.corner_uv is None for mesh in meshes):
         return None
-    out = []
-    for mesh in meshes:
-        uv = np.zeros((len(mesh.vertices), 2), dtype=np.float32)
-        if mesh.corner_uv is not None:
-            uv[mesh.faces] = mesh.corner_uv
-            if not np.array_equal(uv[mesh.faces], mesh.corner_uv):
-                file.notes.append(f"mesh '{mesh.name}': its texture has seams within vertices: left out")
-                return None
-        out.append(uv)
-    return np.concatenate(out)
+    blank = [np.zeros((*m.faces.shape, 2), np.float32) if m.corner_uv is None else m.corner_uv for m in meshes]
+    return np.concatenate(blank)
 
 
 def _widen(array: NDArray[Any], width: int) -> NDArray[Any]:

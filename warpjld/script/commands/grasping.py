@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from typing import cast
+from typing import TYPE_CHECKING, cast
 
 from warpjld.script.arguments import Arguments
 from warpjld.script.commands.animation import FINGERS
@@ -13,6 +13,10 @@ from warpjld.script.keys import named_joint
 from warpjld.script.registry import command
 from warpjld.script.scene import Scene
 from warpjld.skeleton import CHANNELS
+
+if TYPE_CHECKING:
+    from warpjld.script.props import Prop
+    from warpjld.script.scene import Actor
 
 _AUTO = "<key> [LEFT/RIGHT] {}<hand vertex or PAD> <object> <facet or NEAREST> [DISTANCE <metres>]"
 
@@ -76,6 +80,7 @@ def grasp(scene: Scene, arguments: Arguments) -> None:
     first, last = read_frames(arguments, "at which the digits begin to close", "at which they touch")
     side = read_side(scene, arguments)
     prop = read_object(scene, arguments)
+    _check_size(scene.actor_with(side), prop, arguments)
     if arguments.keyword("AUTO"):
         _grasp_auto(scene, arguments, side, prop, first, last)
         return
@@ -91,6 +96,17 @@ def grasp(scene: Scene, arguments: Arguments) -> None:
     coupling = cast("tuple[float, float] | None", options.get("coupling"))
     actor = scene.actor_with(side)
     scene.attempts.append(close_digits(scene, actor, prop, side, first, last, digits, coupling))
+
+
+def _check_size(actor: Actor, prop: Prop, arguments: Arguments) -> None:
+    """Refuse an object read in a unit that nobody stated, where its size is absurd beside the hand."""
+    from warpjld.grasp.hand_scale import doubt_of_size, hand_length
+
+    if prop.assumed is not None:
+        doubt = doubt_of_size(prop.thing, hand_length(actor.skeleton), prop.assumed)
+        if doubt is not None:
+            meant = f"; if it is meant so, say UNIT {prop.assumed.upper()}"
+            raise arguments.error(f"{prop.name} {doubt}{meant}")
 
 
 def _grasp_auto(  # type: ignore[no-untyped-def]
@@ -143,6 +159,7 @@ def _search(scene: Scene, arguments: Arguments, name: str, key: float, side: str
         last = len(covering.surface.vertices) - 1
         vertex = arguments.integer("the hand vertex (its number, or PAD)", minimum=0, maximum=last)
     prop = read_object(scene, arguments)
+    _check_size(actor, prop, arguments)
     if arguments.keyword("NEAREST"):
         facet = NEAREST
     else:

@@ -34,6 +34,7 @@ def object_(scene: Scene, arguments: Arguments) -> None:
     """A §7: a list of objects."""
     from scipy.spatial.transform import Rotation
 
+    from warpjld.grasp.hand_scale import doubt_of_size, hand_length
     from warpjld.grasp.keyframes import load_keyframes
     from warpjld.grasp.object_file import UNITS
     from warpjld.script.props import COLORS, Prop
@@ -76,7 +77,13 @@ def object_(scene: Scene, arguments: Arguments) -> None:
     turn = Rotation.from_euler("xyz", np.radians(cast(tuple, options.get("turn", (0.0, 0.0, 0.0)))))
     thing = thing.placed(cast(tuple, options.get("at", (0.0, 0.0, 0.0))), turn.as_quat())
     color = str(options.get("color", COLORS[len(scene.props) % len(COLORS)]))
-    scene.props[name] = Prop(name, thing, color, shapes=shapes)
+    assumed = "m" if path is not None and shapes is None and "unit" not in options else None
+    scene.props[name] = Prop(name, thing, color, shapes=shapes, assumed=assumed)
+    if path is not None:
+        unit = None if shapes is not None else str(options.get("unit", "m"))
+        hands = [length for actor in scene.actors.values() if (length := hand_length(actor.skeleton))]
+        doubt = doubt_of_size(thing, max(hands, default=None), unit)
+        scene.warned([f"{name} {doubt}"] if doubt else [])
 
 
 @command(

@@ -13,6 +13,7 @@ from scipy.spatial.transform import Rotation
 from warpjld.errors import InputError
 from warpjld.grasp.auto import find_grasp
 from warpjld.grasp.close import close_hand
+from warpjld.grasp.hand_scale import doubt_of_size, hand_length
 from warpjld.grasp.postures import posture_for
 from warpjld.grasp.quality import Patches
 from warpjld.grasp.segments import SEGMENTS
@@ -93,12 +94,19 @@ class GraspExperiment:
         return notes
 
     def doubts(self) -> list[str]:
-        """What looks suspicious in the hands: their size, joints taken for others.
+        """What looks suspicious: a hand's size, joints taken for others, objects in another unit than is said.
 
         Raises:
-            InputError: A hand cannot be used.
+            InputError: A hand or object cannot be used.
         """
-        return [f"{hand.name}: {doubt}" for hand in self.settings.hands for doubt in hand_of(hand).rig.suspicious]
+        found = [f"{hand.name}: {doubt}" for hand in self.settings.hands for doubt in hand_of(hand).rig.suspicious]
+        lengths = [hand_length(hand_of(hand).rig.skeleton) for hand in self.settings.hands]
+        length = max(filter(None, lengths), default=None)
+        for wanted in self.settings.objects:
+            bodies = [self._thing(wanted, scale).body for scale in self.settings.scales] if wanted.file else []
+            doubts = (doubt_of_size(body, length, wanted.unit, _as_in_a_plan) for body in bodies)
+            found += [f"{wanted.name} {doubt}" for doubt in doubts if doubt]
+        return found
 
     def begin(self) -> None:
         """Keep Warp's remarks off the output of a command that runs many workers."""
@@ -182,6 +190,10 @@ class GraspExperiment:
 
     def _thing(self, choice: ObjectChoice, scale: float) -> Thing:
         return thing_of(choice, scale, self.settings.measuring.density)
+
+
+def _as_in_a_plan(unit: str) -> str:
+    return f'unit = "{unit.lower()}"'
 
 
 def _direction(away: Array) -> dict[str, Any]:

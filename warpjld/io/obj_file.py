@@ -1,0 +1,199 @@
+"""Wavefront OBJ as it stands in the file: every ``v`` line is a vertex, in the file's order.
+
+Own parser, since those of the libraries tried change what is exported in the file's order or err in silence: trimesh
+and VTK split vertices where texture coordinates or materials meet, tinyobjloader 2.0 loses the first vertex of a file
+with a byte order mark and refuses a comment behind a face.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from warpjld.errors import InputError
+from warpjld.io.polygons import triangulate_polygons
+from warpjld.surface import Part
+from warpjld.text_file import read_text
+
+__all__ = ["ObjFile", "read_obj"]
+
+
+_GO_ON = ("v", "vt", "f", "fo")
+"""Lines that a backslash continues; in comments and names it is part of a Windows path."""
+
+_MOST = 2**31
+
+
+@dataclass(frozen=True, eq=False)
+class ObjFile:
+    """The triangles of an OBJ file.
+
+    Attributes:
+        vertices: Position of every ``v`` line, also of those that no face uses, shape (W, 3).
+        faces: Triangles, shape (S, 3); larger polygons are split, also concave ones.
+        corner_uv: Texture coordinates of the triangles' corners, shape (S, 3, 2), or None.
+        parts: The file's objects (``o``) where each has a run of vertices of its own, else the file as a whole.
+        notes: What was mended.
+    """
+
+    vertices: NDArray[np.float64]
+    faces: NDArray[np.int64]
+    corner_uv: NDArray[np.float32] | None
+    parts: tuple[Part, ...]
+    notes: tuple[str, ...] = ()
+
+
+@dataclass
+class _Lines:
+    """What the lines of a file say; ``lines`` of vertices, texture coordinates and faces are numbered from one."""
+
+    vertices: list[list[str]] = field(default_factory=list)
+    vertex_lines: list[int] = field(default_factory=list)
+    textures: list[list[str]] = field(default_factory=list)
+    texture_lines: list[int] = field(default_factory=list)
+    corners: list[int] = field(default_factory=list)
+    texture_corners: list[int] = field(default_factory=list)
+    counts: list[int] = field(default_factory=list)
+    face_lines: list[int] = field(default_factory=list)
+    objects: list[tuple[str, int]] = field(default_factory=list)
+
+
+def read_obj(path: str | Path) -> ObjFile:
+    """Read the polygons of an OBJ file; lines, curves, normals and materials are left out.
+
+    Numbers may stand apart by blanks or tabs, lines may go on behind a backslash, comments may follow anything, and
+    the file may begin with a byte order mark. Indices count from one, negative ones backwards from the last vertex
+    so far.
+
+    Raises:
+        InputError: It cannot be read, a line is not as OBJ has it, or there are no faces.
+    """
+    path = Path(path)
+    lines = _split(read_text(path, errors="replace"), path)  # names may be in any encoding
+    vertices = _numbers(lines.vertices, lines.vertex_lines, 3, path)
+    corners, counts = np.array(lines.corners, dtype=np.int64), np.array(lines.counts, dtype=np.int64)
+    _check(corners, len(vertices), "vertex", lines, path)
+    triangles, polygon = triangulate_polygons(vertices[corners], counts)
+    if not len(triangles):
+        raise InputError("has no triangles", path=path)
+    notes = []
+    if (counts < 3).any():
+        notes.append(f"{int((counts < 3).sum())} faces with fewer than three corners left out")
+    corner_uv = _corner_uv(lines, triangles, path, notes)
+    faces = corners[triangles]
+    parts = _parts(lines.objects, len(vertices), faces, polygon)
+    if len(parts) < 2:
+        name = parts[0].name if parts else ""
+        parts = (Part(name or path.stem, slice(0, len(vertices)), slice(0, len(faces))),)
+    return ObjFile(vertices, faces, corner_uv, parts, tuple(notes))
+
+
+def _split(text: str, path: Path) -> _Lines:
+    out = _Lines()
+    continued, begun = "", 0
+    for number, line in enumerate(text.split("\n"), 1):
+        begun = begun or number
+        line = continued + line
+        if line.rstrip().endswith("\\") and line.split(None, 1)[0] in _GO_ON:
+            continued = line.rstrip()[:-1] + " "
+            continue
+        first, continued, begun = begun, "", 0
+        words = line.split("#", 1)[0].split()
+        if not words:
+            continue
+        match words[0]:
+            case "v":
+                out.vertices.append(words[1:4])
+                out.vertex_lines.append(first)
+            case "vt":
+                out.textures.append([*words[1:3], "0"][:2])  # of a curve's texture there is only u
+                out.texture_lines.append(first)
+            case "f" | "fo":
+                _add_face(out, words[1:], first, path)
+            case "o":
+                out.objects.append((line.split(None, 1)[1].strip() if len(words) > 1 else "", len(out.counts)))
+    return out
+
+
+def _add_face(out: _Lines, words: list[str], line: int, path: Path) -> None:
+    for corner in words:
+        word = corner[:40]  # as much as a message may show
+        vertex, _, rest = word.partition("/")
+        texture = rest.partition("/")[0]
+        try:
+            v, t = int(vertex), int(texture) if texture else None
+        except ValueError:
+            raise InputError(f"want corners as 1, 1/1, 1//1 or 1/1/1, got '{word}'", path=path, line=line) from None
+        if max(v, t or 0) > _MOST:
+            raise InputError(f"'{word}': there is no such vertex", path=path, line=line)
+        out.corners.append(_counted(v, len(out.vertices)))
+        out.texture_corners.append(-1 if t is None else _counted(t, len(out.textures)))
+        if out.corners[-1] < 0 or (t is not None and out.texture_corners[-1] < 0):
+            raise InputError(f"'{word}': indices count from 1, or from -1 backwards", path=path, line=line)
+    out.counts.append(len(words))
+    out.face_lines.append(line)
+
+
+def _counted(index: int, count: int) -> int:
+    """An index from zero: those of the file count from one, or backwards from the last of ``count`` so far."""
+    return index - 1 if index > 0 else count + index if index < 0 else -1
+
+
+def _numbers(rows: list[list[str]], lines: Sequence[int], width: int, path: Path) -> NDArray[np.float64]:
+    try:
+        out = np.array([[float(word) for word in row] for row in rows], dtype=np.float64).reshape(-1, width)
+    except ValueError:
+        for row, line in zip(rows, lines, strict=True):
+            try:
+                good = len([float(word) for word in row]) == width
+            except ValueError:
+                good = False
+            if not good:
+                raise InputError(f"want {width} numbers, got '{' '.join(row)}'", path=path, line=line) from None
+        raise
+    bad = np.flatnonzero(~np.isfinite(out).all(axis=1))
+    if len(bad):
+        raise InputError(f"want finite numbers, got '{' '.join(rows[bad[0]])}'", path=path, line=lines[bad[0]])
+    return out
+
+
+def _check(corners: NDArray[np.int64], count: int, what: str, lines: _Lines, path: Path) -> None:
+    bad = np.flatnonzero(corners >= count)
+    if len(bad):
+        face = int(np.searchsorted(np.cumsum(lines.counts), bad[0], side="right"))
+        said = f"there is no {what} {corners[bad[0]] + 1}: the file has {count}"
+        raise InputError(said, path=path, line=lines.face_lines[face])
+
+
+def _corner_uv(lines: _Lines, triangles: NDArray[np.int64], path: Path, notes: list[str]) -> NDArray[np.float32] | None:
+    corners = np.array(lines.texture_corners, dtype=np.int64)[triangles]
+    if (corners < 0).all():
+        return None
+    uv = _numbers(lines.textures, lines.texture_lines, 2, path)
+    _check(np.array(lines.texture_corners, dtype=np.int64), len(uv), "vt", lines, path)
+    missing = int((corners < 0).sum())
+    if missing:
+        notes.append(f"{missing} corners have no texture coordinates: 0, 0")
+    return np.vstack([uv, np.zeros((1, 2))]).astype(np.float32)[corners]  # -1: the last row
+
+
+def _parts(
+    objects: list[tuple[str, int]], count: int, faces: NDArray[np.int64], polygon: NDArray[np.int64]
+) -> tuple[Part, ...]:
+    """One part an object; none where objects share vertices, or have theirs in another order."""
+    names = ["", *(name for name, _ in objects)]
+    bounds = [0, *(int(np.searchsorted(polygon, start)) for _, start in objects), len(faces)]
+    filled = [i for i in range(len(names)) if bounds[i + 1] > bounds[i]]
+    runs = [slice(bounds[i], bounds[i + 1]) for i in filled]
+    lows = [int(faces[run].min()) for run in runs]
+    highs = [int(faces[run].max()) for run in runs]
+    if any(high >= low for high, low in zip(highs, lows[1:], strict=False)):
+        return ()
+    ends = [0, *lows[1:], count]  # vertices that no face uses belong to the object before them
+    return tuple(
+        Part(names[i], slice(ends[k], ends[k + 1]), run) for k, (i, run) in enumerate(zip(filled, runs, strict=True))
+    )
