@@ -79,6 +79,19 @@ def test_bent_segment_touches_a_sphere_at_the_analytic_angle(stiff, centre, dist
     np.testing.assert_allclose(found.angles[0, 0], exact, atol=ANGLE)
 
 
+def test_what_is_rigid_touches_as_its_bone_turns() -> None:
+    """As the stiff tube does, but with every parameter at work: they are not for what is rigid."""
+    skeleton, surface = tube_skeleton(120.0), tube()
+    beyond = surface.vertices[:, 2] < -SEGMENT
+    hard = bind(skeleton, surface, rigid=np.where(beyond, 1, -1).astype(np.int32))
+    vertex, centre = top(hard, 0.75), (0.006, -0.03, -0.055)
+    gap = lambda a: np.linalg.norm(turned(hard, vertex, a) - centre) - 0.02  # noqa: E731
+    exact = brentq(gap, 0, next(a for a in np.linspace(0, 2, 200) if gap(a) < 0), xtol=1e-12)
+    found = FlexionSearch(hard, ObjectSet(BALL.placed(centre))).run(*straight(hard), Searches(vertex=vertex, joint=1))
+    assert found.status[0] == Status.CONVERGED
+    np.testing.assert_allclose(found.angles[0, 0], exact, atol=ANGLE)
+
+
 def test_every_status_with_its_message(stiff) -> None:
     vertex = top(stiff, 0.75)
     start = stiff.surface.vertices[vertex]
