@@ -244,6 +244,24 @@ def test_polygons_of_any_size_keep_their_corners_texture(tmp_path: Path) -> None
     np.testing.assert_allclose(rig.uv, outline, atol=1e-7)
 
 
+def test_seams_within_vertices_are_kept_by_corner(tmp_path: Path) -> None:
+    """A strip of two quads whose shared vertices have other coordinates in each, and a plate without any."""
+    points = np.array([[0, 0, 0], [1, 0, 0], [2, 0, 0], [0, 1, 0], [1, 1, 0], [2, 1, 0]]) * 0.1
+    polygons = [[0, 1, 4, 3], [1, 2, 5, 4]]
+    uv = np.random.default_rng(8).random((8, 2)).astype(np.float32)
+    bound = np.zeros((6, 1), int), np.ones((6, 1))
+    strip = Mesh("strip", points, polygons, *bound, uv=uv)
+    plain = Mesh("plain", points + 1.0, polygons, *bound)
+    rig = read_fbx_rig(replace(chain(), meshes=[strip, plain]).write(tmp_path / "a.fbx"))
+    assert rig.uv is None
+    assert len(rig.vertices) == 12
+    told = {(v, *np.round(pair, 6)) for v, pair in zip(np.ravel(polygons), uv, strict=True)}
+    corners = zip(rig.faces[:4].ravel(), rig.corner_uv[:4].reshape(-1, 2), strict=True)
+    assert {(v, *np.round(pair, 6)) for v, pair in corners} == told
+    assert not rig.corner_uv[4:].any()
+    assert not any("texture" in note for note in rig.notes)
+
+
 def test_vertices_without_weights_follow_the_nearest(tmp_path: Path) -> None:
     fbx = chain()
     weights = np.ones((24, 1))

@@ -1,4 +1,4 @@
-"""Surfaces without joints: OBJ, and PLY, STL, OFF, glTF and whatever else trimesh reads."""
+"""Surfaces without joints: OBJ, PLY and OFF, and STL, glTF and whatever else trimesh reads."""
 
 from __future__ import annotations
 
@@ -10,6 +10,9 @@ from numpy.typing import NDArray
 
 from warpjld.errors import InputError
 from warpjld.io.obj_file import read_obj
+from warpjld.io.off_file import read_off
+from warpjld.io.ply_file import PlyFile, read_ply
+from warpjld.io.polygons import triangulate_polygons
 from warpjld.surface import Part, one_uv_a_vertex
 
 __all__ = ["MeshFile", "read_mesh"]
@@ -54,6 +57,10 @@ def read_mesh(path: str | Path) -> MeshFile:
         file = read_obj(path)
         uv, corner_uv = one_uv_a_vertex(len(file.vertices), file.faces, file.corner_uv)
         return MeshFile(path, file.vertices, file.faces, uv, corner_uv, file.parts, file.notes)
+    if path.suffix.lower() == ".ply":
+        return _of_polygons(path, read_ply(path))
+    if path.suffix.lower() == ".off":
+        return _of_polygons(path, PlyFile(*read_off(path), None, None))
     if path.suffix.lower().lstrip(".") not in trimesh.available_formats():
         raise InputError(f"'{path.suffix}' is not a kind of surface file that can be read", path=path)
     try:
@@ -77,8 +84,7 @@ def read_mesh(path: str | Path) -> MeshFile:
     if not parts:
         raise InputError("has no triangles", path=path)
     everything = np.concatenate(vertices).astype(np.float64)
-    if not np.isfinite(everything).all():
-        raise InputError(f"vertex {int(np.argwhere(~np.isfinite(everything))[0][0])} is not finite", path=path)
+    _check_finite(everything, path)
     return MeshFile(path, everything, np.concatenate(faces).astype(np.int64), _uv(uvs, parts), None, tuple(parts))
 
 
@@ -88,3 +94,28 @@ def _uv(uvs: list[NDArray[np.float64] | None], parts: list[Part]) -> NDArray[np.
     sizes = [part.vertices.stop - part.vertices.start for part in parts]
     filled = [np.zeros((n, 2)) if uv is None or len(uv) != n else uv for uv, n in zip(uvs, sizes, strict=True)]
     return np.concatenate(filled).astype(np.float32)
+
+
+def _of_polygons(path: Path, file: PlyFile) -> MeshFile:
+    _check_finite(file.vertices, path)
+    triangles, _ = triangulate_polygons(file.vertices[file.corners], file.counts)
+    if not len(triangles):
+        raise InputError("has no triangles", path=path)
+    faces = file.corners[triangles]
+    uv, corner_uv = file.uv, None
+    if file.corner_uv is not None:
+        uv, corner_uv = one_uv_a_vertex(len(file.vertices), faces, file.corner_uv[triangles])
+    notes = []
+    if not all(np.isfinite(found).all() for found in (uv, corner_uv) if found is not None):
+        uv, corner_uv = None, None
+        notes.append("texture coordinates are not finite: left out")
+    few = int((file.counts < 3).sum())
+    if few:
+        notes.append(f"{few} faces with fewer than three corners left out")
+    whole = (Part(path.stem, slice(0, len(file.vertices)), slice(0, len(faces))),)
+    return MeshFile(path, file.vertices, faces, uv, corner_uv, whole, tuple(notes))
+
+
+def _check_finite(vertices: NDArray[np.float64], path: Path) -> None:
+    if not np.isfinite(vertices).all():
+        raise InputError(f"vertex {int(np.argwhere(~np.isfinite(vertices))[0][0])} is not finite", path=path)
