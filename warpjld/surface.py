@@ -116,7 +116,7 @@ def weld_surface(
         uv: Texture coordinates, shape (W, 2).
         corner_uv: Texture coordinates of the faces' corners, shape (S, 3, 2), instead of ``uv``.
         parts: Source meshes; vertices of different parts are never welded.
-        tolerance: Distance below which two vertices are one, relative to the bounding box diagonal.
+        tolerance: Distance below which two vertices are one, relative to the diagonal of the faces' bounding box.
 
     Raises:
         InputError: Wrong shapes, not finite, no faces, or an index out of range.
@@ -133,7 +133,8 @@ def weld_surface(
         raise InputError(f"faces: indices must lie in 0…{len(points) - 1}, got {triangles.min()}…{triangles.max()}")
     if not parts:
         parts = (Part("surface", slice(0, len(points)), slice(0, len(triangles))),)
-    size = float(np.linalg.norm(np.ptp(points, axis=0)))
+    # vertices that no face uses may lie anywhere
+    size = float(np.linalg.norm(np.ptp(points[triangles.ravel()], axis=0)))
     owner = np.arange(len(points))
     for part in parts:
         inside = points[part.vertices]

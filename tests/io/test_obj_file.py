@@ -188,6 +188,15 @@ def test_unused_and_split_vertices_stay(tmp_path: Path, unused: int, split: bool
     np.testing.assert_allclose(got[place], want[column], atol=1e-6)
 
 
+def test_a_stray_vertex_far_away_welds_nothing(tmp_path: Path) -> None:
+    """A box of 60 units beside a vertex that no face uses, a million times as far."""
+    path = obj(tmp_path, BOX.replace("f 1 4", "v 6e7 0 6e9\nf 1 4"))
+    thing = load_object(path, unit="mm")
+    assert len(thing.vertices) == 8
+    assert thing.volume * 1e9 == pytest.approx(216_000)
+    np.testing.assert_allclose(thing.size, 0.06)
+
+
 def test_concave_polygons(tmp_path: Path) -> None:
     path = obj(tmp_path, L_SHAPE)
     mesh = read_mesh(path)
