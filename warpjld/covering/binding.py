@@ -157,6 +157,9 @@ def _anchor_some(
     ratio = np.take_along_axis(t, best, axis=1)
     offset = points[:, None] - (table.start[best] + ratio[..., None] * table.along[best])
     side, lift = _side(offset, table.normals[best], np.clip(ratio, 0.0, 1.0))
+    stiff = np.array([fan.stiff for fan in groups for _ in fan.segments])[best]
+    # half-way along and outside nothing rounds: there, all turns with the bone
+    ratio, side, lift = np.where(stiff, 0.5, ratio), np.where(stiff, 1.0, side), np.where(stiff[..., None], 0.0, lift)
     station = np.take_along_axis(along_pair, pair, axis=1)
     return best.astype(np.int32), kept, ratio, side, lift, pair, pair_kept, station
 

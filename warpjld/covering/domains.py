@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from warpjld.covering.heat import cotangent_laplacian, solve, uniform_laplacian
 from warpjld.covering.operators import Fan, segment_ends
+from warpjld.covering.skull import skull_lines
 from warpjld.errors import InputError
 from warpjld.normals import vertex_normals
 from warpjld.rig import Skin
@@ -47,7 +48,8 @@ def domains_from_geometry(
     points = (vertices - centre) / unit
     faces = _distinct(faces)
     size = min(float(np.linalg.norm(np.ptp(points, axis=0))), _LARGEST)
-    owner, distance = _nearest_visible(points, faces, (skeleton.rest - centre) / unit, groups, size)
+    lines, fan_of = _lines(skeleton, vertices, faces, groups)
+    owner, distance = _nearest_visible(points, faces, (lines - centre) / unit, fan_of, size)
     size = max(size, 1e-3)
     # far from every segment heat is not let run further than over the whole surface
     demand = contrast / np.clip(distance, 1e-4 * size, size) ** 2
@@ -134,23 +136,35 @@ def _distinct(faces: NDArray[np.int32]) -> NDArray[np.int32]:
     return kept
 
 
+def _lines(
+    skeleton: Skeleton, vertices: NDArray[np.float64], faces: NDArray[np.int32], groups: tuple[Fan, ...]
+) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
+    """What flesh lies about: every segment, and the skull's other lines, shape (L, 2, 3); and the fan of each."""
+    lines = list(skeleton.rest[segment_ends(groups)])
+    fan_of = [f for f, fan in enumerate(groups) for _ in fan.segments]
+    for f, fan in enumerate(groups):
+        if fan.stiff:
+            more = [np.stack(line) for line in skull_lines(skeleton, vertices, faces)]
+            lines += more
+            fan_of += [f] * len(more)
+    return np.array(lines), np.array(fan_of)
+
+
 def _nearest_visible(
     points: NDArray[np.float64],
     faces: NDArray[np.int32],
-    joints: NDArray[np.float64],
-    groups: tuple[Fan, ...],
+    lines: NDArray[np.float64],
+    fan_of: NDArray[np.int64],
     size: float,
-) -> tuple[NDArray[np.int32], NDArray[np.float64]]:
-    """Fan of the nearest segment that each point sees from inside, and its distance."""
+) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
+    """Fan of the nearest line (L, 2, 3) that each point sees from inside, and its distance."""
     import warp as wp
     from warpjld_kernels.visibility import nearest_visible_segment
 
-    ends = segment_ends(groups)
-    fan_of = np.array([f for f, fan in enumerate(groups) for _ in fan.segments])
     device = "cpu"
     places = wp.array(points.astype(np.float32), dtype=wp.vec3, device=device)
     mesh = wp.Mesh(places, wp.array(faces.ravel(), dtype=wp.int32, device=device))
-    tips = [wp.array(joints[ends[:, k]].astype(np.float32), dtype=wp.vec3, device=device) for k in (0, 1)]
+    tips = [wp.array(lines[:, k].astype(np.float32), dtype=wp.vec3, device=device) for k in (0, 1)]
     normals = wp.array(vertex_normals(points, faces), dtype=wp.vec3, device=device)
     nearest = wp.empty(len(points), dtype=wp.int32, device=device)
     distance = wp.empty(len(points), dtype=float, device=device)

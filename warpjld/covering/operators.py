@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from warpjld.covering.skull import CROWN
 from warpjld.skeleton.tree import Segment, Skeleton
 
 __all__ = ["Fan", "fans", "segment_ends"]
@@ -23,11 +24,13 @@ class Fan:
         name: For reports, e.g. ``left.index.knuckle2`` (the joint where it begins) or ``left.palm``.
         segments: Side by side, ulnar to radial.
         muscle: Whether internal muscles inflate: not in the palm (R50).
+        stiff: Whether all of it turns with the bone, as a skull does: no joint rounds it.
     """
 
     name: str
     segments: tuple[Segment, ...]
     muscle: bool
+    stiff: bool = False
 
 
 def fans(skeleton: Skeleton) -> tuple[Fan, ...]:
@@ -44,7 +47,10 @@ def fans(skeleton: Skeleton) -> tuple[Fan, ...]:
             if side_by_side:
                 groups.append(Fan(f"{side}.{label}".lstrip("."), side_by_side, muscle=False))
             used.update(distals)
-    groups.extend(Fan(skeleton.names[s.proximal], (s,), muscle=True) for d, s in by_distal.items() if d not in used)
+    for d, s in by_distal.items():
+        if d not in used:
+            stiff = skeleton.names[d] == CROWN
+            groups.append(Fan(skeleton.names[s.proximal], (s,), muscle=not stiff, stiff=stiff))
     return tuple(groups)
 
 

@@ -19,7 +19,7 @@ from warpjld.skeleton.recognise.extremity import find_extremity
 from warpjld.skeleton.recognise.section import nearby
 from warpjld.skeleton.tree import Skeleton
 
-__all__ = ["ACTOR_POINTS", "ActorSkeleton", "actor_skeleton"]
+__all__ = ["ACTOR_POINTS", "ActorSkeleton", "actor_skeleton", "body_facing", "face_points"]
 
 _TRUNK = {
     "pelvis": "where spine and legs part",
@@ -91,9 +91,9 @@ def actor_skeleton(skeleton: Skeleton, vertices: NDArray[np.float64], faces: NDA
     points |= dict(_trunk(joints))
     points |= dict(_arms(joints))
     points |= dict(_legs(joints))
-    up, forward = _facing(joints)
+    up, forward = body_facing(joints)
     if up is not None and forward is not None:
-        points |= dict(_face(joints, vertices, up, forward))
+        points |= dict(face_points(joints, vertices, up, forward))
         points |= dict(_heels(joints, vertices, faces, forward))
     ordered = {name: points[name] for name in ACTOR_POINTS if name in points}
     return ActorSkeleton(ordered, tuple(name for name in ACTOR_POINTS if name not in points))
@@ -141,14 +141,15 @@ def _legs(joints: Joints) -> Placed:
             yield f"{side}.middle_toe_tip", joints[f"{side}.toe.tip"]
 
 
-def _facing(joints: Joints) -> tuple[NDArray[np.float64] | None, NDArray[np.float64] | None]:
+def body_facing(joints: Joints) -> tuple[NDArray[np.float64] | None, NDArray[np.float64] | None]:
+    """Up and forward of a body, unit vectors; None where its hips and head do not tell."""
     if not {"head", "left.hip", "right.hip"} <= set(joints):
         return None, None
     up = unit(joints["head"] - joints["pelvis"])
     return up, perpendicular(np.cross(joints["left.hip"] - joints["right.hip"], up), up)
 
 
-def _face(
+def face_points(
     joints: Joints, vertices: NDArray[np.float64], up: NDArray[np.float64], forward: NDArray[np.float64]
 ) -> Placed:
     """Nose and chin from the head's midline profile, seen from the skull base."""
