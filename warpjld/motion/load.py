@@ -136,7 +136,7 @@ def _retargeted(clip: Clip, rig: Rig, rate: float | None) -> LoadedMotion:
     flips = jumps(clip.names, clip.locals())
     clip = clip if rate is None else clip.at_rate(rate)
     moved = retarget_and_tell(clip, rig.skeleton)
-    warnings = (*moved.warnings, *flips, *doubts_of_clip(clip, moved.used))
+    warnings = (*clip.warnings, *moved.warnings, *flips, *doubts_of_clip(clip, moved.used))
     return LoadedMotion(moved.poses, clip.rate, (*clip.notes, *moved.notes), warnings)
 
 
@@ -199,7 +199,12 @@ def _capture(path: Path, rig: Rig, rate: float | None) -> LoadedMotion:
     if recording is None or own is None:
         return _retargeted(clip, rig, rate)
     note = "the recording is of the rig's own joints: they are moved as it says"
-    warnings = (*own.warnings, *jumps(clip.names, clip.locals()), *doubts_of_clip(clip, recording.followed))
+    warnings = (
+        *clip.warnings,
+        *own.warnings,
+        *jumps(clip.names, clip.locals()),
+        *doubts_of_clip(clip, recording.followed),
+    )
     return LoadedMotion(
         own.poses, recording.animation.rate, (*clip.notes, note, *recording.notes, *own.notes), warnings
     )
