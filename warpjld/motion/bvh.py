@@ -9,7 +9,6 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from warpjld.errors import InputError
 from warpjld.motion.bvh_lines import NAMED, BvhLines
 from warpjld.motion.clip import Clip
 from warpjld.rotations import multiply, rotate
