@@ -85,7 +85,7 @@ FRAMES: tuple[dict[str, tuple[float, float, float]], ...] = (
 
 @dataclass(frozen=True)
 class Convention:
-    """Names of joints, ``{Left}``, ``{left}``, ``{L}`` or ``{l}`` standing for the side.
+    """Names of joints, ``{Left}``, ``{left}``, ``{L}``, ``{l}`` or ``{左}`` standing for the side.
 
     Attributes:
         names: Canonical joint (without side) → the file's names: of the joint and of the parts that divide its
@@ -98,7 +98,13 @@ class Convention:
         """The file's names of a canonical joint; empty where the file has none."""
         side, _, part = joint.partition(".") if joint.startswith(("left.", "right.")) else ("left", "", joint)
         found = self.names.get(part, ())
-        words = {"Left": side.capitalize(), "left": side, "L": side[0].upper(), "l": side[0]}
+        words = {
+            "Left": side.capitalize(),
+            "left": side,
+            "L": side[0].upper(),
+            "l": side[0],
+            "左": "左" if side == "left" else "右",
+        }
         return tuple(n.format(**words) for n in ((found,) if isinstance(found, str) else found))
 
 

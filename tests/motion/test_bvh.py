@@ -1,5 +1,6 @@
 """BVH files: analytic positions of known rotations, channel orders, and mistakes with their lines."""
 
+import re
 from pathlib import Path
 
 import numpy as np
@@ -81,7 +82,7 @@ def test_another_rate_keeps_the_ends(tmp_path: Path) -> None:
         ("    End Site", "    Offset 1 1 1\n    Site", 11, "unexpected 'Site'"),
         ("ROOT Hips", "JOINT Hips", 2, "JOINT stands outside a ROOT"),
         ("Frames: 3", "Frames: many", 17, "want 'Frames:'"),
-        ("Frames: 3", "Frames: 0", 17, "want 'Frames:'"),
+        ("Frames: 3", "Frames: -3", 17, "want 'Frames:'"),
         ("Frames: 3", "Frames: ²", 17, "want 'Frames:'"),
         ("Frames: 3", f"Frames: {'9' * 5000}", 17, "want 'Frames:'"),
         ("Frames: 3", "Number: 3", 17, "want 'Frames:' and its value, not 'Number: 3'"),
@@ -100,8 +101,18 @@ def test_mistakes_are_named_with_their_line(tmp_path: Path, old: str, new: str, 
     assert caught.value.line == line
 
 
-@pytest.mark.parametrize(("announced", "note"), [(2, "3 frames, not the 2"), (4, "3 frames, not the 4"), (3, "")])
-def test_the_frames_that_are_there_are_read(tmp_path: Path, announced: int, note: str) -> None:
+@pytest.mark.parametrize(
+    ("announced", "note"),
+    [
+        (2, "3 frames, not the 2"),
+        (4, "3 frames, not the 4"),
+        (0, "3 frames, not the 0"),
+        (999999999999, "3 frames, not the 999999999999"),
+        ("3.0", ""),
+        (3, ""),
+    ],
+)
+def test_the_frames_that_are_there_are_read(tmp_path: Path, announced: int | str, note: str) -> None:
     clip = read_bvh(write(tmp_path, ARM.replace("Frames: 3", f"Frames: {announced}")))
     assert len(clip) == 3
     np.testing.assert_array_equal(clip.positions, read_bvh(write(tmp_path, ARM)).positions)
@@ -126,6 +137,51 @@ def test_marks_tabs_comments_and_missing_blanks_do_not_matter(tmp_path: Path) ->
     clip, plain = read_bvh(path), read_bvh(write(tmp_path, ARM))
     assert (clip.names, clip.rate, clip.notes) == (plain.names, plain.rate, ())
     np.testing.assert_array_equal(clip.positions, plain.positions)
+
+
+HEAD, ROWS = ARM.partition("MOTION")[0], ARM.partition("0.0333333\n")[2]
+WRITINGS = {
+    "UTF-16": ARM.encode("utf-16"),
+    "old Mac": ARM.replace("\n", "\r").encode(),
+    "padded with zeros": ARM.encode() + bytes(512),
+    "braces on the line before": re.sub(r"\n *([{}])", r" \1", ARM).encode(),
+    "one line": (" ".join(HEAD.split()) + ARM[len(HEAD) - 1 :]).encode(),
+    "rows broken": ARM.replace(ROWS, re.sub(r"((?:\S+\s+){4})", r"\1\n", ROWS)).encode(),
+    "rows on one line": ARM.replace(ROWS, " ".join(ROWS.split())).encode(),
+    "decimal commas": re.sub(r"(-?\d+)\.?(\d*)(?=[ \n])", r"\1,\g<2>0", ROWS).join([ARM[: -len(ROWS)], ""]).encode(),
+    "decimal commas in the frame time": ARM.replace("0.0333333", "0,0333333").encode(),
+    "commas between": ARM.replace("OFFSET 10 0 0", "OFFSET 10, 0, 0").encode(),
+    "other blanks": ARM.replace("Frames: 3", "Frames : 3").replace("Frame Time: ", "FrameTime ").encode(),
+    "EndSite": ARM.replace("End Site", "EndSite").encode(),
+}
+
+
+@pytest.mark.parametrize("how", WRITINGS)
+def test_ways_of_writing_the_same(tmp_path: Path, how: str) -> None:
+    path = tmp_path / "other.bvh"
+    path.write_bytes(WRITINGS[how])
+    clip, want = read_bvh(path), read_bvh(write(tmp_path, ARM))
+    np.testing.assert_array_equal(clip.positions, want.positions)
+    np.testing.assert_array_equal(clip.rotations, want.rotations)
+    assert (clip.names, clip.rate, clip.warnings) == (want.names, want.rate, ())
+
+
+def test_channels_of_scale_are_read_over_and_told_where_they_change(tmp_path: Path) -> None:
+    lines = ARM.replace("CHANNELS 3 Yrotation", "CHANNELS 4 Xscale Yrotation").splitlines()
+    for scale in (1, 2):
+        for at, line in enumerate(lines[-3:]):
+            words = line.split()
+            lines[len(lines) - 3 + at] = " ".join([*words[:6], str(1 + at * (scale - 1)), *words[-3:]])
+        clip, want = read_bvh(write(tmp_path, "\n".join(lines))), read_bvh(write(tmp_path, ARM))
+        np.testing.assert_array_equal(clip.rotations, want.rotations)
+        assert clip.warnings == (("the motion scales Arm: scale is not followed",) if scale == 2 else ())
+
+
+def test_frames_that_last_long_are_doubted_and_a_single_one_may_last_no_time(tmp_path: Path) -> None:
+    slow = read_bvh(write(tmp_path, ARM.replace("0.0333333", "30")))
+    assert slow.warnings == ("a frame lasts 30 s, as the file says: are other units meant?",)
+    pose = ARM[: -len(ROWS)] + ROWS.splitlines()[1] + "\n"
+    assert read_bvh(write(tmp_path, pose.replace("Frames: 3", "Frames: 1").replace("0.0333333", "0"))).rate == 30.0
 
 
 def test_positions_below_the_root_replace_offsets_or_add_to_them(tmp_path: Path) -> None:

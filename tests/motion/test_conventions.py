@@ -323,6 +323,17 @@ CONVENTIONS = {
         )
         | digits("f_{digit}.0{n}.{L}", names=("thumb", "index", "middle", "ring", "pinky"), thumb="thumb.0{n}.{L}")
     ),
+    "Rigify metarig": Convention(  # its neck and head are vertebrae by name
+        trunk("spine", "spine.001", "spine.002", "spine.003", "spine.004", "spine.006")
+        | limbs(
+            "shoulder.{L}", "upper_arm.{L}", "forearm.{L}", "hand.{L}", "thigh.{L}", "shin.{L}", "foot.{L}", "toe.{L}"
+        )
+    ),
+    "MikuMikuDance": Convention(
+        trunk("下半身", "上半身", "", "上半身2", "首", "頭")
+        | limbs("{左}肩", "{左}腕", "{左}ひじ", "{左}手首", "{左}足", "{左}ひざ", "{左}足首", "{左}つま先")
+        | digits("{左}{digit}{n}", names=("親指", "人指", "中指", "薬指", "小指"))
+    ),
 }
 
 TRUNK = {"pelvis": "pelvis", "head": "head"}

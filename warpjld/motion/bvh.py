@@ -3,25 +3,26 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
-from warpjld.errors import InputError
+from warpjld.motion.bvh_lines import NAMED, BvhLines
 from warpjld.motion.clip import Clip
 from warpjld.rotations import multiply, rotate
 
 __all__ = ["read_bvh"]
 
 _AXES = "xyz"
-_CHANNELS = {f"{axis}{kind}": (kind, a) for a, axis in enumerate(_AXES) for kind in ("position", "rotation")}
+_CHANNELS = {f"{axis}{kind}": (kind, a) for a, axis in enumerate(_AXES) for kind in ("position", "rotation", "scale")}
 
 
-_COMMENT = re.compile(r"(^|\s)(//|#).*")
-"""Nothing of the format begins with these; within a name they are the name's."""
+_POSE_RATE = 30.0
+"""Frames a second of a single frame, which may last no time."""
+_SLOWEST, _FASTEST = 1.0, 10000.0
+"""Frames a second that no recording has less or more of."""
 
 
 @dataclass
@@ -40,79 +41,20 @@ def read_bvh(path: str | Path) -> Clip:
     joints below the root stand in place of their OFFSET in some files and add to it in others: whichever keeps bones
     nearer to their OFFSETs is meant.
 
-    Tabs, a byte order mark, comments (``//`` or ``#`` and what follows), keywords without the blank after their colon,
-    and another number of frames than announced are taken as they are, the last with a note, as is a last frame cut off.
+    Tabs, byte order marks, comments (``//`` or ``#`` and what follows), lines broken elsewhere, decimal commas,
+    keywords without the blank after their colon, and another number of frames than announced are taken as they are, the
+    last with a note, as is a last frame cut off. Channels of scale are read over.
 
     Raises:
         InputError: Unreadable, or not as the format wants it, with the line.
     """
-    lines = _Lines(path)
+    lines = BvhLines(path)
     joints = _hierarchy(lines)
     values, rate, notes = _motion(lines, sum(len(joint.channels) for joint in joints))
-    return _clip(joints, values, rate, notes)
+    return replace(_clip(joints, values, rate, notes), warnings=tuple(_doubts(joints, values, rate)))
 
 
-class _Lines:
-    """Lines with content, as words, with their numbers for messages."""
-
-    def __init__(self, path: str | Path) -> None:
-        self.path = path
-        try:
-            text = Path(path).read_text(encoding="utf-8-sig", errors="replace")
-        except OSError as error:
-            raise InputError(f"cannot be read: {error.strerror}", path=path) from error
-        lines = enumerate(text.split("\n"), start=1)  # not splitlines, which also breaks at form feeds
-        words = ((number, _COMMENT.sub("", line).split()) for number, line in lines)
-        self._rest: Iterator[tuple[int, list[str]]] = ((n, w) for n, w in words if w)
-        self.number = 0
-
-    def next(self, wanted: str) -> list[str]:
-        """Words of the next line."""
-        words = self.next_or_none()
-        if words is None:
-            raise self.error(f"the file ends here; expected {wanted}")
-        return words
-
-    def next_or_none(self) -> list[str] | None:
-        found = next(self._rest, None)
-        if found is None:
-            return None
-        self.number, words = found
-        return words
-
-    def expect(self, keyword: str) -> list[str]:
-        """Words after a keyword the next line must begin with."""
-        words = self.next(f"'{keyword}'")
-        if words[0].lower() != keyword.lower():
-            raise self.error(f"expected '{keyword}', not '{words[0]}'")
-        return words[1:]
-
-    def setting(self, keyword: str) -> list[str]:
-        """Words after a keyword of one or two words and a colon, which a value may follow without a blank."""
-        words = self.next(f"'{keyword}'")
-        line = " ".join(words)
-        if not line.lower().startswith(keyword.lower()):
-            raise self.error(f"want '{keyword}' and its value, not '{line[:40]}'")
-        return line[len(keyword) :].split()
-
-    def numbers(self, words: list[str], count: int, what: str) -> NDArray[np.float64]:
-        """Words as finite numbers."""
-        if len(words) != count:
-            raise self.error(f"{what}: want {count} numbers, got {len(words)}")
-        try:
-            values = np.array(words, dtype=np.float64)
-        except ValueError:
-            bad = next(word for word in words if not _is_number(word))
-            raise self.error(f"{what}: '{bad}' is not a number") from None
-        if not np.isfinite(values).all():
-            raise self.error(f"{what}: '{words[int(np.argmin(np.isfinite(values)))]}' is not finite")
-        return values
-
-    def error(self, message: str) -> InputError:
-        return InputError(message, path=self.path, line=self.number or None)
-
-
-def _hierarchy(lines: _Lines) -> list[_Joint]:
+def _hierarchy(lines: BvhLines) -> list[_Joint]:
     lines.expect("HIERARCHY")
     joints: list[_Joint] = []
     open_joints: list[int] = []
@@ -120,10 +62,10 @@ def _hierarchy(lines: _Lines) -> list[_Joint]:
     while words[0].upper() != "MOTION":
         keyword = words[0].upper()
         inside = joints[open_joints[-1]] if open_joints else None
-        if keyword in ("ROOT", "JOINT", "END"):
+        if keyword in NAMED:
             if (keyword == "ROOT") != (inside is None):
                 raise lines.error(f"{keyword} stands {'inside a joint' if inside else 'outside a ROOT'}")
-            end = keyword == "END" and inside is not None
+            end = keyword in ("END", "ENDSITE") and inside is not None
             name = f"{joints[open_joints[-1]].name} end" if end else " ".join(words[1:])
             if not name:
                 raise lines.error(f"{keyword} without a name")
@@ -148,26 +90,40 @@ def _hierarchy(lines: _Lines) -> list[_Joint]:
     return joints
 
 
-def _channels(lines: _Lines, words: list[str], joint: str) -> list[tuple[str, int]]:
+def _channels(lines: BvhLines, words: list[str], joint: str) -> list[tuple[str, int]]:
     if not words or words[0] != str(len(words) - 1):
         raise lines.error(f"CHANNELS of '{joint}': want their number, then as many names")
-    for word in words[1:]:
-        if word.lower() not in _CHANNELS:
-            raise lines.error(f"CHANNELS of '{joint}': no channel '{word}'; known: Xposition … Zrotation")
-    return [_CHANNELS[word.lower()] for word in words[1:]]
+    names = [word.rstrip(",;") for word in words[1:]]
+    for name in names:
+        if name.lower() not in _CHANNELS:
+            raise lines.error(f"CHANNELS of '{joint}': no channel '{name}'; known: Xposition … Zrotation")
+    return [_CHANNELS[name.lower()] for name in names]
 
 
-def _motion(lines: _Lines, channels: int) -> tuple[NDArray[np.float64], float, list[str]]:
+def _motion(lines: BvhLines, channels: int) -> tuple[NDArray[np.float64], float, list[str]]:
     """Rows of channel values, frames a second, and notes on rows more or fewer than announced."""
     if channels == 0:
         raise lines.error("no joint has CHANNELS: nothing moves")
-    words = lines.setting("Frames:")
-    if len(words) != 1 or not words[0].isascii() or not words[0].isdigit() or len(words[0]) > 9 or int(words[0]) == 0:
-        raise lines.error("want 'Frames:' and how many, at least one")
-    count = int(words[0])
-    seconds = lines.numbers(lines.setting("Frame Time:"), 1, "Frame Time")[0]
-    if seconds <= 0.0:
+    words = lines.setting("Frames")
+    count = _count(words[0]) if len(words) == 1 else None
+    if count is None:
+        raise lines.error("want 'Frames:' and how many")
+    seconds = lines.numbers(lines.setting("Frame Time"), 1, "Frame Time")[0]
+    timed = lines.number
+    rows, notes = _rows(lines, channels, count)
+    if seconds <= 0.0 and len(rows) == 1:
+        seconds = 1.0 / _POSE_RATE
+    elif seconds <= 0.0:
+        lines.number = timed
         raise lines.error(f"Frame Time must be above 0, got {seconds:g}")
+    if len(rows) != count:
+        notes.append(f"the motion has {len(rows)} frames, not the {count} it announces: those that are there are taken")
+    rate = 1.0 / seconds
+    return np.array(rows), round(rate, 3) if rate > _SLOWEST else rate, notes
+
+
+def _rows(lines: BvhLines, channels: int, count: int) -> tuple[list[NDArray[np.float64]], list[str]]:
+    """Channel values of every frame, and notes; where lines are broken elsewhere, if their numbers fill all frames."""
     rows: list[NDArray[np.float64]] = []
     notes: list[str] = []
     words_next = lines.next_or_none()
@@ -177,14 +133,43 @@ def _motion(lines: _Lines, channels: int) -> tuple[NDArray[np.float64], float, l
         if words_next is None and rows and len(words) < channels:
             notes.append(f"the last frame is cut off and left out: {len(words)} of {channels} numbers")
             break
+        if len(words) != channels and not rows:
+            first = len(words)
+            while words_next is not None and len(words) < count * channels:
+                words += words_next
+                words_next = lines.next_or_none()
+            if len(words) == count * channels and words_next is None:
+                return list(lines.numbers(words, len(words), "frames").reshape(count, channels)), notes
+            lines.number = line
+            raise lines.error(f"frame 0: want {channels} numbers, got {first}")
         after, lines.number = lines.number, line
         rows.append(lines.numbers(words, channels, f"frame {len(rows)}"))
         lines.number = after
     if not rows:
         raise lines.error(f"the file ends here; expected frame 0 of {count}")
-    if len(rows) != count:
-        notes.append(f"the motion has {len(rows)} frames, not the {count} it announces: those that are there are taken")
-    return np.array(rows), round(1.0 / seconds, 3), notes
+    return rows, notes
+
+
+def _count(word: str) -> int | None:
+    """How many, where that is what a word says."""
+    whole = re.fullmatch(r"([0-9]{1,15})([.,]0*)?", word, re.ASCII)
+    return int(whole[1]) if whole else None
+
+
+def _doubts(joints: list[_Joint], values: NDArray[np.float64], rate: float) -> list[str]:
+    """What of a file's values is not followed, or hardly meant."""
+    found = []
+    kinds = [(joint.name, kind) for joint in joints for kind, _ in joint.channels]
+    scaled = [
+        name
+        for (name, kind), column in zip(kinds, values.T, strict=True)
+        if kind == "scale" and np.ptp(column) > 1e-3 * np.abs(column).max()
+    ]
+    if scaled:
+        found.append(f"the motion scales {', '.join(dict.fromkeys(scaled))}: scale is not followed")
+    if len(values) > 1 and not _SLOWEST < rate < _FASTEST:
+        found.append(f"a frame lasts {1.0 / rate:g} s, as the file says: are other units meant?")
+    return found
 
 
 def _clip(joints: list[_Joint], values: NDArray[np.float64], rate: float, notes: list[str]) -> Clip:
@@ -199,7 +184,7 @@ def _clip(joints: list[_Joint], values: NDArray[np.float64], rate: float, notes:
         for kind, axis in joint.channels:
             if kind == "position":
                 places[:, j, axis] = values[:, column]
-            else:
+            elif kind == "rotation":
                 turns[:, j] = multiply(turns[:, j], _about(axis, values[:, column]))
             column += 1
     if _add_to_offsets(joints, places, offsets):
@@ -232,11 +217,3 @@ def _about(axis: int, degrees: NDArray[np.float64]) -> NDArray[np.float64]:
     out = np.zeros((len(half), 4))
     out[:, axis], out[:, 3] = np.sin(half), np.cos(half)
     return out
-
-
-def _is_number(word: str) -> bool:
-    try:
-        float(word)
-    except ValueError:
-        return False
-    return True

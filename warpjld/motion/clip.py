@@ -25,6 +25,7 @@ class Clip:
         rotations: Rotation of every bone from rest, world axes, unit quaternions x, y, z, w, shape (F, B, 4).
         rate: Frames a second.
         notes: What a reader of the result should know of the file.
+        warnings: What of the file is not followed, or looks wrong.
     """
 
     names: tuple[str, ...]
@@ -34,6 +35,7 @@ class Clip:
     rotations: NDArray[np.float64]
     rate: float
     notes: tuple[str, ...] = ()
+    warnings: tuple[str, ...] = ()
 
     def __len__(self) -> int:
         return len(self.positions)

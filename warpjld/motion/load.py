@@ -136,7 +136,7 @@ def _retargeted(clip: Clip, rig: Rig, rate: float | None) -> LoadedMotion:
     flips = jumps(clip.names, clip.locals())
     clip = clip if rate is None else clip.at_rate(rate)
     moved = retarget_and_tell(clip, rig.skeleton)
-    warnings = (*moved.warnings, *flips, *doubts_of_clip(clip, moved.used))
+    warnings = (*clip.warnings, *moved.warnings, *flips, *doubts_of_clip(clip, moved.used))
     return LoadedMotion(moved.poses, clip.rate, (*clip.notes, *moved.notes), warnings)
 
 
@@ -188,8 +188,26 @@ def _table(path: Path, rig: Rig, rate: float | None, limits: Limits) -> LoadedMo
 
 def _capture(path: Path, rig: Rig, rate: float | None) -> LoadedMotion:
     from warpjld.motion.bvh import read_bvh
+    from warpjld.motion.doubts import doubts_of_clip, jumps
+    from warpjld.motion.own_joints import own_poses
+    from warpjld.motion.own_recording import own_recording, with_own_joints
 
-    return _retargeted(read_bvh(path), rig, rate)
+    clip = read_bvh(path)
+    joined = with_own_joints(rig)
+    recording = own_recording(clip if rate is None else clip.at_rate(rate), joined)
+    own = None if recording is None else own_poses(recording.animation, joined)
+    if recording is None or own is None:
+        return _retargeted(clip, rig, rate)
+    note = "the recording is of the rig's own joints: they are moved as it says"
+    warnings = (
+        *clip.warnings,
+        *own.warnings,
+        *jumps(clip.names, clip.locals()),
+        *doubts_of_clip(clip, recording.followed),
+    )
+    return LoadedMotion(
+        own.poses, recording.animation.rate, (*clip.notes, note, *recording.notes, *own.notes), warnings
+    )
 
 
 def _tracked_hands(

@@ -17,7 +17,7 @@ from warpjld.motion.clip import Clip
 from warpjld.motion.landmarks import Landmarks, landmarks_of_clip
 from warpjld.rotations import minimal_rotation, rotate, slerp, unit
 
-__all__ = ["with_usable_rest"]
+__all__ = ["turn_of_rest", "with_usable_rest"]
 
 _OFF = 10.0
 """Degrees by which a rest's bones, carried by the rotations, may miss those of the frames."""
@@ -53,7 +53,7 @@ def with_usable_rest(clip: Clip, *, side: str | None = None) -> tuple[Clip, Land
         notes = (f"the motion's rest says nothing of the body ({why}): its frame {frame} is taken as the rest",)
         marks = landmarks_of_clip(clip, side=side)
         return clip, marks, (*marks.notes, *notes)
-    turn, told = _whole_turn(clip, marks, ways)
+    turn, told = turn_of_rest(clip, marks)
     if turn is None:
         return clip, marks, (*marks.notes, *told)
     clip = clip.turned_rest(turn)
@@ -178,13 +178,13 @@ def _frame(across: NDArray[np.float64], up: NDArray[np.float64]) -> NDArray[np.f
     return np.column_stack([left, up, np.cross(left, up)])
 
 
-def _whole_turn(
-    clip: Clip, marks: Landmarks, ways: NDArray[np.float64]
-) -> tuple[NDArray[np.float64] | None, tuple[str, ...]]:
-    """Turn of a rest that stands along another axis than the figure does in all frames; None where there is none."""
-    at_rest, pelvis = _ways(marks, marks.rest), marks.pelvis
+def turn_of_rest(clip: Clip, marks: Landmarks) -> tuple[NDArray[np.float64] | None, tuple[str, ...]]:
+    """Turn of a rest that stands along another axis than the figure does in the frames, with a note; None where not."""
+    at_rest, ways, pelvis = _ways(marks, marks.rest), _ways(marks, clip.positions), marks.pelvis
+    if at_rest is None or ways is None or pelvis is None:
+        return None, ()
     mean = ways.mean(axis=0)
-    if at_rest is None or pelvis is None or np.linalg.norm(mean) < _MOSTLY:
+    if np.linalg.norm(mean) < _MOSTLY:
         return None, ()
     own, found = _signed_axis(at_rest), _signed_axis(mean)
     if own @ found > 0.5:

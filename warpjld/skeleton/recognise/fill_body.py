@@ -23,6 +23,7 @@ def fill_body(tree: SourceTree, roles: Roles, flesh: Flesh, stated: Collection[s
         return
     _pelvis(tree, roles, stated)
     _trunk_between(tree, roles, stated)
+    _head(tree, roles, stated)
     _feet(tree, roles, flesh, stated)
     _ends(roles, flesh, stated)
 
@@ -43,17 +44,34 @@ def _trunk_between(tree: SourceTree, roles: Roles, stated: Collection[str]) -> N
     """The spine's joints, from pelvis to where the arms part, if no name says them."""
     if any(name.startswith("spine") for name in (*roles.body, *stated)) or "pelvis" not in roles.body:
         return
-    arms = [roles.body[f"{side}.shoulder"] for side in ("left", "right") if f"{side}.shoulder" in roles.body]
-    if len(arms) < 2:
-        return
-    both = set(tree.ancestors(arms[1]))
-    chest = next((j for j in tree.ancestors(arms[0]) if j in both), None)
+    chest = _where_arms_part(tree, roles)
     if chest is None or roles.body["pelvis"] not in tree.ancestors(chest):
         return
     spine = [j for j in path_below(tree, roles.body["pelvis"], chest) if j not in roles.body.values()]
     roles.body |= {f"spine{n}": j for n, j in enumerate(spine, start=1)}
     if spine:
         roles.notes.append(f"spine {', '.join(repr(tree.names[j]) for j in spine)}: between pelvis and arms")
+
+
+def _where_arms_part(tree: SourceTree, roles: Roles) -> int | None:
+    arms = [roles.body[f"{side}.shoulder"] for side in ("left", "right") if f"{side}.shoulder" in roles.body]
+    both = set(tree.ancestors(arms[1])) if len(arms) == 2 else set()
+    return next((j for j in tree.ancestors(arms[0]) if j in both), None) if both else None
+
+
+def _head(tree: SourceTree, roles: Roles, stated: Collection[str]) -> None:
+    """Neck and head, where names have vertebrae all the way up, as Rigify's: those above where the arms part."""
+    chest = _where_arms_part(tree, roles)
+    if chest is None or any(name.startswith(("head", "neck")) for name in (*roles.body, *stated)):
+        return
+    spine = [name for name in roles.body if name.startswith("spine") and name not in stated]
+    above = [name for name in spine if chest in tree.ancestors(roles.body[name])]
+    above.sort(key=lambda name: tree.depth(roles.body[name]))
+    line = [roles.body.pop(name) for name in above]
+    if not line:
+        return
+    roles.body |= {f"neck{n}": j for n, j in enumerate(line[:-1], start=1)} | {"head": line[-1]}
+    roles.notes.append(f"head '{tree.names[line[-1]]}': the last joint of the spine above the arms")
 
 
 def _feet(tree: SourceTree, roles: Roles, flesh: Flesh, stated: Collection[str]) -> None:

@@ -4,8 +4,8 @@ WebXR ``index-finger-phalanx-proximal``, SMPL-X ``left_index1``, MakeHuman and A
 ``mixamorig:LeftHandIndex1``, Leap ``L_index_a``, Godot and VRM ``LeftIndexProximal`` ``J_Bip_L_Index1``, OpenXR
 ``Index_Proximal_L``, Unreal ``index_01_l``, Rigify ``f_index.01.L``, Poser and DAZ ``lIndex1``, Rokoko
 ``LeftFinger2Proximal``, Xsens ``LeftSecondPP``, Perception Neuron and HumanIK ``LeftInHandIndex``, Biped
-``Bip01 L Finger1``, OptiTrack ``LUArm``, CMU ``lhumerus``, Kinect ``ElbowLeft``: all are a side, a few words and a
-number, so one vocabulary reads them all.
+``Bip01 L Finger1``, OptiTrack ``LUArm``, CMU ``lhumerus``, Kinect ``ElbowLeft``, MikuMikuDance ``左ひじ``: all are a
+side, a few words and a number, so one vocabulary reads them all.
 """
 
 from __future__ import annotations
@@ -15,14 +15,11 @@ from dataclasses import dataclass
 from functools import cache
 from itertools import pairwise
 
+from warpjld.skeleton.recognise.names_japanese import in_english
+
 __all__ = ["Meaning", "read_name"]
 
-_SIDES = {"left": "left", "l": "left", "lt": "left", "lft": "left"} | {
-    "right": "right",
-    "r": "right",
-    "rt": "right",
-    "rgt": "right",
-}
+_SIDES = dict.fromkeys(("left", "l", "lt", "lft"), "left") | dict.fromkeys(("right", "r", "rt", "rgt"), "right")
 _DIGITS = {
     "thumb": "thumb",
     "index": "index",
@@ -262,7 +259,7 @@ def _numbered(numbers: list[str]) -> tuple[str | None, int | None]:
 
 
 def _words(name: str) -> list[str]:
-    name = re.sub(r"^CC_Base_", "", name.rsplit(":", 1)[-1])
+    name = re.sub(r"^CC_Base_", "", in_english(name.rsplit(":", 1)[-1]))
     name = re.sub(r"^([LR])([UF]Arm)$", r"\1_\2", name.rsplit("_", 1)[-1]) if _CAPITALS.search(name) else name
     pieces = re.findall(r"[A-Z]+(?![a-z])|[A-Z]?[a-z]+|\d+", name)
     words: list[str] = []

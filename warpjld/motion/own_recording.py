@@ -1,0 +1,168 @@
+"""A recording of a rig's own joints: BVH that shows its skeleton, joint by joint and in its own rest pose.
+
+BVH has no joint frames, only places: zero rotations are the rest, whose joints lie where OFFSETs lead. Where a
+similarity T brings these places on those of the rig's joints of the same names, the recording is an animation of the
+rig's own. With R and p a joint's rotation from rest and its position, Q the rotation in T, and B the joint's rest
+transform in the rig's file, it is
+
+    A(t) = [ Q R(t) Qᵀ B,  T p(t) ]
+
+A hierarchy's first OFFSET is often 0 and its position channels say where it is: T then leaves the origin in its place.
+"""
+
+from __future__ import annotations
+
+import re
+from collections import Counter
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial.transform import Rotation
+
+from warpjld.motion.clip import Clip
+from warpjld.motion.joint_animation import JointAnimation
+from warpjld.motion.landmarks import Landmarks
+from warpjld.motion.rest_pose import turn_of_rest
+from warpjld.motion.same_skeleton import match_joints
+from warpjld.rig import Rig
+from warpjld.scales import polar
+from warpjld.skeleton.recognise.tree import SourceTree
+
+__all__ = ["OwnRecording", "own_recording", "with_own_joints"]
+
+_ENOUGH = 0.5  # share of a rig's joints that a recording must have to be of the rig
+_SAME = 1e-3
+"""Of the rig's size, by which places of joints at rest may differ: some programs write three decimals of a metre."""
+
+
+@dataclass(frozen=True, eq=False)
+class OwnRecording:
+    """A recording as an animation of a rig's own joints.
+
+    Attributes:
+        animation: Those joints of the rig that the recording has.
+        followed: Joints of the recording that are joints of the rig's skeleton, or carry one.
+        notes: What was decided.
+    """
+
+    animation: JointAnimation
+    followed: frozenset[int]
+    notes: tuple[str, ...] = ()
+
+
+def with_own_joints(rig: Rig) -> Rig:
+    """A rig with a tree of its own joints: of one made without a file, those of its skeleton."""
+    if rig.source is not None:
+        return rig
+    count = len(rig.skeleton)
+    frames = np.tile(np.eye(4), (count, 1, 1))
+    frames[:, :3, 3] = rig.skeleton.rest
+    tree = SourceTree(rig.skeleton.names, rig.skeleton.parents.astype(np.int64), frames)
+    return replace(rig, source=tree, sources=tuple(range(count)), owner=np.arange(count), placing=np.eye(4))
+
+
+def own_recording(clip: Clip, rig: Rig) -> OwnRecording | None:
+    """A recording as an animation of a rig's own joints; None where it shows another skeleton, or another rest.
+
+    Args:
+        clip: The recording.
+        rig: One with a ``source``, see ``with_own_joints``.
+    """
+    assert rig.source is not None
+    places = rig.source.positions @ rig.placing[:3, :3].T + rig.placing[:3, 3]
+    match = match_joints(_tree(clip, rig.source), rig.source)
+    joints = [source for source in rig.sources if source >= 0]
+    known = np.array([s for s in joints if match[s] >= 0], dtype=np.int64)
+    if len(known) < max(2, _ENOUGH * len(joints)) or known[0] != joints[0]:
+        return None
+    fit = _similarity(clip.rest[match[known]], places[known])
+    if fit is None:
+        return None
+    notes: tuple[str, ...] = ()
+    if fit.turn.apply([0.0, 1.0, 0.0])[1] < 0.5:  # another axis is up: of the rest only, or of the frames too
+        turn, notes = turn_of_rest(clip, _landmarks(clip, rig, match))
+        if turn is not None:
+            clip = clip.turned_rest(turn)
+            fit = replace(fit, turn=fit.turn * Rotation.from_quat(turn).inv())
+    if not clip.rest[clip.parents < 0].any():
+        fit = replace(fit, shift=np.zeros(3))
+    own = np.flatnonzero(match >= 0)
+    worlds = _worlds(clip, match[own], fit, rig.placing, rig.source.frames[own])
+    used: set[int] = set()
+    for k in match[known].tolist():
+        while k >= 0 and k not in used:
+            used.add(k)
+            k = int(clip.parents[k])
+    return OwnRecording(JointAnimation(_subtree(rig.source, own), worlds, clip.rate), frozenset(used), notes)
+
+
+@dataclass(frozen=True, eq=False)
+class _Fit:
+    """What takes a recording's places to those of a rig [m]: ``scale`` times ``turn`` of them, and ``shift``."""
+
+    scale: float
+    turn: Rotation
+    shift: NDArray[np.float64]
+
+
+def _similarity(theirs: NDArray[np.float64], own: NDArray[np.float64]) -> _Fit | None:
+    """What brings places (K, 3) on others, with quarter turns before others; None where nothing does."""
+    middles = theirs.mean(axis=0), own.mean(axis=0)
+    a, b = theirs - middles[0], own - middles[1]
+    if not np.linalg.norm(a) > 0.0:
+        return None
+    scale = float(np.linalg.norm(b) / np.linalg.norm(a))
+    quarter = Rotation.create_group("O")
+    turns = [quarter[int(k)] for k in np.argsort(quarter.magnitude(), kind="stable")]
+    left, _, right = np.linalg.svd(b.T @ a)
+    turns.append(Rotation.from_matrix(left @ np.diag([1.0, 1.0, np.linalg.det(left @ right)]) @ right))
+    near = _SAME * float(np.linalg.norm(np.ptp(own, axis=0)))
+    for turn in turns:
+        if np.linalg.norm(scale * turn.apply(a) - b, axis=1).max() <= near:
+            return _Fit(scale, turn, middles[1] - scale * turn.apply(middles[0]))
+    return None
+
+
+def _worlds(
+    clip: Clip,
+    joints: NDArray[np.int64],
+    fit: _Fit,
+    placing: NDArray[np.float64],
+    rest: NDArray[np.float64],
+) -> NDArray[np.float64]:
+    """A: joint-to-world transforms of K joints in the rig's file, shape (F, K, 4, 4)."""
+    shape = len(clip), len(joints)
+    back = np.asarray(np.linalg.inv(placing), dtype=np.float64)
+    turn, _ = polar(back[:3, :3])
+    axes = turn @ fit.turn.as_matrix()
+    turns = Rotation.from_quat(clip.rotations[:, joints].reshape(-1, 4)).as_matrix().reshape(*shape, 3, 3)
+    places = fit.scale * clip.positions[:, joints] @ fit.turn.as_matrix().T + fit.shift
+    out = np.tile(np.eye(4), (*shape, 1, 1))
+    out[..., :3, :3] = axes @ turns @ axes.T @ rest[:, :3, :3]
+    out[..., :3, 3] = places @ back[:3, :3].T + back[:3, 3]
+    return out
+
+
+def _tree(clip: Clip, own: SourceTree) -> SourceTree:
+    """The recording's joints; of doubled names that were numbered, which BVH wants, without the numbers."""
+    doubled = {name for name, count in Counter(own.names).items() if count > 1}
+    bare = [re.sub(r"_[0-9]+$", "", name) for name in clip.names]
+    names = tuple(b if n not in own.names and b in doubled else n for n, b in zip(clip.names, bare, strict=True))
+    frames = np.tile(np.eye(4), (len(names), 1, 1))
+    frames[:, :3, 3] = clip.rest
+    return SourceTree(names, clip.parents, frames)
+
+
+def _subtree(tree: SourceTree, joints: NDArray[np.int64]) -> SourceTree:
+    """Some joints of a tree, each below the nearest of its ancestors that is one of them."""
+    number = {int(j): k for k, j in enumerate(joints)}
+    parents = [next((number[a] for a in tree.ancestors(int(j)) if a in number), -1) for j in joints]
+    return SourceTree(tuple(tree.names[j] for j in joints), np.array(parents, dtype=np.int64), tree.frames[joints])
+
+
+def _landmarks(clip: Clip, rig: Rig, match: NDArray[np.int64]) -> Landmarks:
+    """The recording's joints under the canonical names of the rig's."""
+    named = zip(rig.skeleton.names, rig.sources, strict=True)
+    joints = {name: int(match[source]) for name, source in named if source >= 0 and match[source] >= 0}
+    return Landmarks(joints, clip.parents, clip.rest)
