@@ -42,7 +42,7 @@ def rig(command: Callable[..., Any]) -> Callable[..., Any]:
     for option in (
         click.option("--up", type=click.Choice(["y", "z"]), help="RIG's up axis; guessed by default."),
         click.option("--scale", type=float, help="Factor for all of RIG's lengths; without --unit none is guessed."),
-        click.option("--unit", type=click.Choice(["m", "cm", "mm"]), help="RIG's unit; guessed by default."),
+        click.option("--unit", type=click.Choice(["m", "cm", "mm", "in"]), help="RIG's unit; guessed by default."),
         click.option(
             "--side", type=click.Choice(["left", "right"]), help="Which hand RIG is, if the file leaves it open."
         ),

@@ -13,7 +13,8 @@ from warpjld.skeleton.recognise.tree import SourceTree
 
 __all__ = ["METRES", "place"]
 
-METRES = {"m": 1.0, "cm": 0.01, "mm": 0.001}
+METRES = {"m": 1.0, "cm": 0.01, "mm": 0.001, "in": 0.0254}
+_WORDS = {"in": "inches"}
 _HAND = (0.10, 0.30)  # wrist to middle fingertip, children of three to giants [m]
 _FINGERTIP = 1.15  # hand's length per distance from the wrist to the last knuckle
 _SMALLER, _LARGER = 0.6, 1.2  # beyond plausible sizes that a unit is guessed for
@@ -28,7 +29,7 @@ def place(
     Args:
         source: What the file says.
         roles: What was recognised in its joints.
-        unit: ``m``, ``cm``, ``mm`` or None: what the file says, else the one with which hand or body has a plausible
+        unit: ``m``, ``cm``, ``mm``, ``in`` or None: what the file says, else the one with which hand or body has a plausible
             size.
         scale: Factor by which all lengths are multiplied besides; where it is given and ``unit`` is not, nothing is
             guessed: a file that does not say is taken to be in metres.
@@ -42,10 +43,12 @@ def place(
     possible = (_SMALLER * plausible[0], _LARGER * plausible[1])
     guess = unit is None and scale is None and source.metres is None
     if guess and size and not possible[0] <= size <= possible[1]:
-        fits = [u for u, f in METRES.items() if possible[0] <= size * f <= possible[1]]
+        # inches only where no metric unit gives a usual size
+        usual = [u for u, f in METRES.items() if plausible[0] <= size * f <= plausible[1]]
+        fits = usual or [u for u, f in METRES.items() if u != "in" and possible[0] <= size * f <= possible[1]]
         if fits:
             factor = METRES[fits[0]]
-            notes.append(f"unit: a {what} of {size:.4g} units is taken to be in {fits[0]}")
+            notes.append(f"unit: a {what} of {size:.4g} units is taken to be in {_WORDS.get(fits[0], fits[0])}")
     if size and not plausible[0] <= size * factor <= plausible[1]:
         doubts.append(_implausible(size * factor, plausible, what, (scale or 1.0)))
     if up is None and source.up is not None:

@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from warpjld.errors import InputError
+from warpjld.io.placement import METRES
 from warpjld.io.source import SourceRig
 from warpjld.rig import Rig
 
@@ -29,7 +30,7 @@ def load_rig(
         path: The file.
         skeleton: Skeleton file (JSON, see :mod:`warpjld.io.skeleton_file`); needed where the surface has no joints.
         side: ``left`` or ``right`` for a single hand, where the file leaves it open or is wrong.
-        unit: ``m``, ``cm`` or ``mm``; by default what the file says, else guessed from a hand's or body's plausible
+        unit: ``m``, ``cm``, ``mm`` or ``in``; by default what the file says, else guessed from a hand's or body's plausible
             size, with a note.
         scale: Factor by which all lengths are multiplied besides; without ``unit`` nothing is guessed then.
         up: ``y`` or ``z``: the file's up axis; by default what it says, else guessed; turned to Y.
@@ -46,7 +47,7 @@ def load_rig(
 
     for name, value, allowed in (
         ("side", side, ("left", "right")),
-        ("unit", unit, ("m", "cm", "mm")),
+        ("unit", unit, tuple(METRES)),
         ("up", up, ("y", "z")),
     ):
         if value is not None and value not in allowed:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Collection
 
-from warpjld.skeleton.hand import DIGITS
+from warpjld.skeleton.hand import DIGITS, HAND_PARENTS
 from warpjld.skeleton.recognise.by_shape import hands_by_shape
 from warpjld.skeleton.recognise.flesh import Flesh
 from warpjld.skeleton.recognise.names import read_name
@@ -15,25 +15,61 @@ __all__ = ["fill_hands"]
 
 
 def fill_hands(tree: SourceTree, roles: Roles, flesh: Flesh, stated: Collection[str] = ()) -> None:
-    """Add to ``roles`` the digits of hands of which only the wrist is named, and metacarpals with other names."""
+    """Add to ``roles`` the digits that names leave out, and metacarpals with other names."""
     if tree.flat:
         return
-    _digits(tree, roles, flesh)
+    if not any(name.partition(".")[2] in HAND_PARENTS for name in stated):
+        _digits(tree, roles, flesh)
     for hand in roles.hands:
         _metacarpals(tree, roles, hand, flesh, stated)
 
 
 def _digits(tree: SourceTree, roles: Roles, flesh: Flesh) -> None:
     wrists = {joint: name for name, joint in roles.body.items() if name.endswith(".wrist")}
-    if not wrists:
+    partial = {hand.joints["wrist"]: hand for hand in roles.hands if "wrist" in hand.joints and not _whole(hand)}
+    if not wrists and not partial:
         return
     for hand in hands_by_shape(tree, flesh):
+        if (named := partial.get(hand.joints["wrist"])) is not None and not _elsewhere(hand, named, roles):
+            _complete(tree, roles, named, hand)
+            continue
         name = wrists.get(hand.joints["wrist"])
         if name is not None and not set(hand.joints.values()) - {hand.joints["wrist"]} & set(roles.body.values()):
             del roles.body[name]
             side = name.partition(".")[0]
             roles.hands.append(HandRoles(side, hand.joints))
             roles.notes.append(f"{side} hand: fingers below '{tree.names[hand.joints['wrist']]}' by their shape")
+
+
+def _whole(hand: HandRoles) -> bool:
+    return all(f"{digit}.base" in hand.joints for digit in DIGITS)
+
+
+def _elsewhere(hand: HandRoles, named: HandRoles, roles: Roles) -> bool:
+    """Whether a joint of a hand plays another part already."""
+    others = {joint for other in roles.hands if other is not named for joint in other.joints.values()}
+    return bool((set(hand.joints.values()) - {hand.joints["wrist"]}) & (others | set(roles.body.values())))
+
+
+def _complete(tree: SourceTree, roles: Roles, named: HandRoles, shaped: HandRoles) -> None:
+    """Digits of a hand in whose words only some were understood ("Ringfinger" beside "Daumen")."""
+    understood = {name.partition(".")[0] for name in named.joints} - {"wrist"}
+    moved = {
+        digit
+        for digit in understood
+        if not {j for name, j in named.joints.items() if name.startswith(f"{digit}.")}
+        & {j for name, j in shaped.joints.items() if name.startswith(f"{digit}.")}
+    }
+    named.joints = shaped.joints
+    wrist = tree.names[shaped.joints["wrist"]]
+    words = ", ".join(d for d in DIGITS if d in understood)
+    who = f"{named.side or 'a'} hand"
+    roles.notes.append(f"{who}: names tell {words} only; all digits below '{wrist}' by their shape")
+    if moved:
+        roles.suspicious.append(
+            f"{who}: {', '.join(d for d in DIGITS if d in moved)} is not where its name says, going by the shape of the "
+            "hand: state the joints with --map (inspect --write-map writes what was recognised, for editing)"
+        )
 
 
 def _metacarpals(tree: SourceTree, roles: Roles, hand: HandRoles, flesh: Flesh, stated: Collection[str]) -> None:
