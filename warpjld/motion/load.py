@@ -188,19 +188,8 @@ def _table(path: Path, rig: Rig, rate: float | None, limits: Limits) -> LoadedMo
 
 def _capture(path: Path, rig: Rig, rate: float | None) -> LoadedMotion:
     from warpjld.motion.bvh import read_bvh
-    from warpjld.motion.doubts import doubts_of_clip, jumps
-    from warpjld.motion.own_capture import own_capture
-    from warpjld.motion.own_joints import own_poses
 
-    recorded = read_bvh(path)
-    clip = recorded if rate is None else recorded.at_rate(rate)
-    played = own_capture(clip, rig)
-    own = None if played is None else own_poses(played[0], rig)
-    if played is None or own is None:
-        return _retargeted(recorded, rig, rate)
-    animation, used = played
-    doubts = [*jumps(recorded.names, recorded.locals()), *doubts_of_clip(clip, used)]
-    return LoadedMotion(own.poses, clip.rate, (*animation.notes, *own.notes), (*own.warnings, *doubts))
+    return _retargeted(read_bvh(path), rig, rate)
 
 
 def _tracked_hands(
