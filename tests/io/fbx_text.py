@@ -26,7 +26,7 @@ AXES = {  # up, front, right: axis and sign; columns of what turns the world's a
     "y, facing x": ((1, 1), (0, 1), (2, -1)),
     "left-handed": ((1, 1), (2, -1), (0, 1)),
 }
-_MODES = {24.0: 11, 25.0: 10, 30.0: 6, 60.0: 3, 120.0: 1}
+_MODES = {23.976: 13, 24.0: 11, 25.0: 10, 30.0: 6, 60.0: 3, 120.0: 1}
 
 
 @dataclass
@@ -70,6 +70,7 @@ class Fbx:
         shown: World transforms that the nodes show, where it is another pose.
         stacks: Animations: world transforms, shape (F, J, 4, 4), by name.
         rate: Frames a second.
+        stated: What the file says it is, where that is another.
         start: Frame at which they start.
         unit: ``UnitScaleFactor``: centimetres.
         up: One of ``AXES``.
@@ -91,6 +92,7 @@ class Fbx:
     shown: np.ndarray | None = None
     stacks: dict[str, np.ndarray] = field(default_factory=dict)
     rate: float = 30.0
+    stated: float | None = None
     start: int = 0
     unit: float = 1.0
     up: str = "y"
@@ -162,7 +164,8 @@ class _Writer:
 
     def settings(self) -> str:
         fbx = self.fbx
-        mode = _MODES.get(fbx.rate, 14)
+        stated = fbx.rate if fbx.stated is None else fbx.stated
+        mode = _MODES.get(stated, 14)
         rows = [
             f'P: "{name}Axis{what}", "int", "Integer", "",{value}'
             for name, pair in zip(("Up", "Front", "Coord"), AXES[fbx.up], strict=True)
@@ -170,7 +173,7 @@ class _Writer:
         ]
         rows.append(f'P: "UnitScaleFactor", "double", "Number", "",{fbx.unit!r}')
         rows.append(f'P: "TimeMode", "enum", "", "",{mode}')
-        rows.append(f'P: "CustomFrameRate", "double", "Number", "",{fbx.rate!r}')
+        rows.append(f'P: "CustomFrameRate", "double", "Number", "",{stated!r}')
         return "GlobalSettings: {\nVersion: 1000\n" + _properties(rows) + "\n}"
 
     def joints(self) -> list[int]:

@@ -308,6 +308,18 @@ def test_the_last_frame_is_there(tmp_path: Path, rate: float) -> None:
         np.testing.assert_allclose(animation.worlds[-1, :, :3, 3], worlds[-1, :, :3, 3], atol=1e-5)
 
 
+@pytest.mark.parametrize(("stated", "base"), [(23.976, 24), (29.97, 30), (59.94, 60), (119.88, 120)])
+def test_broadcast_rates_are_what_their_decimals_round(tmp_path: Path, stated: float, base: int) -> None:
+    fbx = chain()
+    worlds = np.tile(fbx.frames, (8, 1, 1, 1))
+    worlds[:, :, 0, 3] += 0.01 * np.arange(8)[:, None]
+    path = replace(fbx, stacks={"x": worlds}, rate=base / 1.001, stated=stated).write(tmp_path / "x.fbx")
+    animation = read_fbx_animation(path)
+    assert animation.rate == pytest.approx(base / 1.001, rel=1e-12)
+    assert len(animation) == 8
+    np.testing.assert_allclose(animation.worlds[-1, :, :3, 3], worlds[-1, :, :3, 3], atol=1e-6)
+
+
 def test_an_animation_without_skin_moves_the_rig_of_another_file(hand: Glb, tmp_path: Path) -> None:
     worlds = moved(hand)
     rig = load_rig(as_fbx(hand, shown=worlds[3]).write(tmp_path / "rig.fbx"))

@@ -220,15 +220,24 @@ def main(path: str, out: str, animated: str, name: str, rate: str) -> None:
     chosen = choose(told["stacks"], name) if animated == "yes" else None
     if chosen is not None:
         stack = told["stacks"][chosen]
-        rate_ = float(rate) or settings.frames_per_second
+        rate_ = float(rate) or stated_rate(settings.frames_per_second)
         rate_ = rate_ if np.isfinite(rate_) and rate_ > 0.0 else 30.0
         count = (stack["end"] - stack["begin"]) * rate_
         if not 0.0 <= count < 1e6:
             fail(f"animation '{stack['name']}' would have {count:.3g} frames: at most 1000000")
-        times = stack["begin"] + np.arange(int(np.floor(count + 1e-6)) + 1) / rate_
+        # as warpjld.motion.frame_times: neither a rate rounded to 23.976 nor single floats lose the last frame
+        slack = min(0.01 + 2e-5 * count, 0.4)
+        times = np.minimum(stack["begin"] + np.arange(int(np.floor(count + slack)) + 1) / rate_, stack["end"])
         arrays["worlds"] = sample(scene, chosen, times)
         told |= {"chosen": stack["name"], "rate": rate_}
     np.savez(out, told=np.array(json.dumps(told)), **arrays)  # type: ignore[arg-type]
+
+
+def stated_rate(rate: float) -> float:
+    """Frames a second that a file states: 23.976, as a single float, is 24000/1001, and so are its kin."""
+    broadcast = round(rate * 1.001) / 1.001
+    nearest = min((float(round(rate)), broadcast), key=lambda nice: abs(nice - rate))
+    return nearest if abs(nearest - rate) <= 2e-5 * rate else rate
 
 
 def choose(several: list[dict[str, Any]], name: str) -> int | None:

@@ -24,6 +24,9 @@ _FALLBACK_PARENTS = {
     "ankle": "knee",
 } | {"ball": "ankle"}
 
+_TRUNK = ("pelvis", "spine", "neck", "head")
+_NO_TRUNK = (len(_TRUNK), 0)
+
 
 @dataclass
 class Layout:
@@ -89,7 +92,9 @@ def lay_out(
     for name, joint in named.items():
         if name not in in_hands or name.endswith(".wrist"):
             parent = next((of_source[j] for j in tree.ancestors(joint) if j in of_source), None)
-            above[name] = parent if parent is not None else _fallback(name, named)
+            if parent is None or tree.flat:  # where all hang on the pelvis, that says as little as no hierarchy
+                parent = _fallback(name, named)
+            above[name] = parent
     for side, points in hand_points.items():
         above.setdefault(f"{side}.wrist", _fallback(f"{side}.wrist", named))
         for short, hand_parent in HAND_PARENTS.items():
@@ -112,13 +117,27 @@ def lay_out(
 def _fallback(name: str, named: Mapping[str, int]) -> str | None:
     """Parent by anatomy, for files without a hierarchy."""
     side, _, part = name.rpartition(".")
+    if side.rpartition(".")[2].startswith("toe"):  # left.toe1.base and the like
+        side, part = side.partition(".")[0], "ball"
     above = f"{side}.{_FALLBACK_PARENTS.get(part, '')}"
     if above in named:
         return above
-    trunk = sorted(n for n in named if n.rstrip("0123456789") == "spine")
-    if part in ("clavicle", "shoulder", "neck1", "head") and trunk:
-        return trunk[-1]
-    return "pelvis" if "pelvis" in named and name != "pelvis" else None
+    trunk = [n for n in sorted(named, key=_place_in_trunk) if _place_in_trunk(n) < _NO_TRUNK]
+    if name in trunk:
+        below = trunk[: trunk.index(name)]
+        return below[-1] if below else None
+    spine = [n for n in trunk if not n.startswith(("neck", "head"))]
+    if part in ("clavicle", "shoulder") and spine:
+        return spine[-1]
+    return "pelvis" if "pelvis" in named else None
+
+
+def _place_in_trunk(name: str) -> tuple[int, int]:
+    """Sorts the trunk's joints from pelvis to head."""
+    part = name.rstrip("0123456789")
+    if part not in _TRUNK:
+        return _NO_TRUNK
+    return _TRUNK.index(part), int(name[len(part) :] or 0)
 
 
 def _one_root(above: dict[str, str | None], notes: list[str]) -> None:
