@@ -151,9 +151,9 @@ def test_uv_seams_are_welded_for_geometry_and_kept_for_export(write_glb, hand_gl
     np.testing.assert_allclose(rig.surface.uv, uv[used] * [1, -1] + [0, 1], atol=CLOSE)
 
 
-@pytest.mark.parametrize("unit", ["cm", "mm"])
+@pytest.mark.parametrize("unit", ["cm", "mm", "in"])
 def test_units_are_guessed_from_the_hands_size(write_glb, hand_glb, hands, tmp_path, unit):
-    factor = {"cm": 100.0, "mm": 1000.0}[unit]
+    factor = {"cm": 100.0, "mm": 1000.0, "in": 1 / 0.0254}[unit]
     glb = hand_glb()
     frames = glb.frames.copy()
     frames[:, :3, 3] *= factor

@@ -29,8 +29,8 @@ def place(
     Args:
         source: What the file says.
         roles: What was recognised in its joints.
-        unit: ``m``, ``cm``, ``mm``, ``in`` or None: what the file says, else the one with which hand or body has a plausible
-            size.
+        unit: ``m``, ``cm``, ``mm``, ``in`` or None: what the file says, else the one with which hand or body has a
+            plausible size.
         scale: Factor by which all lengths are multiplied besides; where it is given and ``unit`` is not, nothing is
             guessed: a file that does not say is taken to be in metres.
         up: ``y``, ``z`` or None: what the file says, else Z only where a body's head lies that way from its hips.

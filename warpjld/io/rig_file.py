@@ -30,8 +30,8 @@ def load_rig(
         path: The file.
         skeleton: Skeleton file (JSON, see :mod:`warpjld.io.skeleton_file`); needed where the surface has no joints.
         side: ``left`` or ``right`` for a single hand, where the file leaves it open or is wrong.
-        unit: ``m``, ``cm``, ``mm`` or ``in``; by default what the file says, else guessed from a hand's or body's plausible
-            size, with a note.
+        unit: ``m``, ``cm``, ``mm`` or ``in``; by default what the file says, else guessed from a hand's or body's
+            plausible size, with a note.
         scale: Factor by which all lengths are multiplied besides; without ``unit`` nothing is guessed then.
         up: ``y`` or ``z``: the file's up axis; by default what it says, else guessed; turned to Y.
         joint_map: Joints stated by hand, which win over what is recognised: a JSON file (see

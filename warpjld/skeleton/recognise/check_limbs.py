@@ -113,8 +113,10 @@ def _end(tree: SourceTree, roles: Roles, flesh: Flesh, kind: _Kind, side: str) -
         if hand is not None and "wrist" in hand.joints:
             return hand.joints["wrist"]
     named = roles.body.get(f"{side}.{kind.end}")
-    if named is not None or kind is _ARM:
+    if named is not None:
         return named
+    if kind is _ARM:
+        return _wrist(tree, roles, flesh, side)
     known = [roles.body[name] for part in ("knee", "hip") if (name := f"{side}.{part}") in roles.body]
     if not known:
         return None
@@ -134,6 +136,25 @@ def _end(tree: SourceTree, roles: Roles, flesh: Flesh, kind: _Kind, side: str) -
     roles.body[f"{side}.ankle"] = ankle
     roles.notes.append(f"{side}.ankle '{tree.names[ankle]}': by the leg's shape")
     return ankle
+
+
+def _wrist(tree: SourceTree, roles: Roles, flesh: Flesh, side: str) -> int | None:
+    """Of joints in a line below the shoulder (``arm_joint_L_1`` …) the one that ends a forearm of the usual length."""
+    shoulder = roles.body.get(f"{side}.shoulder")
+    if shoulder is None or f"{side}.elbow" in roles.body:
+        return None
+    arm = [shoulder]
+    while len(below := [c for c in tree.children[arm[-1]] if flesh.live[c]]) == 1:
+        arm.append(below[0])
+    if set(arm[1:]) & {*roles.body.values(), *(j for hand in roles.hands for j in hand.joints.values())}:
+        return None
+    misfits = {arm[k]: divide_limb(tree, arm[: k + 1], FOREARM_RATIO, {0: (shoulder,)})[2] for k in range(2, len(arm))}
+    wrist = min(misfits, key=lambda j: misfits[j], default=None)
+    if wrist is None or misfits[wrist] >= _PLAUSIBLE:
+        return None
+    roles.body[f"{side}.wrist"] = wrist
+    roles.notes.append(f"{side}.wrist '{tree.names[wrist]}': by the arm's shape")
+    return wrist
 
 
 def _parting(tree: SourceTree, roles: Roles, end: int, other: int | None, trunk: set[int]) -> int | None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Collection
+from itertools import pairwise
 
 import numpy as np
 
@@ -23,7 +24,7 @@ def fill_body(tree: SourceTree, roles: Roles, flesh: Flesh, stated: Collection[s
         return
     _pelvis(tree, roles, stated)
     _trunk_between(tree, roles, stated)
-    _head(tree, roles, stated)
+    _head(tree, roles, flesh, stated)
     _feet(tree, roles, flesh, stated)
     _ends(roles, flesh, stated)
 
@@ -38,6 +39,47 @@ def _pelvis(tree: SourceTree, roles: Roles, stated: Collection[str]) -> None:
     if parting is not None and parting not in roles.body.values():
         roles.body["pelvis"] = parting
         roles.notes.append(f"pelvis '{tree.names[parting]}': where the legs part")
+    elif parting is not None and not stated and _trunk(tree, roles)[:1] == [parting]:
+        _renumber(roles, "spine", [j for j in _trunk(tree, roles)[1:] if _word(roles, j) == "spine"])
+        roles.body["pelvis"] = parting
+        roles.notes.append(f"pelvis '{tree.names[parting]}': the spine's first joint, where the legs part")
+
+
+def _head(tree: SourceTree, roles: Roles, flesh: Flesh, stated: Collection[str]) -> None:
+    """The last joint of spine or neck beyond where the arms part, if no name says it; those before are the neck."""
+    arms = [roles.body[f"{side}.shoulder"] for side in ("left", "right") if f"{side}.shoulder" in roles.body]
+    if roles.how != "names" or "head" in roles.body or stated or len(arms) < 2:
+        return
+    both = set(tree.ancestors(arms[1]))
+    chest = next((j for j in tree.ancestors(arms[0]) if j in both), None)
+    beyond = [j for j in _trunk(tree, roles) if chest in tree.ancestors(j)]
+    if len(beyond) == 1 and _word(roles, beyond[0]) == "neck":  # what alone goes on from a neck is the head
+        above = [c for c in tree.children[beyond[-1]] if flesh.live[c] and not flesh.bare[c]]
+        beyond += [c for c in above if len(above) == 1 and c not in roles.body.values()]
+    if not beyond or any(b not in tree.ancestors(a) for b, a in pairwise(beyond)) or flesh.bare[beyond[-1]]:
+        return
+    spine = [j for j in _trunk(tree, roles) if j not in beyond and _word(roles, j) == "spine"]
+    _renumber(roles, "spine", spine)
+    _renumber(roles, "neck", beyond[:-1])
+    roles.body["head"] = beyond[-1]
+    roles.notes.append(f"head '{tree.names[beyond[-1]]}': the last joint of the trunk, beyond the arms")
+
+
+def _trunk(tree: SourceTree, roles: Roles) -> list[int]:
+    """Joints of spine and neck, from the root outwards."""
+    return sorted((j for j in roles.body.values() if _word(roles, j) in ("spine", "neck")), key=tree.depth)
+
+
+def _word(roles: Roles, joint: int) -> str:
+    return next(name for name, j in roles.body.items() if j == joint).rstrip("0123456789")
+
+
+def _renumber(roles: Roles, word: str, joints: list[int]) -> None:
+    """Give a part's joints their numbers anew; other names of these, and other joints of this part, go."""
+    gone = [name for name, j in roles.body.items() if j in joints or name.rstrip("0123456789") == word]
+    for name in gone:
+        del roles.body[name]
+    roles.body |= {f"{word}{n}": j for n, j in enumerate(joints, start=1)}
 
 
 def _trunk_between(tree: SourceTree, roles: Roles, stated: Collection[str]) -> None:
@@ -57,21 +99,6 @@ def _where_arms_part(tree: SourceTree, roles: Roles) -> int | None:
     arms = [roles.body[f"{side}.shoulder"] for side in ("left", "right") if f"{side}.shoulder" in roles.body]
     both = set(tree.ancestors(arms[1])) if len(arms) == 2 else set()
     return next((j for j in tree.ancestors(arms[0]) if j in both), None) if both else None
-
-
-def _head(tree: SourceTree, roles: Roles, stated: Collection[str]) -> None:
-    """Neck and head, where names have vertebrae all the way up, as Rigify's: those above where the arms part."""
-    chest = _where_arms_part(tree, roles)
-    if chest is None or any(name.startswith(("head", "neck")) for name in (*roles.body, *stated)):
-        return
-    spine = [name for name in roles.body if name.startswith("spine") and name not in stated]
-    above = [name for name in spine if chest in tree.ancestors(roles.body[name])]
-    above.sort(key=lambda name: tree.depth(roles.body[name]))
-    line = [roles.body.pop(name) for name in above]
-    if not line:
-        return
-    roles.body |= {f"neck{n}": j for n, j in enumerate(line[:-1], start=1)} | {"head": line[-1]}
-    roles.notes.append(f"head '{tree.names[line[-1]]}': the last joint of the spine above the arms")
 
 
 def _feet(tree: SourceTree, roles: Roles, flesh: Flesh, stated: Collection[str]) -> None:

@@ -67,8 +67,8 @@ def _complete(tree: SourceTree, roles: Roles, named: HandRoles, shaped: HandRole
     roles.notes.append(f"{who}: names tell {words} only; all digits below '{wrist}' by their shape")
     if moved:
         roles.suspicious.append(
-            f"{who}: {', '.join(d for d in DIGITS if d in moved)} is not where its name says, going by the shape of the "
-            "hand: state the joints with --map (inspect --write-map writes what was recognised, for editing)"
+            f"{who}: {', '.join(d for d in DIGITS if d in moved)} is not where its name says, going by the hand's "
+            "shape: state the joints with --map (inspect --write-map writes what was recognised, for editing)"
         )
 
 

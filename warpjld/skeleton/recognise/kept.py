@@ -16,6 +16,7 @@ __all__ = ["kept_joints", "lies_on_bone"]
 _LIMBS = ("clavicle", "shoulder", "elbow", "hip", "knee")
 _STRAIGHT = np.cos(np.radians(25.0))  # cosine of the bend at rest up to which a limb's parts are one bone
 _CHAIN = 2  # joints with flesh that make a digit of their own
+_HAIR = 0.08  # of the skeleton's size: reach of a chain that is hair, or horns, and no part of a face
 _ASIDE = 0.03  # of a bone's length: a joint nearer to it lies on it
 
 
@@ -40,7 +41,7 @@ def kept_joints(
         over = [of_source[k] for k in tree.ancestors(j) if k in of_source]
         below = [of_source[k] for k in tree.subtree(j) if k in of_source]
         part = of_source and _belongs(tree, j, over, below, size) and not _bends(tree, of_source, flesh, j)
-        part = part and not _digit_more(tree, of_source, flesh, j)
+        part = part and not _chain_of_its_own(tree, of_source, flesh, j)
         if j in left_out or _moves_nothing(tree, flesh, j) or part:
             into = over[0] if over else (below[0] if below else "the joint above")
             merged.setdefault(into, []).append(tree.names[j])
@@ -95,18 +96,26 @@ def _bends(tree: SourceTree, of_source: Mapping[int, str], flesh: Flesh, joint: 
     return lengths > 0.0 and float(upper @ lower) < _STRAIGHT * lengths
 
 
-def _digit_more(tree: SourceTree, of_source: Mapping[int, str], flesh: Flesh, joint: int) -> bool:
-    """Whether a joint is of a chain with flesh that leaves a wrist beside the known digits: a sixth finger, say."""
+def _chain_of_its_own(tree: SourceTree, of_source: Mapping[int, str], flesh: Flesh, joint: int) -> bool:
+    """Whether a joint is of a chain with flesh that leaves a wrist beside the known digits, as a sixth finger does, or
+    hangs far down from a head, as hair does."""
     if tree.flat or not flesh.known or flesh.dead[joint]:
         return False
     line = [joint]
     while (above := int(tree.parents[line[-1]])) >= 0 and above not in of_source:
         line.append(above)
-    if above < 0 or of_source[above].rpartition(".")[2] != "wrist":
+    word = of_source[above].rpartition(".")[2] if above >= 0 else ""
+    if word not in ("wrist", "head"):
         return False
     chain = [j for j in tree.subtree(line[-1]) if not flesh.dead[j]]
     fleshy = [j for j in chain if not flesh.bare[j]]
+    if any(sum(not flesh.dead[c] for c in tree.children[j]) > 1 for j in chain):
+        return False  # a face, or what is held
     helper = any(read_name(tree.names[j]).kind in ("helper", "palm") for j in chain)
+    if word == "head":  # jaw and tongue are the head's
+        reach = max(float(np.linalg.norm(tree.positions[j] - tree.positions[above])) for j in chain)
+        if reach < _HAIR * float(np.linalg.norm(np.ptp(tree.positions, axis=0))):
+            return False
     return len(fleshy) >= _CHAIN and not helper and not any(j in of_source for j in chain)
 
 

@@ -15,6 +15,7 @@ _TOE_RATIO = 0.45  # chain length per distance from the common joint: 0.25 for t
 
 _LONGEST = 4.0  # finger per shortest
 _TOGETHER = 0.6  # length of the mean of four fingers' directions
+_FAR = 0.35  # of a chain's length: distance of a chest from its pelvis; of a palm, from which two fingers leave, less
 _DEEPEST = 0.5  # of a row of knuckles, per its width
 
 
@@ -34,7 +35,20 @@ def _is_wrist(tree: SourceTree, joint: int) -> bool:
     for chain in chains:
         away = np.linalg.norm(at[chain[0]] - at[joint])
         ratios.append(np.linalg.norm(np.diff(at[chain], axis=0), axis=1).sum() / max(float(away), 1e-12))
-    return bool(np.median(ratios) > _TOE_RATIO) and _are_fingers([at[chain] for chain in chains])
+    return (
+        bool(np.median(ratios) > _TOE_RATIO)
+        and _are_fingers([at[chain] for chain in chains])
+        and not _is_trunk(tree, joint, chains)
+    )
+
+
+def _is_trunk(tree: SourceTree, joint: int, chains: list[list[int]]) -> bool:
+    """Whether two chains leave the joint itself and two more leave one far from it: legs a pelvis, and arms a chest."""
+    at = tree.positions
+    length = float(np.median([np.linalg.norm(np.diff(at[chain], axis=0), axis=1).sum() for chain in chains]))
+    heads = [int(tree.parents[chain[0]]) for chain in chains]
+    far = [j for j in heads if np.linalg.norm(at[j] - at[joint]) > _FAR * length]
+    return heads.count(joint) >= 2 and any(far.count(j) >= 2 for j in far)
 
 
 def _are_fingers(chains: list[NDArray[np.float64]]) -> bool:
