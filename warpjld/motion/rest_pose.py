@@ -47,12 +47,12 @@ def with_usable_rest(clip: Clip, *, side: str | None = None) -> tuple[Clip, Land
         return clip, marks, marks.notes
     why = _arbitrary(clip, marks)
     if why:
-        up = _signed_axis(ways.mean(axis=0))
+        up, lies = _up(clip, ways)
         frame = _most_like_standing(marks, clip.positions, up)
         clip = clip.rebased(frame, _turns(marks, clip.positions[frame], up))
         notes = (f"the motion's rest says nothing of the body ({why}): its frame {frame} is taken as the rest",)
         marks = landmarks_of_clip(clip, side=side)
-        return clip, marks, (*marks.notes, *notes)
+        return clip, marks, (*marks.notes, *notes, *lies)
     turn, told = turn_of_rest(clip, marks)
     if turn is None:
         return clip, marks, (*marks.notes, *told)
@@ -198,6 +198,21 @@ def turn_of_rest(clip: Clip, marks: Landmarks) -> tuple[NDArray[np.float64] | No
         fitting = [g for g in Rotation.create_group("O") if g.apply(own) @ found > 0.5]
         turn = np.asarray(min(fitting, key=lambda g: float((mean_turn * g.inv()).magnitude())).as_quat())
     return turn, (f"the recorded figure {told}: the latter is taken as up",)
+
+
+def _up(clip: Clip, ways: NDArray[np.float64]) -> tuple[NDArray[np.float64], tuple[str, ...]]:
+    """The axis that is up where no rest tells: the one a figure stands along, or y or z where a floor is seen across.
+
+    Returns:
+        The axis, and a note on a figure that lies.
+    """
+    found = _signed_axis(ways.mean(axis=0))
+    y, z = np.eye(3)[1:]
+    floors = [up for up in (y, z) if _stands(clip.positions, up, found)]
+    if found @ y > 0.5 or not floors or _stands(clip.positions, found, floors[0]):
+        return found, ()
+    told = f"the recorded figure is along {_axis_name(found)} in its frames, on a floor across {_axis_name(floors[0])}"
+    return floors[0], (f"{told}: it is taken not to stand, but to lie or the like",)
 
 
 def _stands(places: NDArray[np.float64], up: NDArray[np.float64], other: NDArray[np.float64]) -> bool:
