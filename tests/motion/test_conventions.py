@@ -469,6 +469,34 @@ def test_lying_down_and_standing_on_hands_stay_what_they_are(tmp_path: Path, res
     assert any("it is taken to lie" in note for note in moved.notes)
 
 
+def mirrored(recording: Recording) -> str:
+    """The file with its x axis turned round, as programs do that take one handedness for the other: names stay."""
+    lines, channels = recording.text.splitlines(), list[str]()
+    start = lines.index("MOTION") + 3
+    for k, line in enumerate(lines):
+        words = line.split()
+        if words[:1] == ["OFFSET"]:
+            lines[k] = f"OFFSET {-float(words[1])} {words[2]} {words[3]}"
+        elif words[:1] == ["CHANNELS"]:
+            channels += words[2:]
+        elif k >= start:
+            signs = [-1 if c in ("Xposition", "Yrotation", "Zrotation") else 1 for c in channels]
+            lines[k] = " ".join(str(sign * float(word)) for sign, word in zip(signs, words, strict=True))
+    return "\n".join(lines)
+
+
+@pytest.mark.parametrize("rest", ["T", "A", "X"])
+@pytest.mark.parametrize("name", ["Mixamo", "Biped"])
+def test_mirrored_figures_change_sides_and_bend_their_knees_forward(tmp_path: Path, name: str, rest: str) -> None:
+    recording = record(CONVENTIONS[name], rest=rest)
+    other = {"left": "right", "right": "left"}
+    places = {".".join(other.get(p, p) for p in j.split(".")): at * [-1, 1, 1] for j, at in recording.places.items()}
+    moved = play(tmp_path, replace(recording, text=mirrored(recording)))
+    assert max(limb_errors(moved, replace(recording, places=places)).values()) < DIRECTIONS
+    assert any("left and right" in line and "exchanged" in line for line in moved.warnings)
+    assert not any("exchanged" in line for line in play(tmp_path, recording).warnings)
+
+
 def on_the_floor(recording: Recording, up: str) -> Recording:
     """The same with the lowest joint at height 0."""
     low = min(float(places[:, 1].min()) for places in recording.places.values())
