@@ -1,5 +1,6 @@
 """Recordings in the names, rests, axes and units of the common conventions drive a rig alike."""
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -466,6 +467,68 @@ def test_lying_down_and_standing_on_hands_stay_what_they_are(tmp_path: Path, res
     moved = play(tmp_path, lying)
     assert_followed(moved, lying)
     assert any("it is taken to lie" in note for note in moved.notes)
+
+
+def mirrored(recording: Recording) -> str:
+    """The file with its x axis turned round, as programs do that take one handedness for the other: names stay."""
+    lines, channels = recording.text.splitlines(), list[str]()
+    start = lines.index("MOTION") + 3
+    for k, line in enumerate(lines):
+        words = line.split()
+        if words[:1] == ["OFFSET"]:
+            lines[k] = f"OFFSET {-float(words[1])} {words[2]} {words[3]}"
+        elif words[:1] == ["CHANNELS"]:
+            channels += words[2:]
+        elif k >= start:
+            signs = [-1 if c in ("Xposition", "Yrotation", "Zrotation") else 1 for c in channels]
+            lines[k] = " ".join(str(sign * float(word)) for sign, word in zip(signs, words, strict=True))
+    return "\n".join(lines)
+
+
+@pytest.mark.parametrize("rest", ["T", "A", "X"])
+@pytest.mark.parametrize("name", ["Mixamo", "Biped"])
+def test_mirrored_figures_change_sides_and_bend_their_knees_forward(tmp_path: Path, name: str, rest: str) -> None:
+    recording = record(CONVENTIONS[name], rest=rest)
+    other = {"left": "right", "right": "left"}
+    places = {".".join(other.get(p, p) for p in j.split(".")): at * [-1, 1, 1] for j, at in recording.places.items()}
+    moved = play(tmp_path, replace(recording, text=mirrored(recording)))
+    assert max(limb_errors(moved, replace(recording, places=places)).values()) < DIRECTIONS
+    assert any("left and right" in line and "exchanged" in line for line in moved.warnings)
+    assert not any("exchanged" in line for line in play(tmp_path, recording).warnings)
+
+
+def on_the_floor(recording: Recording, up: str) -> Recording:
+    """The same with the lowest joint at height 0."""
+    low = min(float(places[:, 1].min()) for places in recording.places.values())
+    head, time, rows = recording.text.partition("Frame Time: 0.0333333\n")
+    lines = [row.split() for row in rows.splitlines()]
+    for words in lines:
+        words[1 if up == "y" else 2] = str(float(words[1 if up == "y" else 2]) - low)
+    return replace(recording, text=head + time + "\n".join(map(" ".join, lines)) + "\n")
+
+
+SEATED = {"left.hip": (-90, 0, 0), "right.hip": (-90, 0, 0), "left.knee": (90, 0, 0), "right.knee": (90, 0, 0)}
+NEVER_STANDING = {
+    "sitting": (SEATED, SEATED | {"left.shoulder": (0, 0, -60)}),
+    "lying": ({"pelvis": (-90, 0, 0)}, {"pelvis": (-90, 0, 0), "left.hip": (-40, 0, 0)}),
+    "on the hands": (
+        {"pelvis": (180, 0, 0), "left.shoulder": (0, 0, 80), "right.shoulder": (0, 0, -80)},
+        {"pelvis": (180, 0, 0), "left.shoulder": (0, 0, 80), "right.shoulder": (0, 0, -80), "left.knee": (50, 0, 0)},
+    ),
+}
+
+
+@pytest.mark.parametrize(
+    ("posture", "up"),
+    [("sitting", "y"), ("sitting", "z"), ("lying", "y"), ("on the hands", "y"), ("on the hands", "z")],
+)
+@pytest.mark.parametrize("how", [{"rest": "X"}, {"rest": "mirrored X"}, {"offsets": "zero"}])
+def test_who_never_stands_and_whose_rest_tells_nothing(tmp_path: Path, posture: str, up: str, how: dict) -> None:
+    """Of a sitting figure the trunk tells what is up; whether one stands along another axis, the floor tells."""
+    recording = on_the_floor(record(CONVENTIONS["LAFAN1"], frames=NEVER_STANDING[posture], up=up, **how), up)
+    moved = play(tmp_path, recording)
+    assert_followed(moved, recording)
+    assert any("taken not to stand" in note for note in moved.notes) == (posture != "sitting")
 
 
 SAYINGS = {

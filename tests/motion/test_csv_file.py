@@ -102,6 +102,8 @@ def test_writing_and_reading_give_the_same_motion(tmp_path: Path, keys: dict, te
         "frame\tindex.base.flexion\troot.y\n0\t0\t0.25\n10\t22.5\n20\t\t0.5\n",
         '\ufeff"Frame";"index.base.flexion";"root.y"\n"0";"0";"0,25"\n"10";"22,5";""\n"20";"";"0,5"\n',
         'frame, "index.base.flexion", root.y\n0, 0, "0,25"\n10, "22,5",\n20,,"0,5"\n',
+        "frame;index.base.flexion;root.y;;\r\n0;0;0,25;;\r\n10;22,5;;;\r\n20;;0,5;;\r\n;;;;\r\n",
+        "Frame;Index . Base . Flexion;root.y;\n0.0;0;0,25;\n10.0;22,5;;\n20.0;;0,5;\n",
         "\ufeffsep=;\nframe;index.base.flexion;root.y\n0;0;.25\n10;22.5;\n20;;.5\n",
     ],
 )
@@ -112,3 +114,8 @@ def test_tables_as_spreadsheets_of_any_country_write_them(tmp_path: Path, text: 
         (10, pytest.approx(22.5)),
     ]
     assert [(k.frame, k.value) for k in motion.tracks["root.y"].keys] == [(0, 0.25), (20, 0.5)]
+
+
+def test_a_minus_sign_of_typography_is_one(tmp_path: Path) -> None:
+    motion = read_csv(write(tmp_path, "frame;index.base.flexion\n0;0\n10;\N{MINUS SIGN}2,5\n"), skeleton=hand())
+    assert np.degrees(motion.tracks["index.base.flexion"].keys[1].value) == pytest.approx(-2.5)

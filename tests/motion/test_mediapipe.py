@@ -68,6 +68,28 @@ def written(points: np.ndarray) -> dict[str, object]:
             "frames": [{"landmarks": i.tolist()} for i in image],
         },
         "lists": {"landmarks": points.tolist(), "handedness": "right", "fps": 25},
+        "holistic": {
+            "image_size": [640, 480],
+            "fps": 25,
+            "frames": [{"left_hand_landmarks": None, "right_hand_landmarks": {"landmark": xyz(i)}} for i in image],
+        },
+        "holistic task": [
+            {
+                "rightHandLandmarks": [xyz(i)],
+                "rightHandWorldLandmarks": [xyz(w)],
+                "leftHandLandmarks": [],
+                "time_ms": 40 * k,
+            }
+            for k, (i, w) in enumerate(zip(image, points, strict=True))
+        ],
+        "by side": {"fps": 25, "frames": [{"Right": w.tolist()} for w in points]},
+        "lists of hands": {
+            "fps": 25,
+            "frames": [
+                [{"keypoints": xyz(i), "keypoints3D": xyz(w), "handedness": "Right"}]
+                for i, w in zip(image, points, strict=True)
+            ],
+        },
         "hands": [
             {"hands": [{"landmarks": xyz(w), "handedness": "Right", "score": 0.8}], "timestamp_us": 40_000 * k}
             for k, w in enumerate(points)

@@ -526,3 +526,15 @@ def test_the_covered_hand_moves_alike_in_metres_and_centimetres(faults: Path) ->
         want = oracle.vertices(1.0) @ rig.placing[:3, :3].T + rig.placing[:3, 3]
         off = np.linalg.norm(covered(rig, open_motion(path, rig), 30) - want, axis=1)[one_bone(oracle)]
         assert off.max() < CLOSE * rig.surface.size
+
+
+def test_flips_are_looked_for_at_the_files_own_rate(tmp_path: Path) -> None:
+    turns = {0.0: 0.0, 1 / 30: 10.0, 2 / 30: 130.0, 3 / 30: 140.0, 4 / 30: 150.0}
+    values = Rotation.from_rotvec([[angle, 0.0, 0.0] for angle in turns.values()], degrees=True)
+    start = Rotation.from_quat(animal().turns[3])
+    track = (np.array(list(turns)), (start * values).as_quat(), "LINEAR")
+    path = write(tmp_path / "a.glb", animal(), {"walk": {(3, "rotation"): track}})
+    rig = load_rig(path)
+    for rate in (None, 30.0, 120.0, 10.0):
+        (line,) = open_motion(path, rig, rate=rate).warnings
+        assert line == "skull turns by 120° from frame 1 to 2 of the recording: a flip?"

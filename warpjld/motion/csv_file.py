@@ -74,6 +74,8 @@ def _read_rows(
     last = -math.inf
     for cells in reader:
         line = skipped + reader.line_num
+        while cells and not cells[-1].strip():  # separators at the ends of lines
+            cells.pop()
         if not any(cell.strip() for cell in cells):
             continue
         if header is None:
@@ -82,7 +84,8 @@ def _read_rows(
         if len(cells) > len(header):
             hint = "; decimal commas need semicolons or tabs between cells" if separator == "," else ""
             raise InputError(f"{len(cells)} cells under {len(header)} headings{hint}", path=path, line=line)
-        frame = _number(cells[0], marks, path, line, 1)
+        whole = re.fullmatch(r"\s*([0-9]+)[.,]0\s*", cells[0], re.ASCII)  # whatever the decimal mark of the others
+        frame = float(whole[1]) if whole else _number(cells[0], marks, path, line, 1)
         if frame is None:
             raise InputError("no frame number", path=path, line=line, column=1)
         if frame <= last:
@@ -130,7 +133,7 @@ def write_csv(path: str | Path, motion: Motion, *, frames: ArrayLike | None = No
 
 
 def _read_header(cells: list[str], skeleton: Skeleton | None, path: str | Path, line: int) -> list[str]:
-    names = [cell.strip() for cell in cells]
+    names = [re.sub(r"\s*\.\s*", ".", cell.strip()) for cell in cells]
     if names[0].lower() != "frame":
         raise InputError(f"first heading must be 'frame', not '{names[0]}'", path=path, line=line, column=1)
     if len(names) == 1:
@@ -157,7 +160,7 @@ def _number(cell: str, marks: dict[str, int], path: str | Path, line: int, colum
         marks: Decimal marks → line where each was first seen; added to.
         path: For messages, as line and column.
     """
-    text = cell.strip()
+    text = cell.strip().replace("\N{MINUS SIGN}", "-")
     if not text:
         return None
     for mark in ".,":

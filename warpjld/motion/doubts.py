@@ -62,7 +62,7 @@ def doubts_of_clip(clip: Clip, used: Collection[int]) -> list[str]:
 
 
 def doubts_of_animation(animation: JointAnimation, followed: Collection[str]) -> list[str]:
-    """Jumps of an animation on a rig's own joints, and what it moves and the rig does not follow.
+    """What an animation of a rig's own joints moves and the rig does not follow.
 
     Args:
         animation: The animation.
@@ -75,7 +75,7 @@ def doubts_of_animation(animation: JointAnimation, followed: Collection[str]) ->
         while k >= 0 and k not in used:
             used.add(k)
             k = int(clip.parents[k])
-    return [*jumps(clip.names, clip.locals()), *doubts_of_clip(clip, used)]
+    return doubts_of_clip(clip, used)
 
 
 def _unfollowed(

@@ -41,10 +41,10 @@ def read_hands(path: str | Path, *, rate: float | None = None, flat_hand_mean: b
             return leap_hands(content)
         if is_webxr(content):
             return webxr_hands(content)
-        if is_mano(content):
-            return mano_hands(content, rate, flat_hand_mean)
         if is_mediapipe(content):
             return mediapipe_hands(content, rate)
+        if is_mano(content):
+            return mano_hands(content, rate, flat_hand_mean)
     except InputError as error:
         raise InputError(error.message, path=path) from error
     raise InputError(

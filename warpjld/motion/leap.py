@@ -27,7 +27,8 @@ def is_leap(content: Any) -> bool:
     frames = content.get("frames") if isinstance(content, Mapping) else None
     if not isinstance(frames, list):
         return False
-    return not frames or isinstance(frames[0], list) or any("pointables" in f for f in frames if isinstance(f, Mapping))
+    packed = bool(frames) and isinstance(frames[0], list) and any(isinstance(field, str) for field in frames[0])
+    return not frames or packed or any("pointables" in f for f in frames if isinstance(f, Mapping))
 
 
 def leap_hands(content: Mapping[str, Any]) -> HandRecording:

@@ -108,32 +108,37 @@ def open_motion(
             return _capture(path, rig, rate)
         if suffix in (".json", ".npz", ".npy"):
             return _tracked_hands(path, rig, rate, side, flat_hand_mean)
-        return _animation(_ANIMATIONS[suffix](path, rate, animation), rig)
+        return _animation(path, rig, rate, animation)
     except InputError as error:
         if error.path is not None:
             raise
         raise InputError(error.message, path=path) from error
 
 
-def _animation(animation: JointAnimation, rig: Rig) -> LoadedMotion:
-    from warpjld.motion.doubts import doubts_of_animation
+def _animation(path: Path, rig: Rig, rate: float | None, name: str | None) -> LoadedMotion:
+    from warpjld.motion.doubts import doubts_of_animation, jumps
     from warpjld.motion.own_joints import own_poses
 
+    read = _ANIMATIONS[path.suffix.lower()]
+    animation = read(path, rate, name)
     own = own_poses(animation, rig)
+    clip = replace(animation.clip(), notes=animation.notes)
+    # at another rate than the file's, a flip may look like a turn, or a turn like a flip
+    recorded = clip if rate is None else read(path, None, name).clip()
+    flips = jumps(recorded.names, recorded.locals())
     if own is None:
-        moved = _retargeted(replace(animation.clip(), notes=animation.notes), rig, animation.rate)
+        moved = _retargeted(clip, rig, animation.rate, flips)
         return replace(moved, warnings=(*animation.warnings, *moved.warnings))
-    doubts = doubts_of_animation(animation, set(rig.source_joints))
+    doubts = (*flips, *doubts_of_animation(animation, set(rig.source_joints)))
     notes, warnings = (*animation.notes, *own.notes), (*animation.warnings, *own.warnings, *doubts)
     return LoadedMotion(own.poses, animation.rate, notes, warnings)
 
 
-def _retargeted(clip: Clip, rig: Rig, rate: float | None) -> LoadedMotion:
-    """A recording of any skeleton on a rig, at a rate; jumps are looked for before it is resampled."""
-    from warpjld.motion.doubts import doubts_of_clip, jumps
+def _retargeted(clip: Clip, rig: Rig, rate: float | None, flips: list[str]) -> LoadedMotion:
+    """A recording of any skeleton on a rig, at a rate, with the flips that were found before it is resampled."""
+    from warpjld.motion.doubts import doubts_of_clip
     from warpjld.motion.retarget import retarget_and_tell
 
-    flips = jumps(clip.names, clip.locals())
     clip = clip if rate is None else clip.at_rate(rate)
     moved = retarget_and_tell(clip, rig.skeleton)
     warnings = (*clip.warnings, *moved.warnings, *flips, *doubts_of_clip(clip, moved.used))
@@ -196,8 +201,9 @@ def _capture(path: Path, rig: Rig, rate: float | None) -> LoadedMotion:
     joined = with_own_joints(rig)
     recording = own_recording(clip if rate is None else clip.at_rate(rate), joined)
     own = None if recording is None else own_poses(recording.animation, joined)
+    flips = jumps(clip.names, clip.locals())
     if recording is None or own is None:
-        return _retargeted(clip, rig, rate)
+        return _retargeted(clip, rig, rate, flips)
     note = "the recording is of the rig's own joints: they are moved as it says"
     warnings = (
         *clip.warnings,

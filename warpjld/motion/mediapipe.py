@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from warpjld.errors import InputError
 from warpjld.motion.hand_motion import HandRecording
+from warpjld.motion.hands_by_side import hands_by_side
 from warpjld.motion.seen_hands import SeenHand, recording_of
 from warpjld.motion.stated_times import stated_times
 
@@ -51,7 +52,10 @@ def is_mediapipe(content: Any) -> bool:
     """Whether JSON holds hand landmarks: frames of them, or a field with a name that MediaPipe gives them."""
     if isinstance(content, Mapping) and any(key in content for key in _WORLD + _STEMS):
         return True
+    if any(hands_by_side(frame) for frame in (_frames(content) or [content])):
+        return True
     first = next((frame for frame in _frames(content) if frame), None)
+    first = first[0] if isinstance(first, list) and first and isinstance(first[0], Mapping) else first
     if isinstance(first, Mapping):
         return "hands" in first or any(key in first for key in _WORLD + _STEMS)
     try:
@@ -64,7 +68,8 @@ def mediapipe_hands(content: Any, rate: float | None = None) -> HandRecording:
     """Hands of a JSON recording: a list of frames, or an object with one in ``frames``, or a single frame.
 
     A frame is an object with ``landmarks`` and ``world_landmarks`` (also by the tasks' and the solutions' names), of
-    one hand or several, ``handedness``, ``confidence`` and a time; or just 21 points. World landmarks are preferred.
+    one hand or several, ``handedness``, ``confidence`` and a time; or with a hand under each side, as the holistic
+    landmarker has them; or a list of hands; or just 21 points. World landmarks are preferred.
 
     Args:
         content: What the file holds.
@@ -143,7 +148,7 @@ def _frames(content: Any) -> list[Any]:
             except ValueError:
                 many = False
             return [{key: one} for one in content[key]] if many else [content]
-        return listed or []
+        return [content] if listed is None and hands_by_side(content) else listed or []
     if isinstance(content, list) and content and isinstance(content[0], (int, float)):
         return []
     if isinstance(content, list) and len(content) == _COUNT and not _is_hand(content[0]) and _is_point(content[0]):
@@ -153,8 +158,12 @@ def _frames(content: Any) -> list[Any]:
 
 def _hands_of(frame: Any, about: Mapping[str, Any]) -> list[SeenHand]:
     """The hands of one frame."""
+    if isinstance(frame, list) and frame and isinstance(frame[0], Mapping) and "x" not in frame[0]:
+        frame = {"hands": frame}
     if not isinstance(frame, Mapping):
         frame = {"landmarks": frame}
+    sided = hands_by_side(frame)
+    frame = frame if sided is None else {"hands": sided}
     if isinstance(frame.get("hands"), list):
         each = [(k, hand) for k, one in enumerate(frame["hands"]) if one for hand in _hands_of(one, about)]
         return [replace(hand, slot=slot) for slot, hand in each]

@@ -9,6 +9,8 @@ the frames, where a root carries all of them from one to the other; the floor te
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
@@ -34,6 +36,9 @@ _MOSTLY = 0.8
 _FLOOR = 0.08
 """Heights, per size of the figure, within which its lowest joint stays on a floor."""
 
+_BEHIND = 0.3
+"""Part of a foot's length by which its toes lie behind the shin, of one that points backwards."""
+
 _AXES = ("x", "y", "z")
 _SIDEWAYS = 0.2
 """Length of what remains of a line across the body, per length, from where on it has a direction."""
@@ -41,24 +46,52 @@ _SIDEWAYS = 0.2
 
 def with_usable_rest(clip: Clip, *, side: str | None = None) -> tuple[Clip, Landmarks, tuple[str, ...]]:
     """A recording with a rest that is a pose, its landmarks, and notes on what was put in its place."""
-    marks = landmarks_of_clip(clip, side=side)
+    marks = _sided_landmarks(clip, side)
     ways = _ways(marks, clip.positions)
     if ways is None:
         return clip, marks, marks.notes
     why = _arbitrary(clip, marks)
     if why:
-        up = _signed_axis(ways.mean(axis=0))
+        up, lies = _up(clip, ways)
         frame = _most_like_standing(marks, clip.positions, up)
         clip = clip.rebased(frame, _turns(marks, clip.positions[frame], up))
         notes = (f"the motion's rest says nothing of the body ({why}): its frame {frame} is taken as the rest",)
-        marks = landmarks_of_clip(clip, side=side)
-        return clip, marks, (*marks.notes, *notes)
+        marks = _sided_landmarks(clip, side)
+        return clip, marks, (*marks.notes, *notes, *lies)
     turn, told = turn_of_rest(clip, marks)
     if turn is None:
         return clip, marks, (*marks.notes, *told)
     clip = clip.turned_rest(turn)
-    marks = landmarks_of_clip(clip, side=side)
+    marks = _sided_landmarks(clip, side)
     return clip, marks, (*marks.notes, *told)
+
+
+def _sided_landmarks(clip: Clip, side: str | None) -> Landmarks:
+    """Landmarks of a recording; left and right are changed where its feet say that names have them the wrong way round.
+
+    That is a file that some program mirrored: with the names' sides, its knees would bend backwards.
+    """
+    marks = landmarks_of_clip(clip, side=side)
+    if not _feet_behind(marks, clip.positions):
+        return marks
+    other = {"left": "right", "right": "left"}
+    joints = {".".join([other.get(p, p) for p in name.split(".")]): joint for name, joint in marks.joints.items()}
+    doubt = "in the recording, feet point backwards where left and right are what its names say: they are exchanged"
+    return replace(marks, joints=joints, doubts=(*marks.doubts, doubt))
+
+
+def _feet_behind(marks: Landmarks, places: NDArray[np.float64]) -> bool:
+    """Whether feet lie behind the shins, as seen from the pelvis, over all frames."""
+    across, sides = marks.across("hip", places), []
+    for side in ("left", "right"):
+        toes = (f"{side}.ball", f"{side}.toe3.base", f"{side}.toe1.base")
+        toe = next((marks.joints[name] for name in toes if name in marks.joints), None)
+        knee, ankle = marks.joints.get(f"{side}.knee"), marks.joints.get(f"{side}.ankle")
+        if across is None or toe is None or knee is None or ankle is None:
+            return False
+        front = np.cross(unit(across), unit(places[:, knee] - places[:, ankle]))
+        sides.append(float((unit(places[:, toe] - places[:, ankle]) * front).sum(-1).mean()))
+    return max(sides) < -_BEHIND
 
 
 def _ways(marks: Landmarks, places: NDArray[np.float64]) -> NDArray[np.float64] | None:
@@ -198,6 +231,21 @@ def turn_of_rest(clip: Clip, marks: Landmarks) -> tuple[NDArray[np.float64] | No
         fitting = [g for g in Rotation.create_group("O") if g.apply(own) @ found > 0.5]
         turn = np.asarray(min(fitting, key=lambda g: float((mean_turn * g.inv()).magnitude())).as_quat())
     return turn, (f"the recorded figure {told}: the latter is taken as up",)
+
+
+def _up(clip: Clip, ways: NDArray[np.float64]) -> tuple[NDArray[np.float64], tuple[str, ...]]:
+    """The axis that is up where no rest tells: the one a figure stands along, or y or z where a floor is seen across.
+
+    Returns:
+        The axis, and a note on a figure that lies.
+    """
+    found = _signed_axis(ways.mean(axis=0))
+    y, z = np.eye(3)[1:]
+    floors = [up for up in (y, z) if _stands(clip.positions, up, found)]
+    if found @ y > 0.5 or not floors or _stands(clip.positions, found, floors[0]):
+        return found, ()
+    told = f"the recorded figure is along {_axis_name(found)} in its frames, on a floor across {_axis_name(floors[0])}"
+    return floors[0], (f"{told}: it is taken not to stand, but to lie or the like",)
 
 
 def _stands(places: NDArray[np.float64], up: NDArray[np.float64], other: NDArray[np.float64]) -> bool:

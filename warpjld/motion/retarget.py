@@ -175,10 +175,10 @@ def _axes(source: Landmarks, target: Landmarks) -> NDArray[np.float64]:
 
 
 def _body_frame(marks: Landmarks) -> NDArray[np.float64] | None:
-    """Columns: left, up, forward; up is against the thighs, or along the trunk of half a body."""
+    """Columns: left, up, forward; up is along the trunk, for people may sit at rest, or else against the thighs."""
     thighs, trunk = marks.segment("hip", "knee", marks.rest), marks.trunk(marks.rest)
     across = next((a for part in ("hip", "shoulder") if (a := marks.across(part, marks.rest)) is not None), None)
-    along = trunk if thighs is None else -thighs.sum(axis=0)
+    along = trunk if thighs is None or (trunk is not None and trunk.any()) else -thighs.sum(axis=0)
     if across is None or along is None:
         return None
     up = unit(along)
