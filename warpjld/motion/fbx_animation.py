@@ -62,9 +62,11 @@ def read_fbx_animation(path: str | Path, *, rate: float | None = None, name: str
         others = ", ".join(f"'{n}'" for n in moving if n != scene.title)
         notes.append(f"animation '{scene.title}' is played; the file also has {others}")
     worlds = scene.worlds[:, skeleton.nodes] @ skeleton.squared
-    warnings = tuple(_turn_flat_ones(worlds, skeleton.tree))
+    warnings = _turn_flat_ones(worlds, skeleton.tree)
+    if any(stack.shapes for stack in scene.stacks if stack.name == scene.title):
+        warnings.append("the animation of blend shapes is not followed")
     told = (*notes, *skeleton.notes)
-    return JointAnimation(skeleton.tree, worlds, scene.rate, title=scene.title, notes=told, warnings=warnings)
+    return JointAnimation(skeleton.tree, worlds, scene.rate, title=scene.title, notes=told, warnings=tuple(warnings))
 
 
 def _turn_flat_ones(worlds: NDArray[np.float64], tree: SourceTree) -> list[str]:
