@@ -416,3 +416,16 @@ def test_moving_blend_shapes_are_told(tmp_path: Path) -> None:
 def test_skins_of_dual_quaternions_are_told(tmp_path: Path, blend: str, told: bool) -> None:
     rig = read_fbx_rig(replace(chain(), blend=blend).write(tmp_path / "rig.fbx"))
     assert any("dual quaternions" in note for note in rig.notes) == told
+
+
+def test_animations_by_the_names_that_people_type(tmp_path: Path) -> None:
+    fbx = chain()
+    worlds = [np.tile(fbx.frames, (n, 1, 1, 1)) for n in (3, 4, 5)]
+    for moving in worlds:
+        moving[-1, :, 0, 3] += 0.1
+    names = ("Armature|Walk", "Armature|Run", "Prop|Run")
+    path = replace(fbx, stacks=dict(zip(names, worlds, strict=True))).write(tmp_path / "x.fbx")
+    for typed, frames in (("walk", 3), ("Walk", 3), ("armature|walk", 3), ("Armature|Run", 4), ("prop|run", 5)):
+        assert len(read_fbx_animation(path, name=typed)) == frames
+    with pytest.raises(InputError, match="no animation 'run'; it has"):
+        read_fbx_animation(path, name="run")

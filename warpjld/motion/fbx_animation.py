@@ -39,7 +39,8 @@ def read_fbx_animation(path: str | Path, *, rate: float | None = None, name: str
     Args:
         path: The file.
         rate: Frames a second; None for the file's own.
-        name: Which animation; None for the first that moves anything.
+        name: Which animation, in any case, with or without the object's name that Blender puts before it and a bar;
+            None for the first that moves anything.
 
     Raises:
         InputError: It cannot be read, has no joints, or no such animation.

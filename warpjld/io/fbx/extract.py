@@ -150,7 +150,7 @@ def mesh_arrays(mesh: Any, node: Any, number: dict[int, int], notes: list[str]) 
 
 def stacks(scene: Any, number: dict[int, int]) -> list[dict[str, Any]]:
     """Name, span and moved nodes of every animation stack; the span is the keys' own where the stack has none."""
-    out = []
+    out: list[dict[str, Any]] = []
     for stack in elements(scene.anim_stacks):
         moved, curved, times, shapes = set(), set(), [], False
         for layer in elements(stack.layers):
@@ -173,7 +173,11 @@ def stacks(scene: Any, number: dict[int, int]) -> list[dict[str, Any]]:
         if not end > begin and times:
             begin, end = min(times), max(times)
         found = {"moved": sorted(moved), "curved": sorted(curved), "shapes": shapes}
-        out.append({"name": stack.name, "begin": begin, "end": end, **found})
+        name, count = stack.name, 1
+        while name in [other["name"] for other in out]:  # as warpjld.motion.animations.unique_names
+            count += 1
+            name = f"{stack.name}#{count}"
+        out.append({"name": name, "begin": begin, "end": end, **found})
     return out
 
 
@@ -255,9 +259,16 @@ def stated_rate(rate: float) -> float:
 
 
 def choose(several: list[dict[str, Any]], name: str) -> int | None:
-    """Number of the stack of this name, or of the first that moves something; None where there is none."""
+    """Number of the stack of this name, or of the first that moves something; None where there is none.
+
+    Case does not matter where that leaves one, nor does the object's name that Blender puts before an action's.
+    """
     if name:
-        return next((i for i, stack in enumerate(several) if stack["name"] == name), None)
+        for plain in (str, str.lower, lambda full: full.rpartition("|")[2].lower()):
+            found = [i for i, stack in enumerate(several) if plain(stack["name"]) == plain(name)]
+            if len(found) == 1:
+                return found[0]
+        return None
     for wanted in ("curved", "moved"):
         for i, stack in enumerate(several):
             if stack[wanted]:
