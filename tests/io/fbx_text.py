@@ -83,6 +83,8 @@ class Fbx:
         spans: Other start and stop [s] than the animations', by name.
         version: The format's version.
         inherit: How joints inherit scale: FBX's ``InheritType``, 1 for as matrices do.
+        blend: What a skin says that it blends.
+        shaped: Animations in which blend shapes go from 0 to 100 per cent.
     """
 
     names: Sequence[str]
@@ -105,6 +107,8 @@ class Fbx:
     spans: dict[str, tuple[float, float]] = field(default_factory=dict)
     version: int = 7400
     inherit: int = 1
+    blend: str = "Linear"
+    shaped: frozenset[str] = frozenset()
 
     def write(self, path: Path) -> Path:
         """Write it."""
@@ -118,6 +122,7 @@ class _Writer:
         self.objects: list[str] = []
         self.links: list[str] = []
         self.last = 1000
+        self.channels: list[int] = []
         up, front, right = ([sign * float(a == axis) for a in range(3)] for axis, sign in AXES[fbx.up])
         self.turn = np.column_stack([right, up, front])  # world (Y up) → file
         self.scale = 100.0 / fbx.unit
@@ -281,11 +286,17 @@ class _Writer:
             )
             body = f"Version: 100\nIndexes: {_array(moved)}\nVertices: {_array(local.ravel())}"
             shape = self.add("Geometry", f"Geometry::shape{n}", "Shape", body)
+            self.channels.append(channel)
             self.link(shape, channel)
             self.link(channel, deformer)
 
     def skin(self, mesh: Mesh, geometry: int, node: np.ndarray, models: list[int]) -> None:
-        skin = self.add("Deformer", "Deformer::skin", "Skin", "Version: 101\nLink_DeformAcuracy: 50")
+        skin = self.add(
+            "Deformer",
+            "Deformer::skin",
+            "Skin",
+            f'Version: 101\nLink_DeformAcuracy: 50\nSkinningType: "{self.fbx.blend}"',
+        )
         self.link(skin, geometry)
         binds = self.file(self.fbx.frames)
         assert mesh.joints is not None
@@ -312,6 +323,12 @@ class _Writer:
         stack = self.add("AnimationStack", f"AnimStack::{name}", "", _properties(rows))
         layer = self.add("AnimationLayer", "AnimLayer::Base", "", "")
         self.link(layer, stack)
+        for channel in self.channels if name in fbx.shaped else ():
+            node = self.add("AnimationCurveNode", "AnimCurveNode::DeformPercent", "", "")
+            self.link(node, layer)
+            self.link(node, channel, "DeformPercent")
+            percent = np.linspace(0.0, 100.0, len(times))
+            self.link(self.add("AnimationCurve", "AnimCurve::", "", _curve(times, percent)), node, "d|DeformPercent")
         for j, model in enumerate(models if len(worlds) else ()):
             for what, values in zip(
                 ("Translation", "Rotation", "Scaling"), self.local(j, self.file(worlds)), strict=True

@@ -406,3 +406,44 @@ def test_without_ufbx_the_extra_is_named(tmp_path: Path, monkeypatch: pytest.Mon
     monkeypatch.setattr("warpjld.io.fbx.scene.find_spec", lambda name: None)
     with pytest.raises(MissingExtraError, match=r"warpjld\[fbx\]"):
         load_rig(path)
+
+
+def test_without_ufbx_that_can_be_imported_the_extra_is_named(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    path = chain().write(tmp_path / "rig.fbx")
+    blocked = tmp_path / "blocked" / "ufbx"
+    blocked.mkdir(parents=True)
+    (blocked / "__init__.py").write_text("raise ImportError('built for another Python')")
+    monkeypatch.setenv("PYTHONPATH", str(blocked.parent))
+    with pytest.raises(MissingExtraError, match=r"warpjld\[fbx\]"):
+        load_rig(path)
+
+
+def test_moving_blend_shapes_are_told(tmp_path: Path) -> None:
+    fbx = chain()
+    offsets = np.full_like(np.asarray(fbx.meshes[0].vertices, dtype=float), 0.01)
+    worlds = np.tile(fbx.frames, (5, 1, 1, 1))
+    worlds[:, :, 0, 3] += 0.01 * np.arange(5)[:, None]
+    shaped = [replace(fbx.meshes[0], shapes=[(0.0, offsets)]), *fbx.meshes[1:]]
+    both = replace(fbx, meshes=shaped, stacks={"still": worlds, "speaks": worlds}, shaped=frozenset({"speaks"}))
+    path = both.write(tmp_path / "x.fbx")
+    assert not read_fbx_animation(path, name="still").warnings
+    assert read_fbx_animation(path, name="speaks").warnings == ("the animation of blend shapes is not followed",)
+
+
+@pytest.mark.parametrize(("blend", "told"), [("Linear", False), ("DualQuaternion", True), ("Blend", True)])
+def test_skins_of_dual_quaternions_are_told(tmp_path: Path, blend: str, told: bool) -> None:
+    rig = read_fbx_rig(replace(chain(), blend=blend).write(tmp_path / "rig.fbx"))
+    assert any("dual quaternions" in note for note in rig.notes) == told
+
+
+def test_animations_by_the_names_that_people_type(tmp_path: Path) -> None:
+    fbx = chain()
+    worlds = [np.tile(fbx.frames, (n, 1, 1, 1)) for n in (3, 4, 5)]
+    for moving in worlds:
+        moving[-1, :, 0, 3] += 0.1
+    names = ("Armature|Walk", "Armature|Run", "Prop|Run")
+    path = replace(fbx, stacks=dict(zip(names, worlds, strict=True))).write(tmp_path / "x.fbx")
+    for typed, frames in (("walk", 3), ("Walk", 3), ("armature|walk", 3), ("Armature|Run", 4), ("prop|run", 5)):
+        assert len(read_fbx_animation(path, name=typed)) == frames
+    with pytest.raises(InputError, match="no animation 'run'; it has"):
+        read_fbx_animation(path, name="run")

@@ -39,7 +39,8 @@ def read_fbx_animation(path: str | Path, *, rate: float | None = None, name: str
     Args:
         path: The file.
         rate: Frames a second; None for the file's own.
-        name: Which animation; None for the first that moves anything.
+        name: Which animation, in any case, with or without the object's name that Blender puts before it and a bar;
+            None for the first that moves anything.
 
     Raises:
         InputError: It cannot be read, has no joints, or no such animation.
@@ -62,9 +63,11 @@ def read_fbx_animation(path: str | Path, *, rate: float | None = None, name: str
         others = ", ".join(f"'{n}'" for n in moving if n != scene.title)
         notes.append(f"animation '{scene.title}' is played; the file also has {others}")
     worlds = scene.worlds[:, skeleton.nodes] @ skeleton.squared
-    warnings = tuple(_turn_flat_ones(worlds, skeleton.tree))
+    warnings = _turn_flat_ones(worlds, skeleton.tree)
+    if any(stack.shapes for stack in scene.stacks if stack.name == scene.title):
+        warnings.append("the animation of blend shapes is not followed")
     told = (*notes, *skeleton.notes)
-    return JointAnimation(skeleton.tree, worlds, scene.rate, title=scene.title, notes=told, warnings=warnings)
+    return JointAnimation(skeleton.tree, worlds, scene.rate, title=scene.title, notes=told, warnings=tuple(warnings))
 
 
 def _turn_flat_ones(worlds: NDArray[np.float64], tree: SourceTree) -> list[str]:

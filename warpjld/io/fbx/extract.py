@@ -5,7 +5,8 @@ binding (0.0.5) counts references wrongly: it keeps each element of a scene in a
 reference, and garbage collection frees what it has freed before. Here every element that is met gets one reference
 more, nothing is ever freed, and what still goes wrong in a broken file ends this process only. Memory is bounded too.
 
-All stays in the file's own units and axes. Exit code 3 with one line on stderr means that the file cannot be used.
+All stays in the file's own units and axes. Exit code 3 with one line on stderr means that the file cannot be
+used, 4 that ufbx cannot be imported.
 """
 
 from __future__ import annotations
@@ -53,8 +54,10 @@ def fail(message: object) -> NoReturn:
 
 
 def load(path: str) -> Any:
-    import ufbx
-
+    try:
+        import ufbx
+    except ImportError:
+        os._exit(4)
     try:
         return ufbx.load_file(
             path,
@@ -128,6 +131,8 @@ def mesh_arrays(mesh: Any, node: Any, number: dict[int, int], notes: list[str]) 
     skins = elements(mesh.skin_deformers)
     if len(skins) > 1:
         notes.append(f"mesh '{node.name}' has {len(skins)} skins: the first is read")
+    if skins and skins[0].skinning_method.name in ("DUAL_QUATERNION", "BLENDED_DQ_LINEAR"):
+        notes.append(f"mesh '{node.name}': its skin blends dual quaternions: of it the weights are read")
     clusters = [(c, taken(c.bone_node)) for c in (elements(skins[0].clusters) if skins else ())]
     if any(bone is None for _, bone in clusters):
         notes.append(f"mesh '{node.name}': clusters without a bone are left out")
@@ -145,13 +150,15 @@ def mesh_arrays(mesh: Any, node: Any, number: dict[int, int], notes: list[str]) 
 
 def stacks(scene: Any, number: dict[int, int]) -> list[dict[str, Any]]:
     """Name, span and moved nodes of every animation stack; the span is the keys' own where the stack has none."""
-    out = []
+    out: list[dict[str, Any]] = []
     for stack in elements(scene.anim_stacks):
-        moved, curved, times = set(), set(), []
+        moved, curved, times, shapes = set(), set(), [], False
         for layer in elements(stack.layers):
             props = layer.anim_props
             for i in range(len(props)):
                 element = taken(props[i].element)
+                if type(element).__name__ == "BlendChannel" and props[i].prop_name == "DeformPercent":
+                    shapes = shapes or any(varies(c) for c in elements(taken(props[i].anim_value).curves))
                 if type(element).__name__ != "Node" or props[i].prop_name not in TRANSFORM:
                     continue
                 curves: Any = taken(props[i].anim_value).curves
@@ -165,8 +172,19 @@ def stacks(scene: Any, number: dict[int, int]) -> list[dict[str, Any]]:
         begin, end = stack.time_begin, stack.time_end
         if not end > begin and times:
             begin, end = min(times), max(times)
-        out.append({"name": stack.name, "begin": begin, "end": end, "moved": sorted(moved), "curved": sorted(curved)})
+        found = {"moved": sorted(moved), "curved": sorted(curved), "shapes": shapes}
+        name, count = stack.name, 1
+        while name in [other["name"] for other in out]:  # as warpjld.motion.animations.unique_names
+            count += 1
+            name = f"{stack.name}#{count}"
+        out.append({"name": name, "begin": begin, "end": end, **found})
     return out
+
+
+def varies(curve: Any) -> bool:
+    """Whether a curve's keys, as far as there is one, have several values."""
+    keys: Any = () if curve is None else curve.keyframes
+    return len({keys[i].value for i in range(len(keys))}) > 1
 
 
 def sample(scene: Any, stack: int, times: Array) -> Array:
@@ -241,9 +259,16 @@ def stated_rate(rate: float) -> float:
 
 
 def choose(several: list[dict[str, Any]], name: str) -> int | None:
-    """Number of the stack of this name, or of the first that moves something; None where there is none."""
+    """Number of the stack of this name, or of the first that moves something; None where there is none.
+
+    Case does not matter where that leaves one, nor does the object's name that Blender puts before an action's.
+    """
     if name:
-        return next((i for i, stack in enumerate(several) if stack["name"] == name), None)
+        for plain in (str, str.lower, lambda full: full.rpartition("|")[2].lower()):
+            found = [i for i, stack in enumerate(several) if plain(stack["name"]) == plain(name)]
+            if len(found) == 1:
+                return found[0]
+        return None
     for wanted in ("curved", "moved"):
         for i, stack in enumerate(several):
             if stack[wanted]:

@@ -21,6 +21,8 @@ __all__ = ["FbxMesh", "FbxScene", "FbxSkin", "FbxStack", "read_scene"]
 _FURTHEST = 1e12
 _LONGEST = 600.0
 """Seconds that reading may take."""
+_NO_LIBRARY = 4
+"""Exit code of the program that reads where ufbx cannot be imported."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -71,11 +73,12 @@ class FbxMesh:
 
 @dataclass(frozen=True)
 class FbxStack:
-    """An animation: its name, its length [s], and how many nodes it moves."""
+    """An animation: its name, its length [s], how many nodes it moves, and whether it moves blend shapes."""
 
     name: str
     length: float
     moving: int
+    shapes: bool = False
 
 
 @dataclass(frozen=True, eq=False)
@@ -148,7 +151,7 @@ def read_scene(path: str | Path, *, animated: bool = False, name: str | None = N
         shown=axes @ arrays["shown"],
         pose=axes @ arrays["pose"],
         meshes=meshes,
-        stacks=tuple(FbxStack(s["name"], s["end"] - s["begin"], len(s["curved"])) for s in told["stacks"]),
+        stacks=tuple(FbxStack(s["name"], s["end"] - s["begin"], len(s["curved"]), s["shapes"]) for s in told["stacks"]),
         worlds=None if worlds is None else axes @ worlds,
         rate=told["rate"],
         title=told.get("chosen", ""),
@@ -174,6 +177,8 @@ def _extract(path: Path, animated: bool, name: str, rate: float) -> tuple[dict[s
         except subprocess.TimeoutExpired:
             raise InputError(f"cannot be read as FBX: not done after {_LONGEST:.0f} s", path=path) from None
         last = done.stderr.strip().splitlines()[-1:] or [""]
+        if done.returncode == _NO_LIBRARY:
+            raise MissingExtraError("FBX", "fbx")
         if done.returncode:
             why = last[0] if done.returncode > 0 and last[0] else f"the reader ends with code {done.returncode}"
             raise InputError(f"cannot be read as FBX: {why}", path=path)
