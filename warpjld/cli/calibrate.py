@@ -51,8 +51,8 @@ def command(
 ) -> None:
     """Fit the covering's parameters to RIG over its joint ranges: volume kept, least stretch.
 
-    RIG is a rig file (.glb, .gltf), a surface with --skeleton, or builtin:left, builtin:right. Scripts load the file
-    written with PARAMETERS. The result is never worse than the start."""
+    RIG is a rig file (.glb, .gltf, .vrm, .fbx, .usd), a surface with --skeleton, or builtin:left, builtin:right.
+    Scripts load the file written with PARAMETERS. The result is never worse than the start."""
     from warpjld.cli.progress import progress
     from warpjld.cli.rig_argument import open_rig
     from warpjld.covering import bind_rig

@@ -38,8 +38,8 @@ def command(
 ) -> None:
     """Report what was recognised in RIG: joints, domains, limits, animations, and joints that look misplaced.
 
-    RIG is a rig file (.glb, .gltf), a surface with --skeleton, or builtin:left, builtin:right. A picture of the
-    surface's wire-frame with the named skeleton in it is written beside, unless --no-picture.
+    RIG is a rig file (.glb, .gltf, .vrm, .fbx, .usd), a surface with --skeleton, or builtin:left, builtin:right.
+    A picture of the surface's wire-frame with the named skeleton in it is written beside, unless --no-picture.
     """
     from warpjld.cli.rig_argument import open_rig
     from warpjld.quiet import silence_warp
