@@ -15,6 +15,7 @@ from warpjld.cli.warn import warn
 from warpjld.errors import InputError
 from warpjld.io.caches import FORMATS
 from warpjld.io.motion_out import MOTION_OUT
+from warpjld.overwriting import check_outputs
 
 if TYPE_CHECKING:
     from warpjld.batch import ClipJob, ClipRecord, Deforming
@@ -112,6 +113,7 @@ def command(rig: str, clips: tuple[Path, ...], motions: tuple[Path, ...], **give
         raise InputError("--motion-out names one file: a batch takes --motion-format")
     if wanted.out is None and (batch or not wanted.motions_out):
         raise InputError(f"deform: want --out, the {'folder' if batch else 'file'} to write")
+    check_outputs(wanted.outputs(jobs), wanted.inputs(jobs))
     if batch:
         _batch(wanted, jobs)
     else:
@@ -153,6 +155,23 @@ class _Wanted:
             "side": self.motion_side,
             "flat_hand_mean": self.flat_hand_mean,
         }
+
+    def inputs(self, jobs: list[ClipJob]) -> list[Path]:
+        """Files that are read."""
+        from warpjld.cli.rig_argument import rig_files
+        from warpjld.io.identity import files_of
+
+        motions = dict.fromkeys(job.motion for job in jobs)
+        motion_files = [file for motion in motions for file in (motion, *files_of(motion))]
+        return [*rig_files(self.rig, self.how | {"parameters": self.parameters}), *motion_files]
+
+    def outputs(self, jobs: list[ClipJob]) -> list[Path]:
+        """Files that are written, but for those that lie beside a cache."""
+        if not (self.formats or self.motion_formats):
+            return [path for path in (self.out, *self.motions_out) if path is not None]
+        assert self.out is not None
+        ends = [*self.formats, *(f".motion{suffix}" for suffix in self.motion_formats)]
+        return [self.out / f"{job.name}{end}" for job in jobs for end in ends]
 
     def settings(self) -> dict[str, Any]:
         """All that determines a batch's files besides the motions."""
