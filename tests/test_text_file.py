@@ -32,6 +32,11 @@ def test_what_is_no_json(tmp_path: Path, content: bytes, says: str) -> None:
         read_json(tmp_path / "a.json")
 
 
+def test_integers_of_endless_digits_are_infinite(tmp_path: Path) -> None:
+    (tmp_path / "a.json").write_text(f"[-7, {2**70}, -{'9' * 400}, {'9' * 5000}]")
+    assert read_json(tmp_path / "a.json") == [-7, 2.0**70, float("-inf"), float("inf")]
+
+
 def test_files_that_cannot_be_read(tmp_path: Path) -> None:
     with pytest.raises(InputError, match=r"none\.txt: cannot be read: No such file"):
         read_text(tmp_path / "none.txt")

@@ -12,6 +12,7 @@ from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wai
 from concurrent.futures.process import BrokenProcessPool
 from contextlib import contextmanager
 from multiprocessing import connection, parent_process
+from multiprocessing.process import BaseProcess
 from typing import Any, Protocol, TypeVar
 
 from warpjld.errors import WarpjldError
@@ -20,6 +21,7 @@ __all__ = ["Work", "one_thread", "run_jobs", "worker_pool"]
 
 _AHEAD = 2  # jobs handed out for each process: keeps it busy, and few are suspected when it dies
 _LIVES = 2  # times a job may kill a worker that has nothing else to do
+_PATIENCE = 5.0  # seconds that a worker has to put away what it was writing
 
 _THREADS = (
     "OMP_NUM_THREADS",
@@ -64,6 +66,7 @@ def run_jobs(work: Work[Job], jobs: Iterable[Job], *, processes: int, done: Call
 
     Raises:
         WarpjldError: Workers do not even start, or what ``Work.do`` raises.
+        KeyboardInterrupt: As soon as it comes: jobs that are being done are given up.
     """
     waiting = deque(jobs)
     with one_thread():
@@ -90,20 +93,27 @@ def one_thread() -> Iterator[None]:
                 os.environ[name] = value
 
 
-def worker_pool(work: Work[Any], processes: int) -> ProcessPoolExecutor:
-    """Workers that have begun.
+@contextmanager
+def worker_pool(work: Work[Any], processes: int) -> Iterator[ProcessPoolExecutor]:
+    """Workers that have begun; left by an exception, they are ended, whatever they are doing.
 
     Raises:
         WarpjldError: They do not start.
     """
-    pool = ProcessPoolExecutor(
+    before = set(multiprocessing.active_children())
+    with ProcessPoolExecutor(
         processes, mp_context=multiprocessing.get_context("spawn"), initializer=_start, initargs=(work,)
-    )
-    try:
-        pool.submit(os.getpid).result()
-    except BrokenProcessPool as error:
-        raise WarpjldError(f"worker processes do not start: {error}") from error
-    return pool
+    ) as pool:
+        try:
+            try:
+                _submit(pool, os.getpid).result()
+            except BrokenProcessPool as error:
+                raise WarpjldError(f"worker processes do not start: {error}") from error
+            yield pool
+        except BaseException:
+            pool.shutdown(wait=False, cancel_futures=True)
+            _end(set(multiprocessing.active_children()) - before)
+            raise
 
 
 _work: Work[Any] | None = None
@@ -115,6 +125,7 @@ def _start(work: Work[Any]) -> None:
     _work = work
     work.begin()
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C is the parent's business
+    signal.signal(signal.SIGTERM, _ended)
     threading.Thread(target=_die_with_parent, daemon=True).start()
 
 
@@ -126,9 +137,38 @@ def _die_with_parent() -> None:
         os._exit(1)
 
 
+def _ended(*_: object) -> None:
+    raise SystemExit(1)  # lets whoever writes a file remove what is half of it
+
+
 def _do(job: Any) -> str:
     assert _work is not None
-    return _work.do(job)
+    try:
+        return _work.do(job)
+    except SystemExit:
+        os._exit(1)  # a pool would take it for the job's result and go on
+
+
+def _submit(pool: ProcessPoolExecutor, do: Callable[..., Any], *arguments: Any) -> Future[Any]:
+    """Hand out work; this is when workers are started, which never hear of Ctrl-C, not even while they import."""
+    if not hasattr(signal, "pthread_sigmask"):
+        return pool.submit(do, *arguments)
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+    try:
+        return pool.submit(do, *arguments)
+    finally:
+        signal.pthread_sigmask(signal.SIG_SETMASK, before)
+
+
+def _end(workers: Iterable[BaseProcess]) -> None:
+    """End workers, those that do not go by force."""
+    workers = list(workers)
+    for worker in workers:
+        worker.terminate()
+    for worker in workers:
+        worker.join(_PATIENCE)
+        if worker.is_alive():
+            worker.kill()
 
 
 def _together(work: Work[Job], waiting: deque[Job], processes: int, done: Callable[[Job, str], None]) -> list[Job]:
@@ -139,16 +179,13 @@ def _together(work: Work[Job], waiting: deque[Job], processes: int, done: Callab
             while waiting or out:
                 while waiting and len(out) < _AHEAD * processes:
                     job = waiting[0]
-                    out[pool.submit(_do, job)] = job
+                    out[_submit(pool, _do, job)] = job
                     waiting.popleft()
                 for future in wait(out, return_when=FIRST_COMPLETED).done:
                     done(out[future], future.result())
                     del out[future]
         except BrokenProcessPool:
             return _settle(work, out.values(), done)
-        except BaseException:
-            pool.shutdown(wait=False, cancel_futures=True)
-            raise
     return []
 
 
@@ -171,7 +208,7 @@ def _alone(work: Work[Job], suspects: list[Job], done: Callable[[Job, str], None
             while lives:
                 job, left = lives[0]
                 try:
-                    status = pool.submit(_do, job).result()
+                    status = _submit(pool, _do, job).result()
                 except BrokenProcessPool:
                     lives[0] = (job, left - 1)
                     if left == 1:

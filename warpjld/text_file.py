@@ -37,14 +37,18 @@ def read_text(path: str | Path, *, errors: Literal["strict", "replace"] = "stric
 
 
 def read_json(path: str | Path) -> Any:
-    """What a JSON file holds.
+    """What a JSON file holds; integers beyond 64 bits are floats, infinite ones where they have endless digits.
 
     Raises:
         InputError: It cannot be read, or is not JSON: names line and column.
     """
     try:
-        return json.loads(read_text(path))
+        return json.loads(read_text(path), parse_int=_integer)
     except json.JSONDecodeError as error:
         raise InputError(f"is not JSON: {error.msg}", path=path, line=error.lineno, column=error.colno) from None
     except RecursionError:
         raise InputError("is nested too deeply", path=path) from None
+
+
+def _integer(digits: str) -> int | float:
+    return int(digits) if len(digits) < 19 else float(digits)

@@ -16,6 +16,11 @@ def names(*files: str) -> list[str]:
     return [job.name for job in clip_jobs(files)]
 
 
+def test_links_in_a_circle_are_for_the_reader_to_refuse(tmp_path: Path) -> None:
+    (tmp_path / "round.bvh").symlink_to("round.bvh")
+    assert names(str(tmp_path / "round.bvh")) == ["round"]
+
+
 def test_a_clip_is_called_as_its_file() -> None:
     assert names("a/walk.bvh", "a/run.bvh") == ["walk", "run"]
 

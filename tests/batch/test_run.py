@@ -12,6 +12,7 @@ import pytest
 from tests.finger import finger
 from warpjld.batch import BatchResult, Deforming, clip_jobs, deform_clip, run_batch
 from warpjld.errors import InputError
+from warpjld.folder_lock import locked_folder
 
 SETTINGS = {"rig": "finger", "rate": None}
 
@@ -88,6 +89,19 @@ def test_another_batch_does_not_mix_with_it(clips: list[Path], tmp_path: Path) -
     with pytest.raises(InputError, match=r"other settings \(rate\); choose another folder, or --fresh"):
         run_batch(how, clip_jobs(clips[:1]), out, (".npz",), other)
     assert run_batch(how, clip_jobs(clips[:1]), out, (".npz",), other, fresh=True, processes=1).made == 1
+
+
+def test_two_batches_at_once_do_not_write_into_one_folder(clips: list[Path], tmp_path: Path) -> None:
+    out = tmp_path / "out"
+    run(clips[:1], out, processes=1)
+    before = content(out)
+    with (
+        locked_folder(out, ".clips/.lock"),
+        pytest.raises(InputError, match="out: another process is working in this folder"),
+    ):
+        run(clips[:2], out, fresh=True)
+    assert content(out) == before
+    assert run(clips[:2], out, processes=1).made == 1
 
 
 def test_a_clip_that_kills_its_process_is_a_line(clips: list[Path], tmp_path: Path) -> None:

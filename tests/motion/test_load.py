@@ -10,6 +10,7 @@ from tests.motion.skeletons import body, hand, rig
 from warpjld.errors import InputError
 from warpjld.io import load_rig
 from warpjld.motion import load_motion
+from warpjld.motion.load import open_motion
 
 
 def test_tables_play_at_the_given_rate(tmp_path: Path) -> None:
@@ -51,3 +52,10 @@ def test_a_real_walk_by_its_suffix(data: Path) -> None:
     strange = replace(body(), names=tuple(f"part {j}" for j in range(len(body()))))
     with pytest.raises(InputError, match=r"walk.bvh: no joint of the motion"):
         load_motion(path, rig(strange))
+
+
+def test_a_name_is_refused_where_a_file_holds_one_motion(tmp_path: Path) -> None:
+    path = tmp_path / "curl.csv"
+    path.write_text("frame,index.base.flexion\n0,0\n10,60\n")
+    with pytest.raises(InputError, match=r"curl.csv: no animation 'walk': a .csv file holds one motion without a name"):
+        open_motion(path, rig(hand()), animation="walk")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import glob
+import os
 import re
 from collections import Counter
 from collections.abc import Iterable, Sequence
@@ -43,7 +44,8 @@ def clip_jobs(motions: Sequence[str | Path], animation: str | None = None) -> li
         InputError: A pattern that no file fits, a file given twice, or names that cannot be told apart.
     """
     files = [file for motion in motions for file in _files(motion)]
-    twice = [file for file, count in Counter(file.resolve() for file in files).items() if count > 1]
+    places = Counter(os.path.realpath(file) for file in files)  # Path.resolve raises at links in a circle
+    twice = [file for file, count in places.items() if count > 1]
     if twice:
         raise InputError("is given twice", path=twice[0])
     jobs = []
@@ -77,7 +79,7 @@ def _files(motion: str | Path) -> list[Path]:
 def _names(files: Sequence[Path]) -> list[str]:
     names = [_safe(file.stem) for file in files]
     for lengthen in (
-        lambda name, file: f"{_safe(file.resolve().parent.name)}-{name}",
+        lambda name, file: f"{_safe(Path(os.path.realpath(file)).parent.name)}-{name}",
         lambda name, file: f"{name}-{file.suffix.lstrip('.')}",
     ):
         same = _repeated(names)

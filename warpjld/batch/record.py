@@ -7,6 +7,7 @@ from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Any
 
+from warpjld.io.identity import content_hash
 from warpjld.study.manifest import file_hash, write_json
 
 __all__ = ["FOLDER", "ClipRecord", "read_record", "still_there", "write_record"]
@@ -22,7 +23,7 @@ class ClipRecord:
     Attributes:
         name: The clip's.
         motion: The motion file, as it was given.
-        motion_sha256: Its hash; "" where it could not be read.
+        motion_sha256: Its hash, see ``content_hash``; "" where it could not be read.
         animation: The animation taken of it, or None.
         status: ``done``, ``failed`` or ``crashed``.
         message: Why it failed.
@@ -69,7 +70,7 @@ def still_there(out: Path, record: ClipRecord) -> bool:
     try:
         return (
             record.status == "done"
-            and file_hash(Path(record.motion)) == record.motion_sha256
+            and content_hash(Path(record.motion)) == record.motion_sha256
             and all(file_hash(out / name) == value for name, value in record.files.items())
         )
     except OSError:

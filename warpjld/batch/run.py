@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import shutil
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -15,6 +14,7 @@ from warpjld.batch.deform import Deforming
 from warpjld.batch.record import FOLDER, ClipRecord, read_record, still_there
 from warpjld.batch.work import BatchWork
 from warpjld.errors import InputError
+from warpjld.folder_lock import locked_folder
 from warpjld.folders import make_folder
 from warpjld.processes import run_jobs
 from warpjld.study.manifest import fingerprint, write_json
@@ -24,6 +24,7 @@ __all__ = ["BatchResult", "run_batch"]
 
 _MANIFEST = "manifest.json"
 _SETTINGS = ".settings.json"  # no clip is called so
+_LOCK = ".lock"
 
 
 @dataclass(frozen=True, eq=False)
@@ -80,10 +81,31 @@ def run_batch(
         ended: Called with every clip as it ends.
 
     Raises:
-        InputError: ``out`` holds a batch with other settings, or cannot be written.
+        InputError: ``out`` holds a batch with other settings, another process makes one there, or it cannot be written.
     """
     began = time.perf_counter()
-    _open(out, settings, fresh)
+    _make(out)
+    with locked_folder(out, f"{FOLDER}/{_LOCK}"):
+        _open(out, settings, fresh)
+        records, made = _made(how, jobs, out, formats, motion_formats, processes, report, ended)
+        write_json(
+            out / _MANIFEST,
+            {"fingerprint": fingerprint(settings), "settings": settings, "clips": [r.content() for r in records]},
+        )
+    return BatchResult(tuple(records), out / _MANIFEST, made, time.perf_counter() - began)
+
+
+def _made(
+    how: Deforming,
+    jobs: Sequence[ClipJob],
+    out: Path,
+    formats: tuple[str, ...],
+    motion_formats: tuple[str, ...],
+    processes: int | None,
+    report: Callable[[str, int, int], None],
+    ended: Callable[[ClipRecord], None],
+) -> tuple[list[ClipRecord], int]:
+    """Make what is missing; records of all clips, and how many were made now."""
     waiting = [job for job in jobs if (kept := read_record(out, job.name)) is None or not _same(out, job, kept)]
     for job in waiting:
         _forget(out, job)
@@ -104,25 +126,28 @@ def run_batch(
             _ = how.covering.runs  # bound and packed once here, not once in every worker
         workers = min(processes or cores(), len(waiting))
         run_jobs(BatchWork(how, out, formats, motion_formats), waiting, processes=workers, done=done)
-    records = [record for job in jobs if (record := read_record(out, job.name)) is not None]
-    write_json(
-        out / _MANIFEST,
-        {"fingerprint": fingerprint(settings), "settings": settings, "clips": [r.content() for r in records]},
-    )
-    return BatchResult(tuple(records), out / _MANIFEST, len(waiting), time.perf_counter() - began)
+    return [record for job in jobs if (record := read_record(out, job.name)) is not None], len(waiting)
 
 
 def _same(out: Path, job: ClipJob, record: ClipRecord) -> bool:
     return (record.motion, record.animation) == (str(job.motion), job.animation) and still_there(out, record)
 
 
+def _make(out: Path) -> None:
+    make_folder(out)
+    make_folder(out / FOLDER)
+    try:
+        (out / FOLDER / _LOCK).open("a").close()
+    except OSError as error:
+        raise InputError(f"cannot write into this folder: {error.strerror}", path=out) from None
+
+
 def _open(out: Path, settings: dict[str, Any], fresh: bool) -> None:
     """Make sure that what the folder holds was made with these settings."""
-    make_folder(out)
     known = out / FOLDER / _SETTINGS
     try:
-        if fresh:
-            shutil.rmtree(out / FOLDER, ignore_errors=True)
+        for record in (out / FOLDER).glob("*.json") if fresh else ():
+            record.unlink()
         if known.exists():
             before = json.loads(known.read_text(encoding="utf-8"))
             plain = json.loads(json.dumps(settings, ensure_ascii=False))
@@ -133,9 +158,8 @@ def _open(out: Path, settings: dict[str, Any], fresh: bool) -> None:
                     "to make them again",
                     path=out,
                 )
-        (out / FOLDER).mkdir(exist_ok=True)
         write_json(known, settings)
-    except (OSError, ValueError) as error:
+    except (OSError, ValueError, AttributeError) as error:
         raise InputError(f"cannot be used as the batch's folder: {error}", path=out) from error
 
 

@@ -10,6 +10,7 @@ from warpjld.batch.clips import ClipJob
 from warpjld.batch.deform import Deforming, deform_clip
 from warpjld.batch.record import ClipRecord, read_record, write_record
 from warpjld.errors import WarpjldError
+from warpjld.io.identity import content_hash
 from warpjld.study.manifest import file_hash
 
 __all__ = ["BatchWork"]
@@ -41,7 +42,7 @@ class BatchWork:
         """Make a clip; returns its status. What goes wrong with one clip is no reason to end the others."""
         hashed = ""
         try:
-            hashed = file_hash(job.motion)
+            hashed = content_hash(job.motion)
             made = deform_clip(
                 self.how,
                 job.motion,

@@ -9,6 +9,7 @@ import sys
 import click
 
 from warpjld import __version__
+from warpjld.cli.warn import one_line
 from warpjld.errors import WarpjldError
 from warpjld.suggest import one_of
 
@@ -73,10 +74,11 @@ def main(arguments: list[str] | None = None) -> None:
         click.echo("interrupted", err=True)
         sys.exit(130)
     except WarpjldError as error:
-        click.echo(f"error: {error}", err=True)
+        click.echo(f"error: {one_line(str(error))}", err=True)
         sys.exit(1)
     except OSError as error:  # a full disk, a folder that went away: nothing a traceback would tell more of
-        click.echo(f"error: {error.filename or 'a file'}: {error.strerror or error}", err=True)
+        what = f"{error.filename or 'a file'}: {error.strerror or error}"
+        click.echo(f"error: {one_line(what)}", err=True)
         sys.exit(1)
     except MemoryError as error:
         click.echo(f"error: not enough memory{f': {error}' if str(error) else ''}", err=True)

@@ -54,17 +54,19 @@ def command(
     RIG is a rig file (.glb, .gltf, .vrm, .fbx, .usd, .usda, .usdc, .usdz), a surface with --skeleton, or builtin:left,
     builtin:right. Scripts load the file written with PARAMETERS. The result is never worse than the start."""
     from warpjld.cli.progress import progress
-    from warpjld.cli.rig_argument import open_rig
+    from warpjld.cli.rig_argument import open_rig, rig_files
     from warpjld.covering import bind_rig
     from warpjld.covering.calibrate import calibrate
     from warpjld.covering.parameters import load_parameters, save_parameters
     from warpjld.covering.pose_sets import calibration_poses
     from warpjld.errors import InputError
+    from warpjld.overwriting import check_outputs
     from warpjld.quiet import silence_warp
 
     silence_warp()
     if not out.absolute().parent.is_dir():
         raise InputError("cannot write the parameter file: no such folder", path=out.parent)
+    check_outputs([out], rig_files(rig, how))
     opened = open_rig(rig, **how)
     begin = None if start is None else load_parameters(start, opened.skeleton)
     with progress(quiet) as report:

@@ -15,6 +15,7 @@ from warpjld.cli.warn import warn
 from warpjld.errors import InputError
 from warpjld.io.caches import FORMATS
 from warpjld.io.motion_out import MOTION_OUT
+from warpjld.overwriting import check_outputs
 
 if TYPE_CHECKING:
     from warpjld.batch import ClipJob, ClipRecord, Deforming
@@ -89,7 +90,9 @@ def command(rig: str, clips: tuple[Path, ...], motions: tuple[Path, ...], **give
     """Deform RIG by MOTION files and write the surface, frame after frame, in the vertex order of RIG's file, or the
     motion of its joints.
 
-    RIG is a rig file, or builtin:left or builtin:right for the built-in hand. With --format or --motion-format (and
+    RIG is a rig file (.glb, .gltf, .vrm, .fbx, .usd), a surface with --skeleton, or builtin:left or builtin:right for
+    the built-in hand. A MOTION is .bvh, .csv, a file with animations (.glb, .gltf, .vrma, .fbx, .usd) or a recording
+    of hands (.json, .npz, .npy). With --format or --motion-format (and
     with more than one clip) it is a batch: RIG is bound once, clips are made in several processes, a clip that fails
     does not end the others, and the same command goes on where it was stopped. manifest.json lists what was made of
     what.
@@ -110,6 +113,7 @@ def command(rig: str, clips: tuple[Path, ...], motions: tuple[Path, ...], **give
         raise InputError("--motion-out names one file: a batch takes --motion-format")
     if wanted.out is None and (batch or not wanted.motions_out):
         raise InputError(f"deform: want --out, the {'folder' if batch else 'file'} to write")
+    check_outputs(wanted.outputs(jobs), wanted.inputs(jobs))
     if batch:
         _batch(wanted, jobs)
     else:
@@ -152,14 +156,32 @@ class _Wanted:
             "flat_hand_mean": self.flat_hand_mean,
         }
 
+    def inputs(self, jobs: list[ClipJob]) -> list[Path]:
+        """Files that are read."""
+        from warpjld.cli.rig_argument import rig_files
+        from warpjld.io.identity import files_of
+
+        motions = dict.fromkeys(job.motion for job in jobs)
+        motion_files = [file for motion in motions for file in (motion, *files_of(motion))]
+        return [*rig_files(self.rig, self.how | {"parameters": self.parameters}), *motion_files]
+
+    def outputs(self, jobs: list[ClipJob]) -> list[Path]:
+        """Files that are written, but for those that lie beside a cache."""
+        if not (self.formats or self.motion_formats):
+            return [path for path in (self.out, *self.motions_out) if path is not None]
+        assert self.out is not None
+        ends = [*self.formats, *(f".motion{suffix}" for suffix in self.motion_formats)]
+        return [self.out / f"{job.name}{end}" for job in jobs for end in ends]
+
     def settings(self) -> dict[str, Any]:
         """All that determines a batch's files besides the motions."""
-        from warpjld.study.manifest import file_hash, versions
+        from warpjld.io.identity import content_hash
+        from warpjld.study.manifest import versions
 
         files = {"rig": Path(self.rig), "parameters": self.parameters} | {
             name: value for name, value in self.how.items() if isinstance(value, Path)
         }
-        hashes = {name: file_hash(path) for name, path in files.items() if path is not None and path.is_file()}
+        hashes = {name: content_hash(path) for name, path in files.items() if path is not None and path.is_file()}
         plain = {name: value for name, value in self.how.items() if not isinstance(value, Path)}
         return {
             "rig": hashes.pop("rig", self.rig),
@@ -295,7 +317,8 @@ def _batch(wanted: _Wanted, jobs: list[ClipJob]) -> None:
         _tell_rig(wanted, how)
         there = len(result.clips) - result.made
         click.echo(
-            f"{len(result.clips)} clips, {frames} frames: {result.made - result.failed} made in {result.seconds:.1f} s"
+            f"{_count(len(result.clips), 'clip')}, {_count(frames, 'frame')}: "
+            f"{result.made - result.failed} made in {result.seconds:.1f} s"
             f"{f', {there} there already' if there else ''}"
             f"{f', {result.failed} failed' if result.failed else ''}; {result.manifest}"
         )
@@ -308,7 +331,13 @@ def _tell_clip(clip: ClipRecord, quiet: bool) -> None:
     if clip.status != "done":
         warn([f"{clip.name}: {clip.message}"], clip.status)
     elif not quiet:
-        click.echo(f"{clip.name}: {clip.frames} frames at {clip.rate:g} a second → {', '.join(_few(clip.files))}")
+        click.echo(
+            f"{clip.name}: {_count(clip.frames, 'frame')} at {clip.rate:g} a second → {', '.join(_few(clip.files))}"
+        )
+
+
+def _count(number: int, what: str) -> str:
+    return f"{number} {what}{'s' * (number != 1)}"
 
 
 def _few(files: dict[str, str]) -> list[str]:
@@ -321,7 +350,7 @@ def _tell(summary: dict[str, Any]) -> None:
     more = f" … {files[-1]} ({len(files)} files)" if len(files) > 1 else ""
     click.echo(f"{files[0]}{more}")
     click.echo(
-        f"{frames} frame{'s' * (frames != 1)} at {summary['rate']:g} a second, {summary['vertices']} vertices, "
+        f"{_count(frames, 'frame')} at {summary['rate']:g} a second, {summary['vertices']} vertices, "
         f"{summary['triangles']} triangles, {summary['joints']} joints; {summary['seconds']} s"
     )
     for note in summary["notes"]:

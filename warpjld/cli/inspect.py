@@ -42,10 +42,12 @@ def command(
     builtin:right. A picture of the surface's wire-frame with the named skeleton in it is written beside, unless
     --no-picture.
     """
-    from warpjld.cli.rig_argument import open_rig
+    from warpjld.cli.rig_argument import open_rig, rig_files
+    from warpjld.overwriting import check_outputs
     from warpjld.quiet import silence_warp
 
     silence_warp()
+    check_outputs([path for path in (out, write_skeleton, write_map) if path is not None], rig_files(rig, how))
     opened = open_rig(rig, **how)
     report = _report(opened)
     if write_skeleton is not None:

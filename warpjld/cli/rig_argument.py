@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from warpjld.cli.warn import warn
@@ -10,7 +11,7 @@ from warpjld.errors import InputError
 if TYPE_CHECKING:
     from warpjld.rig import Rig
 
-__all__ = ["open_rig"]
+__all__ = ["open_rig", "rig_files"]
 
 _OPTIONS = {"joint_map": "map"}  # options that are called otherwise than the arguments of load_rig
 
@@ -40,3 +41,11 @@ def open_rig(text: str, **how: Any) -> Rig:
     from warpjld.hand import build_hand
 
     return build_hand(which)
+
+
+def rig_files(text: str, how: dict[str, Any]) -> list[Path]:
+    """Files that ``open_rig`` reads for the same arguments."""
+    from warpjld.io.identity import files_of
+
+    given = [Path(text), *(value for value in how.values() if isinstance(value, Path))]
+    return [file for path in given for file in (path, *files_of(path))]

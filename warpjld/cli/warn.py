@@ -6,10 +6,19 @@ from collections.abc import Iterable
 
 import click
 
-__all__ = ["warn"]
+__all__ = ["one_line", "warn"]
+
+_LONGEST = 2000  # characters of a line
 
 
 def warn(lines: Iterable[str], kind: str = "warning") -> None:
     """Write each line to stderr, its kind before it: ``warning: …`` or ``suspicious: …``."""
     for line in lines:
-        click.echo(f"{kind}: {line}", err=True)
+        click.echo(f"{kind}: {one_line(line)}", err=True)
+
+
+def one_line(text: str) -> str:
+    """Text as one line of bounded length: names in files may hold line ends, or what terminals take for commands."""
+    if len(text) > _LONGEST:
+        text = f"{text[: _LONGEST // 2]} … {text[-_LONGEST // 2 :]}"
+    return "".join(letter if letter.isprintable() else repr(letter)[1:-1] for letter in text)

@@ -86,7 +86,7 @@ def _assemble(
         skin, bare = _skin(source.joints, source.weights, found.owner, len(found.skeleton), surface)
     rigid, rigid_notes = rigid_parts(surface, found.skeleton, skin, _rigid(source, found.owner, surface))
     return Rig(
-        name=source.path.stem,
+        name=source.path.stem.encode("utf-8", "replace").decode(),  # files may be called by bytes that are no text
         skeleton=found.skeleton,
         surface=surface,
         skin=skin,

@@ -13,6 +13,8 @@ from warpjld.rig import Rig
 
 __all__ = ["load_rig"]
 
+_MOST_SCALE = 1e9  # surfaces are computed in single floats, whose squares end at 1e38
+
 
 def load_rig(
     path: str | Path,
@@ -52,8 +54,8 @@ def load_rig(
     ):
         if value is not None and value not in allowed:
             raise InputError(f"{name}: want {' or '.join(repr(a) for a in allowed)}, got {value!r}")
-    if scale is not None and not 0.0 < scale < float("inf"):
-        raise InputError(f"scale: want a factor above 0, got {scale:g}")
+    if scale is not None and not 1.0 / _MOST_SCALE <= scale <= _MOST_SCALE:
+        raise InputError(f"scale: want a factor above 0, from {1.0 / _MOST_SCALE:g} to {_MOST_SCALE:g}, got {scale:g}")
     if isinstance(joint_map, str | Path):
         from warpjld.io.joint_map_file import read_joint_map
 

@@ -83,7 +83,7 @@ def open_motion(
         limits: What to do with angles beyond a joint's limit, see ``Motion.sample``.
         side: ``left`` or ``right``: which hand a recording is of, where its file leaves it open or is wrong; of a
             recording of both, the hand to follow.
-        animation: Name of one of the file's animations; None for the first.
+        animation: Name of one of the file's animations; None for the first, or where it holds a single motion.
         flat_hand_mean: Whether no rotation in MANO poses means the flat hand (True) or MANO's mean pose (False), where
             the file does not say.
 
@@ -101,6 +101,8 @@ def open_motion(
     if suffix not in MOTION_FORMATS:
         known = ", ".join(f"{s} ({what})" for s, what in MOTION_FORMATS.items())
         raise InputError(f"unknown kind of motion '{path.suffix}'; known: {known}", path=path)
+    if animation is not None and suffix not in _ANIMATIONS:
+        raise InputError(f"no animation '{animation}': a {suffix} file holds one motion without a name", path=path)
     try:
         if suffix == ".csv":
             return _table(path, rig, rate, limits)

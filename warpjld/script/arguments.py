@@ -222,6 +222,7 @@ class Arguments:
                 raise self.error(f"'{path}' is a folder; want a file")
             there = [p.name for p in path.parent.iterdir()] if path.parent.is_dir() else []
             raise self.error(f"there is no file '{path}'{did_you_mean(path.name, there)}")
+        self.interpreter.scene.read.append(path)
         return path
 
     def output_name(self, what: str, suffixes: Sequence[str]) -> str:

@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from warpjld.overwriting import check_outputs
 from warpjld.script.binding import cover
 from warpjld.script.crowd import Crowd, Role
 from warpjld.script.folder import OutputFolder
@@ -76,6 +77,8 @@ def run_scene(
     if scene.contact.pressing is not None and scene.contact.grips:
         outputs.append(Grips("grips.csv"))
     check_available([output.name for output in outputs])
+    read = scene.read if script is None else [*scene.read, script]
+    check_outputs(dict.fromkeys(folder / name for name in _names(scene, outputs)), read)
     summary.notes += check_press(scene, outputs, frames)
     for actor in scene.actors.values():
         stage(actor, frames[:1], scene.rate)  # keys beyond limits are found here

@@ -26,7 +26,9 @@ def file_hash(path: Path) -> str:
 
 def fingerprint(identity: dict[str, Any]) -> str:
     """SHA-256 of settings, whatever their order."""
-    return hashlib.sha256(json.dumps(identity, sort_keys=True, ensure_ascii=False).encode()).hexdigest()
+    return hashlib.sha256(
+        json.dumps(identity, sort_keys=True, ensure_ascii=False).encode("utf-8", "backslashreplace")
+    ).hexdigest()
 
 
 def versions(packages: Iterable[str] = _PACKAGES) -> dict[str, str | None]:
@@ -47,4 +49,5 @@ def versions(packages: Iterable[str] = _PACKAGES) -> dict[str, str | None]:
 def write_json(path: Path, content: dict[str, Any]) -> None:
     """Write a JSON file, whole or not at all."""
     with whole_file(path) as part:
-        part.write_text(json.dumps(content, indent=1, ensure_ascii=False) + "\n", encoding="utf-8")
+        text = json.dumps(content, indent=1, ensure_ascii=False) + "\n"
+        part.write_bytes(text.encode("utf-8", "backslashreplace"))  # bytes of names that are no UTF-8, as JSON has them

@@ -94,8 +94,8 @@ def check_cache(path: str | Path) -> None:
 def _kind(path: Path) -> type[Cache]:
     writer = _WRITERS.get(path.suffix.lower())
     if writer is None:
-        listed = "\n".join(f"  {suffix:6} {what}" for suffix, what in FORMATS.items())
-        raise InputError(f"unknown kind of cache '{path.suffix}'; known are\n{listed}", path=path)
+        listed = "; ".join(f"{suffix} ({what})" for suffix, what in FORMATS.items())
+        raise InputError(f"unknown kind of cache '{path.suffix}'; known: {listed}", path=path)
     module, kind = writer
     found: type[Cache] = getattr(import_module(f"{__name__}.{module}"), kind)
     return found

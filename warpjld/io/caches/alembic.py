@@ -19,6 +19,16 @@ from warpjld.io.caches.cache import Cache
 __all__ = ["AlembicCache"]
 
 
+def _alembic() -> tuple[Any, Any, Any]:
+    """Its modules ``Abc`` and ``AbcGeom`` and its class ``TimeSampling``."""
+    try:
+        from alembic3d import Abc, AbcGeom
+        from alembic3d.AbcCoreAbstract import TimeSampling
+    except ImportError as error:
+        raise MissingExtraError("Alembic", "abc") from error
+    return Abc, AbcGeom, TimeSampling
+
+
 class AlembicCache(Cache):
     """Alembic in its Ogawa form, which is written sample by sample."""
 
@@ -27,12 +37,17 @@ class AlembicCache(Cache):
     _archive: Any = None
     _mesh: Any = None
 
+    @classmethod
+    def check(cls) -> None:
+        """Make sure that Alembic is installed.
+
+        Raises:
+            MissingExtraError: It is not.
+        """
+        _alembic()
+
     def _begin(self) -> None:
-        try:
-            from alembic3d import Abc, AbcGeom
-            from alembic3d.AbcCoreAbstract import TimeSampling
-        except ImportError as error:
-            raise MissingExtraError("Alembic", "abc") from error
+        Abc, AbcGeom, TimeSampling = _alembic()
         name = self.clip.name.replace("/", "_") or "surface"
         with _refusals():
             self._archive = Abc.OArchive(str(self._part(self.path)))

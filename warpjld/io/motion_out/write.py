@@ -84,8 +84,8 @@ def check_motion_out(path: str | Path) -> None:
     """
     path = Path(path)
     if path.suffix.lower() not in _WRITERS:
-        listed = "\n".join(f"  {suffix:6} {what}" for suffix, what in MOTION_OUT.items())
-        raise InputError(f"unknown kind of motion file '{path.suffix}'; known are\n{listed}", path=path)
+        listed = "; ".join(f"{suffix} ({what})" for suffix, what in MOTION_OUT.items())
+        raise InputError(f"unknown kind of motion file '{path.suffix}'; known: {listed}", path=path)
 
 
 def write_motion(

@@ -76,7 +76,7 @@ def open_usd(path: str | Path) -> Iterator[UsdFile]:
         warned = dict.fromkeys(_line(one.commentary) for one in told.TakeUncoalescedDiagnostics())
         file.notes += [f"OpenUSD: {line}" for line in list(warned)[:_MOST_WARNINGS]]
     except Tf.ErrorException as error:
-        raise InputError(f"OpenUSD cannot read it: {_reason(str(error))}", path=path) from None
+        raise InputError(f"OpenUSD cannot read it: {_reason(_told(error))}", path=path) from None
     except (AttributeError, IndexError, KeyError, OverflowError, TypeError, ValueError) as error:
         # a stage may declare any attribute as any type: what the schema forbids shows only where it is used
         raise InputError(
@@ -89,6 +89,13 @@ def open_usd(path: str | Path) -> Iterator[UsdFile]:
 def matrices(values: Any) -> NDArray[np.float64]:
     """One Gf.Matrix4d or an array of them, vectors as columns (USD: rows), shape (4, 4) or (N, 4, 4)."""
     return np.array(values, dtype=np.float64).swapaxes(-1, -2)
+
+
+def _told(error: Exception) -> str:
+    try:
+        return str(error)
+    except UnicodeDecodeError:  # it cites the file
+        return "text that is not UTF-8"
 
 
 def _reason(text: str) -> str:

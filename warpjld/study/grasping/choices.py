@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from warpjld.errors import InputError
-from warpjld.study.manifest import file_hash
+from warpjld.io.identity import content_hash
 from warpjld.toml_table import TomlTable
 
 if TYPE_CHECKING:
@@ -202,7 +202,7 @@ def _hashed(settings: dict[str, Any]) -> dict[str, Any]:
     for key, value in settings.items():
         if isinstance(value, Path):
             try:
-                settings[key] = {"name": value.name, "sha256": file_hash(value)}
+                settings[key] = {"name": value.name, "sha256": content_hash(value)}
             except OSError as error:
                 raise InputError(f"cannot read it: {error.strerror}", path=value) from error
     return settings

@@ -1,0 +1,71 @@
+"""What a rig or motion file is: a hash of its bytes, and of the files that belong to it."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from pathlib import Path
+from urllib.parse import unquote
+
+from warpjld.study.manifest import file_hash
+
+__all__ = ["content_hash", "files_of"]
+
+_USD = (".usd", ".usda", ".usdc")
+
+
+def content_hash(path: Path) -> str:
+    """SHA-256 of a file; where others belong to it, of the hashes of all.
+
+    Raises:
+        OSError: The file itself cannot be read; others that cannot are what they are: missing.
+    """
+    own = file_hash(path)
+    others = files_of(path)
+    if not others:
+        return own
+    return hashlib.sha256("\n".join([own, *map(_hash_or_missing, others)]).encode()).hexdigest()
+
+
+def files_of(path: Path) -> list[Path]:
+    """Files that hold a part of a file's rig or motion: the buffers of a .gltf, the layers of a USD stage.
+
+    Textures are none: nothing that is made depends on them. What cannot be understood refers to nothing: whoever
+    reads it says so.
+    """
+    suffix = path.suffix.lower()
+    if suffix == ".gltf":
+        return _buffers(path)
+    if suffix in _USD:
+        return _layers(path)
+    return []
+
+
+def _hash_or_missing(path: Path) -> str:
+    try:
+        return file_hash(path)
+    except OSError:
+        return "missing"
+
+
+def _buffers(path: Path) -> list[Path]:
+    try:
+        buffers = json.loads(path.read_bytes()).get("buffers", [])
+        uris = [buffer.get("uri") for buffer in buffers]
+    except (OSError, ValueError, RecursionError, AttributeError, TypeError):
+        return []
+    names = [unquote(uri) for uri in uris if isinstance(uri, str) and not uri.startswith("data:") and "\0" not in uri]
+    return [path.parent / name for name in names]
+
+
+def _layers(path: Path) -> list[Path]:
+    try:
+        from pxr import Sdf, UsdUtils
+    except ImportError:
+        return []
+    try:
+        layers, _, _ = UsdUtils.ComputeAllDependencies(Sdf.AssetPath(str(path)))
+    except Exception:  # whatever its plug-ins raise
+        return []
+    found = {Path(layer.realPath).resolve() for layer in layers if layer.realPath} - {path.resolve()}
+    return sorted(found)
