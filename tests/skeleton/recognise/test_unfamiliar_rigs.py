@@ -134,3 +134,17 @@ def test_hair_keeps_its_joints_and_a_jaw_does_not() -> None:
     assert {"more0", "more1", "more2"} <= kept(with_chain(body(), "neck_joint_2", hair))
     jaw = [np.array([0.0, 1.53 - 0.02 * k, 0.06 + 0.02 * k]) for k in range(3)]
     assert not {"more0", "more1", "more2"} & kept(with_chain(body(), "neck_joint_2", jaw))
+
+
+def test_of_an_insects_legs_nothing_is_told_that_holds_for_a_body() -> None:
+    legs = {}
+    for s, x in (("L", 1.0), ("R", -1.0)):
+        for row in range(3):
+            for k, (out, high) in enumerate(((0.1, 0.3), (0.25, 0.4), (0.4, 0.2))):
+                above = f"leg{row}_{k - 1}_{s}" if k else "trunk"
+                legs[f"leg{row}_{k}_{s}"] = (above, (x * out, high, 0.15 * (row - 1)))
+    tree = made({"trunk": (None, (0.0, 0.3, 0.0)), "head": ("trunk", (0.0, 0.32, 0.25))} | legs)
+    roles = recognise(tree, even(tree))
+    assert not roles.body
+    assert not roles.suspicious
+    assert len(roles.notes) == 1

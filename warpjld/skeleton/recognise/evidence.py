@@ -30,17 +30,24 @@ def reject_unfounded(tree: SourceTree, roles: Roles, stated: Collection[str] = (
     """
     if stated:
         return
+    of_body, doubts = len(roles.notes), len(roles.suspicious)
     for hand in [h for h in roles.hands if not _is_hand(tree, h)]:
         roles.hands.remove(hand)
         words = ", ".join(f"'{tree.names[j]}'" for j in list(hand.joints.values())[:3])
         roles.notes.append(f"{words}{', …' if len(hand.joints) > 3 else ''}: named like fingers, but they form no hand")
     if roles.body and not roles.hands and not _is_body(tree, roles):
-        roles.body.clear()
+        _forget_body(roles, of_body, doubts)
         roles.notes.append("some joints are named like limbs, but they form none: joints keep their names")
     if roles.body and (_on_all_fours(tree, roles) or _many_legs(tree)):
-        roles.body.clear()
+        _forget_body(roles, of_body, doubts)
         roles.hands.clear()
-        roles.notes.append("an animal on four legs: joints keep their names")
+        roles.notes.append("an animal's limbs, not an upright body's: joints keep their names")
+
+
+def _forget_body(roles: Roles, notes: int, doubts: int) -> None:
+    """Take the body out, and what was told of its limbs: the first ``notes`` and ``doubts``."""
+    roles.body.clear()
+    del roles.notes[:notes], roles.suspicious[:doubts]
 
 
 def _is_hand(tree: SourceTree, hand: HandRoles) -> bool:
