@@ -125,6 +125,22 @@ def test_an_offset_of_the_root_is_where_it_rests(tmp_path: Path) -> None:
     assert_same(played(other, rig), moved(rig))
 
 
+def test_a_node_at_the_origin_above_the_root_does_not_say_where_the_rig_rests(tmp_path: Path) -> None:
+    rig = rigged(body())
+    clip = clip_of(rig, tmp_path)
+    away = np.array([0.0, 0.1, 0.0])  # the file's floor lies lower than the rig's
+    pelvis = rig.skeleton.rest[0]
+    under = replace(
+        clip,
+        names=("Reference", *clip.names),
+        parents=np.array([-1, *(clip.parents + 1)]),
+        rest=np.vstack([np.zeros(3), clip.rest + pelvis + away]),
+        positions=np.concatenate([np.zeros((len(clip), 1, 3)), clip.positions + away], axis=1),
+        rotations=np.concatenate([np.tile([0.0, 0.0, 0.0, 1.0], (len(clip), 1, 1)), clip.rotations], axis=1),
+    )
+    assert_same(played(under, rig), moved(rig))
+
+
 def test_other_rests_and_other_bones_are_another_skeletons(tmp_path: Path) -> None:
     rig = rigged(body())
     clip = clip_of(rig, tmp_path)

@@ -85,7 +85,8 @@ def own_recording(clip: Clip, rig: Rig) -> OwnRecording | None:
         if turn is not None:
             clip = clip.turned_rest(turn)
             fit = replace(fit, turn=fit.turn * Rotation.from_quat(turn).inv())
-    if not clip.rest[clip.parents < 0].any():
+    top = [k for k in match[match >= 0].tolist() if clip.parents[k] < 0]
+    if top and not clip.rest[top].any():  # else a node of the file's own, such as Reference, stands at the origin
         fit = replace(fit, shift=np.zeros(3))
     own = np.flatnonzero(match >= 0)
     worlds = _worlds(clip, match[own], fit, rig.placing, rig.source.frames[own])
