@@ -126,6 +126,8 @@ def _start(work: Work[Any]) -> None:
     work.begin()
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C is the parent's business
     signal.signal(signal.SIGTERM, _ended)
+    if hasattr(signal, "pthread_sigmask"):
+        signal.pthread_sigmask(signal.SIG_UNBLOCK, {signal.SIGTERM})
     threading.Thread(target=_die_with_parent, daemon=True).start()
 
 
@@ -137,23 +139,33 @@ def _die_with_parent() -> None:
         os._exit(1)
 
 
+_doing = False
+
+
 def _ended(*_: object) -> None:
+    if not _doing:
+        os._exit(1)
     raise SystemExit(1)  # lets whoever writes a file remove what is half of it
 
 
 def _do(job: Any) -> str:
+    global _doing
     assert _work is not None
+    _doing = True
     try:
         return _work.do(job)
     except SystemExit:
         os._exit(1)  # a pool would take it for the job's result and go on
+    finally:
+        _doing = False
 
 
 def _submit(pool: ProcessPoolExecutor, do: Callable[..., Any], *arguments: Any) -> Future[Any]:
-    """Hand out work; this is when workers are started, which never hear of Ctrl-C, not even while they import."""
+    """Hand out work; this is when workers are started: they never hear of Ctrl-C, not even while they import, and none
+    is left half started, which would end in a traceback."""
     if not hasattr(signal, "pthread_sigmask"):
         return pool.submit(do, *arguments)
-    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT, signal.SIGTERM})
     try:
         return pool.submit(do, *arguments)
     finally:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import importlib
+import io
 import signal
 import sys
 
@@ -62,6 +63,8 @@ def main(arguments: list[str] | None = None) -> None:
     """Run the command line. Exit codes: 0 done, 1 bad input or a failed job, 2 wrong usage, 130 interrupted."""
     # a polite kill cleans up as Ctrl-C does, and keeps what is finished
     signal.signal(signal.SIGTERM, signal.default_int_handler)
+    if isinstance(sys.stdout, io.TextIOWrapper):
+        sys.stdout.reconfigure(errors="backslashreplace")  # names of files may be no text
     try:
         code = _group.main(arguments, prog_name="warpjld", standalone_mode=False)
     except click.exceptions.Abort:
