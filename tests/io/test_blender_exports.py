@@ -113,7 +113,9 @@ def skinned(rig: Rig, motion: LoadedMotion, frame: int) -> NDArray[np.float64]:
 def compare(path: Path, rig: Rig, plain: Rig, wanted: LoadedMotion, animation: str | None) -> None:
     order = [rig.skeleton.names.index(name) for name in plain.skeleton.names]
     assert len(order) == len(rig.skeleton)
-    own = np.array([j for j, source in enumerate(plain.sources) if source >= 0])
+    both = zip(plain.sources, (rig.sources[j] for j in order), strict=True)
+    own = np.array([j for j, (a, b) in enumerate(both) if a >= 0 and b >= 0])  # a flat file does not say what a tip is
+    assert len(own) >= 0.9 * sum(source >= 0 for source in plain.sources)
     rest = rig.skeleton.rest[order]
     scale, turn, move = similarity(rest[own], plain.skeleton.rest[own])
     assert np.abs(turn.as_matrix() - np.round(turn.as_matrix())).max() < TURN  # axes, and nothing between
