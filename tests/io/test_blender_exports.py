@@ -157,8 +157,8 @@ def test_whatever_blender_exports_is_the_same_rig(tmp_path: Path, file: str) -> 
     wrong = []
     for job in jobs(tmp_path):
         path = Path(job["out"])
-        if path.name in ("plain.glb", "draco.glb") or (path.name == "flat.glb" and "anny/body" in file):
-            continue  # toes and halves of limbs by MakeHuman's names are only told apart by a hierarchy
+        if path.name in ("plain.glb", "draco.glb") or (path.name == "flat.glb" and file.startswith("body")):
+            continue  # not yet: what a hierarchy alone tells, toes, halves of limbs and leaves of bodies' bones
         try:
             rig = plain if path.suffix == ".bvh" else load_rig(path)
             compare(path, rig, plain, wanted["First"], "First" if path.stem == "two stacks" else None)
