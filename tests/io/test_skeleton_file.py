@@ -92,6 +92,8 @@ def test_a_real_rigs_skeleton_survives_its_file(data, tmp_path, name):
         ({"joints": [{"name": "a", "position": [0, 0, 0], "axis": [0, 0, 0]}]}, "axis has no length"),
         ({"joints": [{"name": "a", "position": [0, 0, 0], "limits": {"flex": [0, 1]}}]}, "did you mean flexion"),
         ({"joints": [{"name": "a", "position": [0, 0, 0], "limits": {"flexion": [2, 1]}}]}, "want .smallest, largest"),
+        ({"joints": [{"name": "a", "position": [0, 0, 0], "limits": {"flexion": [0, 9**99]}}]}, "−360 to 360"),
+        ({"joints": [{"name": "a", "position": [0, 0, 0], "limits": {"flexion": [0, 9**999]}}]}, "−360 to 360"),
         ({"joints": [{"name": "a", "position": [0, 0, 0]}] * 2}, "two joints are called 'a'"),
     ],
 )

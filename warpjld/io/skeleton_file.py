@@ -116,8 +116,10 @@ def _limits(value: Any, name: str) -> dict[str, tuple[float, float]]:
         if channel not in CHANNELS:
             raise InputError(f"joint '{name}': no channel '{channel}'{did_you_mean(channel, CHANNELS)}")
         good = isinstance(pair, list) and len(pair) == 2 and all(isinstance(x, int | float) for x in pair)
-        if not good or not (np.isfinite(pair).all() and pair[0] <= pair[1]):
-            raise InputError(f"joint '{name}': limits of {channel} want [smallest, largest] in degrees, got {pair!r}")
+        if not good or not -360 <= pair[0] <= pair[1] <= 360:
+            raise InputError(
+                f"joint '{name}': limits of {channel} want [smallest, largest] in degrees, −360 to 360, got {pair!r}"
+            )
         out[channel] = (float(np.radians(pair[0])), float(np.radians(pair[1])))
     return out
 
