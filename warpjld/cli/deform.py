@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 import time
-from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Any
 
 import click
 
 from warpjld.cli import options
 from warpjld.cli.answer import answer
+from warpjld.cli.deform_wanted import Wanted, count, deforming, tell_rig
 from warpjld.cli.warn import warn
 from warpjld.errors import InputError
 from warpjld.io.caches import FORMATS
@@ -18,7 +18,7 @@ from warpjld.io.motion_out import MOTION_OUT
 from warpjld.overwriting import check_outputs
 
 if TYPE_CHECKING:
-    from warpjld.batch import ClipJob, ClipRecord, Deforming
+    from warpjld.batch import ClipJob
 
 __all__ = ["command"]
 
@@ -105,7 +105,7 @@ def command(rig: str, clips: tuple[Path, ...], motions: tuple[Path, ...], **give
     how = {name: given.pop(name) for name in options.RIG}
     for name in ("formats", "motion_formats"):
         given[name] = tuple(f".{suffix}" for suffix in dict.fromkeys(given[name]))
-    wanted = _Wanted(rig, how, **given)
+    wanted = Wanted(rig, how, **given)
     batch = bool(wanted.formats or wanted.motion_formats)
     if len(jobs) > 1 and not batch:
         raise InputError(f"{len(jobs)} clips: say by --format what each is to become, in the folder --out")
@@ -115,109 +115,14 @@ def command(rig: str, clips: tuple[Path, ...], motions: tuple[Path, ...], **give
         raise InputError(f"deform: want --out, the {'folder' if batch else 'file'} to write")
     check_outputs(wanted.outputs(jobs), wanted.inputs(jobs))
     if batch:
-        _batch(wanted, jobs)
+        from warpjld.cli.deform_batch import make_batch
+
+        make_batch(wanted, jobs)
     else:
         _single(wanted, jobs[0])
 
 
-@dataclass(frozen=True)
-class _Wanted:
-    """The command line, but for the motions."""
-
-    rig: str
-    how: dict[str, Any]
-    formats: tuple[str, ...]
-    motion_formats: tuple[str, ...]
-    motions_out: tuple[Path, ...]
-    out: Path | None
-    animation: str | None
-    motion_side: str | None
-    flat_hand_mean: bool | None
-    span: str | None
-    rate: float | None
-    limits: str
-    parameters: Path | None
-    domains: Literal["geometry", "skin"]
-    method: Literal["smooth", "paper"]
-    processes: int | None
-    fresh: bool
-    device: str
-    threads: int | None
-    as_json: bool
-    quiet: bool
-
-    @property
-    def reading(self) -> dict[str, Any]:
-        """How motions are read."""
-        return {
-            "rate": self.rate,
-            "limits": self.limits,
-            "side": self.motion_side,
-            "flat_hand_mean": self.flat_hand_mean,
-        }
-
-    def inputs(self, jobs: list[ClipJob]) -> list[Path]:
-        """Files that are read."""
-        from warpjld.cli.rig_argument import rig_files
-        from warpjld.io.identity import files_of
-
-        motions = dict.fromkeys(job.motion for job in jobs)
-        motion_files = [file for motion in motions for file in (motion, *files_of(motion))]
-        return [*rig_files(self.rig, self.how | {"parameters": self.parameters}), *motion_files]
-
-    def outputs(self, jobs: list[ClipJob]) -> list[Path]:
-        """Files that are written, but for those that lie beside a cache."""
-        if not (self.formats or self.motion_formats):
-            return [path for path in (self.out, *self.motions_out) if path is not None]
-        assert self.out is not None
-        ends = [*self.formats, *(f".motion{suffix}" for suffix in self.motion_formats)]
-        return [self.out / f"{job.name}{end}" for job in jobs for end in ends]
-
-    def settings(self) -> dict[str, Any]:
-        """All that determines a batch's files besides the motions."""
-        from warpjld.io.identity import content_hash
-        from warpjld.study.manifest import versions
-
-        files = {"rig": Path(self.rig), "parameters": self.parameters} | {
-            name: value for name, value in self.how.items() if isinstance(value, Path)
-        }
-        hashes = {name: content_hash(path) for name, path in files.items() if path is not None and path.is_file()}
-        plain = {name: value for name, value in self.how.items() if not isinstance(value, Path)}
-        return {
-            "rig": hashes.pop("rig", self.rig),
-            **hashes,
-            **plain,
-            **{f"motion_{name}": value for name, value in self.reading.items()},
-            "frames": self.span,
-            "formats": [*self.formats, *(f".motion{suffix}" for suffix in self.motion_formats)],
-            "domains": self.domains,
-            "method": self.method,
-            "device": self.device,
-            "warpjld": versions(["warpjld"])["warpjld"],
-        }
-
-
-def _deforming(wanted: _Wanted) -> Deforming:
-    from warpjld.batch import Deforming
-    from warpjld.cli.rig_argument import open_rig
-    from warpjld.covering import load_parameters
-    from warpjld.quiet import silence_warp
-
-    silence_warp()
-    rig = open_rig(wanted.rig, **wanted.how)
-    return Deforming(
-        rig,
-        None if wanted.parameters is None else load_parameters(wanted.parameters, rig.skeleton),
-        wanted.domains,
-        wanted.method,
-        wanted.reading,
-        wanted.span,
-        wanted.device,
-        wanted.threads,
-    )
-
-
-def _single(wanted: _Wanted, job: ClipJob) -> None:
+def _single(wanted: Wanted, job: ClipJob) -> None:
     from warpjld.batch import deform_clip
     from warpjld.cli.progress import progress
     from warpjld.io.caches import check_cache
@@ -229,7 +134,7 @@ def _single(wanted: _Wanted, job: ClipJob) -> None:
         check_cache(path)
     for path in wanted.motions_out:
         check_motion_out(path)
-    how = _deforming(wanted)
+    how = deforming(wanted)
     with progress(wanted.quiet) as report:
         made = deform_clip(
             how,
@@ -259,90 +164,7 @@ def _single(wanted: _Wanted, job: ClipJob) -> None:
         answer(summary)
     elif not wanted.quiet:
         _tell(summary)
-        _tell_rig(wanted, how)
-
-
-def _tell_rig(wanted: _Wanted, how: Deforming) -> None:
-    count = len(how.rig.notes)
-    if count:
-        click.echo(f"note: {count} on what was recognised and mended in the rig: warpjld inspect {wanted.rig}")
-
-
-def _batch(wanted: _Wanted, jobs: list[ClipJob]) -> None:
-    from warpjld.batch import run_batch
-    from warpjld.cli.progress import progress
-    from warpjld.io.caches import check_cache
-    from warpjld.io.motion_out import check_motion_out
-
-    assert wanted.out is not None
-    for suffix in wanted.formats:
-        check_cache(f"clip{suffix}")
-    for suffix in wanted.motion_formats:
-        check_motion_out(f"clip{suffix}")
-    settings = wanted.settings()
-    how = _deforming(replace(wanted, threads=wanted.threads or 1))
-    with progress(wanted.quiet) as report:
-        try:
-            result = run_batch(
-                how,
-                jobs,
-                wanted.out,
-                wanted.formats,
-                settings,
-                motion_formats=wanted.motion_formats,
-                processes=wanted.processes,
-                fresh=wanted.fresh,
-                report=report,
-                ended=lambda record: _tell_clip(record, wanted.quiet or wanted.as_json),
-            )
-        except KeyboardInterrupt:
-            click.echo(f"stopped; the same command goes on from what is in {wanted.out}", err=True)
-            raise
-    frames = sum(clip.frames for clip in result.clips)
-    if wanted.as_json:
-        answer(
-            {
-                "rig": wanted.rig,
-                "manifest": str(result.manifest),
-                "clips": [clip.content() for clip in result.clips],
-                "made": result.made,
-                "failed": result.failed,
-                "frames": frames,
-                "seconds": round(result.seconds, 3),
-                "warnings": list(how.rig.suspicious),
-                "rig_notes": list(how.rig.notes),
-            }
-        )
-    elif not wanted.quiet:
-        _tell_rig(wanted, how)
-        there = len(result.clips) - result.made
-        click.echo(
-            f"{_count(len(result.clips), 'clip')}, {_count(frames, 'frame')}: "
-            f"{result.made - result.failed} made in {result.seconds:.1f} s"
-            f"{f', {there} there already' if there else ''}"
-            f"{f', {result.failed} failed' if result.failed else ''}; {result.manifest}"
-        )
-    if result.failed:
-        raise SystemExit(1)
-
-
-def _tell_clip(clip: ClipRecord, quiet: bool) -> None:
-    warn(f"{clip.name}: {warning}" for warning in clip.warnings)
-    if clip.status != "done":
-        warn([f"{clip.name}: {clip.message}"], clip.status)
-    elif not quiet:
-        click.echo(
-            f"{clip.name}: {_count(clip.frames, 'frame')} at {clip.rate:g} a second → {', '.join(_few(clip.files))}"
-        )
-
-
-def _count(number: int, what: str) -> str:
-    return f"{number} {what}{'s' * (number != 1)}"
-
-
-def _few(files: dict[str, str]) -> list[str]:
-    names = list(files)
-    return names if len(names) < 4 else [names[0], "…", f"{names[-1]} ({len(names)} files)"]
+        tell_rig(wanted, how)
 
 
 def _tell(summary: dict[str, Any]) -> None:
@@ -350,7 +172,7 @@ def _tell(summary: dict[str, Any]) -> None:
     more = f" … {files[-1]} ({len(files)} files)" if len(files) > 1 else ""
     click.echo(f"{files[0]}{more}")
     click.echo(
-        f"{_count(frames, 'frame')} at {summary['rate']:g} a second, {summary['vertices']} vertices, "
+        f"{count(frames, 'frame')} at {summary['rate']:g} a second, {summary['vertices']} vertices, "
         f"{summary['triangles']} triangles, {summary['joints']} joints; {summary['seconds']} s"
     )
     for note in summary["notes"]:

@@ -81,11 +81,17 @@ def check_motion_out(path: str | Path) -> None:
 
     Raises:
         InputError: Unknown suffix.
+        MissingExtraError: The format needs an optional dependency.
     """
     path = Path(path)
-    if path.suffix.lower() not in _WRITERS:
+    suffix = path.suffix.lower()
+    if suffix not in _WRITERS:
         listed = "; ".join(f"{suffix} ({what})" for suffix, what in MOTION_OUT.items())
         raise InputError(f"unknown kind of motion file '{path.suffix}'; known: {listed}", path=path)
+    if suffix.startswith(".usd"):
+        from warpjld.io.caches import check_cache
+
+        check_cache(path)  # needs what caches of the kind need
 
 
 def write_motion(

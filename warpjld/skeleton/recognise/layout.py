@@ -179,4 +179,8 @@ def _owner(
         if j in of_source:
             return number[of_source[j]]
     below = [number[of_source[j]] for j in tree.subtree(joint) if j in of_source]
+    if not below and tree.flat and of_source:  # no tree says whose it is: the nearest is the likeliest
+        known = list(of_source)
+        away = np.linalg.norm(tree.positions[known] - tree.positions[joint], axis=1)
+        return number[of_source[known[int(away.argmin())]]]
     return min(below) if below else 0

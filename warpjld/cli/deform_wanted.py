@@ -1,0 +1,121 @@
+"""What ``warpjld deform`` was asked for: its options but for the motions, and what they name."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Literal
+
+import click
+
+if TYPE_CHECKING:
+    from warpjld.batch import ClipJob, Deforming
+
+__all__ = ["Wanted", "count", "deforming", "tell_rig"]
+
+
+@dataclass(frozen=True)
+class Wanted:
+    """The command line, but for the motions."""
+
+    rig: str
+    how: dict[str, Any]
+    formats: tuple[str, ...]
+    motion_formats: tuple[str, ...]
+    motions_out: tuple[Path, ...]
+    out: Path | None
+    animation: str | None
+    motion_side: str | None
+    flat_hand_mean: bool | None
+    span: str | None
+    rate: float | None
+    limits: str
+    parameters: Path | None
+    domains: Literal["geometry", "skin"]
+    method: Literal["smooth", "paper"]
+    processes: int | None
+    fresh: bool
+    device: str
+    threads: int | None
+    as_json: bool
+    quiet: bool
+
+    @property
+    def reading(self) -> dict[str, Any]:
+        """How motions are read."""
+        return {
+            "rate": self.rate,
+            "limits": self.limits,
+            "side": self.motion_side,
+            "flat_hand_mean": self.flat_hand_mean,
+        }
+
+    def inputs(self, jobs: list[ClipJob]) -> list[Path]:
+        """Files that are read."""
+        from warpjld.cli.rig_argument import rig_files
+        from warpjld.io.identity import files_of
+
+        motions = dict.fromkeys(job.motion for job in jobs)
+        motion_files = [file for motion in motions for file in (motion, *files_of(motion))]
+        return [*rig_files(self.rig, self.how | {"parameters": self.parameters}), *motion_files]
+
+    def outputs(self, jobs: list[ClipJob]) -> list[Path]:
+        """Files that are written, but for those that lie beside a cache."""
+        if not (self.formats or self.motion_formats):
+            return [path for path in (self.out, *self.motions_out) if path is not None]
+        assert self.out is not None
+        ends = [*self.formats, *(f".motion{suffix}" for suffix in self.motion_formats)]
+        return [self.out / f"{job.name}{end}" for job in jobs for end in ends]
+
+    def settings(self) -> dict[str, Any]:
+        """All that determines a batch's files besides the motions."""
+        from warpjld.io.identity import content_hash
+        from warpjld.study.manifest import versions
+
+        files = {"rig": Path(self.rig), "parameters": self.parameters} | {
+            name: value for name, value in self.how.items() if isinstance(value, Path)
+        }
+        hashes = {name: content_hash(path) for name, path in files.items() if path is not None and path.is_file()}
+        plain = {name: value for name, value in self.how.items() if not isinstance(value, Path)}
+        return {
+            "rig": hashes.pop("rig", self.rig),
+            **hashes,
+            **plain,
+            **{f"motion_{name}": value for name, value in self.reading.items()},
+            "frames": self.span,
+            "formats": [*self.formats, *(f".motion{suffix}" for suffix in self.motion_formats)],
+            "domains": self.domains,
+            "method": self.method,
+            "device": self.device,
+            "warpjld": versions(["warpjld"])["warpjld"],
+        }
+
+
+def deforming(wanted: Wanted) -> Deforming:
+    from warpjld.batch import Deforming
+    from warpjld.cli.rig_argument import open_rig
+    from warpjld.covering import load_parameters
+    from warpjld.quiet import silence_warp
+
+    silence_warp()
+    rig = open_rig(wanted.rig, **wanted.how)
+    return Deforming(
+        rig,
+        None if wanted.parameters is None else load_parameters(wanted.parameters, rig.skeleton),
+        wanted.domains,
+        wanted.method,
+        wanted.reading,
+        wanted.span,
+        wanted.device,
+        wanted.threads,
+    )
+
+
+def tell_rig(wanted: Wanted, how: Deforming) -> None:
+    count = len(how.rig.notes)
+    if count:
+        click.echo(f"note: {count} on what was recognised and mended in the rig: warpjld inspect {wanted.rig}")
+
+
+def count(number: int, what: str) -> str:
+    return f"{number} {what}{'s' * (number != 1)}"
