@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-__all__ = ["about", "conjugate", "minimal_rotation", "multiply", "rotate", "slerp", "unit"]
+__all__ = ["about", "conjugate", "minimal_rotation", "multiply", "rotate", "slerp", "unit", "upright"]
 
 _PARALLEL = 1e-12
 
@@ -15,6 +15,11 @@ def unit(vectors: ArrayLike) -> NDArray[np.float64]:
     array = np.asarray(vectors, dtype=np.float64)
     lengths = np.linalg.norm(array, axis=-1, keepdims=True)
     return np.asarray(array / np.where(lengths > 0.0, lengths, 1.0))
+
+
+def upright(up: str | None) -> NDArray[np.float64]:
+    """Rotation matrix that brings a file's up axis, ``y`` or ``z``, to Y; none where the file does not say."""
+    return np.array([[1.0, 0.0, 0.0], [0.0, 0.0, 1.0], [0.0, -1.0, 0.0]]) if up == "z" else np.eye(3)
 
 
 def about(vectors: NDArray[np.float64]) -> NDArray[np.float64]:

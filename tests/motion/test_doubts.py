@@ -12,7 +12,7 @@ from tests.motion.skeletons import body, rig
 from tests.motion.test_conventions import CONVENTIONS, play
 from warpjld.io import load_rig
 from warpjld.motion import open_motion
-from warpjld.motion.doubts import doubts_of_animation, jumps
+from warpjld.motion.doubts import doubts_of_own_joints, jumps
 from warpjld.motion.joint_animation import JointAnimation
 from warpjld.skeleton.recognise.tree import SourceTree
 
@@ -69,9 +69,9 @@ def test_joints_merged_into_others_are_named_where_their_own_animation_moves_the
     worlds[:, 3, :3, :3] = worlds[:, 2, :3, :3]
     worlds[1, 1, :3, :3] *= -1e-3  # mirrored and small: read as some rotation, without a traceback
     worlds[2, 0, :3, :3] = 0.0
-    animation = JointAnimation(tree, worlds, 30.0)
-    assert any("moves jaw, which nothing" in line for line in doubts_of_animation(animation, {"hip", "head"}))
-    assert not any("moves" in line for line in doubts_of_animation(animation, {"hip", "head", "jaw"}))
+    clip = JointAnimation(tree, worlds, 30.0).clip()
+    assert any("moves jaw, which nothing" in line for line in doubts_of_own_joints(clip, {"hip", "head"}))
+    assert not any("moves" in line for line in doubts_of_own_joints(clip, {"hip", "head", "jaw"}))
 
 
 @pytest.mark.parametrize("name", ["body_anny/body_104joints.glb", "body_mesh2motion_mannequin/human-male.glb"])

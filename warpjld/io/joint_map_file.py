@@ -55,12 +55,11 @@ def write_joint_map(path: str | Path, rig: Rig) -> None:
     tree = rig.source
     if tree is None:
         raise InputError("a generated rig has no joints of a file: there is nothing to map")
-    content: dict[str, str | None] = {}
-    for name, joint in zip(rig.skeleton.names, rig.sources, strict=True):
-        if is_canonical(name):
-            own = "" if joint < 0 else tree.names[joint]
-            same = [j for j, other in enumerate(tree.names) if other == own]
-            content[name] = None if joint < 0 else own if len(same) == 1 else f"{own}#{same.index(joint) + 1}"
+    content = {
+        name: None if joint < 0 else tree.own_name(joint)
+        for name, joint in zip(rig.skeleton.names, rig.sources, strict=True)
+        if is_canonical(name)
+    }
     try:
         with whole_file(Path(path)) as part:
             part.write_text(json.dumps(content, indent=2, ensure_ascii=False) + "\n", "utf-8")

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from warpjld.io.source import SourceRig
+from warpjld.rotations import upright
 from warpjld.skeleton.recognise.roles import Roles
 from warpjld.skeleton.recognise.tree import SourceTree
 
@@ -58,7 +59,7 @@ def place(
     elif up is None and _lies_on_z(source.tree, roles):
         up = "z"
         notes.append("up axis: the body stands along Z, turned to Y")
-    turn = np.array([[1.0, 0, 0], [0, 0, 1.0], [0, -1.0, 0]]) if up == "z" else np.eye(3)
+    turn = upright(up)
     placing = np.eye(4)
     placing[:3, :3] = factor * turn
     frames = source.tree.frames.copy()

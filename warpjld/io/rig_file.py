@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
 from warpjld.errors import InputError
 from warpjld.io.placement import METRES
 from warpjld.io.source import SourceRig
+from warpjld.lazily import imported
 from warpjld.rig import Rig
 
 __all__ = ["load_rig"]
@@ -74,41 +75,19 @@ def _read(path: Path, skeleton: str | Path | None) -> SourceRig:
     reader = _READERS.get(path.suffix.lower())
     if reader is None:
         raise InputError("has no joints: give a skeleton file for this surface", path=path)
-    return reader(path)
+    source: SourceRig = imported(reader)(path)
+    return source
 
 
-def _read_gltf(path: Path) -> SourceRig:
-    from warpjld.io.gltf.skin import read_gltf_rig
-
-    return read_gltf_rig(path)
-
-
-def _read_fbx(path: Path) -> SourceRig:
-    from warpjld.io.fbx.rig import read_fbx_rig
-
-    return read_fbx_rig(path)
-
-
-def _read_usd(path: Path) -> SourceRig:
-    from warpjld.io.usd.skin import read_usd_rig
-
-    return read_usd_rig(path)
-
-
-def _read_vrm(path: Path) -> SourceRig:
-    from warpjld.io.vrm import read_vrm_rig
-
-    return read_vrm_rig(path)
-
-
-_READERS: dict[str, Callable[[Path], SourceRig]] = {
-    ".glb": _read_gltf,
-    ".gltf": _read_gltf,
-    ".fbx": _read_fbx,
-    ".usd": _read_usd,
-    ".usda": _read_usd,
-    ".usdc": _read_usd,
-    ".usdz": _read_usd,
-    ".vrm": _read_vrm,
+_USD = ("warpjld.io.usd.skin", "read_usd_rig")
+_READERS = {
+    ".glb": ("warpjld.io.gltf.skin", "read_gltf_rig"),
+    ".gltf": ("warpjld.io.gltf.skin", "read_gltf_rig"),
+    ".fbx": ("warpjld.io.fbx.rig", "read_fbx_rig"),
+    ".usd": _USD,
+    ".usda": _USD,
+    ".usdc": _USD,
+    ".usdz": _USD,
+    ".vrm": ("warpjld.io.vrm", "read_vrm_rig"),
 }
 """What reads the rigs of each suffix; libraries are imported when a file of their kind is opened."""

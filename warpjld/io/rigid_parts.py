@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
+from warpjld.listed import first_few
 from warpjld.rig import Skin
 from warpjld.skeleton.tree import Skeleton
 from warpjld.surface import Surface
@@ -28,7 +29,6 @@ _SHARE = 0.9  # of the weight of a piece that one joint has where it is painted 
 _SAMPLES = 15  # places along a bone, of which
 _WITHIN = 0.5  # this share lies inside a piece that holds the bone
 _SAME_PLACE = 1e-6  # of the surface's size
-_NAMED = 4  # pieces named in a note
 
 
 def rigid_parts(
@@ -63,7 +63,7 @@ def rigid_parts(
         found.setdefault(joint, []).append(_name(surface, int(vertices[0])))
     notes = tuple(
         f"{len(names)} separate piece{'s' * (len(names) > 1)} without flesh, rigid to joint "
-        f"'{skeleton.names[joint]}': {_listed(names)}"
+        f"'{skeleton.names[joint]}': {first_few(list(dict.fromkeys(names)))}"
         for joint, names in found.items()
     )
     return (out if (out >= 0).any() else None), notes
@@ -134,9 +134,3 @@ def _name(surface: Surface, vertex: int) -> str:
     """The source's mesh that a vertex belongs to."""
     source = int(np.flatnonzero(surface.weld == vertex)[0])
     return next((p.name for p in surface.parts if p.vertices.start <= source < p.vertices.stop), "surface")
-
-
-def _listed(names: list[str]) -> str:
-    different = list(dict.fromkeys(names))
-    more = len(different) - _NAMED
-    return ", ".join(different[:_NAMED]) + (f" and {more} more" if more > 0 else "")

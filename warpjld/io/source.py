@@ -62,9 +62,4 @@ class SourceRig:
 
     def stated_names(self) -> dict[str, str]:
         """``stated`` by the file's own names, of several joints of one name the second as ``name#2``."""
-        names = self.tree.names
-        out = {}
-        for canonical, joint in self.stated.items():
-            same = [j for j, name in enumerate(names) if name == names[joint]]
-            out[canonical] = names[joint] if len(same) == 1 else f"{names[joint]}#{same.index(joint) + 1}"
-        return out
+        return {canonical: self.tree.own_name(joint) for canonical, joint in self.stated.items()}

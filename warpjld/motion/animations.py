@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 
 from warpjld.errors import InputError
+from warpjld.lazily import imported
 from warpjld.suggest import one_of
 
 __all__ = ["animation_names", "choose_animation", "unique_names"]
@@ -19,7 +20,8 @@ def animation_names(path: str | Path) -> tuple[str, ...]:
     """
     path = Path(path)
     lister = _LISTERS.get(path.suffix.lower())
-    return () if lister is None else lister(path)
+    names: tuple[str, ...] = () if lister is None else imported(lister)(path)
+    return names
 
 
 def choose_animation(wanted: str | None, names: tuple[str, ...], path: Path) -> tuple[str, tuple[str, ...]]:
@@ -59,29 +61,16 @@ def unique_names(names: Sequence[str]) -> list[str]:
     return out
 
 
-def _gltf(path: Path) -> tuple[str, ...]:
-    from warpjld.motion.gltf_animation import gltf_animation_names
-
-    return gltf_animation_names(path)
-
-
-def _fbx(path: Path) -> tuple[str, ...]:
-    from warpjld.motion.fbx_animation import fbx_animation_names
-
-    return fbx_animation_names(path)
-
-
-def _usd(path: Path) -> tuple[str, ...]:
-    from warpjld.motion.usd_animation import usd_animation_names
-
-    return usd_animation_names(path)
-
-
-_LISTERS: dict[str, Callable[[Path], tuple[str, ...]]] = {
-    ".glb": _gltf,
-    ".gltf": _gltf,
-    ".fbx": _fbx,
-    ".vrma": _gltf,
-    **dict.fromkeys((".usd", ".usda", ".usdc", ".usdz"), _usd),
+_GLTF = ("warpjld.motion.gltf_animation", "gltf_animation_names")
+_USD = ("warpjld.motion.usd_animation", "usd_animation_names")
+_LISTERS = {
+    ".glb": _GLTF,
+    ".gltf": _GLTF,
+    ".vrma": _GLTF,
+    ".fbx": ("warpjld.motion.fbx_animation", "fbx_animation_names"),
+    ".usd": _USD,
+    ".usda": _USD,
+    ".usdc": _USD,
+    ".usdz": _USD,
 }
 """What lists the animations of each suffix."""

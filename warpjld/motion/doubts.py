@@ -4,16 +4,16 @@ from __future__ import annotations
 
 import re
 from collections.abc import Collection, Sequence
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from warpjld.motion.clip import Clip
-from warpjld.motion.joint_animation import JointAnimation
 from warpjld.rotations import conjugate, multiply, rotate
 from warpjld.skeleton.recognise.names import read_name
 
-__all__ = ["doubts_of_animation", "doubts_of_clip", "jumps"]
+__all__ = ["doubts_of_clip", "doubts_of_own_joints", "jumps"]
 
 _JUMP = 90.0
 """Degrees from one sample to the next above which a joint hardly turned by itself: 2700° a second at 30 samples."""
@@ -51,24 +51,41 @@ def jumps(names: Sequence[str], turns: NDArray[np.float64]) -> list[str]:
 
 
 def doubts_of_clip(clip: Clip, used: Collection[int]) -> list[str]:
-    """What a clip moves and nothing in the rig follows.
+    """What a clip moves and nothing in the rig follows: one line at most.
+
+    A single frame is compared with the rest, others with their first.
 
     Args:
         clip: The recording.
         used: Its joints that drive a joint of the rig, or carry one that does.
     """
-    at_rest = np.tile([0.0, 0.0, 0.0, 1.0], (len(clip.names), 1))
-    return _unfollowed(clip.names, clip.parents, clip.positions, clip.rotations, (clip.rest, at_rest), used)
+    size = float(np.linalg.norm(np.ptp(clip.positions[0], axis=0)))
+    if len(clip) == 1:
+        at_rest = np.tile([0.0, 0.0, 0.0, 1.0], (1, len(clip.names), 1))
+        positions = np.concatenate([clip.rest[None], clip.positions])
+        clip = replace(clip, positions=positions, rotations=np.concatenate([at_rest, clip.rotations]))
+    local = clip.locals()
+    angles = _degrees_between(local[:1], local).max(axis=0)
+    above = np.maximum(clip.parents, 0)
+    places = rotate(conjugate(clip.rotations[:, above]), clip.positions - clip.positions[:, above])
+    shifts = np.linalg.norm(places - places[:1], axis=-1).max(axis=0)
+    moved = [
+        name
+        for j, name in enumerate(clip.names)
+        if j not in used
+        and (angles[j] > _MOVES or (clip.parents[j] >= 0 and shifts[j] > _SHIFTS * size))
+        and read_name(name).kind != "helper"
+    ]
+    return [f"the motion moves {_listed(moved)}, which nothing in the rig follows"] if moved else []
 
 
-def doubts_of_animation(animation: JointAnimation, followed: Collection[str]) -> list[str]:
+def doubts_of_own_joints(clip: Clip, followed: Collection[str]) -> list[str]:
     """What an animation of a rig's own joints moves and the rig does not follow.
 
     Args:
-        animation: The animation.
+        clip: The animation.
         followed: Names of its joints that are joints of the rig.
     """
-    clip = animation.clip()
     used: set[int] = set()
     for j, name in enumerate(clip.names):
         k = j if name in followed else -1
@@ -76,41 +93,6 @@ def doubts_of_animation(animation: JointAnimation, followed: Collection[str]) ->
             used.add(k)
             k = int(clip.parents[k])
     return doubts_of_clip(clip, used)
-
-
-def _unfollowed(
-    names: Sequence[str],
-    parents: NDArray[np.int64],
-    positions: NDArray[np.float64],
-    rotations: NDArray[np.float64],
-    rest: tuple[NDArray[np.float64], NDArray[np.float64]],
-    used: Collection[int],
-) -> list[str]:
-    """One line at most; a single frame is compared with the rest (positions and rotations), others with their first."""
-    size = float(np.linalg.norm(np.ptp(positions[0], axis=0)))
-    if len(positions) == 1:
-        positions = np.concatenate([rest[0][None], positions])
-        rotations = np.concatenate([rest[1][None], rotations])
-    local = _to_parents(parents, rotations)
-    angles = _degrees_between(local[:1], local).max(axis=0)
-    above = np.maximum(parents, 0)
-    places = rotate(conjugate(rotations[:, above]), positions - positions[:, above])
-    shifts = np.linalg.norm(places - places[:1], axis=-1).max(axis=0)
-    moved = [
-        names[j]
-        for j in range(len(names))
-        if j not in used
-        and (angles[j] > _MOVES or (parents[j] >= 0 and shifts[j] > _SHIFTS * size))
-        and read_name(names[j]).kind != "helper"
-    ]
-    return [f"the motion moves {_listed(moved)}, which nothing in the rig follows"] if moved else []
-
-
-def _to_parents(parents: NDArray[np.int64], rotations: NDArray[np.float64]) -> NDArray[np.float64]:
-    inner = parents >= 0
-    out = rotations.copy()
-    out[:, inner] = multiply(conjugate(rotations[:, parents[inner]]), rotations[:, inner])
-    return out
 
 
 def _degrees_between(a: NDArray[np.float64], b: NDArray[np.float64]) -> NDArray[np.float64]:

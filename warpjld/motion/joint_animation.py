@@ -9,12 +9,11 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from warpjld.motion.clip import Clip
+from warpjld.rotations import upright
 from warpjld.scales import polar
 from warpjld.skeleton.recognise.tree import SourceTree
 
 __all__ = ["JointAnimation"]
-
-_Z_TO_Y = np.array([[1.0, 0, 0, 0], [0, 0, 1.0, 0], [0, -1.0, 0, 0], [0, 0, 0, 1.0]])
 
 
 @dataclass(frozen=True, eq=False)
@@ -53,7 +52,8 @@ class JointAnimation:
         place = np.empty_like(order)
         place[order] = np.arange(len(order))
         parents = self.tree.parents[order]
-        turn = _Z_TO_Y if self.up == "z" else np.eye(4)
+        turn = np.eye(4)
+        turn[:3, :3] = upright(self.up)
         rest, worlds = turn @ self.tree.frames[order], turn @ self.worlds[:, order]
         turned, _ = polar(worlds[..., :3, :3] @ np.linalg.inv(rest[:, :3, :3]))
         return Clip(

@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from warpjld.errors import InputError
+from warpjld.lazily import imported
 from warpjld.motion.clip import Clip
 from warpjld.motion.joint_animation import JointAnimation
 from warpjld.motion.tracks import Limits
@@ -118,20 +119,20 @@ def open_motion(
 
 
 def _animation(path: Path, rig: Rig, rate: float | None, name: str | None) -> LoadedMotion:
-    from warpjld.motion.doubts import doubts_of_animation, jumps
+    from warpjld.motion.doubts import doubts_of_own_joints, jumps
     from warpjld.motion.own_joints import own_poses
 
-    read = _ANIMATIONS[path.suffix.lower()]
-    animation = read(path, rate, name)
+    read: Callable[..., JointAnimation] = imported(_ANIMATIONS[path.suffix.lower()])
+    animation = read(path, rate=rate, name=name)
     own = own_poses(animation, rig)
     clip = replace(animation.clip(), notes=animation.notes)
     # at another rate than the file's, a flip may look like a turn, or a turn like a flip
-    recorded = clip if rate is None else read(path, None, name).clip()
+    recorded = clip if rate is None else read(path, name=name).clip()
     flips = jumps(recorded.names, recorded.locals())
     if own is None:
         moved = _retargeted(clip, rig, animation.rate, flips)
         return replace(moved, warnings=(*animation.warnings, *moved.warnings))
-    doubts = (*flips, *doubts_of_animation(animation, set(rig.source_joints)))
+    doubts = (*flips, *doubts_of_own_joints(clip, set(rig.source_joints)))
     notes, warnings = (*animation.notes, *own.notes), (*animation.warnings, *own.warnings, *doubts)
     return LoadedMotion(own.poses, animation.rate, notes, warnings)
 
@@ -147,41 +148,19 @@ def _retargeted(clip: Clip, rig: Rig, rate: float | None, flips: list[str]) -> L
     return LoadedMotion(moved.poses, clip.rate, (*clip.notes, *moved.notes), warnings)
 
 
-def _read_gltf(path: Path, rate: float | None, name: str | None) -> JointAnimation:
-    from warpjld.motion.gltf_animation import read_gltf_animation
-
-    return read_gltf_animation(path, rate=rate, name=name)
-
-
-def _read_fbx(path: Path, rate: float | None, name: str | None) -> JointAnimation:
-    from warpjld.motion.fbx_animation import read_fbx_animation
-
-    return read_fbx_animation(path, rate=rate, name=name)
-
-
-def _read_usd(path: Path, rate: float | None, name: str | None) -> JointAnimation:
-    from warpjld.motion.usd_animation import read_usd_animation
-
-    return read_usd_animation(path, rate=rate, name=name)
-
-
-def _read_vrma(path: Path, rate: float | None, name: str | None) -> JointAnimation:
-    from warpjld.motion.vrma import read_vrma
-
-    return read_vrma(path, rate=rate, name=name)
-
-
-_ANIMATIONS: dict[str, Callable[[Path, float | None, str | None], JointAnimation]] = {
-    ".glb": _read_gltf,
-    ".gltf": _read_gltf,
-    ".fbx": _read_fbx,
-    ".usd": _read_usd,
-    ".usda": _read_usd,
-    ".usdc": _read_usd,
-    ".usdz": _read_usd,
-    ".vrma": _read_vrma,
+_GLTF = ("warpjld.motion.gltf_animation", "read_gltf_animation")
+_USD = ("warpjld.motion.usd_animation", "read_usd_animation")
+_ANIMATIONS = {
+    ".glb": _GLTF,
+    ".gltf": _GLTF,
+    ".fbx": ("warpjld.motion.fbx_animation", "read_fbx_animation"),
+    ".usd": _USD,
+    ".usda": _USD,
+    ".usdc": _USD,
+    ".usdz": _USD,
+    ".vrma": ("warpjld.motion.vrma", "read_vrma"),
 }
-"""What reads the animations of each suffix: the file, frames a second or None, the animation's name or None."""
+"""What reads the animations of each suffix, called with the file, ``rate`` and ``name``."""
 
 
 def _table(path: Path, rig: Rig, rate: float | None, limits: Limits) -> LoadedMotion:
@@ -210,7 +189,7 @@ def _capture(path: Path, rig: Rig, rate: float | None) -> LoadedMotion:
     warnings = (
         *clip.warnings,
         *own.warnings,
-        *jumps(clip.names, clip.locals()),
+        *flips,
         *doubts_of_clip(clip, recording.followed),
     )
     return LoadedMotion(

@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
+from warpjld.listed import first_few
 from warpjld.motion.joint_animation import JointAnimation
 from warpjld.motion.same_skeleton import match_joints, same_bones, same_rest
 from warpjld.rig import Rig
@@ -30,7 +31,6 @@ _ENOUGH = 0.5  # share of a rig's joints that an animation must know to be its o
 _WIDENED = 1e-3  # change of size of a joint's flesh from which it is told
 _COLLAPSED = 1e3  # times: of flesh that was shrunk to a point at rest, which is told on loading
 _TURNED = np.radians(5.0)  # own rotation of a merged joint from which it is told
-_FEW = 4  # names in a message
 
 
 @dataclass(frozen=True, eq=False)
@@ -77,7 +77,7 @@ def own_poses(animation: JointAnimation, rig: Rig) -> OwnMotion | None:
     positions = np.einsum("fjab,jb->fja", moved[..., :3, :3], rig.skeleton.rest) + moved[..., :3, 3]
     rotations = Rotation.from_matrix(turned.reshape(-1, 3, 3)).as_quat().reshape(*moved.shape[:2], 4)
     if unknown := [rig.source.names[rig.sources[j]] for j in joints if j not in known]:
-        notes.append(f"not in the animation's file, follow the joints above them: {_some(unknown)}")
+        notes.append(f"not in the animation's file, follow the joints above them: {first_few(unknown)}")
     warnings = [*_widened(rig, stretch), *_merged(rig, worlds, match, turned)]
     return OwnMotion(poses_from_world(rig.skeleton, positions, rotations), tuple(notes), tuple(warnings))
 
@@ -143,7 +143,7 @@ def _widened(rig: Rig, stretch: NDArray[np.float64]) -> list[str]:
             told.append((rig.source_joints[j] or rig.skeleton.names[j], frame, factor))
     if not told:
         return []
-    shown = _some([f"'{name}' to {round(factor, 6):.3g} at frame {frame}" for name, frame, factor in told])
+    shown = first_few([f"'{name}' to {round(factor, 6):.3g} at frame {frame}" for name, frame, factor in told])
     return [f"the animation scales {shown}: joints are placed as the file says, but the flesh keeps its size"]
 
 
@@ -169,12 +169,7 @@ def _merged(rig: Rig, worlds: NDArray[np.float64], match: NDArray[np.int64], tur
             told.append((apart, f"{name} ({np.degrees(apart):.0f}°, part of {rig.skeleton.names[over]})"))
     if not told:
         return []
-    shown = _some([text for _, text in sorted(told, reverse=True)])
+    shown = first_few([text for _, text in sorted(told, reverse=True)])
     return [
         f"the animation turns joints that are none of this skeleton, and what flesh they have does not follow: {shown}"
     ]
-
-
-def _some(items: list[str]) -> str:
-    more = f" and {len(items) - _FEW} more" if len(items) > _FEW else ""
-    return f"{', '.join(items[:_FEW])}{more}"

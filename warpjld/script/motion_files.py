@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from pathlib import PurePosixPath
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -13,25 +12,13 @@ from warpjld.errors import InputError
 from warpjld.press.where import placed
 from warpjld.script.folder import OutputFolder
 from warpjld.script.outputs import MotionFile, Output
+from warpjld.script.per_actor import actors_of, file_of
 
 if TYPE_CHECKING:
     from warpjld.script.crowd import Crowd
-    from warpjld.script.scene import Actor, Scene
+    from warpjld.script.scene import Scene
 
-__all__ = ["motion_name", "shown_actors", "write_motions"]
-
-
-def shown_actors(output: MotionFile, scene: Scene) -> list[Actor]:
-    """The actors whose motion a line asks for."""
-    return [actor for actor in scene.actors.values() if output.actor in (None, actor.name)]
-
-
-def motion_name(output: MotionFile, actor: Actor, scene: Scene) -> str:
-    """``hands.bvh``; for one of several actors ``hands-left.bvh``."""
-    if output.actor is not None or len(scene.actors) == 1:
-        return output.name
-    path = PurePosixPath(output.name)
-    return str(path.with_name(f"{path.stem}-{actor.name.lower()}{path.suffix}"))
+__all__ = ["write_motions"]
 
 
 def write_motions(
@@ -44,11 +31,11 @@ def write_motions(
     for output in outputs:
         if not isinstance(output, MotionFile):
             continue
-        shown = [actor.name for actor in shown_actors(output, scene)]
+        shown = [actor.name for actor in actors_of(output, scene)]
         for role in crowd.roles:
             if role.actor.name not in shown:
                 continue
-            name = motion_name(output, role.actor, scene)
+            name = file_of(output, role.actor, scene)
             place = out.place(name)
             try:
                 written = write_motion(

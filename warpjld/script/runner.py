@@ -17,12 +17,13 @@ from warpjld.script.crowd import Crowd, Role
 from warpjld.script.folder import OutputFolder
 from warpjld.script.formats import check_available, video_is_available
 from warpjld.script.grasping import contact_reports
-from warpjld.script.motion_files import motion_name, shown_actors, write_motions
+from warpjld.script.motion_files import write_motions
 from warpjld.script.outputs import ContactSheet, Export, Film, Grips, MotionFile, Output, Picture, Table
+from warpjld.script.per_actor import actors_of, file_of
 from warpjld.script.pictures import draw_contact_sheet, draw_picture, film_studio
 from warpjld.script.press_files import check_press, write_press
 from warpjld.script.props import Prop, prop_surface
-from warpjld.script.scene import Actor, Scene
+from warpjld.script.scene import Scene
 from warpjld.script.staging import frame_numbers, held, notes, stage
 from warpjld.script.summary import Summary
 
@@ -129,26 +130,13 @@ def cast(
 def _names(scene: Scene, outputs: Sequence[Output]) -> list[str]:
     names = []
     for output in outputs:
-        if isinstance(output, Export):
-            names += [_export_name(output, actor, scene) for actor in _exported(output, scene)]
-            names += [_prop_export_name(output, prop) for prop in _exported_props(output, scene)]
-        elif isinstance(output, MotionFile):
-            names += [motion_name(output, actor, scene) for actor in shown_actors(output, scene)]
+        if isinstance(output, Export | MotionFile):
+            names += [file_of(output, actor, scene) for actor in actors_of(output, scene)]
+            if isinstance(output, Export):
+                names += [_prop_export_name(output, prop) for prop in _exported_props(output, scene)]
         else:
             names.append(output.name)
     return names
-
-
-def _exported(export: Export, scene: Scene) -> list[Actor]:
-    return [actor for actor in scene.actors.values() if export.actor in (None, actor.name)]
-
-
-def _export_name(export: Export, actor: Actor, scene: Scene) -> str:
-    """``hands.usd``; for one of several actors ``hands-left.usd``: each has a file and a vertex order of its own."""
-    if export.actor is not None or len(scene.actors) == 1:
-        return export.name
-    path = PurePosixPath(export.name)
-    return str(path.with_name(f"{path.stem}-{actor.name.lower()}{path.suffix}"))
 
 
 def _exported_props(export: Export, scene: Scene) -> list[Prop]:
@@ -182,7 +170,7 @@ def _make_sequences(
             [
                 stack.enter_context(
                     open_cache(
-                        out.place(_export_name(export, role.actor, scene)),
+                        out.place(file_of(export, role.actor, scene)),
                         role.actor.rig.surface,
                         frames=len(frames),
                         rate=scene.rate,

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -13,26 +12,12 @@ from warpjld.errors import InputError
 from warpjld.io.fbx.scene import FbxMesh, FbxScene, FbxSkin, read_scene
 from warpjld.io.fbx.skeleton import FbxSkeleton, find_skeleton
 from warpjld.io.polygons import triangulate_polygons
+from warpjld.io.rig_meshes import RigMesh, joined
 from warpjld.io.source import SourceRig
-from warpjld.surface import Part, one_uv_a_vertex
 
 __all__ = ["read_fbx_rig"]
 
 _BIND_TOLERANCE = 1e-4  # of the surface's size: where two placements of a mesh count as one
-
-
-@dataclass
-class _Placed:
-    """One mesh in the world at rest, joints numbered as in the tree."""
-
-    name: str
-    vertices: NDArray[np.float64]
-    triangles: NDArray[np.int64]  # numbers of corners
-    corners: NDArray[np.int64]
-    uv: NDArray[np.float32] | None
-    joints: NDArray[np.int64]
-    weights: NDArray[np.float64]
-    rigid: int
 
 
 def read_fbx_rig(path: str | Path) -> SourceRig:
@@ -55,33 +40,15 @@ def read_fbx_rig(path: str | Path) -> SourceRig:
     placed = [found for mesh in scene.meshes if (found := _place(scene, skeleton, mesh, notes)) is not None]
     if not placed:
         raise InputError("no mesh is bound to its joints", path=scene.path)
-    width = max(p.joints.shape[1] for p in placed)
-    vertices = np.concatenate([p.vertices for p in placed])
-    parts, faces = [], []
-    vertex = face = 0
-    for p in placed:
-        faces.append(p.corners[p.triangles] + vertex)
-        ends = vertex + len(p.vertices), face + len(p.triangles)
-        parts.append(Part(p.name, slice(vertex, ends[0]), slice(face, ends[1])))
-        vertex, face = ends
-    rigid = np.concatenate([np.full(len(p.vertices), p.rigid) for p in placed])
-    uv, corner_uv = one_uv_a_vertex(len(vertices), np.concatenate(faces), _corner_uv(placed))
     return SourceRig(
         path=scene.path,
         tree=skeleton.tree,
-        vertices=vertices,
-        faces=np.concatenate(faces),
-        uv=uv,
-        corner_uv=corner_uv,
-        parts=tuple(parts),
-        joints=np.concatenate([np.pad(p.joints, ((0, 0), (0, width - p.joints.shape[1]))) for p in placed]),
-        weights=np.concatenate([np.pad(p.weights, ((0, 0), (0, width - p.weights.shape[1]))) for p in placed]),
-        rigid=rigid if (rigid >= 0).any() else None,
+        **joined(placed),
         notes=tuple(notes),
     )
 
 
-def _place(scene: FbxScene, skeleton: FbxSkeleton, mesh: FbxMesh, notes: list[str]) -> _Placed | None:
+def _place(scene: FbxScene, skeleton: FbxSkeleton, mesh: FbxMesh, notes: list[str]) -> RigMesh | None:
     if _lower_detail(scene, mesh.node):
         notes.append(f"mesh '{mesh.name}' is a lower level of detail: left out")
         return None
@@ -118,7 +85,9 @@ def _place(scene: FbxScene, skeleton: FbxSkeleton, mesh: FbxMesh, notes: list[st
     triangles, _ = triangulate_polygons(mesh.points[mesh.corners], mesh.counts)
     if np.linalg.det(transforms[0, :3, :3]) < 0.0:  # a mirrored mesh turns its triangles inside out
         triangles = triangles[:, ::-1]
-    return _Placed(mesh.name, vertices, triangles, mesh.corners, mesh.uv, joints[cluster], weights, rigid)
+    corner_uv = None if mesh.uv is None else mesh.uv[triangles]
+    faces = mesh.corners[triangles]
+    return RigMesh(mesh.name, vertices, faces, joints[cluster], weights, rigid, corner_uv=corner_uv)
 
 
 def _lower_detail(scene: FbxScene, node: int) -> bool:
@@ -159,11 +128,3 @@ def _influences(
     if off:
         notes.append(f"mesh '{mesh.name}': weights of {off} vertices did not sum to one, normalised")
     return cluster, weights / total[:, None]
-
-
-def _corner_uv(placed: list[_Placed]) -> NDArray[np.float32] | None:
-    """Texture coordinates of all triangles' corners, shape (S, 3, 2)."""
-    if all(p.uv is None for p in placed):
-        return None
-    blank = [np.zeros((*p.triangles.shape, 2), np.float32) if p.uv is None else p.uv[p.triangles] for p in placed]
-    return np.concatenate(blank)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -14,27 +13,14 @@ from warpjld.io.gltf.document import Document, open_document
 from warpjld.io.gltf.influences import read_influences
 from warpjld.io.gltf.morph import morphed
 from warpjld.io.gltf.texture import texture_coordinates
+from warpjld.io.rig_meshes import RigMesh, joined
 from warpjld.io.source import SourceRig
 from warpjld.skeleton.recognise.tree import SourceTree
-from warpjld.surface import Part
 
 __all__ = ["joint_nodes", "joint_tree", "read_gltf_rig"]
 
 _TRIANGLES, _STRIP, _FAN = 4, 5, 6
 _BIND_TOLERANCE = 1e-4  # of the surface's size: where bind and shown pose count as one
-
-
-@dataclass
-class _Primitive:
-    """One primitive in world space, joints numbered as in the tree."""
-
-    vertices: NDArray[np.float64]
-    faces: NDArray[np.int64]
-    uv: NDArray[np.float32] | None
-    joints: NDArray[np.int64]
-    weights: NDArray[np.float64]
-    rigid: bool
-    moved: float
 
 
 def read_gltf_rig(path: str | Path) -> SourceRig:
@@ -69,39 +55,20 @@ def _read(document: Document) -> SourceRig:
     for n, collapsed in flattened.items():
         if len(collapsed) == len(nodes):
             raise InputError(f"node '{document.name(n)}': scale 0 at rest collapses all joints", path=document.path)
-    primitives: list[_Primitive] = []
-    parts: list[Part] = []
     notes: list[str] = []
-    vertex_count = face_count = 0
-    holders = _mesh_nodes(document, notes)
-    for node in holders:
-        record = gltf.nodes[node]
-        name = gltf.meshes[record.mesh].name or document.name(node)
-        read = _mesh(document, node, number, name, notes)
-        for primitive in read:
-            primitive.faces += vertex_count
-            first = (vertex_count, face_count)
-            vertex_count += len(primitive.vertices)
-            face_count += len(primitive.faces)
-            parts.append(Part(name, slice(first[0], vertex_count), slice(first[1], face_count)))
-            primitives.append(primitive)
-    if not primitives:
+    placed: list[tuple[RigMesh, float]] = []
+    for node in _mesh_nodes(document, notes):
+        name = gltf.meshes[gltf.nodes[node].mesh].name or document.name(node)
+        placed += _mesh(document, node, number, name, notes)
+    if not placed:
         raise InputError("no mesh uses the skin", path=document.path)
-    vertices = np.concatenate([p.vertices for p in primitives])
-    if max(p.moved for p in primitives) > _BIND_TOLERANCE * np.linalg.norm(np.ptp(vertices, axis=0)):
+    surface = joined([mesh for mesh, _ in placed])
+    if max(moved for _, moved in placed) > _BIND_TOLERANCE * np.linalg.norm(np.ptp(surface["vertices"], axis=0)):
         notes.append("bind pose differs from the pose the file shows: the shown pose is used as rest pose")
-    influences = max(p.joints.shape[1] for p in primitives)
-    rigid = np.concatenate([np.where(p.rigid, p.joints[:, 0], -1) for p in primitives])
     return SourceRig(
         path=document.path,
         tree=tree,
-        vertices=vertices,
-        faces=np.concatenate([p.faces for p in primitives]),
-        uv=_uv(primitives),
-        parts=tuple(parts),
-        joints=np.concatenate([_widen(p.joints, influences) for p in primitives]),
-        weights=np.concatenate([_widen(p.weights, influences) for p in primitives]),
-        rigid=rigid if (rigid >= 0).any() else None,
+        **surface,
         notes=tuple(notes),
         suspicious=tuple(
             f"node '{document.name(n)}': scale 0 at rest: what hangs on it is collapsed, and stays so when moved"
@@ -165,7 +132,10 @@ def joint_tree(document: Document, nodes: list[int]) -> SourceTree:
     return SourceTree(tuple(document.name(n) for n in nodes), parents, document.worlds[nodes])
 
 
-def _mesh(document: Document, node: int, number: dict[int, int], name: str, notes: list[str]) -> list[_Primitive]:
+def _mesh(
+    document: Document, node: int, number: dict[int, int], name: str, notes: list[str]
+) -> list[tuple[RigMesh, float]]:
+    """The primitives of a mesh, each with how far the pose shown is from the one it was bound in."""
     gltf = document.gltf
     record = gltf.nodes[node]
     if record.skin is not None:
@@ -188,7 +158,7 @@ def _mesh(document: Document, node: int, number: dict[int, int], name: str, note
             notes.append(f"mesh '{name}': points or lines left out")
             continue
         read = _primitive(document, primitive, mode, joints, transforms, name, node, notes)
-        if len(read.faces):
+        if len(read[0].faces):
             out.append(read)
     return out
 
@@ -202,7 +172,7 @@ def _primitive(
     name: str,
     node: int,
     notes: list[str],
-) -> _Primitive:
+) -> tuple[RigMesh, float]:
     attributes = vars(primitive.attributes)
     if attributes.get("POSITION") is None:
         raise InputError(f"mesh '{name}' has no positions", path=document.path)
@@ -228,7 +198,8 @@ def _primitive(
     rigid = transforms[0]
     moved = float(np.abs(placed - (points @ rigid[:3, :3].T + rigid[:3, 3])).max(initial=0.0))
     uv = texture_coordinates(document, primitive, len(points), name)
-    return _Primitive(placed, faces, uv, joints[indices], weights, not skinned, moved)
+    follows = -1 if skinned else int(joints[0])
+    return RigMesh(name, placed, faces, joints[indices], weights, follows, uv=uv), moved
 
 
 def _triangles(document: Document, primitive: Any, mode: int, count: int, name: str) -> NDArray[np.int64]:
@@ -267,14 +238,3 @@ def _inverse_binds(document: Document, index: int) -> NDArray[np.float64]:
     if not np.isfinite(matrices).all():
         raise InputError(f"skin {index}: an inverse bind matrix is not finite", path=document.path)
     return matrices[: len(skin.joints)]
-
-
-def _uv(primitives: list[_Primitive]) -> NDArray[np.float32] | None:
-    if all(p.uv is None for p in primitives):
-        return None
-    blank = [np.zeros((len(p.vertices), 2), np.float32) if p.uv is None else p.uv for p in primitives]
-    return np.concatenate(blank)
-
-
-def _widen(array: NDArray[Any], width: int) -> NDArray[Any]:
-    return np.pad(array, ((0, 0), (0, width - array.shape[1])))

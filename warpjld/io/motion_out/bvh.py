@@ -19,6 +19,7 @@ from scipy.spatial.transform import Rotation
 from warpjld.io.motion_out.euler import ContinuousEuler
 from warpjld.io.motion_out.source_motion import SourceMotion, source_motion
 from warpjld.io.motion_out.write import Timing, WrittenMotion
+from warpjld.listed import first_few
 from warpjld.rig import Rig
 from warpjld.rotations import conjugate, multiply, rotate
 from warpjld.skeleton import Poses
@@ -55,7 +56,7 @@ def write_bvh(path: Path, rig: Rig, poses: Poses, timing: Timing) -> WrittenMoti
     stretched = [joint.name for joint, moves in zip(joints, moving, strict=True) if moves and joint.parent >= 0]
     if stretched:
         notes.append(
-            f"position channels besides the root's, where the distance to the parent changes: {_some(stretched)}"
+            f"position channels besides the root's, where the distance to the parent changes: {first_few(stretched, 6)}"
         )
     if timing.start_frame:
         notes.append(f"BVH does not number its frames: the first one is frame {timing.start_frame}")
@@ -103,7 +104,7 @@ def _names(names: tuple[str, ...], notes: list[str]) -> list[str]:
         out.append(unique)
     changed = [f"'{old}' → {new}" for old, new in zip(names, out, strict=True) if old != new]
     if changed:
-        notes.append(f"names that BVH cannot hold: {_some(changed)}")
+        notes.append(f"names that BVH cannot hold: {first_few(changed, 6)}")
     return out
 
 
@@ -182,7 +183,3 @@ def _write_frames(file: TextIO, motion: SourceMotion, joints: list[_Joint], movi
 
 def _numbers(vector: NDArray[np.float64]) -> str:
     return " ".join(f"{x:.8f}" for x in vector + 0.0)
-
-
-def _some(names: list[str]) -> str:
-    return ", ".join(names[:6]) + (f" and {len(names) - 6} more" if len(names) > 6 else "")

@@ -21,6 +21,7 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from warpjld.errors import InputError
+from warpjld.listed import first_few
 from warpjld.rig import Rig
 from warpjld.rotations import rotate
 from warpjld.skeleton import Poses
@@ -129,11 +130,7 @@ def _notes(rig: Rig) -> tuple[str, ...]:
     still = [names[j] for j in np.flatnonzero(rig.owner < 0)]
     notes = []
     if carried:
-        notes.append(f"joints that move rigidly with the one they belong to: {_some(carried)}")
+        notes.append(f"joints that move rigidly with the one they belong to: {first_few(carried, 6)}")
     if still:
-        notes.append(f"joints above the recognised ones, which stay: {_some(still)}")
+        notes.append(f"joints above the recognised ones, which stay: {first_few(still, 6)}")
     return tuple(notes)
-
-
-def _some(names: list[str]) -> str:
-    return ", ".join(names[:6]) + (f" and {len(names) - 6} more" if len(names) > 6 else "")

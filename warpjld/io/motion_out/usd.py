@@ -27,13 +27,13 @@ from warpjld.io.motion_out.source_motion import SourceMotion, source_motion
 from warpjld.io.motion_out.write import Timing, WrittenMotion
 from warpjld.io.usd.skeletons import concatenated
 from warpjld.rig import Rig
+from warpjld.rotations import upright
 from warpjld.skeleton import Poses
 
 __all__ = ["write_usd"]
 
 _SHEARED = 1e-3  # of a joint's scale
 _SAME = 1e-9
-_Z_TO_Y = np.array([[1.0, 0, 0], [0, 0, 1.0], [0, -1.0, 0]])
 
 
 def write_usd(path: Path, rig: Rig, poses: Poses, timing: Timing) -> WrittenMotion:
@@ -107,7 +107,7 @@ class _Space:
 def _space(motion: SourceMotion) -> _Space:
     metres, up, to_rig = 1.0, "Y", np.eye(4)
     unit = float(np.cbrt(np.linalg.det(motion.placing[:3, :3])))
-    for axis, turn in (("Y", np.eye(3)), ("Z", _Z_TO_Y)):
+    for axis, turn in (("Y", upright("y")), ("Z", upright("z"))):
         plain = np.eye(4)
         plain[:3, :3] = unit * turn
         if np.abs(motion.placing - plain).max() <= _SAME * abs(unit):

@@ -2,35 +2,20 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from warpjld.errors import InputError
+from warpjld.io.rig_meshes import RigMesh, joined
 from warpjld.io.source import SourceRig
 from warpjld.io.usd.influences import blended_points, read_influences
 from warpjld.io.usd.mesh import read_usd_mesh
 from warpjld.io.usd.skeletons import UsdSkeleton, UsdSkeletons, read_skeletons
 from warpjld.io.usd.stage import UsdFile, matrices, open_usd
-from warpjld.surface import Part, one_uv_a_vertex
 
 __all__ = ["read_usd_rig"]
-
-
-@dataclass
-class _Skinned:
-    """One mesh at its place in the world, joints numbered as in the tree."""
-
-    name: str
-    vertices: NDArray[np.float64]
-    faces: NDArray[np.int64]
-    corner_uv: NDArray[np.float32] | None
-    joints: NDArray[np.int64]
-    weights: NDArray[np.float64]
-    rigid: int
 
 
 def read_usd_rig(path: str | Path) -> SourceRig:
@@ -51,34 +36,17 @@ def read_usd_rig(path: str | Path) -> SourceRig:
         meshes = _meshes(file, found)
     if not meshes:
         raise InputError("no visible mesh uses its skeleton: this is an animation, or a skeleton alone", path=file.path)
-    vertex = np.cumsum([0, *(len(mesh.vertices) for mesh in meshes)])
-    face = np.cumsum([0, *(len(mesh.faces) for mesh in meshes)])
-    parts = tuple(
-        Part(mesh.name, slice(int(vertex[m]), int(vertex[m + 1])), slice(int(face[m]), int(face[m + 1])))
-        for m, mesh in enumerate(meshes)
-    )
-    vertices = np.concatenate([mesh.vertices for mesh in meshes])
-    faces = np.concatenate([mesh.faces + vertex[m] for m, mesh in enumerate(meshes)])
-    uv, corner_uv = one_uv_a_vertex(len(vertices), faces, _corner_uv(meshes))
-    width = max(mesh.joints.shape[1] for mesh in meshes)
     return SourceRig(
         path=file.path,
         tree=found.tree,
-        vertices=vertices,
-        faces=faces,
-        uv=uv,
-        corner_uv=corner_uv,
-        parts=parts,
-        joints=np.concatenate([_widen(mesh.joints, width) for mesh in meshes]),
-        weights=np.concatenate([_widen(mesh.weights, width) for mesh in meshes]),
-        rigid=np.concatenate([np.full(len(mesh.vertices), mesh.rigid) for mesh in meshes]),
+        **joined(meshes),
         metres=file.metres,
         up=file.up,
         notes=tuple(dict.fromkeys(file.notes)),
     )
 
 
-def _meshes(file: UsdFile, found: UsdSkeletons) -> list[_Skinned]:
+def _meshes(file: UsdFile, found: UsdSkeletons) -> list[RigMesh]:
     from pxr import UsdGeom
 
     out = []
@@ -114,7 +82,7 @@ def _hidden(prim: Any) -> str:
     return ""
 
 
-def _skinned(file: UsdFile, skeleton: UsdSkeleton, query: Any) -> _Skinned | None:
+def _skinned(file: UsdFile, skeleton: UsdSkeleton, query: Any) -> RigMesh | None:
     prim = query.GetPrim()
     where = f"mesh '{prim.GetPath()}'"
     mesh = read_usd_mesh(file, prim)
@@ -131,7 +99,7 @@ def _skinned(file: UsdFile, skeleton: UsdSkeleton, query: Any) -> _Skinned | Non
         raise InputError(f"{where}: its geomBindTransform or a blend shape is not finite", path=file.path)
     turned_inside_out = np.linalg.det(place[:3, :3]) < 0.0
     order = slice(None, None, -1 if turned_inside_out else 1)
-    return _Skinned(
+    return RigMesh(
         name=prim.GetName(),
         vertices=vertices,
         faces=mesh.faces[:, order],
@@ -140,15 +108,3 @@ def _skinned(file: UsdFile, skeleton: UsdSkeleton, query: Any) -> _Skinned | Non
         weights=weights,
         rigid=rigid,
     )
-
-
-def _corner_uv(meshes: list[_Skinned]) -> NDArray[np.float32] | None:
-    """Texture coordinates of all triangles' corners, shape (S, 3, 2)."""
-    if all(mesh.corner_uv is None for mesh in meshes):
-        return None
-    blank = [np.zeros((*m.faces.shape, 2), np.float32) if m.corner_uv is None else m.corner_uv for m in meshes]
-    return np.concatenate(blank)
-
-
-def _widen(array: NDArray[Any], width: int) -> NDArray[Any]:
-    return np.pad(array, ((0, 0), (0, width - array.shape[1])))

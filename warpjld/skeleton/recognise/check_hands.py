@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from warpjld.skeleton.hand import DIGITS, FINGER_JOINTS
-from warpjld.skeleton.recognise.roles import HandRoles, Roles
+from warpjld.skeleton.recognise.roles import BY_MAP, HandRoles, Roles
 from warpjld.skeleton.recognise.tree import SourceTree
 
 __all__ = ["check_hands"]
@@ -26,10 +26,7 @@ def check_hands(tree: SourceTree, roles: Roles) -> None:
         odd = [n for n in shared if not 1 / _UNEQUAL < left[n] / right[n] / scale < _UNEQUAL]
         if odd or counts[0] != counts[1]:
             what = f"{counts[0]} joints on the left and {counts[1]} on the right" if not odd else "unlike bones"
-            roles.suspicious.append(
-                f"{digit}: {what}; if a joint was taken for another, state them with --map "
-                "(inspect --write-map writes what was recognised, for editing)"
-            )
+            roles.suspicious.append(f"{digit}: {what}; if a joint was taken for another, state them with {BY_MAP}")
 
 
 def _bones(tree: SourceTree, hand: HandRoles, digit: str) -> dict[str, float]:

@@ -21,12 +21,12 @@ from warpjld.skeleton.recognise.limbs import (
     path_below,
 )
 from warpjld.skeleton.recognise.names import read_name
-from warpjld.skeleton.recognise.roles import Roles
+from warpjld.skeleton.recognise.roles import BY_MAP, Roles
 from warpjld.skeleton.recognise.tree import SourceTree
 
 __all__ = ["check_limbs"]
 
-_MAP = "state it with --map (inspect --write-map writes what was recognised, for editing)"
+_MAP = f"state it with {BY_MAP}"
 _PLAUSIBLE = np.log(2.0)  # lower per upper segment may be half or twice the usual
 _CLEARLY = np.log(1.3)  # by which one division of a limb fits better than another
 _AT_TRUNK = 0.03  # of the limb: a joint nearer than this to where limbs part is none of the limb's

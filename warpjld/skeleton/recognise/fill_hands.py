@@ -8,7 +8,7 @@ from warpjld.skeleton.hand import DIGITS, HAND_PARENTS
 from warpjld.skeleton.recognise.by_shape import hands_by_shape
 from warpjld.skeleton.recognise.flesh import Flesh
 from warpjld.skeleton.recognise.names import read_name
-from warpjld.skeleton.recognise.roles import HandRoles, Roles
+from warpjld.skeleton.recognise.roles import BY_MAP, HandRoles, Roles
 from warpjld.skeleton.recognise.tree import SourceTree
 
 __all__ = ["fill_hands"]
@@ -68,7 +68,7 @@ def _complete(tree: SourceTree, roles: Roles, named: HandRoles, shaped: HandRole
     if moved:
         roles.suspicious.append(
             f"{who}: {', '.join(d for d in DIGITS if d in moved)} is not where its name says, going by the hand's "
-            "shape: state the joints with --map (inspect --write-map writes what was recognised, for editing)"
+            f"shape: state the joints with {BY_MAP}"
         )
 
 

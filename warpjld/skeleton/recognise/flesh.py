@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from warpjld.rotations import unit
 from warpjld.skeleton.recognise.names import read_name
+from warpjld.skeleton.recognise.roles import BY_MAP
 from warpjld.skeleton.recognise.tree import SourceTree
 
 __all__ = ["Flesh", "flesh_shares", "without_flesh"]
@@ -159,8 +160,8 @@ def without_flesh(
         return []
     owned = np.bincount(owner, weights=flesh.shares, minlength=len(names))
     return [
-        f"{name}: '{tree.names[sources[j]]}' moves no skin in the file; if another joint is meant, state it with --map "
-        "(inspect --write-map writes what was recognised, for editing)"
+        f"{name}: '{tree.names[sources[j]]}' moves no skin in the file; if another joint is meant, state it with "
+        f"{BY_MAP}"
         for j, name in enumerate(names)
         if name.rpartition(".")[2] in _MOVES_SKIN and ".toe" not in name and sources[j] >= 0 and owned[j] <= _NONE
     ]

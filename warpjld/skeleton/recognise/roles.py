@@ -4,7 +4,10 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 
-__all__ = ["HandRoles", "Roles"]
+__all__ = ["BY_MAP", "HandRoles", "Roles"]
+
+BY_MAP = "--map (inspect --write-map writes what was recognised, for editing)"
+"""How joints are stated by hand, for messages of what is suspicious."""
 
 
 @dataclass

@@ -43,6 +43,12 @@ class SourceTree:
         """Whether the hierarchy says nothing: more than four joints and none, or one, has children."""
         return len(self) > 4 and int((np.bincount(self.parents + 1, minlength=len(self) + 1)[1:] > 0).sum()) <= 1
 
+    def own_name(self, joint: int) -> str:
+        """The file's name of a joint; of several of one name the second is ``name#2``."""
+        name = self.names[joint]
+        same = [j for j, other in enumerate(self.names) if other == name]
+        return name if len(same) == 1 else f"{name}#{same.index(joint) + 1}"
+
     def depth(self, joint: int) -> int:
         """Number of ancestors."""
         return len(self.ancestors(joint))
