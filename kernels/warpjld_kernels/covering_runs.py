@@ -11,7 +11,7 @@ from warpjld_kernels.lanes import VECTORISED
 
 wp.set_module_options(VECTORISED)
 
-CPU_LANES = 64
+CPU_LANES = 32
 """Vertices one CPU thread index computes together; a run has at least as many. On a GPU it is 1."""
 
 CPU_FRAMES = 8

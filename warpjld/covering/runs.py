@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
-from itertools import pairwise
 
 import numpy as np
 import scipy.sparse as sp
@@ -12,9 +10,10 @@ from numpy.typing import NDArray
 
 from warpjld.covering.binding import STATIONS, Anchors
 from warpjld.covering.drivers import Drivers
+from warpjld.covering.grouping import group
 from warpjld.covering.parameters import Parameters
 
-__all__ = ["Columns", "Runs", "pack_runs", "palette"]
+__all__ = ["Columns", "Runs", "pack", "pack_runs", "palette"]
 
 
 @dataclass(frozen=True)
@@ -55,6 +54,11 @@ class Columns:
     def muscles(self) -> int:
         """Flexion ratios that inflate the segments' muscles."""
         return self.palm + STATIONS * self.pairs
+
+    @property
+    def kinds(self) -> tuple[int, ...]:
+        """Where joints, rotations, scales and muscles begin, and where they end."""
+        return 0, self.halfway, self.flexion_ratio, self.muscles, self.width
 
     @property
     def width(self) -> int:
@@ -131,32 +135,72 @@ def pack_runs(
     columns = Columns(joints, len(anchors.ends), len(anchors.pairs))
     scalar = _scalar_coefficients(anchors, columns, rotation, rounding)
     swelling = [_muscle_coefficients(anchors, columns, muscle[..., axis]) for axis in range(3)]
-    members, masks = _group(scalar + abs(swelling[0]) + abs(swelling[1]) + abs(swelling[2]), columns, lanes)
-    starts = (0, columns.halfway, columns.flexion_ratio, columns.muscles, columns.width)
-    tiles, runs, slots, coefficients = [], [], [], []
-    first_lane = first_coefficient = first_slot = 0
-    for r, (vertices, mask) in enumerate(zip(members, masks, strict=True)):
-        kinds = [[c for c in mask if low <= c < high] for low, high in pairwise(starts)]
-        plain = [c for kind in kinds[:3] for c in kind]
-        rows = [scalar[vertices][:, plain].toarray().T, offset[vertices].T]
-        swell = np.stack([m[vertices][:, kinds[3]].toarray().T for m in swelling], axis=1)
-        rows.append(swell.reshape(-1, len(vertices)))
-        block = np.concatenate(rows)
-        runs.append((first_lane, len(vertices), first_coefficient, first_slot, *(len(kind) for kind in kinds)))
-        tiles += [(r, min(lane, len(vertices) - lanes)) for lane in range(0, len(vertices), lanes)]
-        slots += plain + kinds[3]
-        coefficients.append(block.ravel())
-        first_lane += len(vertices)
-        first_coefficient += block.size
-        first_slot += len(mask)
+    return pack(scalar, swelling, offset, columns, lanes)
+
+
+def pack(
+    scalar: sp.csr_array,
+    swelling: list[sp.csr_array],
+    offset: NDArray[np.float32],
+    columns: Columns,
+    lanes: int,
+) -> Runs:
+    """Sort vertices into runs of at least ``lanes`` and lay their coefficients out row by row.
+
+    Args:
+        scalar: Coefficients of joints, rotations and scales, shape (V, columns.width).
+        swelling: Muscle vectors, x, y and z apart, likewise.
+        offset: Rest offsets, shape (V, 3).
+        columns: Of the palette.
+        lanes: Vertices in a tile.
+    """
+    used = abs(scalar) + abs(swelling[0]) + abs(swelling[1]) + abs(swelling[2])
+    used.eliminate_zeros()
+    price = np.repeat([3.0, 4.0, 1.0, 3.0], np.diff(columns.kinds))
+    members, read = group(used, price, lanes)
+    order, length = np.concatenate(members), np.array([len(m) for m in members])
+    count, muscle = len(members), columns.muscles
+    run, slot = np.repeat(np.arange(count), [len(c) for c in read]), np.concatenate(read)
+    kind = np.searchsorted(columns.kinds, slot, side="right") - 1
+    slots_of = np.zeros((count, 4), dtype=np.int64)
+    np.add.at(slots_of, (run, kind), 1)
+    # a run holds one row of its length for every slot, but three for offsets and three for a muscle
+    high = slots_of @ [1, 1, 1, 3] + 3
+    first_slot, first_lane = _starts(slots_of.sum(axis=1)), _starts(length)
+    first_coefficient = _starts(high * length)
+    row = np.full((count, columns.width), -1, dtype=np.int64)
+    place = np.arange(len(slot)) - first_slot[run]
+    plain = slots_of[:, :3].sum(axis=1)[run]
+    row[run, slot] = np.where(slot < muscle, place, plain + 3 + 3 * (place - plain))
+    run_of, lane_of = np.repeat(np.arange(count), length), np.arange(len(order)) - np.repeat(first_lane, length)
+    coefficients = np.zeros(int((high * length).sum()), dtype=np.float32)
+
+    def lay(at: NDArray[np.int64], rows: NDArray[np.int64], values: NDArray) -> None:
+        r = run_of[at]
+        coefficients[first_coefficient[r] + rows * length[r] + lane_of[at]] = values
+
+    for axis, matrix in enumerate((scalar, *swelling)):
+        some = matrix[order].tocoo()
+        stored = some.data != 0.0
+        at, column = some.row[stored], some.col[stored]
+        lay(at, row[run_of[at], column] + max(axis - 1, 0), some.data[stored])
+    everyone = np.arange(len(order))
+    for axis in range(3):
+        lay(everyone, slots_of[:, :3].sum(axis=1)[run_of] + axis, offset[order, axis])
+    tiles = [(r, min(lane, n - lanes)) for r, n in enumerate(length.tolist()) for lane in range(0, n, lanes)]
+    table = np.column_stack([first_lane, length, first_coefficient, first_slot, slots_of])
     return Runs(
         columns,
         np.array(tiles, dtype=np.int32),
-        np.array(runs, dtype=np.int32),
-        np.array(slots, dtype=np.int32),
-        np.concatenate(coefficients).astype(np.float32),
-        np.concatenate(members).astype(np.int32),
+        table.astype(np.int32),
+        slot.astype(np.int32),
+        coefficients,
+        order.astype(np.int32),
     )
+
+
+def _starts(lengths: NDArray[np.int64]) -> NDArray[np.int64]:
+    return np.cumsum(lengths) - lengths
 
 
 def _scalar_coefficients(
@@ -196,55 +240,3 @@ def _sparse(entries: list[tuple[NDArray, NDArray]], rows: int, width: int) -> sp
     out = sp.coo_array((value[kept], (row[kept], column[kept])), shape=(rows, width)).tocsr()
     out.sum_duplicates()
     return out
-
-
-def _group(used: sp.csr_array, columns: Columns, lanes: int) -> tuple[list[NDArray[np.int64]], list[list[int]]]:
-    """Vertices by the palette columns they use; groups join where that costs less than tiles that are partly filled."""
-    signature = np.random.default_rng(0).integers(1, 2**62, used.shape[1])
-    pattern = sp.csr_array((np.ones(used.nnz, dtype=np.int64), used.indices, used.indptr), shape=used.shape)
-    _, first, member = np.unique(pattern @ signature, return_index=True, return_inverse=True)
-    members = np.split(np.argsort(member, kind="stable"), np.cumsum(np.bincount(member))[:-1])
-    masks = [sum(1 << int(c) for c in used.indices[used.indptr[v] : used.indptr[v + 1]]) for v in first]
-    sizes = [len(m) for m in members]
-    cost = _column_cost(columns)
-
-    def work(size: int, mask: int) -> int:
-        return -(-size // lanes) * (_FIXED + cost(mask))
-
-    settled = 0  # groups at the front that are better left alone
-    while len(masks) - settled > 0 and len(masks) > 1:
-        small = min(range(settled, len(sizes)), key=sizes.__getitem__)
-        mask, vertices, size = masks.pop(small), members.pop(small), sizes.pop(small)
-        added = [work(n + size, m | mask) - work(n, m) for m, n in zip(masks, sizes, strict=True)]
-        near = min(range(len(added)), key=added.__getitem__)
-        if size >= lanes and added[near] >= work(size, mask):
-            masks.insert(0, mask)
-            members.insert(0, vertices)
-            sizes.insert(0, size)
-            settled += 1
-            continue
-        masks[near] |= mask
-        members[near] = np.concatenate([members[near], vertices])
-        sizes[near] += size
-    if sizes[0] < lanes:  # a surface smaller than one tile: its last vertex stands in for the missing ones
-        members[0] = np.concatenate([members[0], np.repeat(members[0][-1:], lanes - sizes[0])])
-    return members, [[c for c in range(m.bit_length()) if m >> c & 1] for m in masks]
-
-
-_FIXED = 60  # multiply-adds a vertex spends whatever its columns, mostly on rotating
-
-
-def _column_cost(columns: Columns) -> Callable[[int], int]:
-    """Multiply-adds a vertex spends on a set of palette columns."""
-    joints, turns = (1 << columns.halfway) - 1, (1 << columns.flexion_ratio) - (1 << columns.halfway)
-    scales = (1 << columns.muscles) - (1 << columns.flexion_ratio)
-
-    def cost(mask: int) -> int:
-        return (
-            3 * (mask & joints).bit_count()
-            + 4 * (mask & turns).bit_count()
-            + (mask & scales).bit_count()
-            + 3 * (mask >> columns.muscles).bit_count()
-        )
-
-    return cost

@@ -1,0 +1,157 @@
+"""Which vertices go into one run: those whose columns of the palette overlap, so that tiles do little that is wasted.
+
+A tile of vertices pays for every column that one of them uses. Vertices with the same columns are one *kind*; kinds are
+first parted from the top, always by the column that saves most, into parts about as large as a tile, then parts are
+joined from the smallest up wherever that costs least.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+import scipy.sparse as sp
+from numpy.typing import NDArray
+
+__all__ = ["FIXED", "group", "work"]
+
+FIXED = 60
+"""Multiply-adds that a vertex spends whatever its columns, mostly on rotating."""
+
+_PARTS = 600  # that the surface falls into at least before parts are joined, where it has vertices enough
+_SPARSE = 512  # kinds above which products of mostly zeros pay
+
+
+def group(
+    used: sp.csr_array, price: NDArray[np.float64], lanes: int
+) -> tuple[list[NDArray[np.int64]], list[NDArray[np.int64]]]:
+    """Vertices of every run, ascending, and its columns, ascending. A run has at least ``lanes`` vertices.
+
+    Args:
+        used: What a vertex reads, its stored entries whatever their values, shape (V, columns).
+        price: Multiply-adds a vertex spends on a column, shape (columns,).
+        lanes: Vertices that are computed together.
+
+    On a surface smaller than one tile the last vertex stands in for the missing ones.
+    """
+    kinds, kind, sizes = _kinds(used)
+    present = np.flatnonzero(np.diff(kinds.tocsc().indptr))
+    kinds = kinds[:, present].tocsr()
+    prices = price[present].astype(np.float32)
+    part = _parted(kinds, sizes.astype(np.float32), prices, max(lanes, int(sizes.sum()) // _PARTS))
+    run = _joined(*_columns_of(kinds, sizes, part), prices, lanes)[part]
+    member = run[kind]
+    members = np.split(np.argsort(member, kind="stable"), np.cumsum(np.bincount(member))[:-1])
+    columns = [present[np.flatnonzero(row)] for row in _columns_of(kinds, sizes, run)[0]]
+    if len(members[0]) < lanes:
+        members[0] = np.concatenate([members[0], np.repeat(members[0][-1:], lanes - len(members[0]))])
+    return members, columns
+
+
+def work(members: list[NDArray[np.int64]], columns: list[NDArray[np.int64]], price: NDArray, lanes: int) -> float:
+    """Multiply-adds of a frame, those of lanes computed twice included."""
+    pairs = zip(members, columns, strict=True)
+    return float(sum(_tiles(len(m), lanes) * lanes * (FIXED + price[c].sum()) for m, c in pairs))
+
+
+def _kinds(used: sp.csr_array) -> tuple[sp.csr_array, NDArray[np.int64], NDArray[np.int64]]:
+    """Different rows of the pattern, shape (kinds, columns), the kind of every vertex, and the vertices of a kind."""
+    signature = np.random.default_rng(0).integers(1, 2**62, used.shape[1])
+    pattern = sp.csr_array((np.ones(used.nnz, dtype=np.int64), used.indices, used.indptr), shape=used.shape)
+    _, first, kind = np.unique(pattern @ signature, return_index=True, return_inverse=True)
+    distinct = pattern[first].astype(np.float32)
+    return distinct, kind.ravel(), np.bincount(kind.ravel())
+
+
+def _columns_of(
+    kinds: sp.csr_array, sizes: NDArray[np.int64], part: NDArray[np.int64]
+) -> tuple[NDArray[np.float32], NDArray[np.int64]]:
+    """Which columns every part uses, 0 or 1, shape (parts, columns), and its vertices."""
+    count = int(part.max()) + 1
+    entries = (np.ones(len(part), dtype=np.float32), (part, np.arange(len(part))))
+    member = sp.csr_array(entries, shape=(count, len(part)))
+    used = ((member @ kinds).toarray() > 0).astype(np.float32)
+    return used, np.bincount(part, weights=sizes, minlength=count).astype(np.int64)
+
+
+def _parted(
+    kinds: sp.csr_array, sizes: NDArray[np.float32], price: NDArray[np.float32], enough: int
+) -> NDArray[np.int64]:
+    """Part of every kind. Parts split, by the column that saves most, until they have no more than ``enough``."""
+    part = np.zeros(kinds.shape[0], dtype=np.int64)
+    count = 0
+    waiting = [(np.arange(kinds.shape[0]), kinds, price)]
+    while waiting:
+        rows, some, prices = waiting.pop()
+        column = _best_split(some, sizes[rows], prices) if len(rows) > 1 and sizes[rows].sum() > enough else None
+        if column is None:
+            part[rows] = count
+            count += 1
+            continue
+        inside = (some[:, [column]].toarray() if sp.issparse(some) else some[:, [column]])[:, 0] > 0
+        for chosen in (inside, ~inside):
+            mine = some[chosen]
+            if sp.issparse(mine):
+                held = np.bincount(mine.indices, minlength=mine.shape[1]) > 0
+                mine = mine[:, held] if mine.shape[0] > _SPARSE else mine.toarray()[:, held]
+            else:
+                held = mine.any(axis=0)
+                mine = mine[:, held]
+            waiting.append((rows[chosen], mine, prices[held]))
+    return part
+
+
+def _best_split(some: NDArray | sp.csr_array, sizes: NDArray, price: NDArray) -> int | None:
+    """Column whose presence parts these kinds so that both halves together cost least; None where all are alike."""
+    together = some.T @ some
+    if sp.issparse(together):
+        together = together.toarray()
+    here = np.diagonal(together)  # kinds that use a column
+    mixed = np.flatnonzero(here < len(sizes))
+    if not mixed.size:
+        return None
+    both = together[mixed]
+    with_it = (both > 0).astype(np.float32) @ price
+    without = (both < here).astype(np.float32) @ price
+    n = (some.T @ sizes)[mixed].astype(np.float64)
+    cost = n * (FIXED + with_it) + (sizes.sum() - n) * (FIXED + without)
+    return int(mixed[cost.argmin()])
+
+
+def _joined(
+    used: NDArray[np.float32], sizes: NDArray[np.int64], price: NDArray[np.float32], lanes: int
+) -> NDArray[np.int64]:
+    """Run of every part: the smallest joins the one with which it adds least, until none gains by joining."""
+    count = len(sizes)
+    used, sizes = used.copy(), sizes.copy()
+    cost = used @ price
+    into = np.arange(count)
+    alive = np.ones(count, dtype=bool)
+    settled = np.zeros(count, dtype=bool)
+    works = _tiles(sizes, lanes) * (FIXED + cost)
+    left = count
+    while left > 1:
+        waiting = np.where(alive & ~settled, sizes, np.iinfo(np.int64).max)
+        small = int(waiting.argmin())
+        if not alive[small] or settled[small]:
+            break
+        union = cost + cost[small] - used @ (used[small] * price)
+        added = _tiles(sizes + sizes[small], lanes) * (FIXED + union) - works
+        added[~alive] = np.inf
+        added[small] = np.inf
+        near = int(added.argmin())
+        if sizes[small] >= lanes and added[near] >= works[small]:
+            settled[small] = True
+            continue
+        into[small] = near
+        used[near] = np.maximum(used[near], used[small])
+        sizes[near] += sizes[small]
+        cost[near] = used[near] @ price
+        works[near] = _tiles(sizes[near], lanes) * (FIXED + cost[near])
+        alive[small] = False
+        left -= 1
+    while (further := into[into] != into).any():
+        into[further] = into[into[further]]
+    return np.unique(into, return_inverse=True)[1].ravel()
+
+
+def _tiles(sizes: NDArray[np.int64] | int, lanes: int) -> NDArray[np.int64]:
+    return -(-np.asarray(sizes) // lanes)
