@@ -17,24 +17,28 @@ Chain = wp.types.matrix(shape=(MOVERS + 1, 8), dtype=float)
 
 @wp.struct
 class Skin:
-    """Packed operators of the vertices of one or more coverings; see ``warpjld_kernels.anchored``."""
+    """Rows of coefficients of the vertices of one or more coverings; see ``warpjld.covering.rows.Rows``.
+
+    ``turn_input`` counts the halfway rotations, then the bones' rotations; ``rounding_input`` and ``muscle_input``
+    joints and segments; ``palm_input`` the palm pairs' stations.
+    """
 
     ends: wp.array2d(dtype=wp.int32)
     parents: wp.array(dtype=wp.int32)
     offset: wp.array(dtype=wp.vec3)
-    segment: wp.array2d(dtype=wp.int32)
-    weight: wp.array2d(dtype=float)
-    ratio: wp.array2d(dtype=float)
-    rotation: wp.array2d(dtype=wp.vec3)
-    rounding: wp.array2d(dtype=wp.vec2)
+    position_input: wp.array2d(dtype=wp.int32)
+    position: wp.array2d(dtype=float)
+    turn_input: wp.array2d(dtype=wp.int32)
+    turn: wp.array2d(dtype=float)
+    rounding_input: wp.array2d(dtype=wp.int32)
+    rounding: wp.array2d(dtype=float)
+    muscle_input: wp.array2d(dtype=wp.int32)
     muscle: wp.array2d(dtype=wp.vec3)
-    pair: wp.array2d(dtype=wp.int32)
-    between: wp.array2d(dtype=float)
-    station: wp.array2d(dtype=float)
+    palm_input: wp.array2d(dtype=wp.int32)
+    palm: wp.array2d(dtype=float)
     pairs: wp.array2d(dtype=wp.int32)
     across: wp.array2d(dtype=float)
-    palm: wp.array2d(dtype=float)
-    rigid: wp.array(dtype=wp.int32)
+    exponent: wp.array2d(dtype=float)
     vertices: int
 
 
@@ -163,10 +167,11 @@ def palm_share(skin: Skin, posture: Posture, drives: Drives, chain: Chain, r: in
     """What approaching palm segments add to the offset's length, as a portion of it: λ^(−k) − 1 (R44, C3)."""
     total = float(0.0)
     stations = skin.across.shape[1]
-    for k in range(skin.between.shape[1]):
-        amount = skin.between[v, k]
-        if amount > 0.0:
-            n = skin.pair[v, k]
+    for k in range(skin.palm.shape[1]):
+        amount = skin.palm[v, k]
+        if amount != 0.0:
+            n = skin.palm_input[v, k] // stations
+            station = skin.palm_input[v, k] - n * stations
             a = skin.pairs[n, 0]
             b = skin.pairs[n, 1]
             starts = joint_place(posture, drives, chain, r, skin.ends[b, 0]) - joint_place(
@@ -175,17 +180,10 @@ def palm_share(skin: Skin, posture: Posture, drives: Drives, chain: Chain, r: in
             ends = joint_place(posture, drives, chain, r, skin.ends[b, 1]) - joint_place(
                 posture, drives, chain, r, skin.ends[a, 1]
             )
-            low = wp.min(int(skin.station[v, k]), stations - 2)
-            part = skin.station[v, k] - float(low)
-            exponent = skin.palm[v // skin.vertices, n]
-            for i in range(2):
-                at = float(low + i) / float(stations - 1)
-                length = wp.max(wp.length((1.0 - at) * starts + at * ends), 1.0e-9)
-                closing = wp.min(wp.log(length / skin.across[n, low + i]), 0.0)
-                share = part
-                if i == 0:
-                    share = 1.0 - part
-                total += amount * share * (wp.exp(-exponent * closing) - 1.0)
+            at = float(station) / float(stations - 1)
+            length = wp.max(wp.length((1.0 - at) * starts + at * ends), 1.0e-9)
+            closing = wp.min(wp.log(length / skin.across[n, station]), 0.0)
+            total += amount * (wp.exp(-skin.exponent[v // skin.vertices, n] * closing) - 1.0)
     return total
 
 
@@ -195,29 +193,31 @@ def mapped(skin: Skin, posture: Posture, drives: Drives, r: int, v: int, s: floa
     chain = chain_at(posture, drives, r, s)
     f = drives.frame[r]
     foot = wp.vec3(0.0)
+    for k in range(skin.position.shape[1]):
+        c = skin.position[v, k]
+        if c != 0.0:
+            foot += c * joint_place(posture, drives, chain, r, skin.position_input[v, k])
     q = wp.quat(0.0, 0.0, 0.0, 0.0)
+    joints = skin.parents.shape[0]
+    for k in range(skin.turn.shape[1]):
+        w = skin.turn[v, k]
+        if w != 0.0:
+            j = skin.turn_input[v, k]
+            if j < joints:
+                q += scaled(w, joint_halfway(skin, posture, drives, chain, r, j))
+            else:
+                q += scaled(w, rotation_at(chain, drives.depth[r, j - joints], posture.rotations[f, j - joints]))
     scale = 1.0 + palm_share(skin, posture, drives, chain, r, v)
+    for k in range(skin.rounding.shape[1]):
+        g = skin.rounding[v, k]
+        if g != 0.0:
+            scale += g * joint_flexion_ratio(posture, drives, chain, r, skin.rounding_input[v, k])
     added = wp.vec3(0.0)
-    hard = skin.rigid[v]
-    if hard >= 0:
-        foot = joint_place(posture, drives, chain, r, hard)
-        q = rotation_at(chain, drives.depth[r, hard], posture.rotations[f, hard])
-    for k in range(skin.weight.shape[1]):
-        weight = skin.weight[v, k]
-        if weight > 0.0:
-            p = skin.ends[skin.segment[v, k], 0]
-            d = skin.ends[skin.segment[v, k], 1]
-            start = joint_place(posture, drives, chain, r, p)
-            end = joint_place(posture, drives, chain, r, d)
-            foot += weight * (start + skin.ratio[v, k] * (end - start))
-            w = skin.rotation[v, k]
-            q += scaled(w[1], rotation_at(chain, drives.depth[r, p], posture.rotations[f, p]))
-            if w[0] != 0.0:
-                q += scaled(w[0], joint_halfway(skin, posture, drives, chain, r, p))
-            if w[2] != 0.0:
-                q += scaled(w[2], joint_halfway(skin, posture, drives, chain, r, d))
-            at_p = joint_flexion_ratio(posture, drives, chain, r, p)
-            at_d = joint_flexion_ratio(posture, drives, chain, r, d)
-            scale += skin.rounding[v, k][0] * at_p + skin.rounding[v, k][1] * at_d
-            added += 0.5 * (at_p + at_d) * skin.muscle[v, k]
+    for k in range(skin.muscle.shape[1]):
+        m = skin.muscle[v, k]
+        if wp.dot(m, m) > 0.0:
+            segment = skin.muscle_input[v, k]
+            at_p = joint_flexion_ratio(posture, drives, chain, r, skin.ends[segment, 0])
+            at_d = joint_flexion_ratio(posture, drives, chain, r, skin.ends[segment, 1])
+            added += 0.5 * (at_p + at_d) * m
     return foot + wp.quat_rotate(wp.normalize(q), scale * skin.offset[v] + added)

@@ -8,9 +8,20 @@ and the rest pose is exact (C24).
 
 import warp as wp
 
-from warpjld_kernels.anchored import Parameters
 
 wp.set_module_options({"enable_backward": False, "max_unroll": 1})
+
+
+@wp.struct
+class Parameters:
+    """Parameters of the joints; see ``warpjld.covering.parameters.Parameters``."""
+
+    inflation: wp.array(dtype=float)
+    proximity: wp.array2d(dtype=float)
+    muscle: wp.array(dtype=float)
+    peak: wp.array(dtype=float)
+    exponents: wp.array2d(dtype=float)
+    palm: wp.array(dtype=float)
 
 
 @wp.struct

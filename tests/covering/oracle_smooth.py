@@ -15,6 +15,8 @@ from scipy.spatial.transform import Rotation
 
 from warpjld.covering import Covering, Parameters
 from warpjld.covering.binding import FLOOR, LATERAL, SIDE_BAND
+from warpjld.covering.diffusion import BETA
+from warpjld.covering.thinning import THRESHOLD
 from warpjld.skeleton import CHANNELS, Poses, Skeleton
 
 STATIONS = np.linspace(0.0, 1.0, 5)  # where along a palm pair its scale factor is evaluated
@@ -31,7 +33,6 @@ class Operator:
     weight: float
     ratio: float
     side: float
-    height: np.ndarray
 
 
 @dataclass
@@ -63,21 +64,136 @@ class Frame:
     closing: np.ndarray
 
 
-def places(covering: Covering, vertices: list[int]) -> list[Place]:
-    """Where vertices lie on the segments of their operators."""
-    fans = [[(s.proximal, s.distal) for s in fan.segments] for fan in covering.fans]
-    muscled = [fan.muscle for fan in covering.fans]
-    return [
-        _place(
-            covering.skeleton,
-            fans,
-            muscled,
-            covering.surface.vertices[v],
-            covering.domains[v],
-            covering.parameters,
-        )
-        for v in vertices
-    ]
+@dataclass
+class Row:
+    """Coefficients of a vertex: of positions and both kinds of rotations (J each), roundings (J), the palm (N, 5) and
+    muscles, by segment's ends."""
+
+    rest: np.ndarray
+    positions: np.ndarray
+    halfway: np.ndarray
+    bones: np.ndarray
+    roundings: np.ndarray
+    palm: np.ndarray
+    muscles: np.ndarray
+
+
+class Diffused:
+    """The whole surface of a covering, so that its fields can be diffused."""
+
+    def __init__(self, covering: Covering) -> None:
+        self.skeleton = covering.skeleton
+        self.ends = [(s.proximal, s.distal) for fan in covering.fans for s in fan.segments]
+        self.pairs = [(a[0], b[0]) for a, b in palm_pairs(covering)]
+        fans = [[(s.proximal, s.distal) for s in fan.segments] for fan in covering.fans]
+        muscled = [fan.muscle for fan in covering.fans]
+        surface = covering.surface
+        self.places = [
+            _place(self.skeleton, fans, muscled, vertex, domain, covering.parameters)
+            for vertex, domain in zip(surface.vertices, covering.domains, strict=True)
+        ]
+        self.heat = _heat(surface.vertices, surface.faces, covering.diffusion.radius)
+
+    def rows(self, vertices: list[int], parameters: Parameters) -> list[Row]:
+        """Coefficients of vertices after diffusion and thinning."""
+        before = [row_of(p, parameters, self.ends, len(self.pairs)) for p in self.places]
+        names = ("positions", "halfway", "bones", "roundings", "palm", "muscles")
+        after = {n: self.heat[vertices] @ np.array([getattr(r, n).ravel() for r in before]) for n in names}
+        for n in ("positions", "roundings", "palm", "muscles"):
+            after[n] = np.array([_shrunk(row) for row in after[n]])
+        for k in range(len(vertices)):
+            after["positions"][k] /= after["positions"][k].sum()
+            both = _shrunk(np.concatenate([after["halfway"][k], after["bones"][k]]))
+            after["halfway"][k], after["bones"][k] = np.split(both / both.sum(), 2)
+        after["palm"] = after["palm"].reshape(len(vertices), -1, len(STATIONS))
+        return [Row(self.places[v].rest, *(after[n][k] for n in names)) for k, v in enumerate(vertices)]
+
+    def points(self, vertices: list[int], frames: list[Frame], parameters: Parameters) -> np.ndarray:
+        """Positions of vertices in every frame, shape (F, n, 3)."""
+        rows = self.rows(vertices, parameters)
+        return np.array([[self.point(r, f, parameters) for r in rows] for f in frames])
+
+    def point(self, row: Row, frame: Frame, parameters: Parameters) -> np.ndarray:
+        return evaluate(row, frame, parameters, self.skeleton, self.ends, self.pairs)
+
+
+def row_of(place: Place, parameters: Parameters, ends: list[tuple[int, int]], pairs: int) -> Row:
+    """What the operators give a vertex, for amplitudes of one."""
+    joints = len(parameters.inflation)
+    c, half, bone, rounding = (np.zeros(joints) for _ in range(4))
+    palm, muscles = np.zeros((pairs, len(STATIONS))), np.zeros(len(ends))
+    for o in place.operators:
+        p, d, t = o.proximal, o.distal, min(max(o.ratio, 0.0), 1.0)
+        c[p] += o.weight * (1 - o.ratio)
+        c[d] += o.weight * o.ratio
+        prox_p, prox_d = parameters.proximity[p, 0], parameters.proximity[d, 1]
+        in_p = 1 - t / prox_p if t < prox_p else 0.0  # area 1, 1 at the joint
+        in_d = 1 - (1 - t) / prox_d if 1 - t < prox_d else 0.0  # area 2
+        half[p] += o.weight * (o.side * in_p + (1 - o.side) * (1 - t))
+        half[d] += o.weight * (o.side * in_d + (1 - o.side) * t)
+        bone[p] += o.weight * o.side * (1 - in_p - in_d)
+        for j, area in ((p, in_p), (d, in_d)):
+            rounding[j] += o.weight * o.side * area**2 * (3 - 2 * area)
+        if o.muscle:
+            profile = _profile(t, parameters.peak[p], *parameters.exponents[p])
+            muscles[ends.index((p, d))] += o.weight * (1 - o.side) * profile
+    for b in place.between:
+        low = min(int(b.place * 4), 3)
+        palm[b.pair, low] += b.amount * (1 - (b.place * 4 - low))
+        palm[b.pair, low + 1] += b.amount * (b.place * 4 - low)
+    return Row(place.rest, c, half, bone, rounding, palm, muscles)
+
+
+def evaluate(
+    row: Row,
+    frame: Frame,
+    parameters: Parameters,
+    skeleton: Skeleton,
+    ends: list[tuple[int, int]],
+    pairs: list[tuple[int, int]],
+) -> np.ndarray:
+    """S' = Σ c J' + rot(normalise(Σ w q), g d + Σ m h)."""
+    grow = 1.0 + (row.roundings * parameters.inflation) @ frame.ratio
+    for n, (a, b) in enumerate(pairs):
+        exponent = (parameters.palm[a] + parameters.palm[b]) / 2
+        grow += row.palm[n] @ (np.exp(-exponent * frame.closing[n]) - 1)
+    bulge = np.zeros(3)
+    for (p, d), amount in zip(ends, row.muscles, strict=True):
+        if amount != 0.0:
+            driven = (frame.ratio[p] + frame.ratio[d]) / 2
+            bulge += amount * parameters.muscle[p] * driven * _height(skeleton, p, d, row.rest)
+    blend = row.halfway @ frame.halfway + row.bones @ frame.rotations
+    offset = row.rest - row.positions @ skeleton.rest
+    return row.positions @ frame.positions + Rotation.from_quat(blend).as_matrix() @ (grow * offset + bulge)
+
+
+def _height(skeleton: Skeleton, p: int, d: int, vertex: np.ndarray) -> np.ndarray:
+    """y part of the offset from a segment, with the normals of both its joints blended along it."""
+    along, offset = skeleton.rest[d] - skeleton.rest[p], vertex - skeleton.rest[p]
+    t = min(max(offset @ along / (along @ along), 0.0), 1.0)
+    normals = _normal(skeleton, p, d, p, d), _normal(skeleton, p, d, d, p)
+    return sum(share * (offset @ n) * n for share, n in zip((1 - t, t), normals, strict=True))
+
+
+def _heat(vertices: np.ndarray, faces: np.ndarray, radius: np.ndarray) -> np.ndarray:
+    """Two steps of heat, dense."""
+    count, tau = len(vertices), (BETA * radius) ** 2 / 2
+    conducted, area = np.zeros((count, count)), np.zeros(count)
+    for face in faces:
+        for k in range(3):
+            apex, i, j = face[k], face[(k + 1) % 3], face[(k + 2) % 3]
+            u, v = vertices[i] - vertices[apex], vertices[j] - vertices[apex]
+            double = np.linalg.norm(np.cross(u, v))
+            area[apex] += double / 6
+            weight = min(max(u @ v / double, 1e-3), 1e3) / 2 * (tau[i] + tau[j]) / 2
+            conducted[i, j] += weight
+            conducted[j, i] += weight
+    step = np.linalg.solve(np.diag(area + conducted.sum(axis=1)) - conducted, np.diag(area))
+    return np.asarray(step @ step)
+
+
+def _shrunk(row: np.ndarray) -> np.ndarray:
+    return np.where(np.abs(row) > THRESHOLD, row - np.sign(row) * THRESHOLD, 0.0)
 
 
 def palm_pairs(covering: Covering) -> list[tuple[tuple[int, int], tuple[int, int]]]:
@@ -121,34 +237,6 @@ def pose_frame(
             if lengths[0] > 1e-9:
                 closing[n, i] = min(np.log(lengths[1] / lengths[0]), 0.0)
     return Frame(poses.positions[f], halfway, q, ratio, closing)
-
-
-def evaluate(place: Place, frame: Frame, parameters: Parameters, rest_joints: np.ndarray) -> np.ndarray:
-    """S' = Σ c J' + rot(normalise(Σ w q), g d + Σ m e)."""
-    before, after, blend = np.zeros(3), np.zeros(3), np.zeros(4)
-    grow, bulge = 1.0, np.zeros(3)
-    for o in place.operators:
-        p, d, t = o.proximal, o.distal, min(max(o.ratio, 0.0), 1.0)
-        before += o.weight * ((1 - o.ratio) * rest_joints[p] + o.ratio * rest_joints[d])
-        after += o.weight * ((1 - o.ratio) * frame.positions[p] + o.ratio * frame.positions[d])
-        prox_p, prox_d = parameters.proximity[p, 0], parameters.proximity[d, 1]
-        in_p = 1 - t / prox_p if t < prox_p else 0.0  # area 1, 1 at the joint
-        in_d = 1 - (1 - t) / prox_d if 1 - t < prox_d else 0.0  # area 2
-        external = in_p * frame.halfway[p] + (1 - in_p - in_d) * frame.rotations[p] + in_d * frame.halfway[d]
-        internal = (1 - t) * frame.halfway[p] + t * frame.halfway[d]
-        blend += o.weight * (o.side * external + (1 - o.side) * internal)
-        for j, area in ((p, in_p), (d, in_d)):
-            grow += o.weight * o.side * parameters.inflation[j] * area**2 * (3 - 2 * area) * frame.ratio[j]
-        if o.muscle:
-            driven = (frame.ratio[p] + frame.ratio[d]) / 2
-            profile = _profile(t, parameters.peak[p], *parameters.exponents[p])
-            bulge += o.weight * (1 - o.side) * parameters.muscle[p] * driven * profile * o.height
-    for b in place.between:
-        exponent = (parameters.palm[b.a] + parameters.palm[b.b]) / 2
-        inflation = np.exp(-exponent * frame.closing[b.pair]) - 1
-        grow += b.amount * np.interp(b.place, STATIONS, inflation)
-    turn = Rotation.from_quat(blend).as_matrix()  # normalises
-    return after + turn @ (grow * (place.rest - before) + bulge)
 
 
 def _profile(t: float, peak: float, before: float, beyond: float) -> float:
@@ -200,14 +288,12 @@ def _operator(skeleton: Skeleton, p: int, d: int, muscle: bool, weight: float, v
     ratio = _ratio(skeleton, p, d, vertex)
     offset = vertex - ((1 - ratio) * skeleton.rest[p] + ratio * skeleton.rest[d])
     t = min(max(ratio, 0.0), 1.0)
-    side, height = 0.0, np.zeros(3)
+    side = 0.0
     for share, joint, other in ((1 - t, p, d), (t, d, p)):
-        normal = _normal(skeleton, p, d, joint, other)
-        cosine = offset @ normal / np.linalg.norm(offset)
+        cosine = offset @ _normal(skeleton, p, d, joint, other) / np.linalg.norm(offset)
         x = min(max((cosine + SIDE_BAND) / (2 * SIDE_BAND), 0.0), 1.0)
         side += share * (3 * x**2 - 2 * x**3)
-        height += share * (offset @ normal) * normal
-    return Operator(p, d, muscle, weight, ratio, side, height)
+    return Operator(p, d, muscle, weight, ratio, side)
 
 
 def _normal(skeleton: Skeleton, p: int, d: int, joint: int, other: int) -> np.ndarray:

@@ -49,14 +49,15 @@ def angle_between(proximal: float, distal: float, *, external: bool) -> float:
 
 def smooth_normal(skeleton: Skeleton, poses: Poses, t: float, parameters: Parameters, external: bool) -> np.ndarray:
     """Where the formula takes the rest normal at ratio t of the middle segment."""
-    operator = oracle_smooth.Operator(1, 2, False, 1.0, t, float(external), np.zeros(3))
+    operator = oracle_smooth.Operator(1, 2, False, 1.0, t, float(external))
     frame = oracle_smooth.pose_frame(skeleton, poses, 0)
     foot = (1 - t) * skeleton.rest[1] + t * skeleton.rest[2]
     still = oracle_smooth.Place(foot + UP, [operator], [])
     flat = Parameters(
         np.zeros(4), parameters.proximity, np.zeros(4), parameters.peak, parameters.exponents, np.zeros(4)
     )
-    moved = oracle_smooth.evaluate(still, frame, flat, skeleton.rest)
+    row = oracle_smooth.row_of(still, flat, [(1, 2)], 0)
+    moved = oracle_smooth.evaluate(row, frame, flat, skeleton, [(1, 2)], [])
     return moved - ((1 - t) * poses.positions[0, 1] + t * poses.positions[0, 2])
 
 

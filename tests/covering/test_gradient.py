@@ -35,7 +35,7 @@ class Case:
         self.vertices = np.concatenate([rng.choice(p, min(len(p), 6), replace=False) for p in pools if len(p)])
         self.covering = covering
         self.poses = random_poses(covering.skeleton, 2, 7)
-        self.places = oracle.places(covering, self.vertices.tolist())
+        self.oracle = oracle.Diffused(covering)
         self.frames = oracle.frames(covering, self.poses)
         self.adjoint = rng.normal(size=(2, len(self.vertices), 3)).astype(np.float32)
         self.operator = Differentiable(covering, self.poses, self.vertices)
@@ -43,9 +43,8 @@ class Case:
         self.gradients = self.operator.backward(self.adjoint)
 
     def value(self, parameters: Parameters, frames: list[oracle.Frame]) -> float:
-        rest = self.covering.skeleton.rest
-        points = [[oracle.evaluate(p, f, parameters, rest) for p in self.places] for f in frames]
-        return float((np.array(points) * self.adjoint).sum())
+        points = self.oracle.points(self.vertices.tolist(), frames, parameters)
+        return float((points * self.adjoint).sum())
 
 
 @pytest.fixture(scope="module")

@@ -27,10 +27,8 @@ def sample(covering: Covering, each: int, seed: int) -> np.ndarray:
 
 
 def smooth_points(covering: Covering, poses: Poses, vertices: np.ndarray) -> np.ndarray:
-    rest = covering.skeleton.rest
-    placed = oracle_smooth.places(covering, vertices.tolist())
     frames = oracle_smooth.frames(covering, poses)
-    return np.array([[oracle_smooth.evaluate(p, f, covering.parameters, rest) for p in placed] for f in frames])
+    return oracle_smooth.Diffused(covering).points(vertices.tolist(), frames, covering.parameters)
 
 
 def paper_points(covering: Covering, poses: Poses, vertices: np.ndarray) -> np.ndarray:

@@ -47,7 +47,6 @@ class Anchors:
         ratio: Projection on the segment, 0 at the proximal joint, 1 at the distal one, clamped except beyond
             extremities, shape (V, 4) (R37, C1).
         side: 1 on the external side, 0 on the internal, between over a band of R45's cosine, shape (V, 4).
-        lift: y part of the vertex's offset from its segment: (offset · normal) normal [m], shape (V, 4, 3) (R63).
         pairs: Segments of every pair of palm neighbours, shape (N, 2).
         pair: Palm pairs between which a vertex lies, shape (V, 2), and
         between: how much it lies in between, 0 on either segment, 1 in the middle, shape (V, 2) (R44, R49);
@@ -63,7 +62,6 @@ class Anchors:
     weight: NDArray[np.float64]
     ratio: NDArray[np.float64]
     side: NDArray[np.float64]
-    lift: NDArray[np.float64]
     pairs: NDArray[np.int32]
     pair: NDArray[np.int32]
     between: NDArray[np.float64]
@@ -103,12 +101,12 @@ def anchor(
         for i in range(0, len(vertices), chunk)
     ]
     joined = [np.concatenate(column) for column in zip(*rows, strict=True)]
-    segment, weight, ratio, side, lift, pair, between, station = joined
+    segment, weight, ratio, side, pair, between, station = joined
     muscle = np.array([fan.muscle for fan in groups for _ in fan.segments])
     rigid = np.full(len(vertices), -1, dtype=np.int32) if rigid is None else rigid
     flesh = (rigid < 0)[:, None]
     weight, between = weight * flesh, between * flesh
-    return Anchors(ends, muscle, vertices, segment, weight, ratio, side, lift, pairs, pair, between, station, rigid)
+    return Anchors(ends, muscle, vertices, segment, weight, ratio, side, pairs, pair, between, station, rigid)
 
 
 def _neighbour_pairs(groups: tuple[Fan, ...]) -> tuple[NDArray[np.int32], dict[int, int]]:
@@ -156,18 +154,18 @@ def _anchor_some(
     pair, pair_kept = _strongest_pairs(between)
     ratio = np.take_along_axis(t, best, axis=1)
     offset = points[:, None] - (table.start[best] + ratio[..., None] * table.along[best])
-    side, lift = _side(offset, table.normals[best], np.clip(ratio, 0.0, 1.0))
+    side = _side(offset, table.normals[best], np.clip(ratio, 0.0, 1.0))
     stiff = np.array([fan.stiff for fan in groups for _ in fan.segments])[best]
     # half-way along and outside nothing rounds: there, all turns with the bone
-    ratio, side, lift = np.where(stiff, 0.5, ratio), np.where(stiff, 1.0, side), np.where(stiff[..., None], 0.0, lift)
+    ratio, side = np.where(stiff, 0.5, ratio), np.where(stiff, 1.0, side)
     station = np.take_along_axis(along_pair, pair, axis=1)
-    return best.astype(np.int32), kept, ratio, side, lift, pair, pair_kept, station
+    return best.astype(np.int32), kept, ratio, side, pair, pair_kept, station
 
 
 def _side(
     offset: NDArray[np.float64], normals: NDArray[np.float64], place: NDArray[np.float64]
-) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """External side (1) or internal (0) by R45's cosine, and the y part of the offset, blended along the segment.
+) -> NDArray[np.float64]:
+    """External side (1) or internal (0) by R45's cosine, blended along the segment.
 
     Judged with the normals of both joints one by one: hip and knee bend in opposite senses, and half-way along a thigh
     an interpolated normal would vanish and turn over.
@@ -176,7 +174,7 @@ def _side(
     height = np.einsum("vok,voek->voe", offset, normals)
     sides = _smoothstep((height / length[..., None] + SIDE_BAND) / (2.0 * SIDE_BAND))
     share = np.stack([1.0 - place, place], axis=2)
-    return (share * sides).sum(axis=2), np.einsum("voe,voe,voek->vok", share, height, normals)
+    return np.asarray((share * sides).sum(axis=2))
 
 
 def _share_in_fan(

@@ -10,13 +10,18 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from warpjld.covering.binding import Anchors, anchor
-from warpjld.covering.device import anchors_on, checked_device, drivers_on, parameters_on
+from warpjld.covering.device import checked_device
+from warpjld.covering.diffusion import Diffusion
 from warpjld.covering.domains import domains_from_geometry, domains_from_skin
 from warpjld.covering.drivers import drive
+from warpjld.covering.fields import Fields, joint_of_column, operator_fields
 from warpjld.covering.operators import Fan, fans
-from warpjld.covering.parameters import Parameters, default_parameters
+from warpjld.covering.parameters import SHAPES, Parameters, default_parameters
 from warpjld.covering.rigid import domains_of_rigid, flesh_of, part_of_surface
-from warpjld.covering.runs import Runs, pack_runs, palette
+from warpjld.covering.rows import Rows, pose_on, rows_of, rows_on
+from warpjld.covering.runs import Columns, Runs, pack_runs, palette
+from warpjld.covering.thickness import room
+from warpjld.covering.thinning import thinned
 from warpjld.errors import InputError
 from warpjld.rig import Rig, Skin
 from warpjld.skeleton.kinematics import Poses
@@ -59,12 +64,41 @@ class Covering:
         self._resident: dict[str, list[Any]] = {}
 
     def with_parameters(self, parameters: Parameters) -> Covering:
-        """The same binding with other parameters; domains are not computed again."""
+        """The same binding with other parameters; domains are not computed again, and fields only where parameters
+        other than amplitudes change."""
         parameters.check(self.skeleton)
-        anchors = anchor(
-            self.surface.vertices, self.skeleton, self.fans, self.domains, parameters, rigid=self.anchors.rigid
-        )
-        return type(self)(self.skeleton, self.surface, parameters, self.fans, self.domains, anchors)
+        made = (self.skeleton, self.surface, parameters, self.fans, self.domains)
+        if all(np.array_equal(getattr(parameters, n), getattr(self.parameters, n)) for n in SHAPES):
+            other = type(self)(*made, self.anchors)
+            other.__dict__.update({n: self.__dict__[n] for n in ("diffusion", "spread", "fields") if n in self.__dict__})
+            return other
+        rigid = self.anchors.rigid
+        anchors = anchor(self.surface.vertices, self.skeleton, self.fans, self.domains, parameters, rigid=rigid)
+        return type(self)(*made, anchors)
+
+    @cached_property
+    def diffusion(self) -> Diffusion:
+        """Heat on the flesh, on the scale of its thickness."""
+        flesh = np.flatnonzero(self.anchors.rigid < 0)
+        vertices, faces = part_of_surface(self.surface.vertices, self.surface.faces, flesh)
+        offsets = operator_fields(self.anchors, self.parameters).offsets(self.anchors.rest, self.skeleton.rest)
+        return Diffusion(vertices, faces, room(vertices, faces, offsets[flesh]), flesh)
+
+    @cached_property
+    def spread(self) -> Fields:
+        """The operators' coefficients after diffusion."""
+        fields = operator_fields(self.anchors, self.parameters)
+        return fields.like(self.diffusion.spread(fields.stacked(), joint_of_column(self.anchors, len(self.skeleton))))
+
+    @cached_property
+    def fields(self) -> Fields:
+        """The coefficients in use: diffused, and thinned out."""
+        return thinned(self.spread)
+
+    @cached_property
+    def rows(self) -> Rows:
+        """The coefficients with the amplitudes of the parameters."""
+        return rows_of(self.fields, self.skeleton, self.anchors, self.parameters)
 
     @cached_property
     def flesh(self) -> Surface:
@@ -74,22 +108,10 @@ class Covering:
     @cached_property
     def runs(self) -> Runs:
         """The packed operators."""
-        import warp as wp
-        from warpjld_kernels.anchored import pack_coefficients
         from warpjld_kernels.covering_runs import CPU_LANES
 
-        device = checked_device("cpu")
-        shape = self.anchors.weight.shape
-        out = [
-            wp.empty(shape[0], dtype=wp.vec3, device=device),
-            wp.empty(shape, dtype=wp.vec3, device=device),
-            wp.empty(shape, dtype=wp.vec2, device=device),
-            wp.empty(shape, dtype=wp.vec3, device=device),
-        ]
-        model = [anchors_on(device, self.anchors, self.skeleton.rest), parameters_on(device, self.parameters)]
-        wp.launch(pack_coefficients, dim=shape[0], inputs=model, outputs=out, device=device)
-        offset, rotation, rounding, muscle = (a.numpy() for a in out)
-        return pack_runs(self.anchors, offset, rotation, rounding, muscle, len(self.skeleton), CPU_LANES)
+        columns = Columns(len(self.skeleton), len(self.anchors.ends), len(self.anchors.pairs))
+        return pack_runs(self.rows, columns, CPU_LANES)
 
     @cached_property
     def run_surface(self) -> Surface:
@@ -158,16 +180,16 @@ class Covering:
     def points(self, poses: Poses, vertices: ArrayLike, *, device: str = "cpu") -> NDArray[np.float32]:
         """Final positions of chosen vertices only [m], shape (F, n, 3) (R74)."""
         import warp as wp
-        from warpjld_kernels.anchored import deform_points
+        from warpjld_kernels.rows import deform_rows
 
         where = checked_device(device)
         chosen = self.chosen(vertices)
         self.check(poses)
         out = wp.empty((len(poses), len(chosen)), dtype=wp.vec3, device=where)
-        model = self._on(where, "anchored", self._anchored)
-        pose = drivers_on(where, drive(self.skeleton, self.anchors, poses))
+        model = self._on(where, "rows", lambda device: [rows_on(device, self.rows)])
+        pose = pose_on(where, self.anchors, self.parameters, drive(self.skeleton, self.anchors, poses))
         picked = wp.array(chosen, dtype=wp.int32, device=where)
-        wp.launch(deform_points, dim=out.shape, inputs=[*model, picked, *pose], outputs=[out], device=where)
+        wp.launch(deform_rows, dim=out.shape, inputs=[*model, picked, *pose], outputs=[out], device=where)
         result: NDArray[np.float32] = out.numpy()
         return result
 
@@ -228,9 +250,6 @@ class Covering:
         tiles = r.tiles if device.is_cpu else r.lanes()
         kinds = ((tiles, wp.int32), (r.runs, wp.int32), (r.slots, wp.int32), (r.coefficients, float))
         return [wp.array(a, dtype=k, device=device) for a, k in (*kinds, (r.order, wp.int32))]
-
-    def _anchored(self, device: Any) -> list[Any]:
-        return [anchors_on(device, self.anchors, self.skeleton.rest), parameters_on(device, self.parameters)]
 
 
 def bind(

@@ -2,17 +2,21 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+import scipy.sparse as sp
 from numpy.typing import ArrayLike, NDArray
 
 from warpjld.covering.covering import Covering
-from warpjld.covering.device import anchors_on, checked_device, drivers_on, parameters_on
+from warpjld.covering.device import checked_device
 from warpjld.covering.drivers import Drivers, drive
+from warpjld.covering.fields import Fields, OperatorKernel, joint_of_column
 from warpjld.covering.paper import PaperCovering
-from warpjld.covering.parameters import Parameters
+from warpjld.covering.parameters import SHAPES, Parameters
+from warpjld.covering.rows import Padded, Rows, palm_exponents, pose_on, rows_of, rows_on
+from warpjld.covering.thinning import thinned, thinned_slope
 from warpjld.errors import InputError
 from warpjld.skeleton.kinematics import Poses
 
@@ -67,33 +71,41 @@ class Differentiable:
                 "covering: the paper's hard-edged operators have no derivatives; bind with method='smooth'"
             )
         chosen = covering.chosen(np.arange(len(covering.surface.vertices)) if vertices is None else vertices)
-        self._anchors = anchors_on(self._device, covering.anchors, covering.skeleton.rest)
         self._chosen = wp.array(chosen, dtype=wp.int32, device=self._device)
-        drivers = drive(covering.skeleton, covering.anchors, poses)
-        self._pose = drivers_on(self._device, drivers, requires_grad=True)
+        self._drivers = drive(covering.skeleton, covering.anchors, poses)
         self._shape = (len(poses), len(chosen))
-        self._step: tuple[wp.Tape, Any, wp.array] | None = None
+        self._step: _Step | None = None
 
     def forward(self, parameters: Parameters | None = None) -> NDArray[np.float32]:
         """Final positions [m], shape (F, n, 3), with other parameters than the covering's if given."""
         import warp as wp
-        from warpjld_kernels.anchored_gradient import deform_points_with_gradient
+        from warpjld_kernels.rows_gradient import deform_rows_with_gradient
 
-        chosen = self._covering.parameters if parameters is None else parameters
-        chosen.check(self._covering.skeleton)
-        # a tape's backward reads arrays as they are then: parameters and outputs are made afresh at every step
-        values = parameters_on(self._device, chosen, requires_grad=True)
+        covering = self._covering
+        chosen = covering.parameters if parameters is None else parameters
+        chosen.check(covering.skeleton)
+        shapes = None
+        spread, thin = covering.spread, covering.fields
+        if any(not np.array_equal(getattr(chosen, n), getattr(covering.parameters, n)) for n in SHAPES):
+            shapes = OperatorKernel(covering.anchors, chosen, requires_grad=True)
+            owner = joint_of_column(covering.anchors, len(covering.skeleton))
+            spread = shapes.fields.like(covering.diffusion.spread(shapes.fields.stacked(), owner))
+            thin = thinned(spread)
+        rows = rows_of(thin, covering.skeleton, covering.anchors, chosen)
+        # a tape's backward reads arrays as they are then: inputs and outputs are made afresh at every step
+        values = rows_on(self._device, rows, requires_grad=True)
+        pose = pose_on(self._device, covering.anchors, chosen, self._drivers, requires_grad=True)
         points = wp.empty(self._shape, dtype=wp.vec3, device=self._device, requires_grad=True)
         tape = wp.Tape()
         with tape:
             wp.launch(
-                deform_points_with_gradient,
+                deform_rows_with_gradient,
                 dim=self._shape,
-                inputs=[self._anchors, values, self._chosen, *self._pose],
+                inputs=[values, self._chosen, *pose],
                 outputs=[points],
                 device=self._device,
             )
-        self._step = (tape, values, points)
+        self._step = _Step(tape, values, pose, points, chosen, shapes, spread, thin, rows)
         result: NDArray[np.float32] = points.numpy().copy()
         return result
 
@@ -112,13 +124,92 @@ class Differentiable:
             raise InputError("backward: call forward first")
         if adjoint.shape != (*self._shape, 3):
             raise InputError(f"adjoint: want shape {(*self._shape, 3)}, got {adjoint.shape}")
-        tape, values, points = self._step
-        tape.zero()
+        step = self._step
+        step.tape.zero()
         seed = wp.array(np.ascontiguousarray(adjoint, dtype=np.float32), dtype=wp.vec3, device=self._device)
-        tape.backward(grads={points: seed})
-        by_parameter = {f.name: _gradient(getattr(values, f.name)) for f in fields(Parameters)}
-        by_driver = (_gradient(a) for a in self._pose)
-        return Gradients(Parameters(**by_parameter), Drivers(*by_driver))
+        step.tape.backward(grads={step.points: seed})
+        positions, turns, scalars = (_gradient(a) for a in step.pose)
+        joints = len(self._covering.skeleton)
+        return Gradients(
+            self._by_parameters(step, scalars),
+            Drivers(positions, turns[:, :joints], turns[:, joints:], *self._by_scalars(step, scalars)),
+        )
+
+    def _by_scalars(
+        self, step: _Step, slope: NDArray[np.float64]
+    ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Derivatives by flexion ratios and by log λ, from those by the scalar inputs."""
+        anchors, joints = self._covering.anchors, len(self._covering.skeleton)
+        muscles = slope[:, step.rows.scales.shape[1] :]
+        ratio = slope[:, :joints].copy()
+        for end in range(2):
+            np.add.at(ratio, (slice(None), anchors.ends[:, end]), 0.5 * muscles)
+        closing = np.zeros_like(self._drivers.closing)
+        if len(anchors.pairs):
+            exponent = palm_exponents(anchors, step.parameters)[:, None]
+            palm = slope[:, joints : step.rows.scales.shape[1]].reshape(closing.shape)
+            closing = -exponent * np.exp(-exponent * self._drivers.closing) * palm
+        return ratio, closing
+
+    def _by_parameters(self, step: _Step, scalars: NDArray[np.float64]) -> Parameters:
+        covering, anchors, chosen = self._covering, self._covering.anchors, step.parameters
+        rows, joints, vertices = step.rows, len(self._covering.skeleton), len(self._covering.anchors)
+        scale_slope = _entries(rows.scales, step.values.scale)
+        unit = Padded.of(rows.muscles)
+        by_vector = unit.sums(_gradient(step.values.muscle), len(rows.muscles.data))
+        muscle_slope = (by_vector * rows.heights).sum(axis=1)  # by what scales the height: amplitude × field
+        by_rounding = sp.csr_array((scale_slope, rows.scales.indices, rows.scales.indptr), shape=rows.scales.shape)
+        by_rounding = by_rounding.tocsc()[:, :joints].toarray()
+        by_muscle = sp.csr_array((muscle_slope, rows.muscles.indices, rows.muscles.indptr), shape=rows.muscles.shape)
+        by_muscle = by_muscle.toarray()
+        first = anchors.ends[:, 0]
+        muscle = np.bincount(first, (by_muscle * step.thin.muscles.toarray()).sum(axis=0), minlength=joints)
+        palm = np.zeros(joints)
+        if len(anchors.pairs):
+            exponent = palm_exponents(anchors, chosen)[:, None]
+            slope = scalars[:, joints : rows.scales.shape[1]].reshape(self._drivers.closing.shape)
+            by_exponent = (-self._drivers.closing * np.exp(-exponent * self._drivers.closing) * slope).sum(axis=(0, 2))
+            for end in range(2):
+                np.add.at(palm, anchors.ends[anchors.pairs[:, end], 0], 0.5 * by_exponent)
+        shapes = step.shapes or OperatorKernel(anchors, chosen, requires_grad=True)
+        turns = sp.csr_array(
+            (_entries(rows.turns, step.values.turn), rows.turns.indices, rows.turns.indptr), shape=rows.turns.shape
+        )
+        slopes = Fields(
+            sp.csr_array((vertices, joints)),
+            sp.csr_array(thinned_slope(step.spread.turns, step.thin.turns, turns.toarray())),
+            sp.csr_array(by_rounding * chosen.inflation * (step.thin.roundings.toarray() != 0.0)),
+            sp.csr_array(step.thin.palm.shape),
+            sp.csr_array(by_muscle * chosen.muscle[first] * (step.thin.muscles.toarray() != 0.0)),
+        )
+        owner = joint_of_column(anchors, joints)
+        before = covering.diffusion.adjoint(slopes.stacked().toarray(), shapes.fields.stacked(), owner)
+        undiffused = slopes.like(sp.csr_array(before))
+        proximity, peak, exponents = shapes.backward(
+            undiffused.turns.toarray(), undiffused.roundings.toarray(), undiffused.muscles.toarray()
+        )
+        inflation = (by_rounding * step.thin.roundings.toarray()).sum(axis=0)
+        return Parameters(inflation, proximity, muscle, peak, exponents, palm)
+
+
+@dataclass(frozen=True, eq=False)
+class _Step:
+    """A forward pass, for its backward one."""
+
+    tape: Any
+    values: Any
+    pose: list[Any]
+    points: Any
+    parameters: Parameters
+    shapes: OperatorKernel | None
+    spread: Fields
+    thin: Fields
+    rows: Rows
+
+
+def _entries(matrix: sp.csr_array, padded: Any) -> NDArray[np.float64]:
+    """Derivatives by the entries of a matrix."""
+    return Padded.of(matrix).sums(_gradient(padded), len(matrix.data))
 
 
 def _gradient(array: Any) -> NDArray[np.float64]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import warnings
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 
 import numpy as np
@@ -13,7 +13,7 @@ from scipy.sparse.linalg import LinearOperator, cg, splu
 
 from warpjld.covering.corners import corner_conductivity
 
-__all__ = ["cotangent_laplacian", "solve", "uniform_laplacian"]
+__all__ = ["Factor", "conducting_laplacian", "cotangent_laplacian", "solve", "uniform_laplacian"]
 
 _DIRECT_LIMIT = 20_000  # vertices up to which a sparse factorisation is quicker than multigrid
 _TOLERANCE = 1e-7  # residual of the iterative solvers, and
@@ -30,8 +30,21 @@ def cotangent_laplacian(
     Cotangents are kept within (0, 1e3): a weight of the wrong sign would let heat run uphill. Around saddle corners
     heat is conducted better, so that weights have no spike there.
     """
-    count = len(vertices)
     conductivity = corner_conductivity(vertices, faces)
+    return _cotangents(vertices, faces, lambda i, j: conductivity)
+
+
+def conducting_laplacian(
+    vertices: NDArray[np.float64], faces: NDArray[np.int32], conductivity: NDArray[np.float64]
+) -> tuple[sp.csr_array, NDArray[np.float64]]:
+    """The same where heat is conducted as well as each vertex says, shape (V,): an edge by the mean of its ends."""
+    return _cotangents(vertices, faces, lambda i, j: (conductivity[i] + conductivity[j]) / 2.0)
+
+
+def _cotangents(
+    vertices: NDArray[np.float64], faces: NDArray[np.int32], conductivity: Callable[[NDArray, NDArray], NDArray]
+) -> tuple[sp.csr_array, NDArray[np.float64]]:
+    count = len(vertices)
     rows, columns, values = [], [], []
     area = np.zeros(count)
     for k in range(3):
@@ -41,7 +54,7 @@ def cotangent_laplacian(
         cotangent = np.clip((u * v).sum(axis=1) / np.maximum(twice, 1e-30), 1e-3, 1e3) / 2.0
         rows += [i, j]
         columns += [j, i]
-        values += [cotangent * conductivity] * 2
+        values += [cotangent * conductivity(i, j)] * 2
         np.add.at(area, apex, twice / 6.0)
     positive = area[area > 0.0]
     # vertices no face uses, and those among faces without area, still belong somewhere
@@ -90,6 +103,20 @@ def solve(matrix: sp.sparray, right: NDArray[np.float64]) -> NDArray[np.float64]
         if np.isfinite(found).all() and (residual <= _ACCEPTED * np.linalg.norm(goal, axis=0) + 1e-300).all():
             return scale[:, None] * found
     return None
+
+
+class Factor:
+    """A symmetric, diagonally dominant matrix, factorised once for many right-hand sides."""
+
+    def __init__(self, matrix: sp.sparray) -> None:
+        self._scale = 1.0 / np.sqrt(matrix.diagonal())
+        scaled = (sp.diags_array(self._scale) @ matrix @ sp.diags_array(self._scale)).tocsc()
+        self._factor = splu(scaled, permc_spec="MMD_AT_PLUS_A", options={"SymmetricMode": True})
+
+    def solve(self, right: NDArray[np.float64]) -> NDArray[np.float64]:
+        """X of A X = B, shape (V, n)."""
+        out: NDArray[np.float64] = self._scale[:, None] * self._factor.solve(self._scale[:, None] * right)
+        return out
 
 
 @contextmanager

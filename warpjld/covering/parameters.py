@@ -16,7 +16,10 @@ from warpjld.suggest import one_of
 from warpjld.text_file import read_json
 from warpjld.whole_file import whole_file
 
-__all__ = ["Parameters", "default_parameters", "load_parameters", "save_parameters"]
+__all__ = ["SHAPES", "Parameters", "default_parameters", "load_parameters", "save_parameters"]
+
+SHAPES = ("proximity", "peak", "exponents")
+"""Parameters that shape the fields on the surface; the others are amplitudes of them."""
 
 # Amplitudes of a 90° joint: a tube of two segments, half as thick as they are long, then keeps its volume within 2 %.
 _INFLATION = 0.21

@@ -12,6 +12,7 @@ from warpjld.covering.binding import STATIONS, Anchors
 from warpjld.covering.drivers import Drivers
 from warpjld.covering.grouping import group
 from warpjld.covering.parameters import Parameters
+from warpjld.covering.rows import Rows, scalar_inputs
 
 __all__ = ["Columns", "Runs", "pack", "pack_runs", "palette"]
 
@@ -102,40 +103,15 @@ def palette(columns: Columns, anchors: Anchors, parameters: Parameters, drivers:
     out[:, : columns.halfway] = drivers.positions.reshape(frames, -1)
     out[:, columns.halfway : columns.rotations] = drivers.halfway.reshape(frames, -1)
     out[:, columns.rotations : columns.flexion_ratio] = drivers.rotations.reshape(frames, -1)
-    out[:, columns.flexion_ratio : columns.palm] = drivers.flexion_ratio
-    if columns.pairs:
-        joints = anchors.ends[anchors.pairs, 0]
-        exponent = parameters.palm[joints].mean(axis=1)
-        out[:, columns.palm : columns.muscles] = np.expm1(-exponent[:, None] * drivers.closing).reshape(frames, -1)
-    ratio = drivers.flexion_ratio
-    out[:, columns.muscles :] = 0.5 * (ratio[:, anchors.ends[:, 0]] + ratio[:, anchors.ends[:, 1]])
+    out[:, columns.flexion_ratio :] = scalar_inputs(anchors, parameters, drivers)
     return out
 
 
-def pack_runs(
-    anchors: Anchors,
-    offset: NDArray[np.float32],
-    rotation: NDArray[np.float32],
-    rounding: NDArray[np.float32],
-    muscle: NDArray[np.float32],
-    joints: int,
-    lanes: int,
-) -> Runs:
-    """Sort vertices into runs of at least ``lanes`` and lay their coefficients out row by row.
-
-    Args:
-        anchors: Places of V vertices.
-        offset: Rest offsets, shape (V, 3).
-        rotation: Weights of the three rotations of every operator, shape (V, 4, 3).
-        rounding: Roundings of the two joints of every operator, shape (V, 4, 2).
-        muscle: Muscle of every operator, shape (V, 4, 3).
-        joints: J of the skeleton.
-        lanes: Vertices in a tile.
-    """
-    columns = Columns(joints, len(anchors.ends), len(anchors.pairs))
-    scalar = _scalar_coefficients(anchors, columns, rotation, rounding)
-    swelling = [_muscle_coefficients(anchors, columns, muscle[..., axis]) for axis in range(3)]
-    return pack(scalar, swelling, offset, columns, lanes)
+def pack_runs(rows: Rows, columns: Columns, lanes: int) -> Runs:
+    """Rows of coefficients as :func:`pack` wants them: by the palette column their input begins at."""
+    place = columns.muscles + np.arange(columns.segments)
+    swelling = [_placed(rows.muscles, place, columns.width, rows.heights[:, axis]) for axis in range(3)]
+    return pack(_by_palette(rows, columns), swelling, rows.offset.astype(np.float32), columns, lanes)
 
 
 def pack(
@@ -203,40 +179,27 @@ def _starts(lengths: NDArray[np.int64]) -> NDArray[np.int64]:
     return np.cumsum(lengths) - lengths
 
 
-def _scalar_coefficients(
-    anchors: Anchors, columns: Columns, rotation: NDArray[np.float32], rounding: NDArray[np.float32]
+def _by_palette(rows: Rows, columns: Columns) -> sp.csr_array:
+    """Coefficients of positions, rotations and scales by the palette column their input begins at, shape (V, width)."""
+    joints = columns.joints
+    parts = (
+        (rows.positions, 3 * np.arange(joints)),
+        (rows.turns, columns.halfway + 4 * np.arange(2 * joints)),
+        (rows.scales, columns.flexion_ratio + np.arange(columns.muscles - columns.flexion_ratio)),
+    )
+    total = sp.csr_array((rows.positions.shape[0], columns.width))
+    for matrix, place in parts:
+        total = total + _placed(matrix, place, columns.width, None)
+    return sp.csr_array(total)
+
+
+def _placed(
+    matrix: sp.csr_array, place: NDArray[np.integer], width: int, factor: NDArray[np.float64] | None
 ) -> sp.csr_array:
-    """Coefficients of joints, rotations and scales by palette column, shape (V, columns.width)."""
-    proximal, distal = anchors.ends[anchors.segment, 0], anchors.ends[anchors.segment, 1]
-    entries: list[tuple[NDArray, NDArray]] = [
-        (3 * proximal, anchors.weight * (1.0 - anchors.ratio)),
-        (3 * distal, anchors.weight * anchors.ratio),
-        (columns.halfway + 4 * proximal, rotation[..., 0]),
-        (columns.rotations + 4 * proximal, rotation[..., 1]),
-        (columns.halfway + 4 * distal, rotation[..., 2]),
-        (columns.flexion_ratio + proximal, rounding[..., 0]),
-        (columns.flexion_ratio + distal, rounding[..., 1]),
-    ]
-    hard = (anchors.rigid >= 0).astype(np.float64)[:, None]
-    joint = np.maximum(anchors.rigid, 0)[:, None]
-    entries += [(3 * joint, hard), (columns.rotations + 4 * joint, hard)]
-    if columns.pairs:
-        low = np.minimum(anchors.station.astype(int), STATIONS - 2)
-        part = anchors.station - low
-        first = columns.palm + STATIONS * anchors.pair + low
-        entries += [(first, anchors.between * (1.0 - part)), (first + 1, anchors.between * part)]
-    return _sparse(entries, len(anchors), columns.width)
-
-
-def _muscle_coefficients(anchors: Anchors, columns: Columns, muscle: NDArray[np.float32]) -> sp.csr_array:
-    return _sparse([(columns.muscles + anchors.segment, muscle)], len(anchors), columns.width)
-
-
-def _sparse(entries: list[tuple[NDArray, NDArray]], rows: int, width: int) -> sp.csr_array:
-    row = np.concatenate([np.repeat(np.arange(rows), c.shape[1]) for c, _ in entries])
-    column = np.concatenate([c.ravel() for c, _ in entries])
-    value = np.concatenate([v.ravel() for _, v in entries]).astype(np.float64)
-    kept = value != 0.0
-    out = sp.coo_array((value[kept], (row[kept], column[kept])), shape=(rows, width)).tocsr()
-    out.sum_duplicates()
+    """A matrix with its columns at other places of a wider one, entries times a factor each."""
+    values = matrix.data.copy() if factor is None else matrix.data * factor
+    # what follows changes arrays in place: none of them may be the matrix's own
+    out = sp.csr_array((values, place[matrix.indices], matrix.indptr.copy()), shape=(matrix.shape[0], width))
+    out.eliminate_zeros()
+    out.sort_indices()
     return out

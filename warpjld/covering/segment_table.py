@@ -61,3 +61,16 @@ class SegmentTable:
         t = np.where(np.abs(t) < SNAP, 0.0, np.where(np.abs(t - 1.0) < SNAP, 1.0, t))
         t = np.where((t < 0.0) & ~self.open_start, 0.0, t)
         return np.where((t > 1.0) & ~self.open_end, 1.0, t)
+
+    def heights(self, points: NDArray[np.float64], segments: NDArray[np.integer]) -> NDArray[np.float64]:
+        """y part of the offset of each point from a segment: (offset · normal) normal [m], shape (n, 3) (R63).
+
+        With the normals of both joints, blended along the segment: hip and knee bend in opposite senses, and half-way
+        along a thigh an interpolated normal would vanish and turn over.
+        """
+        along, start, normals = self.along[segments], self.start[segments], self.normals[segments]
+        offset = points - start
+        place = np.clip((offset * along).sum(axis=1) / (along**2).sum(axis=1), 0.0, 1.0)
+        share = np.stack([1.0 - place, place], axis=1)
+        height = np.einsum("nk,nek->ne", offset, normals)
+        return np.asarray(np.einsum("ne,ne,nek->nk", share, height, normals))

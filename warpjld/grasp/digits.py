@@ -7,6 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from warpjld.covering import Covering
+from warpjld.covering.segment_table import SegmentTable
 from warpjld.errors import InputError
 from warpjld.skeleton import DIGITS, Skeleton
 
@@ -53,7 +54,8 @@ def pad_vertex(covering: Covering, digit: str) -> int:
     on_last = anchors.ends[anchors.segment[rows, strongest], 0] == chain[-1]
     ratio, side = anchors.ratio[rows, strongest], anchors.side[rows, strongest]
     # of vertices alike in ratio the one farthest out on the internal side
-    height = np.linalg.norm(anchors.lift[rows, strongest], axis=1)
+    table = SegmentTable.build(covering.skeleton, anchors.ends)
+    height = np.linalg.norm(table.heights(anchors.rest, anchors.segment[rows, strongest]), axis=1)
     length = np.linalg.norm(np.ptp(covering.surface.vertices[on_last], axis=0))
     cost = np.where(on_last, np.abs(ratio - 0.6) + side - height / length, np.inf)
     return int(cost.argmin())

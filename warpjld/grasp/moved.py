@@ -5,9 +5,11 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
+import scipy.sparse as sp
 from numpy.typing import NDArray
 
 from warpjld.covering import Covering
+from warpjld.covering.binding import STATIONS
 from warpjld.skeleton import Skeleton
 
 __all__ = ["joints_beyond", "share_moved", "skin_beyond", "skin_that_moves"]
@@ -37,7 +39,14 @@ def skin_beyond(covering: Covering, joint: int) -> NDArray[np.int32]:
 
 def skin_that_moves(covering: Covering, joints: Sequence[int]) -> NDArray[np.int32]:
     """Vertices that move at all when joints bend, those of the palm that swell included."""
-    anchors = covering.anchors
+    rows = covering.rows
     beyond = np.any([joints_beyond(covering.skeleton, joint) for joint in joints], axis=0)
-    touched = beyond[anchors.ends[anchors.segment]].any(axis=2)
-    return np.flatnonzero(((anchors.weight > 0.0) & touched).any(axis=1)).astype(np.int32)
+    parents = np.maximum(covering.skeleton.parents, 0)
+    # a halfway rotation turns with its joint's own bone and with the one before
+    inputs = np.concatenate([beyond, beyond | beyond[parents], beyond])
+    ends = beyond[covering.anchors.ends]
+    pairs = ends[covering.anchors.pairs].any(axis=(1, 2)) if len(covering.anchors.pairs) else np.zeros(0, dtype=bool)
+    scales = np.concatenate([beyond, np.repeat(pairs, STATIONS)])
+    read = sp.hstack([rows.positions, rows.turns, rows.scales, rows.muscles], format="csr")
+    moves = np.concatenate([inputs, scales, ends.any(axis=1)])
+    return np.flatnonzero((abs(read) @ moves.astype(np.float64)) > 0.0).astype(np.int32)

@@ -7,12 +7,14 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+import scipy.sparse as sp
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from warpjld.covering import Covering
-from warpjld.covering.device import anchors_on, array_on, parameters_on
+from warpjld.covering.device import array_on
 from warpjld.covering.drivers import flexion_ratio, virtual_lengths
+from warpjld.covering.rows import Padded
 from warpjld.errors import InputError
 from warpjld.skeleton import CHANNELS, Poses, Skeleton
 
@@ -63,47 +65,37 @@ def skin_on(device: Any, coverings: Sequence[Covering]) -> Any:
         InputError: Coverings of different surfaces, or of another method than the smooth one.
     """
     import warp as wp
-    from warpjld_kernels.anchored import pack_coefficients
     from warpjld_kernels.closing_chain import Skin
 
     first = coverings[0]
-    columns: dict[str, list[NDArray]] = {n: [] for n in ("offset", "rotation", "rounding", "muscle")}
     for covering in coverings:
         if covering.skeleton is not first.skeleton or len(covering.anchors) != len(first.anchors):
             raise InputError("coverings: want parameter sets of one surface on one skeleton (with_parameters)")
         if type(covering) is not Covering:
             raise InputError("coverings: searches know the smooth method only; bind with method='smooth'")
-        shape = covering.anchors.weight.shape
-        kinds = {"offset": wp.vec3, "rotation": wp.vec3, "rounding": wp.vec2, "muscle": wp.vec3}
-        sizes = {"offset": shape[0], "rotation": shape, "rounding": shape, "muscle": shape}
-        outs = [wp.empty(sizes[n], dtype=kinds[n], device=device) for n in columns]
-        model = [anchors_on(device, covering.anchors, covering.skeleton.rest)]
-        model.append(parameters_on(device, covering.parameters))
-        wp.launch(pack_coefficients, dim=shape[0], inputs=model, outputs=outs, device=device)
-        for name, out in zip(columns, outs, strict=True):
-            columns[name].append(out.numpy())
+    anchors, joints = first.anchors, len(first.skeleton)
+    rows = [covering.rows for covering in coverings]
+    muscles = sp.vstack([r.muscles for r in rows], format="csr")
+    heights = np.concatenate([r.heights for r in rows])
     skin = Skin()
-    anchors = [covering.anchors for covering in coverings]
-    for name, kind in (("offset", wp.vec3), ("rotation", wp.vec3), ("rounding", wp.vec2), ("muscle", wp.vec3)):
-        setattr(skin, name, array_on(device, np.concatenate(columns[name]), kind))
-    for name, kind in (
-        ("segment", wp.int32),
-        ("weight", float),
-        ("ratio", float),
-        ("pair", wp.int32),
-        ("between", float),
-        ("station", float),
-        ("rigid", wp.int32),
+    for name, padded, kind in (
+        ("position", Padded.of(sp.vstack([r.positions for r in rows], format="csr")), float),
+        ("turn", Padded.of(sp.vstack([r.turns for r in rows], format="csr")), float),
+        ("rounding", Padded.of(sp.vstack([r.scales[:, :joints] for r in rows], format="csr")), float),
+        ("palm", Padded.of(sp.vstack([r.scales[:, joints:] for r in rows], format="csr")), float),
+        ("muscle", Padded.of(muscles, muscles.data[:, None] * heights), wp.vec3),
     ):
-        setattr(skin, name, array_on(device, np.concatenate([getattr(a, name) for a in anchors]), kind))
-    skin.ends = array_on(device, anchors[0].ends, wp.int32)
+        setattr(skin, f"{name}_input", array_on(device, padded.column, wp.int32))
+        setattr(skin, name, array_on(device, padded.value, kind))
+    skin.offset = array_on(device, np.concatenate([r.offset for r in rows]), wp.vec3)
+    skin.ends = array_on(device, anchors.ends, wp.int32)
     skin.parents = array_on(device, first.skeleton.parents, wp.int32)
-    pairs = anchors[0].pairs if len(anchors[0].pairs) else np.zeros((1, 2), np.int32)
+    pairs = anchors.pairs if len(anchors.pairs) else np.zeros((1, 2), np.int32)
     skin.pairs = array_on(device, pairs, wp.int32)
-    skin.across = array_on(device, virtual_lengths(anchors[0].ends, pairs, first.skeleton.rest[None])[0], float)
-    proximal = anchors[0].ends[pairs, 0]
-    skin.palm = array_on(device, np.stack([c.parameters.palm[proximal].mean(axis=1) for c in coverings]), float)
-    skin.vertices = len(anchors[0])
+    skin.across = array_on(device, virtual_lengths(anchors.ends, pairs, first.skeleton.rest[None])[0], float)
+    proximal = anchors.ends[pairs, 0]
+    skin.exponent = array_on(device, np.stack([c.parameters.palm[proximal].mean(axis=1) for c in coverings]), float)
+    skin.vertices = len(anchors)
     return skin
 
 

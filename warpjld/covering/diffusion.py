@@ -1,0 +1,159 @@
+"""Fields smoothed over the surface on the scale of its thickness: bending needs room.
+
+The skin on the inside of a joint shortens by about r θ, r the limb's thickness there and θ the angle, so a transition
+narrower than r folds, however long the segments are. Proximities are shares of a segment's length and know nothing of
+r; a step of heat does:
+
+    (A + L_τ) X = A X₀,   τ = (β r)²
+
+with A the vertices' areas and L_τ the cotangent Laplacian, each edge conducting by the mean τ of its ends. It is taken
+in two steps of τ / 2, whose tails are shorter than those of one. Constants stay as they are, so rows still sum to one,
+and nothing jumps that did not jump before. Heat runs over the surface, never through space: fingers side by side are
+far from each other.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+import scipy.sparse as sp
+from numpy.typing import NDArray
+from scipy.sparse.csgraph import dijkstra
+
+from warpjld.covering.heat import Factor, conducting_laplacian, uniform_laplacian
+
+__all__ = ["BETA", "Diffusion"]
+
+BETA = 0.5
+"""Reach of the heat as a share of the thickness. Of .3, .5, .6 and .7, over the hands and bodies of
+``tests/benchmarks/skin.py``: .3 leaves roughness behind at knuckles and shoulders, beyond .5 hips are stretched more
+than blend skinning does and volume falls."""
+
+_STEPS = 2
+_FAR = 8.0  # lengths of decay beyond which a field is not followed: less is left of it than the threshold takes away
+_SHARED = 1.6  # joints share a factorisation where it grows by no more than this over the largest one's
+_ALL = 3_000  # vertices up to which all joints share one
+
+
+@dataclass(frozen=True, eq=False)
+class Diffusion:
+    """Heat on a surface of V vertices.
+
+    Attributes:
+        vertices: Rest positions [m], shape (V, 3).
+        faces: Triangles, shape (T, 3).
+        radius: Thickness at each vertex [m], shape (V,).
+        flesh: Vertices that take part, shape (n,); ``vertices`` … are of these only, and others keep their fields.
+    """
+
+    vertices: NDArray[np.float64]
+    faces: NDArray[np.int32]
+    radius: NDArray[np.float64]
+    flesh: NDArray[np.int64]
+
+    @cached_property
+    def _system(self) -> tuple[sp.csr_array, NDArray[np.float64], sp.csr_array]:
+        """A + L of a single step, A, and the edges' lengths in lengths of decay."""
+        tau = (BETA * self.radius) ** 2 / _STEPS
+        laplacian, area = conducting_laplacian(self.vertices, self.faces, tau)
+        edges = sp.triu(uniform_laplacian(self.faces, len(self.vertices)), 1).tocoo()
+        i, j = edges.coords
+        length = np.linalg.norm(self.vertices[i] - self.vertices[j], axis=1)
+        decay = length / np.sqrt(np.maximum((tau[i] + tau[j]) / 2.0, 1e-30))
+        graph = sp.coo_array((np.maximum(decay, 1e-9), (i, j)), shape=edges.shape).tocsr()
+        return sp.csr_array(sp.diags_array(area) + laplacian), area, graph
+
+    def spread(self, fields: sp.csr_array, owner: NDArray[np.int64]) -> sp.csr_array:
+        """Fields (all vertices, columns) after diffusion; those of one ``owner`` lie in one place, shape (columns,)."""
+        columns = fields.tocsc()
+        present = np.flatnonzero(np.diff(columns.indptr))
+        rows, places, values = [], [], []
+        hard = np.setdiff1d(np.arange(fields.shape[0]), self.flesh)
+        kept = fields[hard].tocoo()
+        rows.append(hard[kept.coords[0]])
+        places.append(kept.coords[1])
+        values.append(kept.data)
+        for members, where, factor in self._clusters(columns, present, owner):
+            dense = columns[:, members].tocsr()[self.flesh[where]].toarray()
+            out = self._solved(factor, where, dense)
+            row, column = np.nonzero(out)
+            rows.append(self.flesh[where[row]])
+            places.append(members[column])
+            values.append(out[row, column])
+        index = (np.concatenate(rows), np.concatenate(places))
+        return sp.coo_array((np.concatenate(values), index), shape=fields.shape).tocsr()
+
+    def adjoint(
+        self, slopes: NDArray[np.float64], fields: sp.csr_array, owner: NDArray[np.int64]
+    ) -> NDArray[np.float64]:
+        """Derivatives by ``fields`` of a number whose derivatives by ``spread(fields)`` are given, both dense."""
+        columns = fields.tocsc()
+        present = np.flatnonzero(np.diff(columns.indptr))
+        out = slopes.copy()
+        out[self.flesh] = 0.0
+        for members, where, factor in self._clusters(columns, present, owner):
+            area, rows = self._system[1], self.flesh[where]
+            part = slopes[np.ix_(rows, members)]
+            for _ in range(_STEPS):  # S = (A + L)⁻¹ A, so Sᵀ = A (A + L)⁻¹
+                part = area[where, None] * factor.solve(part)
+            out[np.ix_(rows, members)] = part
+        return out
+
+    def _solved(self, factor: Factor, where: NDArray[np.int64], dense: NDArray[np.float64]) -> NDArray[np.float64]:
+        area = self._system[1][where, None]
+        for _ in range(_STEPS):
+            dense = factor.solve(area * dense)
+        return dense
+
+    def _clusters(
+        self, columns: sp.csc_array, present: NDArray[np.int64], owner: NDArray[np.int64]
+    ) -> list[tuple[NDArray[np.int64], NDArray[np.int64], Factor]]:
+        """Columns, the vertices (of the flesh) they are followed on, and the system there."""
+        key = present.tobytes()
+        if key not in self._cache:
+            self._cache[key] = self._find_clusters(columns, present, owner)
+        return self._cache[key]
+
+    @cached_property
+    def _cache(self) -> dict[bytes, list[tuple[NDArray[np.int64], NDArray[np.int64], Factor]]]:
+        return {}
+
+    def _find_clusters(
+        self, columns: sp.csc_array, present: NDArray[np.int64], owner: NDArray[np.int64]
+    ) -> list[tuple[NDArray[np.int64], NDArray[np.int64], Factor]]:
+        count = len(self.flesh)
+        if not count:
+            return []
+        matrix, _, graph = self._system
+        if count <= _ALL:
+            return [(present, np.arange(count), Factor(matrix))]
+        number = np.full(columns.shape[0], -1)
+        number[self.flesh] = np.arange(count)
+        groups: list[tuple[list[int], NDArray[np.bool_], int]] = []
+        for joint in np.unique(owner[present]).tolist():
+            mine = present[owner[present] == joint]
+            touched = np.unique(np.concatenate([columns.indices[columns.indptr[c] : columns.indptr[c + 1]] for c in mine]))
+            touched = number[touched]
+            touched = touched[touched >= 0]
+            reached = np.zeros(count, dtype=bool)
+            if touched.size:
+                reached = dijkstra(graph, directed=False, indices=touched, min_only=True, limit=_FAR) < np.inf
+            size = int(reached.sum())
+            # with the group that grows least, if that pays
+            best, best_size = -1, 0
+            for g, (_, mask, largest) in enumerate(groups):
+                together = int((mask | reached).sum())
+                if together <= _SHARED * max(largest, size) and (best < 0 or together - mask.sum() < best_size):
+                    best, best_size = g, together - int(mask.sum())
+            if best < 0:
+                groups.append((mine.tolist(), reached, size))
+            else:
+                members, mask, largest = groups[best]
+                groups[best] = (members + mine.tolist(), mask | reached, max(largest, size))
+        out = []
+        for members, mask, _ in groups:
+            where = np.flatnonzero(mask)
+            out.append((np.sort(np.array(members)), where, Factor(matrix[where][:, where])))
+        return out

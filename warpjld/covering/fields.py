@@ -1,0 +1,165 @@
+"""Coefficients of the covering formula as fields on the surface: one number for each vertex and each pose input.
+
+    S' = Σ c_j J_j' + rot(normalise(Σ w_k q_k), (1 + Σ g_i f_i) d + Σ m_s f_s h_s),  d = S − Σ c_j J_j
+
+with positions J', rotations q and flexion ratios f of a pose, and the height h_s of a vertex over a segment. Being
+fields they can be smoothed and thinned out before they are used, whatever they were made from; d is taken from what is
+left of c, so that the rest pose stays exact.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import scipy.sparse as sp
+from numpy.typing import NDArray
+
+from warpjld.covering.binding import STATIONS, Anchors
+from warpjld.covering.device import array_on, checked_device
+from warpjld.covering.parameters import Parameters
+
+__all__ = ["Fields", "OperatorKernel", "joint_of_column", "operator_fields"]
+
+_KINDS = ("positions", "turns", "roundings", "palm", "muscles")
+
+
+@dataclass(frozen=True, eq=False)
+class Fields:
+    """Sparse coefficients of V vertices. The joints' amplitudes are not in them.
+
+    Attributes:
+        positions: Of the joints' positions, shape (V, J); rows sum to one.
+        turns: Of the J halfway rotations, then of the J bones' rotations, shape (V, 2 J); rows sum to one.
+        roundings: Of the joints' flexion ratios, shape (V, J).
+        palm: Of the palm pairs' thickening at their stations, shape (V, N · STATIONS).
+        muscles: Of the segments' muscles, shape (V, S).
+    """
+
+    positions: sp.csr_array
+    turns: sp.csr_array
+    roundings: sp.csr_array
+    palm: sp.csr_array
+    muscles: sp.csr_array
+
+    def stacked(self) -> sp.csr_array:
+        """All fields side by side, in the order of the attributes."""
+        return sp.csr_array(sp.hstack([getattr(self, kind) for kind in _KINDS], format="csr"))
+
+    def like(self, stacked: sp.csr_array) -> Fields:
+        """Other fields, laid out as these are, from all of them side by side."""
+        ends = np.cumsum([getattr(self, kind).shape[1] for kind in _KINDS])
+        columns = stacked.tocsc()
+        return Fields(*(columns[:, a:b].tocsr() for a, b in zip([0, *ends[:-1]], ends, strict=True)))
+
+    def offsets(self, rest: NDArray[np.float64], joints: NDArray[np.float64]) -> NDArray[np.float64]:
+        """d of every vertex [m], shape (V, 3), from rest positions of the vertices and of the joints."""
+        return np.asarray(rest - self.positions @ joints)
+
+
+def joint_of_column(anchors: Anchors, joints: int) -> NDArray[np.int64]:
+    """The joint that each column of all fields side by side belongs to: fields of one joint lie in one place."""
+    own = np.arange(joints)
+    pairs = anchors.ends[anchors.pairs[:, 0], 0] if len(anchors.pairs) else np.zeros(0, dtype=np.int64)
+    return np.concatenate([own, own, own, own, np.repeat(pairs, STATIONS), anchors.ends[:, 0]]).astype(np.int64)
+
+
+def operator_fields(anchors: Anchors, parameters: Parameters) -> Fields:
+    """The fields as the operators give them, from the vertices' places on their segments."""
+    return OperatorKernel(anchors, parameters).fields
+
+
+class OperatorKernel:
+    """Fields of the operators, and what derivatives by them mean for the parameters.
+
+    Attributes:
+        fields: As :func:`operator_fields` gives them.
+    """
+
+    def __init__(self, anchors: Anchors, parameters: Parameters, *, requires_grad: bool = False) -> None:
+        import warp as wp
+        from warpjld_kernels import operator_fields as kernels
+
+        device = checked_device("cpu")
+        self._anchors = anchors
+        shape = anchors.weight.shape
+        self._out = [
+            wp.empty(shape, dtype=kind, device=device, requires_grad=requires_grad)
+            for kind in (wp.vec3, wp.vec2, float)
+        ]
+        places = [("ends", wp.int32), ("muscle", float), ("segment", wp.int32), ("weight", float), ("ratio", float)]
+        self._inputs = [array_on(device, getattr(anchors, n), kind) for n, kind in (*places, ("side", float))]
+        self._values = [
+            array_on(device, a, float, requires_grad=requires_grad)
+            for a in (parameters.proximity, parameters.peak, parameters.exponents)
+        ]
+        self._tape = wp.Tape()
+        launch = {"dim": shape, "inputs": [*self._inputs, *self._values], "outputs": self._out, "device": device}
+        if requires_grad:
+            with self._tape:
+                wp.launch(kernels.operator_fields, **launch)
+        else:
+            wp.launch(kernels.operator_fields, **launch)
+        self._layout(len(parameters.inflation))
+
+    def _layout(self, joints: int) -> None:
+        anchors = self._anchors
+        turn, rounding, muscle = (a.numpy() for a in self._out)
+        proximal, distal = anchors.ends[anchors.segment, 0], anchors.ends[anchors.segment, 1]
+        hard = (anchors.rigid >= 0).astype(np.float64)[:, None]
+        follows = np.maximum(anchors.rigid, 0)[:, None]
+        positions = [
+            (proximal, anchors.weight * (1.0 - anchors.ratio)),
+            (distal, anchors.weight * anchors.ratio),
+            (follows, hard),
+        ]
+        self._turn_columns = (proximal, joints + proximal, distal)
+        turns = [*((c, turn[..., k]) for k, c in enumerate(self._turn_columns)), (joints + follows, hard)]
+        self._rounding_columns = (proximal, distal)
+        roundings = [(c, rounding[..., k]) for k, c in enumerate(self._rounding_columns)]
+        low = np.minimum(anchors.station.astype(int), STATIONS - 2)
+        part = anchors.station - low
+        first = STATIONS * anchors.pair + low
+        palm = [(first, anchors.between * (1.0 - part)), (first + 1, anchors.between * part)]
+        vertices = len(anchors)
+        self.fields = Fields(
+            _sparse(positions, vertices, joints),
+            _sparse(turns, vertices, 2 * joints),
+            _sparse(roundings, vertices, joints),
+            _sparse(palm if len(anchors.pairs) else [], vertices, STATIONS * len(anchors.pairs)),
+            _sparse([(anchors.segment, muscle)], vertices, len(anchors.ends)),
+        )
+
+    def backward(
+        self, turns: NDArray[np.float64], roundings: NDArray[np.float64], muscles: NDArray[np.float64]
+    ) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
+        """Derivatives by proximity (J, 2), peak (J,) and exponents (J, 2) of a number whose derivatives by the fields
+        of turns (V, 2 J), roundings (V, J) and muscles (V, S) are given. Wants ``requires_grad``."""
+        import warp as wp
+
+        rows = np.arange(len(self._anchors))[:, None]
+        adjoints = [
+            np.stack([turns[rows, c] for c in self._turn_columns], axis=-1),
+            np.stack([roundings[rows, c] for c in self._rounding_columns], axis=-1),
+            muscles[rows, self._anchors.segment],
+        ]
+        self._tape.zero()
+        seeds = {
+            out: wp.array(np.ascontiguousarray(a, dtype=np.float32), dtype=out.dtype, device="cpu")
+            for out, a in zip(self._out, adjoints, strict=True)
+        }
+        self._tape.backward(grads=seeds)
+        proximity, peak, exponents = (a.grad.numpy().astype(np.float64) for a in self._values)
+        return proximity, peak, exponents
+
+
+def _sparse(entries: list[tuple[NDArray, NDArray]], rows: int, width: int) -> sp.csr_array:
+    if not entries or not width:
+        return sp.csr_array((rows, width))
+    row = np.concatenate([np.repeat(np.arange(rows), c.shape[1]) for c, _ in entries])
+    column = np.concatenate([c.ravel() for c, _ in entries])
+    value = np.concatenate([v.ravel() for _, v in entries]).astype(np.float64)
+    kept = value != 0.0
+    out = sp.coo_array((value[kept], (row[kept], column[kept])), shape=(rows, width)).tocsr()
+    out.sum_duplicates()
+    return out

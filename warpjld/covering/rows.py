@@ -1,0 +1,151 @@
+"""What the kernels read of a vertex: a row of coefficients for each kind of pose input, with all amplitudes in it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import scipy.sparse as sp
+from numpy.typing import NDArray
+
+from warpjld.covering.binding import STATIONS, Anchors
+from warpjld.covering.device import array_on
+from warpjld.covering.drivers import Drivers
+from warpjld.covering.fields import Fields
+from warpjld.covering.parameters import Parameters
+from warpjld.covering.segment_table import SegmentTable
+from warpjld.skeleton.tree import Skeleton
+
+__all__ = ["Padded", "Rows", "palm_exponents", "pose_on", "rows_of", "rows_on", "scalar_inputs"]
+
+
+@dataclass(frozen=True, eq=False)
+class Rows:
+    """Coefficients of V vertices.
+
+    Attributes:
+        positions: Of the joints' positions, shape (V, J).
+        turns: Of the halfway rotations and the bones' rotations, shape (V, 2 J).
+        scales: Of the flexion ratios and of the palm pairs' thickening, shape (V, J + N · STATIONS).
+        muscles: Of the segments' muscles, shape (V, S), without
+        heights: the vector that each entry of ``muscles`` scales [m], shape (entries, 3).
+        offset: d [m], shape (V, 3).
+    """
+
+    positions: sp.csr_array
+    turns: sp.csr_array
+    scales: sp.csr_array
+    muscles: sp.csr_array
+    heights: NDArray[np.float64]
+    offset: NDArray[np.float64]
+
+
+def rows_of(fields: Fields, skeleton: Skeleton, anchors: Anchors, parameters: Parameters) -> Rows:
+    """Rows of diffused and thinned fields with these amplitudes (R58–R65).
+
+    Roundings scale with the inflation of their joint, muscles with that of the joint where the segment begins.
+    """
+    muscles = sp.csr_array(fields.muscles @ sp.diags_array(parameters.muscle[anchors.ends[:, 0]]))
+    muscles.eliminate_zeros()
+    roundings = fields.roundings @ sp.diags_array(parameters.inflation)
+    table = SegmentTable.build(skeleton, anchors.ends)
+    vertex = np.repeat(np.arange(muscles.shape[0]), np.diff(muscles.indptr))
+    return Rows(
+        fields.positions,
+        fields.turns,
+        sp.csr_array(sp.hstack([roundings, fields.palm], format="csr")),
+        muscles,
+        table.heights(anchors.rest[vertex], muscles.indices),
+        fields.offsets(anchors.rest, skeleton.rest),
+    )
+
+
+def scalar_inputs(anchors: Anchors, parameters: Parameters, drivers: Drivers) -> NDArray[np.float64]:
+    """Flexion ratios, thickening of the palm pairs (λ^(−k) − 1, C3) and drive of the segments' muscles of every frame,
+    shape (F, J + N · STATIONS + S). Each of a segment's joints drives half of its muscle (R63)."""
+    ratio = drivers.flexion_ratio
+    driven = 0.5 * (ratio[:, anchors.ends[:, 0]] + ratio[:, anchors.ends[:, 1]])
+    return np.concatenate([ratio, palm_thickening(anchors, parameters, drivers), driven], axis=1)
+
+
+def palm_thickening(anchors: Anchors, parameters: Parameters, drivers: Drivers) -> NDArray[np.float64]:
+    """λ^(−k) − 1 of every palm pair at its stations, shape (F, N · STATIONS) (R44, C3)."""
+    frames = len(drivers.positions)
+    if not len(anchors.pairs):
+        return np.zeros((frames, 0))
+    thickening = np.expm1(-palm_exponents(anchors, parameters)[:, None] * drivers.closing)
+    return np.asarray(thickening.reshape(frames, len(anchors.pairs) * STATIONS))
+
+
+def palm_exponents(anchors: Anchors, parameters: Parameters) -> NDArray[np.float64]:
+    """k of every palm pair: the mean of those of the joints where its segments begin, shape (N,)."""
+    return np.asarray(parameters.palm[anchors.ends[anchors.pairs, 0]].mean(axis=1))
+
+
+@dataclass(frozen=True, eq=False)
+class Padded:
+    """A sparse matrix as two arrays of one width; rows end with zeros.
+
+    Attributes:
+        column: Shape (V, K).
+        value: Shape (V, K) or (V, K, 3).
+        entry: Place of each value among the matrix's entries, -1 for the zeros, shape (V, K).
+    """
+
+    column: NDArray[np.int32]
+    value: NDArray[np.float64]
+    entry: NDArray[np.int64]
+
+    @staticmethod
+    def of(matrix: sp.csr_array, values: NDArray[np.float64] | None = None) -> Padded:
+        """Of a matrix, with other values than its own in the place of its entries if given."""
+        length = np.diff(matrix.indptr)
+        width = max(int(length.max(initial=0)), 1)
+        inside = np.arange(width) < length[:, None]
+        entry = np.full(inside.shape, -1, dtype=np.int64)
+        entry[inside] = np.arange(len(matrix.data))
+        column = np.zeros(inside.shape, dtype=np.int32)
+        column[inside] = matrix.indices
+        data = matrix.data if values is None else values
+        value = np.zeros((*inside.shape, *data.shape[1:]))
+        value[inside] = data
+        return Padded(column, value, entry)
+
+    def sums(self, slopes: NDArray[np.float64], size: int) -> NDArray[np.float64]:
+        """Numbers laid out as ``value`` back in the order of the matrix's entries, shape (size, …)."""
+        out = np.zeros((size, *slopes.shape[2:]))
+        out[self.entry[self.entry >= 0]] = slopes[self.entry >= 0]
+        return out
+
+
+def rows_on(device: Any, rows: Rows, *, requires_grad: bool = False) -> Any:
+    """``warpjld_kernels.rows.Rows`` on a device."""
+    import warp as wp
+    from warpjld_kernels import rows as kernels
+
+    out = kernels.Rows()
+    vectors = rows.muscles.data[:, None] * rows.heights
+    scalars = rows.scales.shape[1]
+    for name, padded, kind, shift in (
+        ("position", Padded.of(rows.positions), float, 0),
+        ("turn", Padded.of(rows.turns), float, 0),
+        ("scale", Padded.of(rows.scales), float, 0),
+        ("muscle", Padded.of(rows.muscles, vectors), wp.vec3, scalars),
+    ):
+        setattr(out, f"{name}_input", array_on(device, padded.column + shift, wp.int32))
+        setattr(out, name, array_on(device, padded.value, kind, requires_grad=requires_grad))
+    out.offset = array_on(device, rows.offset, wp.vec3)
+    return out
+
+
+def pose_on(
+    device: Any, anchors: Anchors, parameters: Parameters, drivers: Drivers, *, requires_grad: bool = False
+) -> list[Any]:
+    """Pose arguments of ``deform_rows``, in its order."""
+    import warp as wp
+
+    turns = np.concatenate([drivers.halfway, drivers.rotations], axis=1)
+    scalars = scalar_inputs(anchors, parameters, drivers)
+    values = ((drivers.positions, wp.vec3), (turns, wp.quat), (scalars, float))
+    return [array_on(device, a, kind, requires_grad=requires_grad) for a, kind in values]

@@ -1,0 +1,57 @@
+"""Short rows: what is left of diffused fields once their faint ends are taken away, without a jump."""
+
+from __future__ import annotations
+
+import numpy as np
+import scipy.sparse as sp
+from numpy.typing import NDArray
+
+from warpjld.covering.fields import Fields
+
+__all__ = ["THRESHOLD", "thinned", "thinned_slope"]
+
+THRESHOLD = 0.01
+"""What every coefficient is drawn towards zero by. A larger one makes rows shorter and evaluation quicker, but where
+many fields overlap, as in a shoulder, .03 is seen: it takes a fifth of the smoothness that diffusion gave."""
+
+
+def thinned(fields: Fields) -> Fields:
+    """x ← sign(x) max(|x| − ``THRESHOLD``, 0); rows of positions and rotations are scaled back to a sum of one."""
+    return Fields(
+        _summing_to_one(fields.positions),
+        _summing_to_one(fields.turns),
+        _shrunk(fields.roundings),
+        _shrunk(fields.palm),
+        _shrunk(fields.muscles),
+    )
+
+
+def thinned_slope(
+    turns: sp.csr_array, thin: sp.csr_array, slope: NDArray[np.float64]
+) -> NDArray[np.float64]:
+    """Derivatives by rotations' weights before thinning, from those by the weights ``thin`` after it, both dense.
+
+    w = t / Σ t with t the shrunk weights, so dw/dt = (1 − w Σ) / Σ t where t is left at all.
+    """
+    left = thin.toarray()
+    total = np.asarray(_shrunk(turns).sum(axis=1))[:, None]
+    kept = left != 0.0
+    mean = (slope * left).sum(axis=1, keepdims=True)
+    return np.where(kept, (slope - mean) / total, 0.0)
+
+
+def _shrunk(fields: sp.csr_array) -> sp.csr_array:
+    out = fields.copy()
+    out.data = np.sign(out.data) * np.maximum(np.abs(out.data) - THRESHOLD, 0.0)
+    out.eliminate_zeros()
+    return out
+
+
+def _summing_to_one(fields: sp.csr_array) -> sp.csr_array:
+    """Rows that hold nothing but faint entries, as of more joints than any skeleton has in one place, stay as they
+    are."""
+    thin = _shrunk(fields)
+    total = np.asarray(thin.sum(axis=1)).ravel()
+    if (total < THRESHOLD).any():
+        return fields
+    return sp.csr_array(sp.diags_array(1.0 / total) @ thin)
