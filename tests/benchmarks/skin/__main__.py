@@ -1,6 +1,7 @@
 """How skin looks by measure: every rig × pose × method, one table.
 
     python -m tests.benchmarks.skin [--rigs godot_low,webxr] [--poses curl] [--methods lbs,ours] [--csv FILE]
+        [--sheet DIR]
 
 Names may be cut short (``curl`` is all curls, ``shoulder_150`` all of them). Without options everything is run but the
 calibrated covering (--calibrated).
@@ -16,12 +17,15 @@ from dataclasses import astuple, fields
 from pathlib import Path
 
 import click
+import numpy as np
 import warp
+from numpy.typing import NDArray
 
 from tests.benchmarks.skin.measures import Measured, Measuring
 from tests.benchmarks.skin.methods import METHODS, Deform
 from tests.benchmarks.skin.poses import POSES, pose
 from tests.benchmarks.skin.rigs import RIGS, load
+from tests.benchmarks.skin.sheet import draw_sheet
 
 _COLUMNS = ("rig", "pose", "method", *(f.name for f in fields(Measured)), "ms")
 
@@ -31,8 +35,9 @@ _COLUMNS = ("rig", "pose", "method", *(f.name for f in fields(Measured)), "ms")
 @click.option("--poses", default="", help=f"Of {', '.join(POSES)}.")
 @click.option("--methods", default="", help=f"Of {', '.join(METHODS)}.")
 @click.option("--calibrated", is_flag=True, help="Calibrate too (minutes a rig).")
+@click.option("--sheet", "sheets", type=click.Path(path_type=Path), help="Draw a sheet of every rig into this folder.")
 @click.option("--csv", "csv_file", type=click.Path(path_type=Path), help="Write the table there too.")
-def main(rigs: str, poses: str, methods: str, calibrated: bool, csv_file: Path | None) -> None:
+def main(rigs: str, poses: str, methods: str, calibrated: bool, sheets: Path | None, csv_file: Path | None) -> None:
     """Print the table in Markdown."""
     warp.config.quiet = True
     chosen = [m for m in _chosen("methods", methods, METHODS) if methods or m != "calibrated"]
@@ -53,6 +58,7 @@ def main(rigs: str, poses: str, methods: str, calibrated: bool, csv_file: Path |
             deform = METHODS[method](bench)
             if deform is not None:
                 ready[method] = deform
+        drawn: dict[str, list[NDArray[np.floating]]] = {}
         for pose_name in wanted:
             posed = pose(pose_name, bench.rig.skeleton)
             if posed is None:
@@ -64,6 +70,9 @@ def main(rigs: str, poses: str, methods: str, calibrated: bool, csv_file: Path |
                 took = 1e3 * (time.perf_counter() - start)
                 rows.append((name, pose_name, method, *astuple(measuring.measure(points, posed)), took))
                 _print_row(rows[-1])
+                drawn.setdefault(pose_name, []).append(points)
+        if sheets is not None and drawn:
+            draw_sheet(bench, list(ready), drawn, sheets)
     if csv_file is not None:
         with csv_file.open("w", newline="") as out:
             csv.writer(out).writerows([_COLUMNS, *rows])

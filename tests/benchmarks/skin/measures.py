@@ -98,10 +98,9 @@ class Measuring:
         """Widths at joints in the bisecting plane: along the flexion normal and the flexion axis, shape (N, 2)."""
         skeleton = self.bench.rig.skeleton
         out = np.full((len(joints), 2), np.nan)
+        corners = points[self.flesh]
         for row, j in enumerate(joints):
             parent = int(skeleton.parents[j])
-            near = np.isin(self.owner, [j, parent])
-            corners = points[self.flesh[near[self.flesh].any(axis=1)]]
             centre = skeleton.rest[j] if poses is None else poses.positions[0, j]
             directions = np.stack([np.cross(skeleton.directions[j], skeleton.axes[j]), skeleton.axes[j]])
             if poses is not None:

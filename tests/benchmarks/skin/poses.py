@@ -62,7 +62,11 @@ _BY_ANGLES: dict[str, tuple[Angles, tuple[str, ...]]] = {
         (),
     ),
     "hook": (
-        {f"{f}.{joint}": {"flexion": angle} for f in _FINGERS for joint, angle in zip(_PHALANGES[1:], (90.0, 60.0))},
+        {
+            f"{f}.{joint}": {"flexion": angle}
+            for f in _FINGERS
+            for joint, angle in zip(_PHALANGES[1:], (90.0, 60.0), strict=True)
+        },
         (),
     ),
     "point": ({**_curl(0.8, ("pinky", "ring", "middle")), **_THUMB_OPPOSED, **_THUMB_IN}, ()),
@@ -94,7 +98,7 @@ def _turn(axis: NDArray[np.float64], degrees: float) -> NDArray[np.float64]:
 
 
 def _arm(sideways: bool, raised: float, clavicle: float) -> Callable[[Skeleton, _Facing], Turns]:
-    """The left upper arm at an elevation from hanging, in the body's frontal or sagittal plane, whatever it rests at."""
+    """The left upper arm raised from hanging in the body's frontal or sagittal plane, whatever it rests at."""
 
     def turns(skeleton: Skeleton, facing: _Facing) -> Turns:
         names = skeleton.names
