@@ -61,6 +61,8 @@ class Measuring:
         self.dihedral = dihedral_angles(self.rest, self.faces)
         self.crossing = _keys(crossing_faces(self.rest, self.faces).pairs, len(self.faces))
         self.volume = enclosed_volume(self.rest, self.flesh)
+        palms = [f for f, fan in enumerate(bench.covering.fans) if fan.name.endswith("palm")]
+        self.palm = np.isin(bench.covering.domains.argmax(axis=1), palms)
         # the segment whose operator holds most of a vertex
         self.owner = np.array([fan.segments[0].proximal for fan in bench.covering.fans])[
             bench.covering.domains.argmax(axis=1)
@@ -98,9 +100,12 @@ class Measuring:
         """Widths at joints in the bisecting plane: along the flexion normal and the flexion axis, shape (N, 2)."""
         skeleton = self.bench.rig.skeleton
         out = np.full((len(joints), 2), np.nan)
-        corners = points[self.flesh]
         for row, j in enumerate(joints):
             parent = int(skeleton.parents[j])
+            near = np.isin(self.owner, [j, parent])
+            if skeleton.names[parent].endswith("wrist"):
+                near |= self.palm  # its one operator holds all metacarpals
+            corners = points[self.flesh[near[self.flesh].any(axis=1)]]
             centre = skeleton.rest[j] if poses is None else poses.positions[0, j]
             directions = np.stack([np.cross(skeleton.directions[j], skeleton.axes[j]), skeleton.axes[j]])
             if poses is not None:
