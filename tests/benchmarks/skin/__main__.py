@@ -18,7 +18,6 @@ from pathlib import Path
 
 import click
 import numpy as np
-import warp
 from numpy.typing import NDArray
 
 from tests.benchmarks.skin.measures import Measured, Measuring
@@ -26,6 +25,7 @@ from tests.benchmarks.skin.methods import METHODS, Deform
 from tests.benchmarks.skin.poses import POSES, pose
 from tests.benchmarks.skin.rigs import RIGS, load
 from tests.benchmarks.skin.sheet import draw_sheet
+from warpjld.quiet import silence_warp
 
 _COLUMNS = ("rig", "pose", "method", *(f.name for f in fields(Measured)), "ms")
 
@@ -39,7 +39,7 @@ _COLUMNS = ("rig", "pose", "method", *(f.name for f in fields(Measured)), "ms")
 @click.option("--csv", "csv_file", type=click.Path(path_type=Path), help="Write the table there too.")
 def main(rigs: str, poses: str, methods: str, calibrated: bool, sheets: Path | None, csv_file: Path | None) -> None:
     """Print the table in Markdown."""
-    warp.config.quiet = True
+    silence_warp()
     chosen = [m for m in _chosen("methods", methods, METHODS) if methods or m != "calibrated"]
     if calibrated and "calibrated" not in chosen:
         chosen.append("calibrated")

@@ -72,6 +72,7 @@ class Measuring:
         """Of one surface, shape (V, 3)."""
         moved = np.asarray(points, dtype=np.float64)
         stretch = edge_stretch(self.rest, moved, self.edges)
+        low, high = np.percentile(stretch, [0.5, 99.5])
         limb = self.flesh[np.isin(self.owner, posed.limb)[self.flesh].all(axis=1)]
         pairs = crossing_faces(moved, self.faces).pairs
         pairs = pairs[~np.isin(_keys(pairs, len(self.faces)), self.crossing)]
@@ -81,7 +82,8 @@ class Measuring:
             if len(limb)
             else float("nan"),
             float(stretch.min()),
-            *(float(q) for q in np.percentile(stretch, [0.5, 99.5])),
+            float(low),
+            float(high),
             float(stretch.max()),
             *fold_kinds(pairs, self.bench.parts, self.bench.rig.skeleton),
             roughness(self.dihedral, dihedral_angles(moved, self.faces)),
