@@ -173,6 +173,13 @@ def test_what_is_rigid_stays() -> None:
     assert abs(found.follow - np.eye(len(vertices))).max() == 0.0
 
 
+def test_a_small_shell_of_many_vertices_has_short_rows() -> None:
+    vertices, faces, piece = together(FINGER, pipe(0.0088, -0.012, -0.015, rings=30, around=60))
+    found = shells(vertices, faces, LINES)
+    assert whole_of(found, piece).tolist() == [False, True]
+    assert np.diff(found.follow.indptr).max() <= 48
+
+
 def test_a_suit_larger_than_the_body_is_no_body() -> None:
     vertices, faces, piece = together(FINGER, pipe(0.012, 0.01, -0.07))
     found = shells(vertices, faces, LINES)

@@ -25,6 +25,7 @@ _RAYS = 8  # rays from each of them around it, that ask which shell its flesh is
 _OWN = 0.5  # share of a segment's length in a shell that makes it a host: an eyeball on its bone's end has less; or
 _ACROSS = 0.25  # of the shell's own width in segments that go on: balls of a mannequin hide much of what lies between
 _SMALL = 1.5  # a shell that reaches no further from its middle than so many host thicknesses stays rigid
+_PLACES = 16  # of a small shell, whose mean says what it follows
 _SEAM = 1e-6  # of the surface's size: borders nearer than this are one border
 _FURTHER = 0.5  # host thicknesses that a shell may stand off so that it faces the same way as its host
 
@@ -202,7 +203,8 @@ def _follow(
     on = faces[(host[label] & flesh)[faces].all(axis=1)]
     some = np.flatnonzero(lies[label] & flesh)
     of = label[some]
-    place, face, weights, apart = _nearest(vertices, on, some, np.zeros((len(some), 3)), np.zeros(len(some)))
+    below = _mesh(vertices, on)
+    place, face, weights, apart = _nearest(vertices, on, below, some, np.zeros((len(some), 3)), np.zeros(len(some)))
     thick = _line_distance(place, lines)
 
     # where a shell faces the skin it lies on, it may not stick to a neighbour's; one with an inner side, or one
@@ -215,7 +217,7 @@ def _follow(
     border[_border(faces)] = True
     sheet = np.bincount(label, border, number) > 0
     normals = normals * (sense * sheet)[of][:, None]
-    place, face, weights, apart = _nearest(vertices, on, some, normals, _FURTHER * thick)
+    place, face, weights, apart = _nearest(vertices, on, below, some, normals, _FURTHER * thick)
 
     mean = sp.csr_array((np.ones(len(some)), (of, np.arange(len(some)))), shape=(number, len(some)))
     size = np.maximum(mean.sum(axis=1), 1.0)
@@ -225,27 +227,48 @@ def _follow(
     whole = lies & (reach <= _SMALL * (mean @ thick) / size)
 
     rows = sp.csr_array((weights.ravel(), on[face].ravel(), np.arange(len(some) + 1) * 3), shape=(len(some), count))
-    common = sp.diags_array(1.0 / size) @ mean @ rows
-    together = whole[of].astype(np.float64)
-    rows = sp.diags_array(1.0 - together) @ rows + sp.diags_array(together) @ (mean.T @ common)
+    # one row of a small shell for all of it: mean of a few of its vertices far apart, each for those around it
+    small = np.flatnonzero(whole[of])
+    if small.size:
+        chosen = small[_far_apart(vertices[some[small]], of[small], middle)]
+        pick = sp.csr_array((np.ones(len(small)), (of[small], chosen)), shape=(number, len(some)))
+        common = sp.diags_array(1.0 / np.maximum(pick.sum(axis=1), 1.0)) @ (pick @ rows)
+        spread = sp.csr_array((np.ones(len(small)), (small, of[small])), shape=(len(some), number))
+        rows = sp.diags_array((~whole[of]).astype(np.float64)) @ rows + spread @ common
     placed = sp.csr_array((np.ones(len(some)), (some, np.arange(len(some)))), shape=(count, len(some)))
     distance = np.zeros(count)
     distance[some] = apart
     return sp.csr_array(placed @ rows), distance, whole
 
 
+def _far_apart(points: NDArray[np.float64], of: NDArray[np.int32], middle: NDArray[np.float64]) -> NDArray[np.int64]:
+    """The chosen point that stands for each point, shape (n,): some of its shell, each as far as can be from others."""
+    stands = np.zeros(len(points), dtype=np.int64)
+    reach = np.linalg.norm(points - middle[of], axis=1)
+    last = np.zeros(len(middle), dtype=np.int64)
+    for k in range(_PLACES):
+        order = np.lexsort((reach, of))
+        ends = order[np.append(np.flatnonzero(np.diff(of[order])), len(order) - 1)]
+        last[of[ends]] = ends
+        apart = np.linalg.norm(points - points[last[of]], axis=1)
+        nearer = (apart < reach) | (k == 0)
+        stands, reach = np.where(nearer, last[of], stands), np.where(nearer, apart, reach)
+    return stands
+
+
 def _nearest(
     vertices: NDArray[np.float64],
     faces: NDArray[np.int32],
+    below: tuple[Any, NDArray[np.float64]],
     some: NDArray[np.int64],
     normals: NDArray[np.float64],
     further: NDArray[np.float64],
 ) -> tuple[NDArray[np.float64], NDArray[np.int32], NDArray[np.float64], NDArray[np.float64]]:
-    """Nearest place on ``faces`` of some vertices: where (n, 3), face (n,), weights (n, 3) and distance (n,)."""
+    """Nearest place on ``faces``, which ``below`` is made of, of some vertices: where (n, 3), face (n,), weights (n, 3) and distance (n,)."""
     import warp as wp
     from warpjld_kernels.shells import nearest_facing
 
-    mesh, centre = _mesh(vertices, faces)
+    mesh, centre = below
     count = len(some)
     inputs = [wp.array(a.astype(np.float32), dtype=wp.vec3, device="cpu") for a in (vertices[some] - centre, normals)]
     inputs.append(wp.array(further.astype(np.float32), dtype=float, device="cpu"))
