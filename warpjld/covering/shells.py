@@ -264,8 +264,8 @@ def _nearest(
     normals: NDArray[np.float64],
     further: NDArray[np.float64],
 ) -> tuple[NDArray[np.float64], NDArray[np.int32], NDArray[np.float64], NDArray[np.float64]]:
-    """Nearest place on ``faces``, which ``below`` holds, of some vertices: it (n, 3), face (n,), weights (n, 3), distance
-    (n,)."""
+    """Nearest place on ``faces``, which ``below`` holds, of some vertices: it (n, 3), face (n,), weights (n, 3),
+    distance (n,)."""
     import warp as wp
     from warpjld_kernels.shells import nearest_facing
 
