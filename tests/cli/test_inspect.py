@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 
 import numpy as np
 import pytest
@@ -72,3 +73,28 @@ def test_animations_are_listed(tmp_path):
     path = write(tmp_path / "a.glb", animal(), {"Idle": still, "Walk": still})
     assert "animations: Idle, Walk" in run(path, "--no-picture").stdout
     assert json.loads(run(path, "--no-picture", "--json").stdout)["animations"] == ["Idle", "Walk"]
+
+
+def test_joints_off_their_flesh_are_told_and_moved_on_request(tmp_path):
+    import trimesh
+
+    from warpjld.io.skeleton_file import write_skeleton_file
+    from warpjld.skeleton import Skeleton, default_limits
+
+    names = tuple(f"left.index.{part}" for part in ("base", "knuckle2", "knuckle3", "tip"))
+    rest = np.array([[0, 0, 0], [0, 0, -0.03], [0, 0.004, -0.06], [0, 0, -0.085]])
+    axes = np.tile([-1.0, 0, 0], (4, 1))
+    parents = np.array([-1, 0, 1, 2], dtype=np.int32)
+    write_skeleton_file(tmp_path / "joints.json", Skeleton(names, parents, rest, axes, default_limits(names)))
+    pipe = trimesh.creation.cylinder(radius=0.008, height=0.1, sections=32)
+    pipe = pipe.subdivide_to_size(0.012)
+    pipe.apply_translation([0, 0, -0.042])
+    pipe.export(tmp_path / "finger.ply")
+    arguments = (tmp_path / "finger.ply", "--skeleton", tmp_path / "joints.json", "--unit", "m", "--no-picture")
+    told = run(*arguments).output
+    found = re.search(r"left.index.knuckle3 lies (\S+) mm off the middle of its flesh, which is (\S+) mm thick", told)
+    assert found, told
+    assert [float(x) for x in found.groups()] == pytest.approx([4.0, 16.0], abs=0.15)
+    moved = run(*arguments, "--centre-joints").output
+    assert "off centre" not in moved
+    assert re.search(r"left.index.knuckle3 is moved by (3.9|4.0) mm to the middle of its flesh", moved)

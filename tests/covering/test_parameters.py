@@ -79,3 +79,18 @@ def test_wrong_files_are_named(built: Rig, tmp_path: Path, content: str, says: s
         load_parameters(path, built.skeleton)
     assert caught.value.path == path
     assert says in str(caught.value)
+
+
+def test_the_thumbs_base_counts_by_its_whole_swing() -> None:
+    """It flexes little and swings far: by its flexion alone nothing of the thumb's ball would swell."""
+    from warpjld.hand import build_hand
+
+    skeleton = build_hand("left").skeleton
+    inflation = default_parameters(skeleton).inflation
+    thumb, finger = (skeleton.index(f"left.{name}") for name in ("thumb.base", "index.carpometacarpal"))
+    flexion, abduction = skeleton.limits[thumb, [0, 3], 1]
+    swing = np.hypot(flexion, abduction)
+    loss = [1.0 - np.sin(x / 2) / (x / 2) for x in (swing, np.pi / 2)]
+    assert abduction > flexion
+    assert inflation[thumb] == pytest.approx(3.0 * 0.21 * loss[0] / loss[1])
+    assert inflation[finger] < 0.1 * inflation[thumb]

@@ -72,6 +72,7 @@ def command(
 
 def _report(rig: Rig) -> dict[str, Any]:
     from warpjld.motion.animations import animation_names
+    from warpjld.skeleton.centres import joint_centres
     from warpjld.skeleton.recognise.placing import check_placing
 
     skeleton, surface = rig.skeleton, rig.surface
@@ -110,6 +111,16 @@ def _report(rig: Rig) -> dict[str, Any]:
             vars(finding) | {"message": finding.message}
             for finding in check_placing(skeleton, surface.vertices, surface.faces)
         ],
+        "off centre": [
+            {
+                "joint": centre.name,
+                "distance": round(centre.distance, 6),
+                "thickness": round(centre.thickness, 6),
+                "message": centre.message,
+            }
+            for centre in joint_centres(skeleton, surface.vertices, surface.faces)
+            if centre.off
+        ],
         "suspicious": list(rig.suspicious),
         "notes": list(rig.notes),
     }
@@ -146,6 +157,8 @@ def _print(report: dict[str, Any], quiet: bool) -> None:
             click.echo(f"note: {note}")
     for finding in report["placing"]:
         click.echo(f"suspicious: {finding['message']}")
+    for centre in report["off centre"]:
+        click.echo(f"off centre: {centre['message']}; --centre-joints moves it there")
     if not quiet:
         if not report["placing"]:
             click.echo("placing: nothing suspicious")

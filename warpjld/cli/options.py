@@ -33,13 +33,19 @@ json: Decorator = click.option("--json", "as_json", is_flag=True, help="Write th
 quiet: Decorator = click.option("-q", "--quiet", is_flag=True, help="Say nothing but errors.")
 
 
-RIG = ("skeleton", "side", "unit", "scale", "up", "joint_map")
+RIG = ("skeleton", "side", "unit", "scale", "up", "joint_map", "centre_joints")
 """Names of the options that ``rig`` adds: keyword arguments of ``load_rig``."""
 
 
 def rig(command: Callable[..., Any]) -> Callable[..., Any]:
     """How to read a RIG that does not say everything itself: the keyword arguments of ``open_rig``."""
     for option in (
+        click.option(
+            "--centre-joints",
+            is_flag=True,
+            default=None,
+            help="Move RIG's joints that lie off the middle of a finger's or limb's flesh there (see inspect).",
+        ),
         click.option("--up", type=click.Choice(["y", "z"]), help="RIG's up axis; guessed by default."),
         click.option("--scale", type=float, help="Factor for all of RIG's lengths; without --unit none is guessed."),
         click.option("--unit", type=click.Choice(["m", "cm", "mm", "in"]), help="RIG's unit; guessed by default."),

@@ -13,7 +13,10 @@ if TYPE_CHECKING:
 
 __all__ = ["open_rig", "rig_files"]
 
-_OPTIONS = {"joint_map": "map"}  # options that are called otherwise than the arguments of load_rig
+_OPTIONS = {
+    "joint_map": "map",
+    "centre_joints": "centre-joints",
+}  # options that are called otherwise than the arguments of load_rig
 
 
 def open_rig(text: str, **how: Any) -> Rig:

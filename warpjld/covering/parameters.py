@@ -78,14 +78,18 @@ def default_parameters(skeleton: Skeleton) -> Parameters:
     knuckle. Growing with θ where the loss grows with θ², they gain a little on the way and end near zero.
 
     Where a finger meets the palm both amplitudes are three times as large: the palm loses volume at that joint too,
-    but has no internal inflation to make up for it (R50). A joint that cannot bend leaves its segment's muscle to the
-    joint at the other end.
+    but has no internal inflation to make up for it (R50). A joint that
+    cannot bend leaves its segment's muscle to the joint at the other end.
     """
     count = len(skeleton)
     largest = np.minimum(skeleton.limits[:, CHANNELS.index("flexion"), 1], _WIDEST)
     bends = (largest > 1e-6) & (skeleton.parents >= 0) & np.array([bool(c) for c in skeleton.children])
     loss = np.where(bends, _volume_loss(largest) / _volume_loss(np.array(np.pi / 2.0)), 0.0)
     loss[[s.distal for s in skeleton.segments if s.palm]] *= _PALM
+    swing = np.minimum(np.hypot(largest, skeleton.limits[:, CHANNELS.index("abduction"), 1]), _WIDEST)
+    swings = bends & (swing > 1.01 * largest)
+    balls = [s.proximal for s in skeleton.segments if s.palm and swings[s.proximal]]
+    loss[balls] = _PALM * _volume_loss(swing[balls]) / _volume_loss(np.array(np.pi / 2.0))
     muscle = np.zeros(count)
     flat = {end for palm in skeleton.palms for segment in palm for end in segment}  # metacarpals and carpus
     for segment in skeleton.segments:

@@ -26,6 +26,7 @@ def load_rig(
     scale: float | None = None,
     up: str | None = None,
     joint_map: str | Path | Mapping[str, Any] | None = None,
+    centre_joints: bool | None = None,
 ) -> Rig:
     """Load a rig: a skinned glTF, FBX, VRM or USD file, or any surface (OBJ, PLY, STL, …) with a skeleton file.
 
@@ -39,6 +40,8 @@ def load_rig(
         up: ``y`` or ``z``: the file's up axis; by default what it says, else guessed; turned to Y.
         joint_map: Joints stated by hand, which win over what is recognised: a JSON file (see
             :mod:`warpjld.io.joint_map_file`), or what it holds: ``{"left.knee": "LeftShin", "ignore": ["Socket"]}``.
+        centre_joints: Whether joints that lie clearly off the middle of a finger's or limb's flesh are moved there (see
+            :mod:`warpjld.skeleton.centres`); the file's own joints stay where they are.
 
     Returns:
         Skeleton in canonical names, metres; each hand has its 25 joints, those the file lacks added.
@@ -61,7 +64,12 @@ def load_rig(
         from warpjld.io.joint_map_file import read_joint_map
 
         joint_map = read_joint_map(joint_map)
-    return assemble_rig(_read(Path(path), skeleton), side=side, unit=unit, scale=scale, up=up, joint_map=joint_map)
+    rig = assemble_rig(_read(Path(path), skeleton), side=side, unit=unit, scale=scale, up=up, joint_map=joint_map)
+    if not centre_joints:
+        return rig
+    from warpjld.skeleton.centres import with_centred_joints
+
+    return with_centred_joints(rig)
 
 
 def _read(path: Path, skeleton: str | Path | None) -> SourceRig:

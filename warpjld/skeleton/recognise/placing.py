@@ -12,7 +12,7 @@ from warpjld.skeleton.recognise.section import first_hits
 from warpjld.skeleton.tree import Skeleton
 from warpjld.winding import winding_numbers
 
-__all__ = ["Finding", "check_placing"]
+__all__ = ["Finding", "check_placing", "in_trunk"]
 
 _OFF_CENTRE = 0.5  # |a − b| / (a + b) of the flesh on both sides: at 0.5 one side is three times the other
 _NARROW = 1.6  # a section wider than this times its depth is judged by its depth alone (palms)
@@ -139,7 +139,7 @@ def _sections(
     skeleton: Skeleton, vertices: NDArray[np.float64], faces: NDArray[np.int32], inside: NDArray[np.bool_]
 ) -> list[Finding]:
     """Flesh on the four sides of every joint, and beyond every extremity."""
-    joints = [j for j in np.flatnonzero(inside) if not _in_trunk(skeleton.names[j])]
+    joints = [j for j in np.flatnonzero(inside) if not in_trunk(skeleton.names[j])]
     if not joints:
         return []
     bone, axis = skeleton.directions[joints], skeleton.axes[joints]
@@ -167,5 +167,6 @@ def _sections(
     return out
 
 
-def _in_trunk(name: str) -> bool:
+def in_trunk(name: str) -> bool:
+    """Whether a joint of this canonical name is the trunk's, hips and shoulders among them."""
     return name.rpartition(".")[2].rstrip("0123456789") in _TRUNK

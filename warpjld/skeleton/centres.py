@@ -1,0 +1,112 @@
+"""Joints off the middle of their flesh: how far they lie from it, and rigs whose joints are moved there.
+
+A finger or limb that bends about a joint near its skin stretches on one side and crumples on the other. Anatomy puts
+no joint exactly in the middle, so only what is clearly off is told, and nothing is moved unasked.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from warpjld.rig import Rig
+from warpjld.rotations import unit
+from warpjld.skeleton.recognise.placing import in_trunk
+from warpjld.skeleton.recognise.section import cross_section, nearby
+from warpjld.skeleton.tree import Skeleton
+
+__all__ = ["OFF_CENTRE", "OffCentre", "joint_centres", "with_centred_joints"]
+
+OFF_CENTRE = 0.2
+"""Share of the flesh's thickness from which a joint counts as off its middle: a body's elbows and knees lie up to a
+sixth of it off."""
+_RAYS = 72
+_ALL_ROUND = 0.97  # share of directions in which there must be a surface: at an open end nothing is known
+_STUBBY = 0.6  # radius per shorter segment from which a section is more than a finger's or limb's own flesh
+
+
+@dataclass(frozen=True, eq=False)
+class OffCentre:
+    """A joint and the flesh around it, in the plane halfway between its two segments.
+
+    Attributes:
+        joint: Its number.
+        name: Its canonical name.
+        middle: Centroid of the section of flesh [m], shape (3,).
+        distance: From the joint to it [m].
+        thickness: Diameter of the circle of the section's area [m].
+    """
+
+    joint: int
+    name: str
+    middle: NDArray[np.float64]
+    distance: float
+    thickness: float
+
+    @property
+    def off(self) -> bool:
+        """Whether the joint is clearly off the middle."""
+        return self.distance > OFF_CENTRE * self.thickness
+
+    @property
+    def message(self) -> str:
+        """One line for people."""
+        return (
+            f"{self.name} lies {1e3 * self.distance:.1f} mm off the middle of its flesh, "
+            f"which is {1e3 * self.thickness:.1f} mm thick there"
+        )
+
+
+def joint_centres(skeleton: Skeleton, vertices: NDArray[np.float64], faces: NDArray[np.int32]) -> tuple[OffCentre, ...]:
+    """Where the joints of fingers and limbs lie in their flesh.
+
+    Joints between two segments of which neither branches are looked at: not the trunk's, and not a finger's base, whose
+    section runs through the palm. What lies outside its flesh, or where the flesh is open or as wide as a segment is
+    long, is left out.
+
+    Args:
+        skeleton: Rest skeleton.
+        vertices: Rest surface [m], shape (V, 3).
+        faces: Its triangles, shape (T, 3).
+    """
+    out = []
+    palm = {joint for pairs in skeleton.palms for pair in pairs for joint in pair}
+    for j, name in enumerate(skeleton.names):
+        above = int(skeleton.parents[j])
+        if above < 0 or len(skeleton.children[j]) != 1 or len(skeleton.children[above]) != 1:
+            continue
+        if j in palm or in_trunk(name):
+            continue
+        place = skeleton.rest[j]
+        before, after = place - skeleton.rest[above], skeleton.rest[skeleton.children[j][0]] - place
+        lengths = [float(np.linalg.norm(v)) for v in (before, after)]
+        if min(lengths) < 1e-9:
+            continue
+        halfway = unit(before) + unit(after)
+        if np.linalg.norm(halfway) < 0.2:  # folded back on itself: no plane lies between
+            continue
+        around = nearby(vertices, faces, place, 3.0 * max(lengths))
+        section = cross_section(vertices, around, place, unit(halfway), rays=_RAYS)
+        if section is None or section.seen < _ALL_ROUND or section.radius > _STUBBY * min(lengths):
+            continue
+        distance = float(np.linalg.norm(section.centre - place))
+        out.append(OffCentre(j, name, section.centre, distance, 2.0 * section.radius))
+    return tuple(out)
+
+
+def with_centred_joints(rig: Rig) -> Rig:
+    """The same rig with each joint that is clearly off moved to the middle of its flesh.
+
+    The file's own joints stay: a bone's motion is a rigid motion of its flesh wherever one says that it turns about. So
+    own animations carry a moved joint with the bone that begins at it, and motions of angles turn the bone about it.
+    """
+    rest = rig.skeleton.rest.copy()
+    moved = [found for found in joint_centres(rig.skeleton, rig.surface.vertices, rig.surface.faces) if found.off]
+    for found in moved:
+        rest[found.joint] = found.middle
+    notes = tuple(
+        f"{found.name} is moved by {1e3 * found.distance:.1f} mm to the middle of its flesh" for found in moved
+    )
+    return replace(rig, skeleton=replace(rig.skeleton, rest=rest), notes=(*rig.notes, *notes))
