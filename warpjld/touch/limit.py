@@ -69,6 +69,7 @@ def close_until_touch(covering: Covering, poses: Poses, touch: Touch, *, first: 
     for f in range(len(poses)):
         pose = poses[f : f + 1]
         meets, depth = _meets(covering, touch, pose, parts)
+        meets &= np.array([_bend(covering, pose, some) > 1e-6 for some in joints])
         if meets.any():
             share = _search(covering, touch, pose, joints, parts, meets)
             pose = _bent(covering, pose, joints, share)
@@ -106,6 +107,13 @@ def _search(
             break
         low = np.where(meets, low - _BACK, low).clip(0.0)
     return low
+
+
+def _bend(covering: Covering, pose: Poses, joints: list[int]) -> float:
+    """Largest rotation of a digit's joints from rest [rad]."""
+    parents = [max(int(covering.skeleton.parents[j]), 0) for j in joints]
+    local = multiply(conjugate(pose.rotations[:, parents]), pose.rotations[:, joints])
+    return float(Rotation.from_quat(local.reshape(-1, 4)).magnitude().max())
 
 
 def _digits(covering: Covering) -> dict[str, tuple[list[int], NDArray[np.bool_]]]:

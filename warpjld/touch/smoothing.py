@@ -11,6 +11,7 @@ from warpjld.touch.patches import neighbours
 __all__ = ["smoothing"]
 
 _MOST = 12  # Jacobi steps: beyond that a row reaches over hundreds of vertices
+_LEAST = 0.05  # of a row's largest entry: what is less is dropped
 
 
 def smoothing(
@@ -32,4 +33,8 @@ def smoothing(
     out = step
     for _ in range(steps - 1):
         out = csr_array(out @ step)
-    return out
+    # far tails are dropped, so that nothing far away moves by a billionth
+    largest = out.max(axis=1).toarray().ravel()
+    out.data[out.data < _LEAST * np.repeat(largest, np.diff(out.indptr))] = 0.0
+    out.eliminate_zeros()
+    return csr_array(diags_array(1.0 / np.maximum(out.sum(axis=1), 1e-300)) @ out)

@@ -26,7 +26,9 @@ __all__ = ["SHARE", "Touch", "Touched"]
 SHARE = 1.0 / 3.0
 """Of the local thickness: overlaps up to it are parted, deeper ones are poses that nobody can take."""
 
-_SWEEPS = 3
+_SWEEPS = 4
+_SOFT = 0.05  # of the depth that can be parted: over it a vertex comes to count as touching
+_CLEARANCE = 0.1  # likewise: how far both sides are moved beyond their meeting
 _REACH = 0.25  # of the median thickness: how far a displacement is smoothed
 
 
@@ -62,7 +64,6 @@ class Touch:
         self.finder = Finder(patches, vertices)
         reach = _REACH * float(np.median(patches.thickness))
         self._smooth = smoothing(vertices, patches.faces, reach)
-        self._wide = smoothing(vertices, patches.faces, 2.0 * reach)
         self.limit = SHARE * patches.thickness
         self._rest = np.zeros(len(vertices))
         self._rest = self.depths(vertices).depth
@@ -132,11 +133,13 @@ class Touch:
         give = self.patches.give
         other = np.where(found.other >= 0, self._mean_give[found.other], 1.0)
         share = give / np.maximum(give + other, 1e-12)
-        wanted = (share * depth)[:, None] * found.way
-        hit = depth > 0.0
-        weight = self._smooth @ hit.astype(np.float64)
-        # at the rim the mean is over what is free as well; where contact is, over contact
-        smooth = (self._smooth @ wanted) / np.maximum(weight, 0.5)[:, None]
+        hit = np.clip(depth / (_SOFT * limit), 0.0, 1.0)
+        # a little more than met: between vertices that are just out, edges still cross
+        wanted = (share * (depth + _CLEARANCE * limit * hit))[:, None] * found.way
+        weight = self._smooth @ hit
+        # where contact is, the mean is over contact; at its rim over what is free as well
+        over = hit * weight + (1.0 - hit) * np.maximum(weight, 0.5)
+        smooth = (self._smooth @ wanted) / np.maximum(over, 1e-9)[:, None]
         free = (give > 0.0)[:, None]
         return np.asarray(np.where(free, smooth, 0.0))
 
@@ -145,7 +148,7 @@ class Touch:
     ) -> NDArray[np.float64]:
         """What gives each part's displaced volume back, around where it was displaced, shape (V, 3)."""
         size = np.linalg.norm(shift, axis=1)
-        ring = np.clip(self._wide @ size - size, 0.0, None) * (self.patches.give > 0.0)
+        ring = np.clip(self._smooth @ size - size, 0.0, None) * (self.patches.give > 0.0)
         faces = self.patches.faces
         a, b, c = (points[faces[:, k]] for k in range(3))
         area = np.linalg.norm(np.cross(b - a, c - a), axis=1) / 6.0
