@@ -22,7 +22,7 @@ __all__ = ["Closed", "close_until_touch"]
 
 _STEPS = 8  # halvings: 1/256 of a digit's bend, a degree of a full fist
 _ALLOWED = 0.5  # of the depth that can be parted
-_BACK = 0.02  # of a bend
+_BACK = 0.02  # of a bend, at first; twice as much each time
 
 
 @dataclass(frozen=True)
@@ -101,11 +101,11 @@ def _search(
         meets = at(share)
         low, high = np.where(bent & ~meets, share, low), np.where(bent & meets, share, high)
     # a digit was judged beside others on their way: what meets beside them at their ends opens a little more
-    for _ in range(_STEPS):
+    for step in range(_STEPS):
         meets = at(low) & bent
         if not meets.any():
             break
-        low = np.where(meets, low - _BACK, low).clip(0.0)
+        low = np.where(meets, low - _BACK * 2.0**step, low).clip(0.0)
     return low
 
 

@@ -87,10 +87,7 @@ def domains(scene: Scene, arguments: Arguments) -> None:
 @command(
     "TOUCH",
     syntax="TOUCH <ON/OFF/LIMIT>",
-    help=(
-        "Skin of the current actor that crosses is parted, as a display of contact (PRESS solves it); LIMIT also "
-        "closes digits only until they touch."
-    ),
+    help="Skin of the current actor that crosses is parted, for display (PRESS solves contact); LIMIT: digits close until they touch.",
     group="Covering",
 )
 def touch(scene: Scene, arguments: Arguments) -> None:
