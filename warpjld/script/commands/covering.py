@@ -87,7 +87,10 @@ def domains(scene: Scene, arguments: Arguments) -> None:
 @command(
     "TOUCH",
     syntax="TOUCH <ON/OFF/LIMIT>",
-    help="Skin of the current actor that crosses is parted, for display (PRESS solves contact); LIMIT: digits close until they touch.",
+    help=(
+        "Skin of the current actor that crosses is parted, for display (PRESS solves contact); "
+        "LIMIT: digits close until they touch."
+    ),
     group="Covering",
 )
 def touch(scene: Scene, arguments: Arguments) -> None:
