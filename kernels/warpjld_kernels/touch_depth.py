@@ -10,12 +10,12 @@ def touch_depth(
     points: wp.array(dtype=wp.vec3),
     normals: wp.array(dtype=wp.vec3),
     part: wp.array(dtype=wp.int32),
-    # of every part its mesh and box; share of a vertex that counts: 0 at a part's border, 1 inside
+    # of every part its mesh, its box, and how deep one can be inside; share of a vertex that counts: 0 at a part's border, 1 inside
     meshes: wp.array(dtype=wp.uint64),
     lower: wp.array(dtype=wp.vec3),
     upper: wp.array(dtype=wp.vec3),
+    farthest: wp.array(dtype=float),
     inner: wp.array(dtype=float),
-    farthest: float,
     # out
     depth_out: wp.array(dtype=float),
     way_out: wp.array(dtype=wp.vec3),
@@ -36,7 +36,7 @@ def touch_depth(
         high = upper[k]
         outside = p[0] < low[0] or p[1] < low[1] or p[2] < low[2] or p[0] > high[0] or p[1] > high[1] or p[2] > high[2]
         if k != part[v] and not outside:
-            found = wp.mesh_query_point_no_sign(meshes[k], p, farthest)
+            found = wp.mesh_query_point_no_sign(meshes[k], p, farthest[k])
             if found.result:
                 mesh = wp.mesh_get(meshes[k])
                 a = mesh.indices[3 * found.face]

@@ -51,6 +51,9 @@ class Finder:
         ]
         self._ids = wp.array([m.id for m in self._meshes], dtype=wp.uint64, device="cpu")
         self._part = wp.array(where[patches.part], dtype=wp.int32, device="cpu")
+        # nothing lies deeper in flesh than it is thick; half more, for flesh that swells
+        thick = [1.5 * float(patches.thickness[c].max()) for c in (self._corners[k] for k in self._kept)]
+        self._farthest = wp.array(thick, dtype=float, device="cpu")
         self._inner = wp.array(patches.inner.astype(np.float32), dtype=float, device="cpu")
         self._out: list[Any] = [
             wp.empty(len(vertices), dtype=kind, device="cpu") for kind in (float, wp.vec3, wp.int32)
@@ -78,8 +81,8 @@ class Finder:
                 self._ids,
                 low,
                 high,
+                self._farthest,
                 self._inner,
-                float(np.linalg.norm(np.ptp(there, axis=0))),
             ],
             outputs=self._out,
             device="cpu",

@@ -29,6 +29,7 @@ SHARE = 1.0 / 3.0
 _SWEEPS = 4
 _SOFT = 0.05  # of the depth that can be parted: over it a vertex comes to count as touching
 _CLEARANCE = 0.1  # likewise: how far both sides are moved beyond their meeting
+_NOISE = 1e-6  # of the surface's size
 _REACH = 0.25  # of the median thickness: how far a displacement is smoothed
 
 
@@ -66,7 +67,10 @@ class Touch:
         self._smooth = smoothing(vertices, patches.faces, reach)
         self.limit = SHARE * patches.thickness
         self._rest = np.zeros(len(vertices))
-        self._rest = self.depths(vertices).depth
+        at_rest = self.depths(vertices).depth
+        # a little more than it is: in other positions single precision makes some of it anew
+        noise = _NOISE * float(np.linalg.norm(np.ptp(vertices, axis=0)))
+        self._rest = np.where(at_rest > 0.0, 1.001 * at_rest + noise, 0.0)
         self._mean_give = np.array(
             [
                 patches.give[patches.part == k].mean() if (patches.part == k).any() else 1.0
