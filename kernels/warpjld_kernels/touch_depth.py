@@ -10,7 +10,8 @@ def touch_depth(
     points: wp.array(dtype=wp.vec3),
     normals: wp.array(dtype=wp.vec3),
     part: wp.array(dtype=wp.int32),
-    # of every part its mesh, its box, and how deep one can be inside; share of a vertex that counts: 0 at a part's border, 1 inside
+    # of every part its mesh, its box, and how deep one can be inside;
+    # share of a vertex that counts: 0 at a part's border, 1 inside
     meshes: wp.array(dtype=wp.uint64),
     lower: wp.array(dtype=wp.vec3),
     upper: wp.array(dtype=wp.vec3),
