@@ -26,7 +26,7 @@ def test_hands_are_built_and_named(run) -> None:
 def test_skin_is_parted_where_touch_says_so(run) -> None:
     assert run("HAND RIGHT BUILTIN RESOLUTION 1500").actor().touch == "off"
     assert run("HAND RIGHT BUILTIN RESOLUTION 1500\nTOUCH LIMIT").actor().touch == "limit"
-    with pytest.raises(InputError, match="whether skin is parted"):
+    with pytest.raises(InputError, match="ON.*OFF.*LIMIT"):
         run("HAND RIGHT BUILTIN RESOLUTION 1500\nTOUCH MAYBE")
 
 
