@@ -23,6 +23,13 @@ def test_hands_are_built_and_named(run) -> None:
         run("HAND RIGHT BUILTIN RESOLUTION 1500 NAME Ruth")
 
 
+def test_skin_is_parted_where_touch_says_so(run) -> None:
+    assert run("HAND RIGHT BUILTIN RESOLUTION 1500").actor().touch == "off"
+    assert run("HAND RIGHT BUILTIN RESOLUTION 1500\nTOUCH LIMIT").actor().touch == "limit"
+    with pytest.raises(InputError, match="ON.*OFF.*LIMIT"):
+        run("HAND RIGHT BUILTIN RESOLUTION 1500\nTOUCH MAYBE")
+
+
 def test_rigs_come_from_files(data) -> None:
     left = next((data / "hand_webxr_generic").glob("*left*.glb"))
     scene = Scene()

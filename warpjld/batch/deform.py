@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any, Literal
 from warpjld.errors import InputError
 from warpjld.motion.load import LoadedMotion, open_motion
 from warpjld.rig import Rig
+from warpjld.touch.contact import SkinContact
 
 if TYPE_CHECKING:
     from warpjld.covering import Covering, Parameters
@@ -32,6 +33,7 @@ class Deforming:
         span: ``A:B``, the frames to make, the motion's first being 0; None for all.
         device: Warp device.
         threads: CPU threads; None for as many as pay.
+        touch: Whether skin that crosses is parted: "off", "on", or "limit" to close digits only until they touch.
     """
 
     rig: Rig
@@ -42,6 +44,7 @@ class Deforming:
     span: str | None = None
     device: str = "cpu"
     threads: int | None = None
+    touch: Literal["off", "on", "limit"] = "off"
 
     @cached_property
     def covering(self) -> Covering:
@@ -103,6 +106,9 @@ def deform_clip(
     moved = open_motion(motion, rig, animation=animation, **how.reading)
     first, last = frame_span(how.span, len(moved.poses))
     poses = moved.poses[slice(first, last + 1)]
+    contact = None if how.touch == "off" else SkinContact(how.covering, limits=how.touch == "limit")
+    if contact is not None:
+        poses = contact.poses(poses, first=first)
     caches = []
     with ExitStack() as opened:
         for path in surfaces:
@@ -111,8 +117,9 @@ def deform_clip(
         if caches:
             report("binding", 0, len(poses))
             for start, block in how.covering.blocks(poses, frames=_BLOCK, device=how.device, threads=how.threads):
+                parted = block if contact is None else contact.skin(block, first=first + start)
                 for cache in caches:
-                    cache.write(block)
+                    cache.write(parted)
                 report("deforming", start + len(block), len(poses))
         # here, so that a motion that cannot be written leaves no cache either
         told = [write_motion(path, rig, poses, rate=moved.rate, start_frame=first) for path in motions]
@@ -122,7 +129,11 @@ def deform_clip(
         first=first,
         moved=moved,
         notes=(*(cache.note for cache in caches if cache.note), *(note for one in told for note in one.notes)),
-        warnings=(*moved.warnings, *(warning for one in told for warning in one.warnings)),
+        warnings=(
+            *moved.warnings,
+            *(() if contact is None else contact.told()),
+            *(warning for one in told for warning in one.warnings),
+        ),
     )
 
 

@@ -80,6 +80,13 @@ __all__ = ["command"]
     show_default=True,
     help="Soft domain borders, or one segment a vertex as published.",
 )
+@click.option(
+    "--touch",
+    type=click.Choice(["off", "on", "limit"]),
+    default="off",
+    show_default=True,
+    help="Part skin that crosses (a display of contact); limit: close digits only until they touch.",
+)
 @click.option("--processes", type=click.IntRange(min=1), help="Worker processes of a batch; one a core by default.")
 @click.option("--fresh", is_flag=True, help="Make a batch again from its start, whatever the folder holds of it.")
 @options.device

@@ -33,6 +33,7 @@ class Wanted:
     parameters: Path | None
     domains: Literal["geometry", "skin"]
     method: Literal["smooth", "paper"]
+    touch: Literal["off", "on", "limit"]
     processes: int | None
     fresh: bool
     device: str
@@ -86,6 +87,7 @@ class Wanted:
             "formats": [*self.formats, *(f".motion{suffix}" for suffix in self.motion_formats)],
             "domains": self.domains,
             "method": self.method,
+            "touch": self.touch,
             "device": self.device,
             "warpjld": versions(["warpjld"])["warpjld"],
         }
@@ -108,6 +110,7 @@ def deforming(wanted: Wanted) -> Deforming:
         wanted.span,
         wanted.device,
         wanted.threads,
+        wanted.touch,
     )
 
 

@@ -22,8 +22,9 @@ if TYPE_CHECKING:
     from warpjld.press.pressed import Pressed
     from warpjld.render import Camera as RenderCamera
     from warpjld.render import Solid
+    from warpjld.touch.contact import SkinContact
 
-__all__ = ["Crowd", "Role"]
+__all__ = ["Crowd", "Role", "role_of"]
 
 _SAMPLES = 12  # frames whose surface a camera is made to show; the joints of all frames count as well
 
@@ -35,6 +36,24 @@ class Role:
     actor: Actor
     covering: Covering
     poses: Poses
+    contact: SkinContact | None = None
+
+    def limited(self, poses: Poses, first: int) -> Poses:
+        """Poses of this role, whose digits close only until they touch where TOUCH LIMIT says so."""
+        return poses if self.contact is None else self.contact.poses(poses, first=first)
+
+
+def role_of(actor: Actor, frames: NDArray[np.float64], rate: float) -> Role:
+    """An actor bound and posed at these frames of a scene with that rate [1/s]."""
+    from warpjld.script.binding import cover
+
+    role = Role(actor, cover(actor), stage(actor, frames, rate))
+    if actor.touch == "off":
+        return role
+    from warpjld.touch.contact import SkinContact
+
+    role = replace(role, contact=SkinContact(role.covering, limits=actor.touch == "limit"))
+    return replace(role, poses=role.limited(role.poses, round(float(frames[0])) if len(frames) else 0))
 
 
 @dataclass(frozen=True, eq=False)
@@ -78,7 +97,9 @@ class Crowd:
     def at(self, frame: float, rate: float) -> Crowd:
         """The same roles at one frame, whole or not, of a scene with that rate [1/s]."""
         moment = np.array([frame])
-        roles = [replace(role, poses=stage(role.actor, moment, rate)) for role in self.roles]
+        roles = [
+            replace(role, poses=role.limited(stage(role.actor, moment, rate), round(frame))) for role in self.roles
+        ]
         return replace(self, roles=roles, frames=moment)
 
     @cached_property
@@ -136,7 +157,10 @@ class Crowd:
         )
 
     def worn(self, role: Role, vertices: NDArray[np.float32], start: int) -> NDArray[np.float32]:
-        """Surfaces of a role (n, V, 3) from the frame of that place on, as contact deforms them where it was solved."""
+        """Surfaces of a role (n, V, 3) from the frame of that place on: what crosses is parted where TOUCH is on, and
+        where contact was solved the skin is as it found it."""
+        if role.contact is not None and len(vertices):
+            vertices = role.contact.skin(vertices, first=round(float(self.frames[start])))
         if self.pressed is None:
             return vertices
         out = vertices

@@ -10,13 +10,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from warpjld import render
-from warpjld.script.binding import cover
-from warpjld.script.crowd import Crowd, Role
+from warpjld.script.crowd import Crowd, role_of
 from warpjld.script.folder import OutputFolder
 from warpjld.script.outputs import Camera, ContactSheet, Film, Picture, Style
 from warpjld.script.pressure import PressureView
 from warpjld.script.scene import Scene
-from warpjld.script.staging import stage
 
 __all__ = [
     "FilmStudio",
@@ -138,7 +136,7 @@ def sheet_frames(scene: Scene, frames: NDArray[np.float64]) -> tuple[float, ...]
 
 def preview(scene: Scene, frame: float, style: Style) -> Path:
     """A picture of any frame of the scene as it is, in the output folder (R5)."""
-    roles = [Role(a, cover(a), stage(a, np.array([frame]), scene.rate)) for a in scene.actors.values()]
+    roles = [role_of(a, np.array([frame]), scene.rate) for a in scene.actors.values()]
     crowd = Crowd(roles, np.array([frame]), props=list(scene.props.values()), whereabouts=scene.whereabouts)
     name = f"{style}-{frame:g}.png"
     with OutputFolder(scene.folder) as out:

@@ -12,8 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from warpjld.overwriting import check_outputs
-from warpjld.script.binding import cover
-from warpjld.script.crowd import Crowd, Role
+from warpjld.script.crowd import Crowd, role_of
 from warpjld.script.folder import OutputFolder
 from warpjld.script.formats import check_available, video_is_available
 from warpjld.script.grasping import contact_reports
@@ -109,6 +108,8 @@ def run_scene(
                 summary.contacts = contact_reports(scene, crowd)
         with summary.timed("pictures"):
             _make_pictures(scene, crowd, outputs, out, progress, "" if script is None else script.stem)
+        for role in crowd.roles:
+            scene.warned(f"{role.actor.name}: {line}" for line in (role.contact.told() if role.contact else ()))
         return summary.write(out)
 
 
@@ -123,7 +124,7 @@ def cast(
     roles = []
     for number, actor in enumerate(scene.actors.values()):
         progress(f"binding {actor.name.lower()}", number, len(scene.actors))
-        roles.append(Role(actor, cover(actor), stage(actor, frames, scene.rate)))
+        roles.append(role_of(actor, frames, scene.rate))
     return Crowd(roles, frames, device, list(scene.props.values()), scene.whereabouts)
 
 

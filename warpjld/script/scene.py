@@ -51,6 +51,7 @@ class Actor:
         parameters: The covering's.
         method: The covering's.
         domains: Whether domains come from the geometry or from the rig's painted weights.
+        touch: Whether skin that crosses is parted, and digits are closed only until they touch.
         recorded: Poses of a motion file and their rate [1/s], which the keys then do not override.
         motion_notes: What a reader of the result should know of that file.
         placement: Keys of the actor as a whole.
@@ -64,6 +65,7 @@ class Actor:
     parameters: Parameters
     method: Literal["smooth", "paper"] = "smooth"
     domains: Literal["geometry", "skin"] = "geometry"
+    touch: Literal["off", "on", "limit"] = "off"
     recorded: tuple[Poses, float] | None = None
     motion_notes: tuple[str, ...] = ()
     placement: Placement = field(default_factory=Placement)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import fields, replace
+from typing import Literal
 
 from warpjld.errors import InputError
 from warpjld.script.arguments import Arguments
@@ -81,3 +82,18 @@ def domains(scene: Scene, arguments: Arguments) -> None:
     if chosen == "SKIN" and actor.rig.skin is None:
         raise arguments.error(f"actor {actor.name} has no painted weights; use DOMAINS GEOMETRY")
     actor.domains = "skin" if chosen == "SKIN" else "geometry"
+
+
+@command(
+    "TOUCH",
+    syntax="TOUCH <ON/OFF/LIMIT>",
+    help=(
+        "Skin of the current actor that crosses is parted, for display (PRESS solves contact); "
+        "LIMIT: digits close until they touch."
+    ),
+    group="Covering",
+)
+def touch(scene: Scene, arguments: Arguments) -> None:
+    """Contact of the skin without finite elements."""
+    words: dict[str, Literal["on", "off", "limit"]] = {"ON": "on", "OFF": "off", "LIMIT": "limit"}
+    scene.actor().touch = words[arguments.choice("whether skin is parted", tuple(words))]
