@@ -79,9 +79,10 @@ def test_packed_runs_give_back_every_coefficient(count: int) -> None:
 def test_rows_written_through_the_buffer_are_those_of_the_runs(monkeypatch: pytest.MonkeyPatch) -> None:
     """Blocks of frames that do not divide the batch, rows at any address, and a surface smaller than one tile."""
     hand = build_hand("left", resolution=1500)
-    tip = hand.surface.vertices[:7], np.array([[0, 1, 2], [2, 3, 4], [4, 5, 6]], dtype=np.int32)
+    faces = np.array([[0, 1, 2], [2, 3, 4], [4, 5, 6]], dtype=np.int32)
+    few = Surface(hand.surface.vertices[:7], faces, np.arange(7, dtype=np.int32), faces)
     monkeypatch.setattr("warpjld.covering.launch._BUFFERED", 1)
-    for surface in (hand.surface, Surface(*tip)):
+    for surface in (hand.surface, few):
         covering = bind(hand.skeleton, surface)
         angles = np.random.default_rng(2).uniform(0.0, 0.3, (21, len(hand.skeleton), len(CHANNELS)))
         poses = poses_from_angles(hand.skeleton, angles)
