@@ -9,7 +9,6 @@ from __future__ import annotations
 import hashlib
 import os
 import sys
-import tempfile
 import zipfile
 from dataclasses import astuple, fields, is_dataclass
 from functools import cache
@@ -88,9 +87,9 @@ def save_binding(
     runs = covering.runs
     key = _key(rig, skeleton=covering.skeleton, parameters=covering.parameters, domains=domains)
     arrays = {name: getattr(runs, name) for name in _ARRAYS}
-    descriptor, name = tempfile.mkstemp(suffix=".npz", prefix=".binding", dir=path.parent)
+    beside = path.with_name(f".{path.name}.{os.getpid()}")
     try:
-        with os.fdopen(descriptor, "wb") as file:
+        with beside.open("wb") as file:
             np.savez(
                 file,
                 format=np.array(_FORMAT),
@@ -99,9 +98,9 @@ def save_binding(
                 domains=covering.domains,
                 **arrays,
             )
-        os.replace(name, path)
+        beside.replace(path)
     except BaseException:
-        Path(name).unlink(missing_ok=True)
+        beside.unlink(missing_ok=True)
         raise
 
 
