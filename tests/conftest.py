@@ -22,6 +22,10 @@ if worker := os.environ.get("PYTEST_XDIST_WORKER"):
     os.environ["WARP_CACHE_PATH"] = str(Path(base) / worker)
 
 
+# what was bound by other tests, or by other programs, is bound again
+os.environ["WARPJLD_CACHE"] = "off"
+
+
 @pytest.fixture(scope="session")
 def data() -> Path:
     """Folder of third-party assets."""

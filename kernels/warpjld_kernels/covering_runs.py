@@ -1,18 +1,18 @@
 """The covering formula over runs of vertices that share their joints and rotations.
 
 Scalar kernels are compiled to scalar code on the CPU, and chains of tile operations go through memory at every step.
-So the arithmetic is one function of portable C++ whose loops over lanes the compiler turns into vector instructions; on
-a GPU the same loops have one lane and neighbouring threads take neighbouring vertices.
+So the arithmetic is one function of portable C++ on vectors of lanes that stay in registers; on a GPU a vector is one
+number and neighbouring threads take neighbouring vertices.
 """
 
 import warp as wp
 
-from warpjld_kernels.lanes import VECTORISED
+from warpjld_kernels.lanes import VECTORISED, prelude
 
 wp.set_module_options(VECTORISED)
 
 CPU_LANES = 32
-"""Vertices one CPU thread index computes together; a run has at least as many. On a GPU it is 1."""
+"""Vertices of a tile, which one CPU thread index computes; a run has at least as many. On a GPU it is 1."""
 
 CPU_FRAMES = 8
 """Frames computed one after another for the same vertices, while their coefficients are in the first-level cache."""
@@ -20,97 +20,95 @@ CPU_FRAMES = 8
 RUN_FIELDS = 8
 """Columns of the run table: first lane, length, first coefficient, first slot, joints, rotations, scales, muscles."""
 
+# sums of four rows (a rotation's) and what is added to them fit sixteen registers of eight floats
+_LANES = 16
+
 
 @wp.func_native(
-    f"""
+    prelude(_LANES)
+    + f"""
 #if defined(__CUDA_ARCH__)
-    constexpr int N = 1;
+    constexpr int TILE = 1;
 #else
-    constexpr int N = {CPU_LANES};
+    constexpr int TILE = {CPU_LANES};
+    typedef float Four __attribute__((ext_vector_type(4), aligned(4)));
 #endif
+#define ROW(at) (*(const Stored*)(at))
     const int* r = runs.data + {RUN_FIELDS} * run;
     const int length = r[1], joints = r[4], rotations = r[5], scales = r[6], muscles = r[7];
-    const float* c = coefficients.data + r[2] + lane;
-    const int* slot = slots.data + r[3];
-    const float* row = palette.data + size_t(frame) * palette.shape[1];
+    for (int base = 0; base < TILE; base += N)
+    for (int frame = first; frame < last; ++frame) {{
+        const float* c = coefficients.data + r[2] + lane + base;
+        const int* slot = slots.data + r[3];
+        const float* row = palette.data + size_t(frame) * palette.shape[1];
 
-    float x[N], y[N], z[N];
-    for (int i = 0; i < N; ++i) x[i] = y[i] = z[i] = 0.0f;
-    for (int k = 0; k < joints; ++k, c += length) {{
-        const float* p = row + *slot++;
-        const float px = p[0], py = p[1], pz = p[2];
-        for (int i = 0; i < N; ++i) {{
-            x[i] += c[i] * px;
-            y[i] += c[i] * py;
-            z[i] += c[i] * pz;
+        Floats x = 0.0f, y = 0.0f, z = 0.0f;
+        for (int k = 0; k < joints; ++k, c += length) {{
+            const float* p = row + *slot++;
+            const Floats w = ROW(c);
+            x += w * p[0];
+            y += w * p[1];
+            z += w * p[2];
         }}
-    }}
 
-    float qx[N], qy[N], qz[N], qw[N];
-    for (int i = 0; i < N; ++i) qx[i] = qy[i] = qz[i] = qw[i] = 0.0f;
-    for (int k = 0; k < rotations; ++k, c += length) {{
-        const float* q = row + *slot++;
-        const float ax = q[0], ay = q[1], az = q[2], aw = q[3];
-        for (int i = 0; i < N; ++i) {{
-            qx[i] += c[i] * ax;
-            qy[i] += c[i] * ay;
-            qz[i] += c[i] * az;
-            qw[i] += c[i] * aw;
+        Floats qx = 0.0f, qy = 0.0f, qz = 0.0f, qw = 0.0f;
+        for (int k = 0; k < rotations; ++k, c += length) {{
+            const float* q = row + *slot++;
+            const Floats w = ROW(c);
+            qx += w * q[0];
+            qy += w * q[1];
+            qz += w * q[2];
+            qw += w * q[3];
         }}
-    }}
 
-    float dx[N], dy[N], dz[N];
-    for (int i = 0; i < N; ++i) dx[i] = 1.0f;
-    for (int k = 0; k < scales; ++k, c += length) {{
-        const float s = row[*slot++];
-        for (int i = 0; i < N; ++i) dx[i] += s * c[i];
-    }}
-    for (int i = 0; i < N; ++i) {{
-        const float g = dx[i];
-        dx[i] = g * c[i];
-        dy[i] = g * c[i + length];
-        dz[i] = g * c[i + 2 * length];
-    }}
-    c += 3 * length;
-    for (int k = 0; k < muscles; ++k, c += 3 * length) {{
-        const float s = row[*slot++];
-        for (int i = 0; i < N; ++i) {{
-            dx[i] += s * c[i];
-            dy[i] += s * c[i + length];
-            dz[i] += s * c[i + 2 * length];
+        Floats g = 1.0f;
+        for (int k = 0; k < scales; ++k, c += length) g += ROW(c) * row[*slot++];
+        Floats dx = g * ROW(c), dy = g * ROW(c + length), dz = g * ROW(c + 2 * length);
+        c += 3 * length;
+        for (int k = 0; k < muscles; ++k, c += 3 * length) {{
+            const float s = row[*slot++];
+            dx += ROW(c) * s;
+            dy += ROW(c + length) * s;
+            dz += ROW(c + 2 * length) * s;
         }}
-    }}
 
-    // d + 2 q × (q × d + w d) / |q|²: the blend need not be normalised first
-    for (int i = 0; i < N; ++i) {{
-        const float squared = qx[i] * qx[i] + qy[i] * qy[i] + qz[i] * qz[i] + qw[i] * qw[i];
-        const float twice = 2.0f / (squared + 1e-20f);
-        const float tx = qy[i] * dz[i] - qz[i] * dy[i] + qw[i] * dx[i];
-        const float ty = qz[i] * dx[i] - qx[i] * dz[i] + qw[i] * dy[i];
-        const float tz = qx[i] * dy[i] - qy[i] * dx[i] + qw[i] * dz[i];
-        x[i] += dx[i] + twice * (qy[i] * tz - qz[i] * ty);
-        y[i] += dy[i] + twice * (qz[i] * tx - qx[i] * tz);
-        z[i] += dz[i] + twice * (qx[i] * ty - qy[i] * tx);
-    }}
+        // d + 2 q × (q × d + w d) / |q|²: the blend need not be normalised first
+        const Floats twice = 2.0f / (qx * qx + qy * qy + qz * qz + qw * qw + 1e-20f);
+        const Floats tx = qy * dz - qz * dy + qw * dx;
+        const Floats ty = qz * dx - qx * dz + qw * dy;
+        const Floats tz = qx * dy - qy * dx + qw * dz;
+        x += dx + twice * (qy * tz - qz * ty);
+        y += dy + twice * (qz * tx - qx * tz);
+        z += dz + twice * (qx * ty - qy * tx);
 
-    float xyz[3 * N];
-    float* out = (float*)points.data + 3 * size_t(frame) * points.shape[1];
-    float* packed = scatter ? xyz : out + 3 * (r[0] + lane);
-    for (int i = 0; i < N; ++i) {{
-        packed[3 * i] = x[i];
-        packed[3 * i + 1] = y[i];
-        packed[3 * i + 2] = z[i];
+        float* out = (float*)points.data + 3 * size_t(frame) * points.shape[1];
+#if defined(__CUDA_ARCH__)
+        const int place = scatter ? order.data[r[0] + lane] : r[0] + lane;
+        out[3 * place] = x;
+        out[3 * place + 1] = y;
+        out[3 * place + 2] = z;
+#else
+        out += 3 * (r[0] + lane + base);
+#define QUAD(v, i) __builtin_shufflevector(v, v, i, i + 1, i + 2, i + 3)
+#define STORE(i) {{ \\
+        const auto a = QUAD(x, i), b = QUAD(y, i), e = QUAD(z, i); \\
+        const auto ab = __builtin_shufflevector(a, b, 0, 4, 1, 5), be = __builtin_shufflevector(b, e, 1, 5, 2, 6); \\
+        const auto ae = __builtin_shufflevector(a, e, 4, 1, 6, 3), bz = __builtin_shufflevector(b, e, 3, 7, 3, 7); \\
+        *(Four*)(out + 3 * i) = __builtin_shufflevector(ab, ae, 0, 1, 4, 5); \\
+        *(Four*)(out + 3 * i + 4) = __builtin_shufflevector( \\
+            __builtin_shufflevector(b, e, 1, 5, 2, 2), a, 0, 1, 6, 2); \\
+        *(Four*)(out + 3 * i + 8) = __builtin_shufflevector(ae, bz, 2, 3, 4, 5); }}
+        STORE(0) STORE(4) STORE(8) STORE(12)
+#undef STORE
+#undef QUAD
+#endif
     }}
-    if (scatter) {{
-        const int* target = order.data + r[0] + lane;
-        for (int i = 0; i < N; ++i) {{
-            memcpy(out + 3 * target[i], xyz + 3 * i, 12);
-        }}
-    }}
+#undef ROW
 """
 )
 def deform_lanes(
-    frame: int,
+    first: int,
+    last: int,
     run: int,
     lane: int,
     runs: wp.array2d(dtype=wp.int32),
@@ -140,17 +138,64 @@ def deform_runs(
 ):
     """S' = Σ c_j J_j' + rot(normalise(Σ w_k q_k), (1 + Σ s_i g_i) d + Σ m_i e_i).
 
-    Launched over blocks of frames, tiles of vertices, and the frames of a block.
+    Launched over blocks of frames and tiles of vertices.
 
     ``slots`` of a run give the columns of the palette where its joints (3 values), rotations (4), scales s (1) and
     muscles m (1) begin; ``coefficients`` of a run are rows of its length: one a joint, one a rotation, one a scale,
     three for d, three a muscle. ``tiles`` hold a run and its lane where the tile begins. The last tile of a run is
-    moved back to its end: some vertices are computed twice, none of another run. With ``scatter`` vertices are written
-    to the places that ``order`` gives, otherwise one after another.
+    moved back to its end: some vertices are computed twice, none of another run. With ``scatter`` a GPU writes vertices
+    to the places that ``order`` gives; otherwise they are written one after another.
     """
-    block, tile, part = wp.tid()
-    frame = block * block_frames + part
-    if frame < palette.shape[0]:
-        deform_lanes(
-            frame, tiles[tile, 0], tiles[tile, 1], runs, slots, coefficients, order, scatter, palette, points_out
-        )
+    block, tile = wp.tid()
+    first = block * block_frames
+    last = wp.min(first + block_frames, palette.shape[0])
+    deform_lanes(
+        first, last, tiles[tile, 0], tiles[tile, 1], runs, slots, coefficients, order, scatter, palette, points_out
+    )
+
+
+@wp.func_native(
+    """
+#if !defined(__CUDA_ARCH__)
+    typedef float Four __attribute__((ext_vector_type(4)));
+    typedef float Loose __attribute__((ext_vector_type(4), aligned(4)));
+    const int count = points.shape[1];
+    const float* from = (const float*)packed.data + 3 * size_t(frame) * packed.shape[1];
+    float* to = (float*)points.data + 3 * size_t(frame) * count;
+    const int* at = lane.data;
+    int i = 0;
+    // whole vectors that go past the caches want an address that divides by their size
+    for (; i < count && (size_t(to + 3 * i) & 15); ++i)
+        for (int k = 0; k < 3; ++k) to[3 * i + k] = from[3 * at[i] + k];
+    for (; i + 4 <= count; i += 4) {
+        // each reads one number too many, which the array has
+        const Four a = *(const Loose*)(from + 3 * at[i]), b = *(const Loose*)(from + 3 * at[i + 1]);
+        const Four c = *(const Loose*)(from + 3 * at[i + 2]), d = *(const Loose*)(from + 3 * at[i + 3]);
+        Four* out = (Four*)(to + 3 * i);
+        __builtin_nontemporal_store(__builtin_shufflevector(a, b, 0, 1, 2, 4), out);
+        __builtin_nontemporal_store(__builtin_shufflevector(b, c, 1, 2, 4, 5), out + 1);
+        __builtin_nontemporal_store(__builtin_shufflevector(c, d, 2, 4, 5, 6), out + 2);
+    }
+    for (; i < count; ++i)
+        for (int k = 0; k < 3; ++k) to[3 * i + k] = from[3 * at[i] + k];
+#endif
+"""
+)
+def gather_row(
+    frame: int,
+    packed: wp.array2d(dtype=wp.vec3),
+    lane: wp.array(dtype=wp.int32),
+    points: wp.array2d(dtype=wp.vec3),
+): ...
+
+
+@wp.kernel
+def gather_lanes(
+    packed: wp.array2d(dtype=wp.vec3), lane: wp.array(dtype=wp.int32), points_out: wp.array2d(dtype=wp.vec3)
+):
+    """Vertices from the lanes they were computed in, a frame a thread; for the CPU.
+
+    Reading them from a buffer that the caches hold and writing rows from end to end is quicker than writing vertices
+    each to its place in memory. A row of ``packed`` has at least one vertex more than there are lanes.
+    """
+    gather_row(wp.tid(), packed, lane, points_out)

@@ -10,8 +10,12 @@ import scipy.sparse as sp
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from warpjld.covering import bind
 from warpjld.covering.grouping import FIXED, group, work
 from warpjld.covering.runs import Columns, pack
+from warpjld.hand import build_hand
+from warpjld.skeleton import CHANNELS, poses_from_angles
+from warpjld.surface import Surface
 
 
 def _strip(vertices: int, columns: int, seed: int) -> sp.csr_array:
@@ -70,3 +74,20 @@ def test_packed_runs_give_back_every_coefficient(count: int) -> None:
             back[1 + axis][np.ix_(vertices, read[plain:])] = rows[plain + 3 + axis :: 3].T
     np.testing.assert_array_equal(back, dense.astype(np.float32))
     np.testing.assert_array_equal(offsets, offset)
+
+
+def test_rows_written_through_the_buffer_are_those_of_the_runs(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Blocks of frames that do not divide the batch, rows at any address, and a surface smaller than one tile."""
+    hand = build_hand("left", resolution=1500)
+    faces = np.array([[0, 1, 2], [2, 3, 4], [4, 5, 6]], dtype=np.int32)
+    few = Surface(hand.surface.vertices[:7], faces, np.arange(7, dtype=np.int32), faces)
+    monkeypatch.setattr("warpjld.covering.launch._BUFFERED", 1)
+    for surface in (hand.surface, few):
+        covering = bind(hand.skeleton, surface)
+        angles = np.random.default_rng(2).uniform(0.0, 0.3, (21, len(hand.skeleton), len(CHANNELS)))
+        poses = poses_from_angles(hand.skeleton, angles)
+        runs, count = covering.deform(poses, order="runs"), len(surface.vertices)
+        expected = np.empty_like(runs)
+        expected[:, covering.runs.order[:count]] = runs
+        for threads in (1, 2):
+            np.testing.assert_array_equal(covering.deform(poses, threads=threads), expected)

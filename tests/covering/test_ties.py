@@ -6,6 +6,7 @@ from dataclasses import fields, replace
 
 import numpy as np
 import pytest
+import scipy.sparse as sp
 
 from tests.covering.tube import tube, tube_skeleton
 from warpjld.covering import bind, heat
@@ -14,6 +15,7 @@ from warpjld.covering.operators import fans
 from warpjld.covering.paper_places import PaperPlaces, paper_places
 from warpjld.covering.parameters import default_parameters
 from warpjld.covering.segment_table import SegmentTable
+from warpjld.hand import build_hand
 from warpjld.rig import Rig
 from warpjld.skeleton import Skeleton
 from warpjld.surface import Surface
@@ -116,3 +118,17 @@ def test_multigrid_does_not_depend_on_what_was_drawn_before(monkeypatch: pytest.
     np.random.seed(1)  # noqa: NPY002
     assert np.random.rand() == after  # noqa: NPY002
     assert np.array_equal(bind(skeleton, surface).domains, first)
+
+
+def test_heat_does_not_depend_on_the_order_its_equations_are_solved_in() -> None:
+    hand = build_hand("left", resolution=1500).surface
+    laplacian, area = heat.cotangent_laplacian(hand.vertices, hand.faces)
+    right = np.random.default_rng(0).random((len(area), 3)) * area[:, None]
+    order = heat.spatial_order(hand.vertices)
+    np.testing.assert_array_equal(np.sort(order), np.arange(len(area)))
+    matrix = laplacian + sp.diags_array(area * 100.0)
+    found, plain = heat.solve(matrix, right, order), heat.solve(matrix, right)
+    assert found is not None
+    assert plain is not None
+    np.testing.assert_allclose(found, plain, rtol=1e-9, atol=1e-12)
+    np.testing.assert_allclose(matrix @ found, right, atol=1e-9 * right.max())

@@ -34,6 +34,7 @@ class Deforming:
         device: Warp device.
         threads: CPU threads; None for as many as pay.
         touch: Whether skin that crosses is parted: "off", "on", or "limit" to close digits only until they touch.
+        binding: File of a kept binding; None for the cache's.
     """
 
     rig: Rig
@@ -45,13 +46,20 @@ class Deforming:
     device: str = "cpu"
     threads: int | None = None
     touch: Literal["off", "on", "limit"] = "off"
+    binding: Path | None = None
 
     @cached_property
     def covering(self) -> Covering:
         """The rig's surface, bound when it is first wanted; copies sent to other processes take it along."""
-        from warpjld.covering import bind_rig
+        return self.bound[0]
 
-        return bind_rig(self.rig, parameters=self.parameters, domains=self.domains, method=self.method)
+    @cached_property
+    def bound(self) -> tuple[Covering, tuple[str, ...]]:
+        """The covering, and what is to be told of how it was come by."""
+        from warpjld.covering.kept import bind_kept
+
+        how = {"parameters": self.parameters, "domains": self.domains, "method": self.method}
+        return bind_kept(self.rig, path=self.binding, **how)  # type: ignore[arg-type]
 
 
 @dataclass(frozen=True, eq=False)
@@ -128,7 +136,11 @@ def deform_clip(
         frames=len(poses),
         first=first,
         moved=moved,
-        notes=(*(cache.note for cache in caches if cache.note), *(note for one in told for note in one.notes)),
+        notes=(
+            *(how.bound[1] if caches else ()),
+            *(cache.note for cache in caches if cache.note),
+            *(note for one in told for note in one.notes),
+        ),
         warnings=(
             *moved.warnings,
             *(() if contact is None else contact.told()),

@@ -21,6 +21,7 @@ _COMMANDS = {
     "shell": "Type a script's commands one by one and look at the result.",
     "inspect": "Report what was recognised in a rig.",
     "calibrate": "Fit the covering's parameters to a rig.",
+    "bind": "Bind a rig once and keep the binding in a file.",
     "deform": "Deform a rig by a motion file.",
     "study": "Run many grasps and bring them into one table.",
     "fem": "Load a deformable body and solve for its shape, stresses and reactions.",

@@ -72,6 +72,7 @@ __all__ = ["command"]
     help="CSV angles beyond a joint's limit.",
 )
 @click.option("--parameters", type=click.Path(path_type=Path), help="Covering parameters, as calibrate writes them.")
+@click.option("--binding", type=click.Path(path_type=Path), help="Binding of RIG, as bind writes it.")
 @options.domains
 @click.option(
     "--method",

@@ -31,6 +31,7 @@ class Wanted:
     rate: float | None
     limits: str
     parameters: Path | None
+    binding: Path | None
     domains: Literal["geometry", "skin"]
     method: Literal["smooth", "paper"]
     touch: Literal["off", "on", "limit"]
@@ -58,7 +59,10 @@ class Wanted:
 
         motions = dict.fromkeys(job.motion for job in jobs)
         motion_files = [file for motion in motions for file in (motion, *files_of(motion))]
-        return [*rig_files(self.rig, self.how | {"parameters": self.parameters}), *motion_files]
+        return [
+            *rig_files(self.rig, self.how | {"parameters": self.parameters, "binding": self.binding}),
+            *motion_files,
+        ]
 
     def outputs(self, jobs: list[ClipJob]) -> list[Path]:
         """Files that are written, but for those that lie beside a cache."""
@@ -111,6 +115,7 @@ def deforming(wanted: Wanted) -> Deforming:
         wanted.device,
         wanted.threads,
         wanted.touch,
+        wanted.binding,
     )
 
 

@@ -162,9 +162,7 @@ def _anchor_some(
     return best.astype(np.int32), kept, ratio, side, pair, pair_kept, station
 
 
-def _side(
-    offset: NDArray[np.float64], normals: NDArray[np.float64], place: NDArray[np.float64]
-) -> NDArray[np.float64]:
+def _side(offset: NDArray[np.float64], normals: NDArray[np.float64], place: NDArray[np.float64]) -> NDArray[np.float64]:
     """External side (1) or internal (0) by R45's cosine, blended along the segment.
 
     Judged with the normals of both joints one by one: hip and knee bend in opposite senses, and half-way along a thigh

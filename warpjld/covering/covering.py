@@ -15,6 +15,7 @@ from warpjld.covering.diffusion import Diffusion
 from warpjld.covering.domains import domains_from_geometry, domains_from_skin
 from warpjld.covering.drivers import drive
 from warpjld.covering.fields import Fields, joint_of_column, operator_fields
+from warpjld.covering.launch import lane_of, launch_gathered, launch_runs
 from warpjld.covering.operators import Fan, fans
 from warpjld.covering.parameters import SHAPES, Parameters, default_parameters
 from warpjld.covering.rigid import domains_of_rigid, flesh_of, part_of_surface
@@ -27,7 +28,7 @@ from warpjld.rig import Rig, Skin
 from warpjld.skeleton.kinematics import Poses
 from warpjld.skeleton.tree import Skeleton
 from warpjld.surface import Surface
-from warpjld.threads import in_threads, threads_for
+from warpjld.threads import threads_for
 
 __all__ = ["Covering", "bind", "bind_rig"]
 
@@ -70,7 +71,9 @@ class Covering:
         made = (self.skeleton, self.surface, parameters, self.fans, self.domains)
         if all(np.array_equal(getattr(parameters, n), getattr(self.parameters, n)) for n in SHAPES):
             other = type(self)(*made, self.anchors)
-            other.__dict__.update({n: self.__dict__[n] for n in ("diffusion", "spread", "fields") if n in self.__dict__})
+            other.__dict__.update(
+                {n: self.__dict__[n] for n in ("diffusion", "spread", "fields") if n in self.__dict__}
+            )
             return other
         rigid = self.anchors.rigid
         anchors = anchor(self.surface.vertices, self.skeleton, self.fans, self.domains, parameters, rigid=rigid)
@@ -217,24 +220,15 @@ class Covering:
 
     def _launch(self, rows: Any, points: Any, device: Any, threads: int, order: str) -> None:
         import warp as wp
-        from warpjld_kernels.covering_runs import CPU_FRAMES, deform_runs
 
-        *model, targets = self._on(device, "runs", self._packed)
-        # a surface smaller than one tile has stand-ins at its end, which only scattering puts in their place
-        scatter = order == "surface" or len(self.runs.order) > len(self.surface.vertices)
+        *model, lane = self._on(device, "runs", self._packed)
         pose = wp.array(rows, dtype=float, device=device, copy=False)
-        together = CPU_FRAMES if device.is_cpu else 1
-
-        def span(begin: int, end: int) -> None:
-            wp.launch(
-                deform_runs,
-                dim=(-(-(end - begin) // together), len(model[0]), together),
-                inputs=[*model, targets, scatter, pose[begin:end], together],
-                outputs=[points[begin:end]],
-                device=device,
-            )
-
-        in_threads(span, len(rows), threads, deform_runs, device)
+        # a surface smaller than one tile is one run in its own order, with stand-ins that have no place in ``points``
+        placed = order == "surface" or len(self.runs.order) > points.shape[1]
+        if placed and device.is_cpu:
+            launch_gathered(model, lane, pose, points, device, threads)
+        else:
+            launch_runs(model, pose, points, device, threads, scatter=placed)
 
     def _on(self, device: Any, name: str, make: Any) -> list[Any]:
         """Arguments that stay on a device between calls."""
@@ -248,8 +242,9 @@ class Covering:
 
         r = self.runs
         tiles = r.tiles if device.is_cpu else r.lanes()
+        lane = lane_of(r.order, len(self.surface.vertices))
         kinds = ((tiles, wp.int32), (r.runs, wp.int32), (r.slots, wp.int32), (r.coefficients, float))
-        return [wp.array(a, dtype=k, device=device) for a, k in (*kinds, (r.order, wp.int32))]
+        return [wp.array(a, dtype=k, device=device) for a, k in (*kinds, (r.order, wp.int32), (lane, wp.int32))]
 
 
 def bind(

@@ -22,7 +22,7 @@ import scipy.sparse as sp
 from numpy.typing import NDArray
 from scipy.sparse.csgraph import dijkstra
 
-from warpjld.covering.heat import Factor, conducting_laplacian, uniform_laplacian
+from warpjld.covering.heat import Factor, conducting_laplacian, spatial_order, uniform_laplacian
 
 __all__ = ["BETA", "Diffusion"]
 
@@ -127,14 +127,17 @@ class Diffusion:
         if not count:
             return []
         matrix, _, graph = self._system
+        order = spatial_order(self.vertices)
         if count <= _ALL:
-            return [(present, np.arange(count), Factor(matrix))]
+            return [(present, order, Factor(matrix[order][:, order]))]
         number = np.full(columns.shape[0], -1)
         number[self.flesh] = np.arange(count)
         groups: list[tuple[list[int], NDArray[np.bool_], int]] = []
         for joint in np.unique(owner[present]).tolist():
             mine = present[owner[present] == joint]
-            touched = np.unique(np.concatenate([columns.indices[columns.indptr[c] : columns.indptr[c + 1]] for c in mine]))
+            touched = np.unique(
+                np.concatenate([columns.indices[columns.indptr[c] : columns.indptr[c + 1]] for c in mine])
+            )
             touched = number[touched]
             touched = touched[touched >= 0]
             reached = np.zeros(count, dtype=bool)
@@ -154,6 +157,6 @@ class Diffusion:
                 groups[best] = (members + mine.tolist(), mask | reached, max(largest, size))
         out = []
         for members, mask, _ in groups:
-            where = np.flatnonzero(mask)
+            where = order[mask[order]]
             out.append((np.sort(np.array(members)), where, Factor(matrix[where][:, where])))
         return out

@@ -10,7 +10,7 @@ import numpy as np
 import scipy.sparse as sp
 from numpy.typing import NDArray
 
-from warpjld.covering.heat import cotangent_laplacian, solve, uniform_laplacian
+from warpjld.covering.heat import cotangent_laplacian, solve, spatial_order, uniform_laplacian
 from warpjld.covering.operators import Fan, segment_ends
 from warpjld.covering.skull import skull_lines
 from warpjld.errors import InputError
@@ -18,11 +18,13 @@ from warpjld.normals import vertex_normals
 from warpjld.rig import Skin
 from warpjld.skeleton.tree import Skeleton
 from warpjld.spread import spread
+from warpjld.threads import in_threads, threads_for
 
 __all__ = ["domains_from_geometry", "domains_from_skin"]
 
 _LARGEST = 10.0  # skeletons: what lies further out says nothing of how large a surface is
 _NOTHING = 1e-6  # painted weight below which a vertex counts as bare
+_THREAD = 2_000  # points that a thread must have to look from
 _TIE = 1e-5  # of the surface's size: segments whose distances differ by less, as float32 does, are equally near
 
 
@@ -57,13 +59,14 @@ def domains_from_geometry(
     source[np.arange(len(vertices)), owner] = 1.0
     present = np.flatnonzero(source.any(axis=0))
     laplacian, area = cotangent_laplacian(points, faces)
+    order = spatial_order(points)
     for conducting, cover in (
         (lambda: laplacian, area),
         (lambda: uniform_laplacian(faces, len(vertices)), np.full(len(vertices), area.mean())),
     ):
         heat = cover * demand
         weights = np.zeros_like(source)
-        found = solve(conducting() + sp.diags_array(heat), heat[:, None] * source[:, present])
+        found = solve(conducting() + sp.diags_array(heat), heat[:, None] * source[:, present], order)
         if found is not None and (total := np.maximum(found, 0.0).sum(axis=1)).min() > 0.5:
             weights[:, present] = np.maximum(found, 0.0) / total[:, None]
             return weights
@@ -168,11 +171,15 @@ def _nearest_visible(
     normals = wp.array(vertex_normals(points, faces), dtype=wp.vec3, device=device)
     nearest = wp.empty(len(points), dtype=wp.int32, device=device)
     distance = wp.empty(len(points), dtype=float, device=device)
-    wp.launch(
-        nearest_visible_segment,
-        dim=len(points),
-        inputs=[mesh.id, places, normals, 1e-4 * size, _TIE * size, *tips],
-        outputs=[nearest, distance],
-        device=device,
-    )
+
+    def span(begin: int, end: int) -> None:
+        wp.launch(
+            nearest_visible_segment,
+            dim=end - begin,
+            inputs=[mesh.id, places[begin:end], normals[begin:end], 1e-4 * size, _TIE * size, *tips],
+            outputs=[nearest[begin:end], distance[begin:end]],
+            device=device,
+        )
+
+    in_threads(span, len(points), threads_for(len(points), _THREAD), nearest_visible_segment, device)
     return fan_of[nearest.numpy()], distance.numpy().astype(np.float64)

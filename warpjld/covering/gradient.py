@@ -135,9 +135,7 @@ class Differentiable:
             Drivers(positions, turns[:, :joints], turns[:, joints:], *self._by_scalars(step, scalars)),
         )
 
-    def _by_scalars(
-        self, step: _Step, slope: NDArray[np.float64]
-    ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    def _by_scalars(self, step: _Step, slope: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """Derivatives by flexion ratios and by log λ, from those by the scalar inputs."""
         anchors, joints = self._covering.anchors, len(self._covering.skeleton)
         muscles = slope[:, step.rows.scales.shape[1] :]

@@ -13,9 +13,12 @@ from scipy.sparse.linalg import LinearOperator, cg, splu
 
 from warpjld.covering.corners import corner_conductivity
 
-__all__ = ["Factor", "conducting_laplacian", "cotangent_laplacian", "solve", "uniform_laplacian"]
+__all__ = ["Factor", "conducting_laplacian", "cotangent_laplacian", "solve", "spatial_order", "uniform_laplacian"]
 
-_DIRECT_LIMIT = 20_000  # vertices up to which a sparse factorisation is quicker than multigrid
+# vertices up to which a sparse factorisation is taken: with 60 right-hand sides it is far quicker than multigrid, and
+# beyond its memory counts (1.5 kB a vertex)
+_DIRECT_LIMIT = 1_500_000
+_BITS = 16  # of each coordinate in a place on the curve
 _TOLERANCE = 1e-7  # residual of the iterative solvers, and
 _ACCEPTED = 1e-5  # of a solution that is taken, both relative to the right-hand side
 _MULTIGRID_STEPS = 200
@@ -75,15 +78,42 @@ def _laplacian(rows: NDArray, columns: NDArray, conducted: NDArray[np.float64], 
     return sp.diags_array(np.asarray(off.sum(axis=1)).ravel()) - off
 
 
-def solve(matrix: sp.sparray, right: NDArray[np.float64]) -> NDArray[np.float64] | None:
+def spatial_order(vertices: NDArray[np.float64]) -> NDArray[np.int64]:
+    """Vertices along a Z-order curve through space (Morton, 1966), near ones near each other, shape (V,).
+
+    What makes a factorisation quick besides its own ordering by least degrees, which leaves ties to the order given: a
+    third of the time of a mesh of 160,000 vertices numbered by reverse Cuthill-McKee.
+    """
+    low, size = vertices.min(axis=0), float(np.ptp(vertices, axis=0).max())
+    cells = ((vertices - low) / (size or 1.0) * (2**_BITS - 1)).astype(np.int64)
+    code = np.zeros(len(vertices), dtype=np.int64)
+    for bit in range(_BITS):
+        for axis in range(3):
+            code |= ((cells[:, axis] >> bit) & 1) << (3 * bit + axis)
+    return np.argsort(code, kind="stable")
+
+
+def solve(
+    matrix: sp.sparray, right: NDArray[np.float64], order: NDArray[np.int64] | None = None
+) -> NDArray[np.float64] | None:
     """X of A X = B for a symmetric, diagonally dominant A with a positive diagonal, shape (V, n).
 
     Scaled to a diagonal of ones, so that tiny and huge triangles count alike. Small systems are factorised; large ones
     are left to multigrid, and where that does not settle to conjugate gradients, both with a bounded number of steps.
 
+    Args:
+        matrix: A, shape (V, V).
+        right: B, shape (V, n).
+        order: Rows near each other near each other, as :func:`spatial_order` gives them, which makes it quick.
+
     Returns:
         The solution, or None where none was found.
     """
+    if order is not None:
+        back = np.empty_like(order)
+        back[order] = np.arange(len(order))
+        found = solve(sp.csr_array(matrix)[order][:, order], right[order])
+        return None if found is None else found[back]
     diagonal = matrix.diagonal()
     if not (np.isfinite(matrix.data).all() and (diagonal > 0.0).all()):
         return None
@@ -131,9 +161,8 @@ def _drawn_alike() -> Iterator[None]:
 
 
 def _direct(matrix: sp.csc_array, right: NDArray[np.float64], scale: NDArray[np.float64]) -> NDArray[np.float64]:
-    solution: NDArray[np.float64] = splu(matrix, permc_spec="MMD_AT_PLUS_A", options={"SymmetricMode": True}).solve(
-        right
-    )
+    factors = splu(matrix, diag_pivot_thresh=0.0, permc_spec="MMD_AT_PLUS_A", options={"SymmetricMode": True})
+    solution: NDArray[np.float64] = factors.solve(right)
     return solution
 
 

@@ -12,9 +12,7 @@ __all__ = ["room"]
 _INSET = 1e-4  # of the surface's size, so that a ray does not meet the face it starts from
 
 
-def room(
-    vertices: NDArray[np.float64], faces: NDArray[np.int32], offsets: NDArray[np.float64]
-) -> NDArray[np.float64]:
+def room(vertices: NDArray[np.float64], faces: NDArray[np.int32], offsets: NDArray[np.float64]) -> NDArray[np.float64]:
     """Thickness at every vertex [m], shape (V,): the length of its offset from its bones, and at most half of the gap
     to the surface outside it.
 

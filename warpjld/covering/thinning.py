@@ -26,9 +26,7 @@ def thinned(fields: Fields) -> Fields:
     )
 
 
-def thinned_slope(
-    turns: sp.csr_array, thin: sp.csr_array, slope: NDArray[np.float64]
-) -> NDArray[np.float64]:
+def thinned_slope(turns: sp.csr_array, thin: sp.csr_array, slope: NDArray[np.float64]) -> NDArray[np.float64]:
     """Derivatives by rotations' weights before thinning, from those by the weights ``thin`` after it, both dense.
 
     w = t / Σ t with t the shrunk weights, so dw/dt = (1 − w Σ) / Σ t where t is left at all.

@@ -1,0 +1,68 @@
+"""Launching the covering's kernels over the frames of a batch."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from warpjld.threads import in_threads
+
+__all__ = ["lane_of", "launch_gathered", "launch_runs"]
+
+_BUFFERED = 150_000  # vertex-frames that are computed before their rows are written: they stay in the caches
+
+
+def launch_runs(model: list[Any], pose: Any, points: Any, device: Any, threads: int, *, scatter: bool = False) -> None:
+    """Deform all frames of ``pose`` (F, columns) into ``points`` (F, V), in the order of the runs.
+
+    Args:
+        model: ``tiles``, ``runs``, ``slots``, ``coefficients`` and ``order`` on the device.
+        scatter: In the surface's order instead, on a GPU.
+    """
+    from warpjld_kernels.covering_runs import deform_runs
+
+    in_threads(
+        lambda a, b: _deform(model, pose[a:b], points[a:b], device, scatter), len(pose), threads, deform_runs, device
+    )
+
+
+def launch_gathered(model: list[Any], lane: Any, pose: Any, points: Any, device: Any, threads: int) -> None:
+    """The same on the CPU, vertex v from lane ``lane[v]``: block by block through a buffer."""
+    import warp as wp
+    from warpjld_kernels.covering_runs import CPU_FRAMES, deform_runs, gather_lanes
+
+    lanes = len(model[-1])
+    together = max(CPU_FRAMES, _BUFFERED // lanes // CPU_FRAMES * CPU_FRAMES)
+
+    def span(begin: int, end: int) -> None:
+        packed = wp.empty((min(together, end - begin), lanes + 1), dtype=wp.vec3, device=device)
+        for first in range(begin, end, together):
+            last = min(first + together, end)
+            some = packed[: last - first]
+            _deform(model, pose[first:last], some, device, False)
+            wp.launch(gather_lanes, dim=last - first, inputs=[some, lane], outputs=[points[first:last]], device=device)
+
+    in_threads(span, len(pose), threads, deform_runs, device)
+
+
+def _deform(model: list[Any], pose: Any, points: Any, device: Any, scatter: bool) -> None:
+    import warp as wp
+    from warpjld_kernels.covering_runs import CPU_FRAMES, deform_runs
+
+    together = CPU_FRAMES if device.is_cpu else 1
+    wp.launch(
+        deform_runs,
+        dim=(-(-len(pose) // together), len(model[0])),
+        inputs=[*model, scatter, pose, together],
+        outputs=[points],
+        device=device,
+    )
+
+
+def lane_of(order: NDArray[np.int32], vertices: int) -> NDArray[np.int32]:
+    """Lane of every vertex, where stand-ins at the end repeat one."""
+    out = np.empty(vertices, dtype=np.int32)
+    out[order[:vertices]] = np.arange(vertices)
+    return out
