@@ -27,7 +27,7 @@ def test_skin_is_parted_where_touch_says_so(run) -> None:
     scene = run("HAND RIGHT BUILTIN RESOLUTION 1500")
     assert scene.actor().touch == "off"
     assert run("TOUCH LIMIT").actor().touch == "limit"
-    with pytest.raises(InputError, match="ON.*OFF.*LIMIT"):
+    with pytest.raises(InputError, match=r"ON.*OFF.*LIMIT"):
         run("TOUCH MAYBE")
 
 
