@@ -24,10 +24,11 @@ def test_hands_are_built_and_named(run) -> None:
 
 
 def test_skin_is_parted_where_touch_says_so(run) -> None:
-    assert run("HAND RIGHT BUILTIN RESOLUTION 1500").actor().touch == "off"
-    assert run("HAND RIGHT BUILTIN RESOLUTION 1500\nTOUCH LIMIT").actor().touch == "limit"
-    with pytest.raises(InputError, match="ON.*OFF.*LIMIT"):
-        run("HAND RIGHT BUILTIN RESOLUTION 1500\nTOUCH MAYBE")
+    scene = run("HAND RIGHT BUILTIN RESOLUTION 1500")
+    assert scene.actor().touch == "off"
+    assert run("TOUCH LIMIT").actor().touch == "limit"
+    with pytest.raises(InputError, match=r"ON.*OFF.*LIMIT"):
+        run("TOUCH MAYBE")
 
 
 def test_rigs_come_from_files(data) -> None:
