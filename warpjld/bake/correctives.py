@@ -2,8 +2,8 @@
 
 The error of blend skinning at frame f is brought back to the bind pose by each vertex's blended matrix, since engines
 add shapes before they skin. Every bone's rotation against its parent, a quaternion x, y, z, w with w ≥ 0, gives nine
-features: x, y, z, x², y², z², xy, xz, yz. A ridge regression predicts the errors from them; its strength is the one with
-the least leave-one-out error. Of the prediction, the K directions of largest variance are the shapes (reduced-rank
+features: x, y, z, x², y², z², xy, xz, yz. A ridge regression predicts the errors from them; its strength is the one
+with the least leave-one-out error. Of the prediction, the K directions of largest variance are the shapes (reduced-rank
 regression: Izenman 1975), so that shapes are what joints predict, not what one pose happens to need.
 """
 
@@ -18,6 +18,7 @@ __all__ = ["Correctives", "features", "fit_correctives", "no_correctives"]
 
 _RIDGES = 10.0 ** np.arange(-6.0, 1.1, 0.5)  # of the features' mean square
 _DAMPING = 1e-2  # of blended matrices that are nearly singular: candy wrappers take no shape
+_HEARD = 0.01  # of the joint that drives most
 _PRODUCTS = ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2))
 
 
@@ -65,13 +66,28 @@ def fit_correctives(
         turns: Rotations of the bones against their parents, shape (F, B, 4).
         count: At most as many as frames.
     """
-    frames, vertices = errors.shape[:2]
+    vertices = errors.shape[1]
     normal = np.einsum("fvji,fvjk->fvik", blended, blended) + _DAMPING * np.eye(3)
     right = np.einsum("fvji,fvj->fvi", blended, errors)
     back = np.linalg.solve(normal, right[..., None])[..., 0] * (1.0 + _DAMPING)
-    rows = back.reshape(frames, -1)
-    inputs = features(turns).reshape(frames, -1)
+    rows = back.reshape(len(back), -1)
     between = rows @ rows.T
+    inputs = features(turns)
+    first = _reduced(rows, between, inputs, count)
+    # joints whose shapes are not among the K must not be heard in others': the regression again, without them
+    heard = np.einsum("fbn,kbn->fbk", inputs, first.drivers) * np.linalg.norm(first.shapes, axis=1)
+    share = (heard**2).sum(axis=(0, 2))
+    inputs[:, share < _HEARD * share.max()] = 0.0
+    found = _reduced(rows, between, inputs, count)
+    return Correctives(found.shapes.reshape(-1, vertices, 3), found.drivers, found.ridge)
+
+
+def _reduced(
+    rows: NDArray[np.float64], between: NDArray[np.float64], by_bone: NDArray[np.float64], count: int
+) -> Correctives:
+    """Reduced-rank regression of errors (F, 3 V), whose products are ``between``; shapes are flat, (K, 3 V)."""
+    frames = len(rows)
+    inputs = by_bone.reshape(frames, -1)
     left, values, right_vectors = np.linalg.svd(inputs, full_matrices=False)
     scale = float((values**2).sum()) / frames
     ridge = min(_RIDGES * scale, key=lambda r: _left_out(left, values, r, between))
@@ -87,7 +103,7 @@ def fit_correctives(
     largest = np.abs(inputs @ drivers.T).max(axis=0)
     shapes *= largest[:, None]
     drivers /= largest[:, None]
-    return Correctives(shapes.reshape(-1, vertices, 3), drivers.reshape(len(kept), turns.shape[1], 9), float(ridge))
+    return Correctives(shapes, drivers.reshape(len(kept), *by_bone.shape[1:]), float(ridge))
 
 
 def _left_out(

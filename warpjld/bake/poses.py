@@ -19,9 +19,10 @@ __all__ = ["NamedPoses", "joined", "training_poses", "unseen_poses"]
 _FLEXION, _PIVOT, _TWISTING, _ABDUCTION = range(len(CHANNELS))
 _WIDE = np.radians(150.0)  # no joint is trained further, whatever its limits allow
 _UNKNOWN = np.radians(30.0)  # of channels about whose joint nothing is known: limits as wide one way as the other
-_TURN = np.radians(15.0)  # of joints turned alone about the axes of the world: motion files heed no limits
-_SHARES = (0.4, 0.7, 1.0)  # of a limit, of joints moved alone
-_RANDOM = 160
+_TURN = np.radians(20.0)  # of joints turned alone about the axes of the world: motion files heed no limits
+_SHARES = (0.5, 1.0)  # of a limit, of joints moved alone
+_ASIDE = 0.6  # of a limit, of all channels but flexion in random poses: they seldom reach it together
+_RANDOM = 200
 
 
 @dataclass(frozen=True, eq=False)
@@ -55,15 +56,14 @@ def training_poses(skeleton: Skeleton, *, seed: int = 0, random: int = _RANDOM) 
     """
     low, high = ranges(skeleton)
     inner = _inner(skeleton)
-    alone = []
-    for j in inner:
-        for channel in range(len(CHANNELS)):
-            for end in (low, high):
-                if abs(end[j, channel]) > 1e-6:
-                    for share in _SHARES:
-                        row = np.zeros_like(low)
-                        row[j, channel] = share * end[j, channel]
-                        alone.append(row)
+    alone: list[NDArray[np.float64]] = []
+    unknown = _unknown(skeleton).all(axis=1)  # of these, turning them says it all
+    for j, channel in ((j, channel) for j in inner if not unknown[j] for channel in range(len(CHANNELS))):
+        for end in (float(low[j, channel]), float(high[j, channel])):
+            for share in _SHARES if abs(end) > 1e-6 else ():
+                row = np.zeros(low.shape)
+                row[j, channel] = share * end
+                alone.append(row)
     generator = np.random.default_rng(seed)
     many = np.zeros((random, *low.shape))
     common = generator.uniform(0.0, 1.0, (random, 1, 1))
@@ -77,7 +77,7 @@ def training_poses(skeleton: Skeleton, *, seed: int = 0, random: int = _RANDOM) 
         bent[..., _FLEXION] * high[:, _FLEXION],
         own[..., _FLEXION] * low[:, _FLEXION],
     )
-    many[..., 1:] = (np.where(side > 0.0, side * high, -side * low) * 0.8)[..., 1:]
+    many[..., 1:] = (np.where(side > 0.0, side * high, -side * low) * _ASIDE)[..., 1:]
     many *= moves
     parts = [poses_from_angles(skeleton, many), _turned(skeleton, inner)]
     if alone:
@@ -139,13 +139,18 @@ def unseen_poses(skeleton: Skeleton) -> NamedPoses:
 
 def ranges(skeleton: Skeleton) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Smallest and largest angle [rad] that joints are trained to, shapes (J, 4); zero for ends and roots."""
-    low, high = skeleton.limits[..., 0].copy(), skeleton.limits[..., 1].copy()
-    unknown = (high >= np.radians(89.0)) & (np.abs(low + high) < 1e-9)
-    wide = np.where(unknown, _UNKNOWN, _WIDE)
+    wide = np.where(_unknown(skeleton), _UNKNOWN, _WIDE)
     still = np.setdiff1d(np.arange(len(skeleton)), [j for j in _inner(skeleton) if skeleton.parents[j] >= 0])
-    low, high = np.clip(low, -wide, 0.0), np.clip(high, 0.0, wide)
+    low = np.clip(skeleton.limits[..., 0], -wide, 0.0)
+    high = np.clip(skeleton.limits[..., 1], 0.0, wide)
     low[still], high[still] = 0.0, 0.0
     return low, high
+
+
+def _unknown(skeleton: Skeleton) -> NDArray[np.bool_]:
+    """Channels that may go as far one way as the other, and far: nothing is known of them, shape (J, 4)."""
+    low, high = skeleton.limits[..., 0], skeleton.limits[..., 1]
+    return np.asarray((high >= np.radians(89.0)) & (np.abs(low + high) < 1e-9))
 
 
 def _turned(skeleton: Skeleton, inner: list[int]) -> Poses:

@@ -17,7 +17,7 @@ from warpjld.covering.covering import Covering
 from warpjld.errors import InputError
 from warpjld.whole_file import whole_file
 
-__all__ = ["REPORTS", "Accuracy", "accuracy", "write_report"]
+__all__ = ["REPORTS", "Accuracy", "accuracy", "check_report", "write_report"]
 
 REPORTS = (".csv", ".json")
 """Suffixes of reports."""
@@ -91,8 +91,15 @@ def _row(name: str, frames: NDArray[np.bool_], squares: dict[str, NDArray[np.flo
 
     painted, corrected = of("painted"), of("corrected")
     mean, largest = of("weights")
-    assert mean is not None and largest is not None
-    return Accuracy(name, int(frames.sum()), *painted, mean, largest, *corrected)
+    assert mean is not None
+    assert largest is not None
+    return Accuracy(name, int(frames.sum()), painted[0], painted[1], mean, largest, corrected[0], corrected[1])
+
+
+def check_report(path: Path) -> None:
+    """Raise InputError for a suffix that no report has."""
+    if path.suffix.lower() not in REPORTS:
+        raise InputError(f"unknown kind of report '{path.suffix}'; known: {', '.join(REPORTS)}", path=path)
 
 
 def write_report(path: Path, rows: list[Accuracy]) -> None:
@@ -101,13 +108,11 @@ def write_report(path: Path, rows: list[Accuracy]) -> None:
     Raises:
         InputError: Another suffix, or a place that cannot be written.
     """
-    suffix = path.suffix.lower()
-    if suffix not in REPORTS:
-        raise InputError(f"unknown kind of report '{path.suffix}'; known: {', '.join(REPORTS)}", path=path)
+    check_report(path)
     records = [{k: round(v, 6) if isinstance(v, float) else v for k, v in asdict(row).items()} for row in rows]
     try:
         with whole_file(path) as part, part.open("w", encoding="utf-8", newline="") as file:
-            if suffix == ".json":
+            if path.suffix.lower() == ".json":
                 json.dump({"unit": "mm", "unseen": records}, file, indent=1)
             else:
                 table = csv.DictWriter(file, list(records[0]))

@@ -19,7 +19,7 @@ __all__ = ["fit_weights"]
 _CANDIDATES = 10  # bones tried a vertex
 _NEAR = 2  # steps in the tree from the best bone to its candidates
 _RIDGE = 1e-9  # of G's trace: two bones that moved alike share
-_BLOCK = 256
+_NUMBERS = 8_000_000  # held at once
 
 
 def fit_weights(
@@ -45,13 +45,14 @@ def fit_weights(
     width = min(max(_CANDIDATES, influences + 2), bones)
     joints = np.zeros((vertices, influences), dtype=np.int64)
     weights = np.zeros((vertices, influences))
-    for start in range(0, vertices, _BLOCK):
-        block = slice(start, min(start + _BLOCK, vertices))
+    length = max(_NUMBERS // (3 * len(moves) * bones), 1)
+    table = moves.transpose(3, 1, 0, 2).reshape(4, -1)
+    for start in range(0, vertices, length):
+        block = slice(start, min(start + length, vertices))
         homogeneous = np.column_stack([rest[block], np.ones(block.stop - start)])
         # (v, B, 3 F): where each bone alone would be off
-        off = np.einsum("fbij,vj->vbfi", moves, homogeneous, optimize=True)
-        off -= targets[:, block].transpose(1, 0, 2)[:, None]
-        off = off.reshape(len(homogeneous), bones, -1)
+        off = (homogeneous @ table).reshape(len(homogeneous), bones, -1)
+        off -= targets[:, block].transpose(1, 0, 2).reshape(len(homogeneous), 1, -1)
         alone = np.einsum("vbn,vbn->vb", off, off)
         best = alone.argmin(axis=1)
         # near in the skeleton first, then by how well they do alone

@@ -22,6 +22,7 @@ _COMMANDS = {
     "inspect": "Report what was recognised in a rig.",
     "calibrate": "Fit the covering's parameters to a rig.",
     "deform": "Deform a rig by a motion file.",
+    "bake": "Write a rig for engines: fitted skin weights and corrective shapes.",
     "study": "Run many grasps and bring them into one table.",
     "fem": "Load a deformable body and solve for its shape, stresses and reactions.",
 }
