@@ -5,7 +5,7 @@ from __future__ import annotations
 from warpjld.bake.baked import Baked, bake
 from warpjld.bake.poses import NamedPoses, training_poses, unseen_poses
 from warpjld.bake.report import Accuracy, accuracy, write_report
-from warpjld.bake.write import write_baked, write_drivers
+from warpjld.bake.write import write_baked
 
 __all__ = [
     "Accuracy",
@@ -16,6 +16,5 @@ __all__ = [
     "training_poses",
     "unseen_poses",
     "write_baked",
-    "write_drivers",
     "write_report",
 ]

@@ -9,7 +9,7 @@ regression: Izenman 1975), so that shapes are what joints predict, not what one 
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
@@ -30,11 +30,13 @@ class Correctives:
         shapes: Displacements in the bind pose [m], shape (K, V, 3).
         drivers: Weight of every feature of every bone, shape (K, B, 9).
         ridge: Strength of the regression chosen.
+        span: Smallest and largest weight that the poses fitted to ask for, shape (K, 2).
     """
 
     shapes: NDArray[np.float64]
     drivers: NDArray[np.float64]
     ridge: float = 0.0
+    span: NDArray[np.float64] = field(default_factory=lambda: np.zeros((0, 2)))
 
     def __len__(self) -> int:
         return len(self.shapes)
@@ -79,7 +81,7 @@ def fit_correctives(
     share = (heard**2).sum(axis=(0, 2))
     inputs[:, share < _HEARD * share.max()] = 0.0
     found = _reduced(rows, between, inputs, count)
-    return Correctives(found.shapes.reshape(-1, vertices, 3), found.drivers, found.ridge)
+    return Correctives(found.shapes.reshape(-1, vertices, 3), found.drivers, found.ridge, found.span)
 
 
 def _reduced(
@@ -99,11 +101,9 @@ def _reduced(
     length = np.sqrt(spread[kept])
     shapes = ((hat @ directions[:, kept]) / length).T @ rows
     drivers = ((right_vectors.T * shrink) @ (left.T @ (rows @ shapes.T))).T
-    # a weight of 1 is the largest that a training pose asks for
-    largest = np.abs(inputs @ drivers.T).max(axis=0)
-    shapes *= largest[:, None]
-    drivers /= largest[:, None]
-    return Correctives(shapes, drivers.reshape(len(kept), *by_bone.shape[1:]), float(ridge))
+    asked = inputs @ drivers.T
+    span = np.column_stack([np.minimum(asked.min(axis=0), 0.0), np.maximum(asked.max(axis=0), 0.0)])
+    return Correctives(shapes, drivers.reshape(len(kept), *by_bone.shape[1:]), float(ridge), span)
 
 
 def _left_out(

@@ -57,7 +57,7 @@ def training_poses(skeleton: Skeleton, *, seed: int = 0, random: int = _RANDOM) 
     low, high = ranges(skeleton)
     inner = _inner(skeleton)
     alone: list[NDArray[np.float64]] = []
-    unknown = _unknown(skeleton).all(axis=1)  # of these, turning them says it all
+    unknown: NDArray[np.bool_] = np.asarray(_unknown(skeleton).all(axis=1))  # of these, turning them says it all
     for j, channel in ((j, channel) for j in inner if not unknown[j] for channel in range(len(CHANNELS))):
         for end in (float(low[j, channel]), float(high[j, channel])):
             for share in _SHARES if abs(end) > 1e-6 else ():
@@ -67,10 +67,10 @@ def training_poses(skeleton: Skeleton, *, seed: int = 0, random: int = _RANDOM) 
     generator = np.random.default_rng(seed)
     many = np.zeros((random, *low.shape))
     common = generator.uniform(0.0, 1.0, (random, 1, 1))
-    own = generator.uniform(0.0, 1.0, many.shape)
+    own: NDArray[np.float64] = np.asarray(generator.uniform(0.0, 1.0, many.shape))
     # half of the poses bend only some joints, so that a joint's share is not taken for its neighbours'
     moves = generator.uniform(0.0, 1.0, many.shape) < np.where(np.arange(random)[:, None, None] % 2, 0.4, 1.0)
-    bent = 0.5 * (common + own)
+    bent: NDArray[np.float64] = 0.5 * (common + own)
     side = generator.uniform(-1.0, 1.0, many.shape)
     many[..., _FLEXION] = np.where(
         generator.uniform(0.0, 1.0, many.shape[:2]) < 0.85,
@@ -139,10 +139,10 @@ def unseen_poses(skeleton: Skeleton) -> NamedPoses:
 
 def ranges(skeleton: Skeleton) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Smallest and largest angle [rad] that joints are trained to, shapes (J, 4); zero for ends and roots."""
-    wide = np.where(_unknown(skeleton), _UNKNOWN, _WIDE)
+    wide: NDArray[np.float64] = np.asarray(np.where(_unknown(skeleton), _UNKNOWN, _WIDE))
     still = np.setdiff1d(np.arange(len(skeleton)), [j for j in _inner(skeleton) if skeleton.parents[j] >= 0])
-    low = np.clip(skeleton.limits[..., 0], -wide, 0.0)
-    high = np.clip(skeleton.limits[..., 1], 0.0, wide)
+    low: NDArray[np.float64] = np.clip(skeleton.limits[..., 0], -wide, 0.0)
+    high: NDArray[np.float64] = np.clip(skeleton.limits[..., 1], 0.0, wide)
     low[still], high[still] = 0.0, 0.0
     return low, high
 

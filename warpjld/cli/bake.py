@@ -72,7 +72,7 @@ def command(
 
     RIG is a rig file (.glb, .gltf, .vrm, .fbx, .usd, .usda, .usdc, .usdz), a surface with --skeleton, or builtin:left,
     builtin:right."""
-    from warpjld.bake import accuracy, bake, write_baked, write_drivers, write_report
+    from warpjld.bake import accuracy, bake, write_baked, write_report
     from warpjld.bake.motions import with_motions
     from warpjld.bake.report import check_report
     from warpjld.bake.write import check_baked, drivers_file
@@ -112,8 +112,6 @@ def command(
         written = write_baked(
             out, baked, None if shown is None else shown.poses, rate=30.0 if shown is None else shown.rate
         )
-    if correctives:
-        write_drivers(drivers_file(out), baked)
     if table is not None:
         make_folder(table.parent)
         write_report(table, rows)

@@ -19,6 +19,7 @@ class BakedSkin:
         weights: Their weights, rows summing to one, shape (V, 4 k).
         names: Names of the shapes.
         shapes: Displacements of the welded vertices at rest [m], shape (K, V, 3).
+        at_rest: Weights of the shapes where nothing animates them, shape (K,).
         over_time: Weights of the shapes at the frames of the motion, shape (F, K).
     """
 
@@ -26,4 +27,5 @@ class BakedSkin:
     weights: NDArray[np.float64]
     names: tuple[str, ...] = ()
     shapes: NDArray[np.float64] = field(default_factory=lambda: np.zeros((0, 0, 3)))
+    at_rest: NDArray[np.float64] = field(default_factory=lambda: np.zeros(0))
     over_time: NDArray[np.float64] = field(default_factory=lambda: np.zeros((0, 0)))

@@ -121,5 +121,5 @@ def _mesh(file: GlbFile, rig: Rig, motion: SourceMotion, baked: BakedSkin | None
         moved = baked.shapes.astype("<f4")[:, vertex]
         primitive["targets"] = [{"POSITION": file.add(m, "VEC3", target=ARRAY_BUFFER, bounds=True)} for m in moved]
         # the place where programs look for the targets' names
-        mesh |= {"weights": [0.0] * len(moved), "extras": {"targetNames": list(baked.names)}}
+        mesh |= {"weights": baked.at_rest.tolist(), "extras": {"targetNames": list(baked.names)}}
     return mesh
