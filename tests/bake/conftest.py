@@ -11,10 +11,10 @@ from warpjld.hand import build_hand
 
 @pytest.fixture(scope="session")
 def covering() -> Covering:
-    return bind_rig(build_hand("left", resolution=800))
+    return bind_rig(build_hand("left", resolution=1500))
 
 
 @pytest.fixture(scope="session")
 def baked(covering: Covering) -> Baked:
-    rig = build_hand("left", resolution=800)
+    rig = build_hand("left", resolution=1500)
     return bake(rig, covering, training_poses(rig.skeleton), correctives=16)
