@@ -14,7 +14,7 @@ import pytest
 from warpjld.cli import main
 from warpjld.cli.answer import answer
 
-COMMANDS = ["run", "shell", "inspect", "calibrate", "deform", "study", "fem"]
+COMMANDS = ["run", "shell", "inspect", "calibrate", "deform", "bake", "study", "fem"]
 
 
 def run(*arguments: str) -> int | str | None:

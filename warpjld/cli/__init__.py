@@ -23,6 +23,7 @@ _COMMANDS = {
     "calibrate": "Fit the covering's parameters to a rig.",
     "bind": "Bind a rig once and keep the binding in a file.",
     "deform": "Deform a rig by a motion file.",
+    "bake": "Write a rig for engines: fitted skin weights and corrective shapes.",
     "study": "Run many grasps and bring them into one table.",
     "fem": "Load a deformable body and solve for its shape, stresses and reactions.",
 }

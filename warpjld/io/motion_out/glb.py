@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from warpjld.io.motion_out.baked_skin import BakedSkin
 from warpjld.io.motion_out.glb_file import GlbFile
 from warpjld.io.motion_out.gltf_new import new_document
 from warpjld.io.motion_out.gltf_own import own_document
@@ -24,7 +25,7 @@ from warpjld.io.motion_out.write import Timing, WrittenMotion
 from warpjld.rig import Rig
 from warpjld.skeleton import Poses
 
-__all__ = ["write_glb"]
+__all__ = ["animate", "write_glb"]
 
 _CONSTANT = 1e-7  # of the joints' size: those that stray by less from their place under their parent stay there
 _SHEARED = 1e-3  # of a joint's scale
@@ -36,14 +37,22 @@ def write_glb(path: Path, rig: Rig, poses: Poses, timing: Timing) -> WrittenMoti
     notes = list(motion.notes)
     warnings: list[str] = []
     file, nodes = own_document(rig, motion, notes, warnings) or new_document(rig, motion, notes)
-    _animate(file, nodes, motion, timing, warnings)
+    animate(file, nodes, motion, timing, warnings)
     if timing.start_frame:
         notes.append(f"time starts at 0, which is frame {timing.start_frame}")
     file.write(path)
     return WrittenMotion(tuple(notes), tuple(warnings))
 
 
-def _animate(file: GlbFile, nodes: NodeTree, motion: SourceMotion, timing: Timing, warnings: list[str]) -> None:
+def animate(
+    file: GlbFile,
+    nodes: NodeTree,
+    motion: SourceMotion,
+    timing: Timing,
+    warnings: list[str],
+    baked: BakedSkin | None = None,
+) -> None:
+    """Add an animation of the joints, and of baked shapes, before those that the file has."""
     count, frames = len(nodes.joints), len(motion)
     at = nodes.joints
     given = np.isin(np.arange(len(nodes.parents)), at)
@@ -74,6 +83,11 @@ def _animate(file: GlbFile, nodes: NodeTree, motion: SourceMotion, timing: Timin
         channel(joint, "rotation", rotations[:, joint], "VEC4")
         if strays[joint] > _CONSTANT * nodes.size:
             channel(joint, "translation", translations[:, joint], "VEC3")
+    if baked is not None and baked.names:
+        shown = file.add(baked.over_time.astype("<f4").reshape(-1), "SCALAR")
+        samplers.append({"input": times, "interpolation": "LINEAR", "output": shown})
+        mesh = next(n for n, node in enumerate(nodes.records) if "mesh" in node)
+        channels.append({"sampler": len(samplers) - 1, "target": {"node": mesh, "path": "weights"}})
     file.content.setdefault("animations", []).insert(
         0, {"name": timing.name, "samplers": samplers, "channels": channels}
     )

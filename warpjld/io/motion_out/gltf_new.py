@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from warpjld import __version__
+from warpjld.io.motion_out.baked_skin import BakedSkin
 from warpjld.io.motion_out.glb_file import ARRAY_BUFFER, ELEMENT_ARRAY_BUFFER, GlbFile
 from warpjld.io.motion_out.local_motion import nearest_rotations
 from warpjld.io.motion_out.node_tree import NodeTree
@@ -20,8 +21,20 @@ from warpjld.rig import Rig
 __all__ = ["new_document"]
 
 
-def new_document(rig: Rig, motion: SourceMotion, notes: list[str]) -> tuple[GlbFile, NodeTree]:
-    """A document with the rig at rest, and its nodes."""
+def new_document(
+    rig: Rig,
+    motion: SourceMotion,
+    notes: list[str],
+    baked: BakedSkin | None = None,
+) -> tuple[GlbFile, NodeTree]:
+    """A document with the rig at rest, and its nodes; the mesh's node follows those of the joints.
+
+    Args:
+        rig: The rig.
+        motion: Motion of its joints.
+        notes: What whoever opens the file should know is added.
+        baked: Skin weights in place of the rig's own, with morph targets.
+    """
     rest_worlds = motion.rest_frames.copy()
     # joints keep the axes that the file gives them, but no scale: nothing is left for it to do
     rest_worlds[:, :3, :3] = nearest_rotations(rest_worlds[:, :3, :3])
@@ -39,7 +52,7 @@ def new_document(rig: Rig, motion: SourceMotion, notes: list[str]) -> tuple[GlbF
         "scene": 0,
         "scenes": [{"nodes": [*np.flatnonzero(~hang).tolist(), count]}],
         "nodes": nodes,
-        "meshes": [{"name": rig.name, "primitives": [_primitive(file, rig, motion, notes)]}],
+        "meshes": [_mesh(file, rig, motion, baked, notes)],
         "skins": [{"joints": list(range(count)), "inverseBindMatrices": file.add(binds, "MAT4")}],
         # without one, glTF's default is bare metal
         "materials": [
@@ -72,7 +85,7 @@ def _node(name: str, rest: NDArray[np.float64], children: tuple[int, ...]) -> di
     return node
 
 
-def _primitive(file: GlbFile, rig: Rig, motion: SourceMotion, notes: list[str]) -> dict[str, Any]:
+def _mesh(file: GlbFile, rig: Rig, motion: SourceMotion, baked: BakedSkin | None, notes: list[str]) -> dict[str, Any]:
     """The surface in its source's vertex order, copies for texture seams behind it, with all its influences."""
     surface = rig.surface
     origin, faces, uv = surface.split_at_seams()
@@ -90,15 +103,23 @@ def _primitive(file: GlbFile, rig: Rig, motion: SourceMotion, notes: list[str]) 
         # glTF counts v downwards from the top of the picture
         flipped = np.asarray(uv, np.float32) * [1, -1] + [0, 1]
         attributes["TEXCOORD_0"] = file.add(flipped.astype("<f4"), "VEC2", target=ARRAY_BUFFER)
-    joints, weights = (array[vertex] for array in joint_weights(rig, motion, notes))
+    influences = joint_weights(rig, motion, notes) if baked is None else (baked.joints, baked.weights)
+    joints, weights = (array[vertex] for array in influences)
     for first in range(0, joints.shape[1], 4):
         part = slice(first, first + 4)
         n = first // 4
         attributes[f"JOINTS_{n}"] = file.add(joints[:, part].astype("<u2"), "VEC4", target=ARRAY_BUFFER)
         attributes[f"WEIGHTS_{n}"] = file.add(weights[:, part].astype("<f4"), "VEC4", target=ARRAY_BUFFER)
     corners = faces.astype("<u4").reshape(-1)
-    return {
+    primitive = {
         "attributes": attributes,
         "indices": file.add(corners, "SCALAR", target=ELEMENT_ARRAY_BUFFER),
         "material": 0,
     }
+    mesh: dict[str, Any] = {"name": rig.name, "primitives": [primitive]}
+    if baked is not None and baked.names:
+        moved = baked.shapes.astype("<f4")[:, vertex]
+        primitive["targets"] = [{"POSITION": file.add(m, "VEC3", target=ARRAY_BUFFER, bounds=True)} for m in moved]
+        # the place where programs look for the targets' names
+        mesh |= {"weights": baked.at_rest.tolist(), "extras": {"targetNames": list(baked.names)}}
+    return mesh

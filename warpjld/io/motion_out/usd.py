@@ -21,6 +21,7 @@ from scipy.spatial.transform import Rotation
 
 from warpjld.errors import MissingExtraError
 from warpjld.io.caches.usd import write_texture_coordinates
+from warpjld.io.motion_out.baked_skin import BakedSkin
 from warpjld.io.motion_out.local_motion import local_motion, rest_scales
 from warpjld.io.motion_out.skin_weights import joint_weights
 from warpjld.io.motion_out.source_motion import SourceMotion, source_motion
@@ -36,8 +37,15 @@ _SHEARED = 1e-3  # of a joint's scale
 _SAME = 1e-9
 
 
-def write_usd(path: Path, rig: Rig, poses: Poses, timing: Timing) -> WrittenMotion:
+def write_usd(path: Path, rig: Rig, poses: Poses, timing: Timing, baked: BakedSkin | None = None) -> WrittenMotion:
     """Write a motion of a rig's own joints as USD; a :class:`~warpjld.io.motion_out.write.Writer`.
+
+    Args:
+        path: The file.
+        rig: What moves.
+        poses: Poses of its skeleton.
+        timing: When frames are.
+        baked: Skin weights in place of the rig's own, with blend shapes.
 
     Raises:
         MissingExtraError: OpenUSD is not installed.
@@ -63,7 +71,9 @@ def write_usd(path: Path, rig: Rig, poses: Poses, timing: Timing) -> WrittenMoti
     UsdSkel.BindingAPI.Apply(skeleton.GetPrim()).CreateAnimationSourceRel().SetTargets([animation.GetPath()])
     animation.CreateJointsAttr(skeleton.GetJointsAttr().Get())
     sheared = _animate(animation, motion, space, timing.start_frame)
-    _surface(stage, root, skeleton, rig, motion, space, notes)
+    mesh = _surface(stage, root, skeleton, rig, motion, space, baked, notes)
+    if baked is not None and baked.names:
+        _blend_shapes(stage, mesh, animation, rig, space, baked, timing.start_frame)
     if not stage.GetRootLayer().Save():
         raise OSError("USD could not save the layer")
     bent = [motion.tree.names[j] for j in np.flatnonzero(sheared > _SHEARED)]
@@ -214,8 +224,15 @@ def _animate(animation: Any, motion: SourceMotion, space: _Space, start: int) ->
 
 
 def _surface(
-    stage: Any, root: Any, skeleton: Any, rig: Rig, motion: SourceMotion, space: _Space, notes: list[str]
-) -> None:
+    stage: Any,
+    root: Any,
+    skeleton: Any,
+    rig: Rig,
+    motion: SourceMotion,
+    space: _Space,
+    baked: BakedSkin | None,
+    notes: list[str],
+) -> Any:
     """The surface at rest in its source's vertex order, bound to the joints."""
     from pxr import Gf, UsdGeom, UsdSkel, Vt
 
@@ -231,7 +248,7 @@ def _surface(
     mesh.CreatePointsAttr(Vt.Vec3fArray.FromNumpy(points))
     mesh.CreateExtentAttr(Vt.Vec3fArray.FromNumpy(np.stack([points.min(axis=0), points.max(axis=0)])))
     write_texture_coordinates(mesh, surface)
-    joints, weights = joint_weights(rig, motion, notes)
+    joints, weights = joint_weights(rig, motion, notes) if baked is None else (baked.joints, baked.weights)
     joints, weights = np.argsort(space.order)[joints][surface.weld], weights[surface.weld]
     binding = UsdSkel.BindingAPI.Apply(mesh.GetPrim())
     binding.CreateSkeletonRel().SetTargets([skeleton.GetPath()])
@@ -239,3 +256,24 @@ def _surface(
     width = joints.shape[1]
     binding.CreateJointIndicesPrimvar(False, width).Set(Vt.IntArray.FromNumpy(joints.astype(np.int32).ravel()))
     binding.CreateJointWeightsPrimvar(False, width).Set(Vt.FloatArray.FromNumpy(weights.astype(np.float32).ravel()))
+    return mesh
+
+
+def _blend_shapes(stage: Any, mesh: Any, animation: Any, rig: Rig, space: _Space, baked: BakedSkin, start: int) -> None:
+    """Shapes below the mesh, and their weights over time beside the joints'."""
+    from pxr import UsdSkel, Vt
+
+    back = np.linalg.inv(space.to_rig)[:3, :3]
+    targets = []
+    for name, shape in zip(baked.names, baked.shapes, strict=True):
+        target = UsdSkel.BlendShape.Define(stage, mesh.GetPath().AppendChild(name))
+        offsets = (shape @ back.T)[rig.surface.weld].astype(np.float32)
+        target.CreateOffsetsAttr(Vt.Vec3fArray.FromNumpy(offsets))
+        targets.append(target.GetPath())
+    binding = UsdSkel.BindingAPI(mesh.GetPrim())
+    binding.CreateBlendShapesAttr(list(baked.names))
+    binding.CreateBlendShapeTargetsRel().SetTargets(targets)
+    animation.CreateBlendShapesAttr(list(baked.names))
+    weights = animation.CreateBlendShapeWeightsAttr()
+    for frame, row in enumerate(baked.over_time):
+        weights.Set(Vt.FloatArray.FromNumpy(row.astype(np.float32)), start + frame)

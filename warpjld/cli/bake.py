@@ -1,0 +1,149 @@
+"""``warpjld bake``: skin weights and corrective shapes that engines play, fitted to the covering."""
+
+from __future__ import annotations
+
+from dataclasses import asdict
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Literal
+
+import click
+
+from warpjld.cli import options
+from warpjld.cli.answer import answer
+
+if TYPE_CHECKING:
+    from warpjld.bake import Accuracy
+
+__all__ = ["command"]
+
+
+@click.command("bake")
+@click.argument("rig")
+@click.option(
+    "-o",
+    "--out",
+    type=click.Path(path_type=Path, dir_okay=False),
+    required=True,
+    help="File to write: .glb, .usd, .usda or .usdc; what drives correctives goes to NAME.correctives.json beside it.",
+)
+@options.rig
+@click.option(
+    "--poses",
+    "motions",
+    multiple=True,
+    type=click.Path(path_type=Path),
+    help="Motion to fit to besides the range of motion; its last quarter is kept for the report. Repeatable.",
+)
+@click.option(
+    "--influences", type=click.Choice(["4", "8"]), default="4", show_default=True, help="Most joints a vertex."
+)
+@click.option(
+    "--correctives", type=click.IntRange(0, 128), default=0, show_default=True, help="How many corrective shapes."
+)
+@click.option(
+    "--clip", type=click.Path(path_type=Path), help="Motion to animate the file by, with the shapes' weights."
+)
+@click.option(
+    "--report",
+    "table",
+    type=click.Path(path_type=Path, dir_okay=False),
+    help="Errors on poses that were not fitted, as .csv or .json.",
+)
+@click.option("--parameters", type=click.Path(path_type=Path), help="Covering parameters, as calibrate writes them.")
+@options.domains
+@options.json
+@options.quiet
+def command(
+    rig: str,
+    out: Path,
+    motions: tuple[Path, ...],
+    influences: str,
+    correctives: int,
+    clip: Path | None,
+    table: Path | None,
+    parameters: Path | None,
+    domains: Literal["geometry", "skin"],
+    as_json: bool,
+    quiet: bool,
+    **how: Any,
+) -> None:
+    """Fit skin weights, and corrective shapes driven by joint rotations, to what the covering does with RIG, and write
+    a file that engines play: RIG's own joints and bind pose, a skin, morph targets.
+
+    RIG is a rig file (.glb, .gltf, .vrm, .fbx, .usd, .usda, .usdc, .usdz), a surface with --skeleton, or builtin:left,
+    builtin:right."""
+    from warpjld.bake import accuracy, bake, write_baked, write_report
+    from warpjld.bake.motions import with_motions
+    from warpjld.bake.report import check_report
+    from warpjld.bake.write import check_baked, drivers_file
+    from warpjld.cli.progress import progress
+    from warpjld.cli.rig_argument import open_rig, rig_files
+    from warpjld.cli.warn import warn
+    from warpjld.covering import bind_rig, load_parameters
+    from warpjld.folders import make_folder
+    from warpjld.io.identity import files_of
+    from warpjld.motion import open_motion
+    from warpjld.overwriting import check_outputs
+    from warpjld.quiet import silence_warp
+
+    silence_warp()
+    check_baked(out)
+    outputs = [out, *([drivers_file(out)] if correctives else [])]
+    if table is not None:
+        check_report(table)
+        outputs.append(table)
+    read = [path for path in (*motions, clip) if path is not None]
+    inputs = [file for path in dict.fromkeys(read) for file in (path, *files_of(path))]
+    check_outputs(outputs, [*rig_files(rig, how | {"parameters": parameters}), *inputs])
+    opened = open_rig(rig, **how)
+    chosen = None if parameters is None else load_parameters(parameters, opened.skeleton)
+    warnings: list[str] = []
+    loaded = [open_motion(path, opened) for path in motions]
+    shown = None if clip is None else open_motion(clip, opened)
+    for motion in (*loaded, *([shown] if shown else [])):
+        warnings.extend(motion.warnings)
+    if opened.skin is None:
+        warnings.append("the rig has no painted weights: the report has nothing to set the fitted ones beside")
+    with progress(quiet) as report:
+        covering = bind_rig(opened, parameters=chosen, domains=domains)
+        fitted, unseen = with_motions(opened.skeleton, [motion.poses for motion in loaded])
+        baked = bake(opened, covering, fitted, influences=int(influences), correctives=correctives, progress=report)
+        rows = accuracy(baked, covering, unseen)
+        written = write_baked(
+            out, baked, None if shown is None else shown.poses, rate=30.0 if shown is None else shown.rate
+        )
+    if table is not None:
+        make_folder(table.parent)
+        write_report(table, rows)
+    warn(dict.fromkeys([*warnings, *written.warnings]))
+    if as_json:
+        answer(
+            {
+                "rig": rig,
+                "files": [str(path) for path in outputs],
+                "influences": int(influences),
+                "correctives": len(baked.correctives),
+                "poses": len(fitted),
+                "unseen": [asdict(row) for row in rows],
+                "warnings": [*opened.suspicious, *warnings, *written.warnings],
+                "notes": list(written.notes),
+            }
+        )
+    elif not quiet:
+        _table(rows, len(fitted))
+        click.echo(f"{', '.join(str(path) for path in outputs)} written")
+        for note in written.notes:
+            click.echo(f"note: {note}")
+
+
+def _table(rows: list[Accuracy], fitted: int) -> None:
+    click.echo(f"fitted to {fitted} poses; on others, mm from the covering (root of the mean square / largest):")
+    click.echo(f"{'':14}{'painted':>16}{'weights':>16}{'with shapes':>16}")
+    for row in rows:
+        cells = (
+            (row.painted_rms, row.painted_largest),
+            (row.weights_rms, row.weights_largest),
+            (row.corrected_rms, row.corrected_largest),
+        )
+        told = (f"{a:8.3f} /{b:6.2f}" if a is not None and b is not None else "-" for a, b in cells)
+        click.echo(f"{row.poses:14}" + "".join(f"{text:>16}" for text in told))
