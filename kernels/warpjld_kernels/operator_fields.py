@@ -1,4 +1,4 @@
-"""Coefficients of the JLD operators at every vertex before diffusion: what depends on parameters but not on the pose."""
+"""Coefficients of the JLD operators at every vertex, before diffusion: they depend on parameters, not on the pose."""
 
 import warp as wp
 

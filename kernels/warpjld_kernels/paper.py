@@ -8,7 +8,6 @@ and the rest pose is exact (C24).
 
 import warp as wp
 
-
 wp.set_module_options({"enable_backward": False, "max_unroll": 1})
 
 

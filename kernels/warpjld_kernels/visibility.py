@@ -84,22 +84,3 @@ def nearest_visible_segment(
         found_distance = first_distance
     nearest_out[tid] = found
     distance_out[tid] = found_distance
-
-
-@wp.kernel
-def gap_outside(
-    # surface
-    mesh: wp.uint64,
-    points: wp.array(dtype=wp.vec3),
-    normals: wp.array(dtype=wp.vec3),
-    inset: float,
-    far: float,
-    # out
-    gap_out: wp.array(dtype=float),
-):
-    """How far from every point along its normal other surface lies; ``far`` where there is none nearer."""
-    tid = wp.tid()
-    hit = wp.mesh_query_ray(mesh, points[tid] + inset * normals[tid], normals[tid], far)
-    gap_out[tid] = far
-    if hit.result:
-        gap_out[tid] = hit.t

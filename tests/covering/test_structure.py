@@ -7,10 +7,12 @@ from typing import Literal
 
 import numpy as np
 import pytest
+import scipy.sparse as sp
 from scipy.spatial.transform import Rotation
 
 from tests.covering.poses import random_angles, random_poses
 from warpjld.covering import Covering, bind
+from warpjld.covering.binding import STATIONS
 from warpjld.covering.paper import PaperCovering
 from warpjld.errors import InputError
 from warpjld.io import load_rig
@@ -155,20 +157,36 @@ def untouched(covering: Covering, joint: int) -> tuple[np.ndarray, np.ndarray]:
     proximal, distal = ends.T
     changed = (proximal == joint) | (distal == joint) | below[proximal] | below[distal]
     carried = below[proximal] & below[distal]
-    segment, used = used_segments(covering)
+    if not isinstance(covering, PaperCovering):
+        return of_rows(covering, joint, below, changed, carried)
+    places = covering.places
+    segment = places.segment
+    used = np.column_stack([np.ones(len(places.between), dtype=bool), places.between])
     still = ~(used & changed[segment]).any(axis=1)
     rigid = (~used | carried[segment]).all(axis=1)
     return still, rigid
 
 
-def used_segments(covering: Covering) -> tuple[np.ndarray, np.ndarray]:
-    """Segments of every vertex, and which of the columns are in use."""
-    if isinstance(covering, PaperCovering):
-        places = covering.places
-        return places.segment, np.column_stack([np.ones(len(places.between), dtype=bool), places.between])
-    anchors = covering.anchors
-    pairs = anchors.pairs if len(anchors.pairs) else np.zeros((1, 2), dtype=int)
-    beside = pairs[anchors.pair].reshape(len(anchors), -1)
-    segment = np.concatenate([anchors.segment, beside], axis=1)
-    used = np.concatenate([anchors.weight > 0.0, np.repeat(anchors.between > 0.0, 2, axis=1)], axis=1)
-    return segment, used
+def of_rows(
+    covering: Covering, joint: int, below: np.ndarray, changed: np.ndarray, carried: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """The same of the smooth method, by what the coefficients of a vertex read."""
+    rows, parents, pairs = covering.rows, covering.skeleton.parents, covering.anchors.pairs
+    own = below.copy()
+    own[joint] = True  # its bone turns; the joint itself stays where it is
+    halfway = own | own[np.maximum(parents, 0)]
+    beside = changed[pairs].any(axis=1) if len(pairs) else np.zeros(0, dtype=bool)
+    moving = np.concatenate([below, halfway, own, own, np.repeat(beside, STATIONS), changed])
+    together = np.concatenate(
+        [below | (np.arange(len(own)) == joint), own & own[np.maximum(parents, 0)] & (parents >= 0), own]
+    )
+    inputs = sp.hstack([rows.positions, rows.turns, rows.scales, rows.muscles], format="csr")
+    still = (abs(inputs) @ moving.astype(np.float64)) == 0.0
+    # what only follows: positions and rotations carried along, and nothing that swells where a bend changes
+    swelling = abs(sp.hstack([rows.scales, rows.muscles], format="csr"))
+    swells = np.concatenate([own, np.repeat(beside, STATIONS), changed])
+    swells[: len(own)] = np.arange(len(own)) == joint
+    swells[len(own) + STATIONS * len(pairs) :] = (covering.anchors.ends == joint).any(axis=1)
+    frame = abs(sp.hstack([rows.positions, rows.turns], format="csr"))
+    rigid = ((frame @ (~together).astype(np.float64)) == 0.0) & ((swelling @ swells.astype(np.float64)) == 0.0)
+    return still, rigid

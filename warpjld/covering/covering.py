@@ -21,7 +21,7 @@ from warpjld.covering.parameters import SHAPES, Parameters, default_parameters
 from warpjld.covering.rigid import domains_of_rigid, flesh_of, part_of_surface
 from warpjld.covering.rows import Rows, pose_on, rows_of, rows_on
 from warpjld.covering.runs import Columns, Runs, pack_runs, palette
-from warpjld.covering.thickness import room
+from warpjld.covering.thickness import thickness
 from warpjld.covering.thinning import thinned
 from warpjld.errors import InputError
 from warpjld.rig import Rig, Skin
@@ -32,6 +32,7 @@ from warpjld.threads import threads_for
 
 __all__ = ["Covering", "bind", "bind_rig"]
 
+_STIFF = 0.75  # how much less far fields reach inside a skull
 _SPLIT_BELOW = 200_000  # vertex-frames a thread must have before splitting pays
 
 
@@ -84,8 +85,10 @@ class Covering:
         """Heat on the flesh, on the scale of its thickness."""
         flesh = np.flatnonzero(self.anchors.rigid < 0)
         vertices, faces = part_of_surface(self.surface.vertices, self.surface.faces, flesh)
-        offsets = operator_fields(self.anchors, self.parameters).offsets(self.anchors.rest, self.skeleton.rest)
-        return Diffusion(vertices, faces, room(vertices, faces, offsets[flesh]), flesh)
+        # a skull needs no room: nothing of it bends, and lids may not leave the eyes
+        stiff = self.domains[flesh][:, [fan.stiff for fan in self.fans]].sum(axis=1)
+        reach = thickness(self.anchors, self.skeleton.rest)[flesh] * (1.0 - _STIFF * stiff)
+        return Diffusion(vertices, faces, reach, flesh)
 
     @cached_property
     def spread(self) -> Fields:

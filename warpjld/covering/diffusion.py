@@ -135,10 +135,7 @@ class Diffusion:
         groups: list[tuple[list[int], NDArray[np.bool_], int]] = []
         for joint in np.unique(owner[present]).tolist():
             mine = present[owner[present] == joint]
-            touched = np.unique(
-                np.concatenate([columns.indices[columns.indptr[c] : columns.indptr[c + 1]] for c in mine])
-            )
-            touched = number[touched]
+            touched = number[np.unique(columns[:, mine].indices)]
             touched = touched[touched >= 0]
             reached = np.zeros(count, dtype=bool)
             if touched.size:

@@ -141,7 +141,7 @@ class Differentiable:
         muscles = slope[:, step.rows.scales.shape[1] :]
         ratio = slope[:, :joints].copy()
         for end in range(2):
-            np.add.at(ratio, (slice(None), anchors.ends[:, end]), 0.5 * muscles)
+            np.add.at(ratio.T, anchors.ends[:, end], 0.5 * muscles.T)
         closing = np.zeros_like(self._drivers.closing)
         if len(anchors.pairs):
             exponent = palm_exponents(anchors, step.parameters)[:, None]
@@ -161,7 +161,8 @@ class Differentiable:
         by_muscle = sp.csr_array((muscle_slope, rows.muscles.indices, rows.muscles.indptr), shape=rows.muscles.shape)
         by_muscle = by_muscle.toarray()
         first = anchors.ends[:, 0]
-        muscle = np.bincount(first, (by_muscle * step.thin.muscles.toarray()).sum(axis=0), minlength=joints)
+        muscle = np.zeros(joints)
+        np.add.at(muscle, first, (by_muscle * step.thin.muscles.toarray()).sum(axis=0))
         palm = np.zeros(joints)
         if len(anchors.pairs):
             exponent = palm_exponents(anchors, chosen)[:, None]
