@@ -179,17 +179,36 @@ def _heat(vertices: np.ndarray, faces: np.ndarray, radius: np.ndarray) -> np.nda
     """Two steps of heat, dense."""
     count, tau = len(vertices), (BETA * radius) ** 2 / 2
     conducted, area = np.zeros((count, count)), np.zeros(count)
+    corners = _saddles(vertices, faces)
+    reach = 0.02 * np.linalg.norm(np.ptp(vertices, axis=0))
     for face in faces:
+        exponent = 0.0  # around a saddle corner of angle θ heat is conducted as r^((2π/θ)² − 1), and a little more so
+        for corner, turns in corners:
+            distance = np.linalg.norm(vertices[face].mean(axis=0) - corner)
+            if distance <= reach:
+                exponent += 1.3 * (turns**-2 - 1) * np.log(distance / reach)
+        better = min(np.exp(exponent), 1e4)
         for k in range(3):
             apex, i, j = face[k], face[(k + 1) % 3], face[(k + 2) % 3]
             u, v = vertices[i] - vertices[apex], vertices[j] - vertices[apex]
             double = np.linalg.norm(np.cross(u, v))
             area[apex] += double / 6
-            weight = min(max(u @ v / double, 1e-3), 1e3) / 2 * (tau[i] + tau[j]) / 2
+            weight = better * min(max(u @ v / double, 1e-3), 1e3) / 2 * (tau[i] + tau[j]) / 2
             conducted[i, j] += weight
             conducted[j, i] += weight
     step = np.linalg.solve(np.diag(area + conducted.sum(axis=1)) - conducted, np.diag(area))
     return np.asarray(step @ step)
+
+
+def _saddles(vertices: np.ndarray, faces: np.ndarray) -> list[tuple[np.ndarray, float]]:
+    """Vertices whose angles sum to more than 1.03 of a full turn, and to how many turns."""
+    angle = np.zeros(len(vertices))
+    for face in faces:
+        for k in range(3):
+            u, v = (vertices[face[(k + n) % 3]] - vertices[face[k]] for n in (1, 2))
+            angle[face[k]] += np.arccos(u @ v / np.linalg.norm(u) / np.linalg.norm(v))
+    turns = angle / (2 * np.pi)
+    return [(vertices[v], float(turns[v])) for v in np.flatnonzero(turns > 1.03)]
 
 
 def _shrunk(row: np.ndarray) -> np.ndarray:

@@ -27,7 +27,10 @@ def test_a_tube_keeps_its_volume_at_every_angle(limit: float) -> None:
 
 
 def test_a_tube_at_ninety_degrees() -> None:
-    """Volume within 2 %, the joint as thick as at rest, no edge below 0.65 of its length, none reversed."""
+    """Volume within 2 %, the joint as thick as at rest, no edge below half of its length, none reversed.
+
+    Diffusion rounds the outer edge of the bend, which costs some of its height; blend skinning leaves .71 of it, and
+    .71 on the inside."""
     skeleton = tube_skeleton()
     poses = bend(skeleton, [90.0])
     points = bind(skeleton, SURFACE).deform(poses)[0]
@@ -36,13 +39,14 @@ def test_a_tube_at_ninety_degrees() -> None:
     # thickness: how far the joint's section reaches along the bisector's normal, and to the sides
     section = points[30 * AROUND : 31 * AROUND] - poses.positions[0, 1]
     normal = np.array([0.0, np.sqrt(0.5), -np.sqrt(0.5)])
-    assert (section @ normal).max() >= RADIUS * (1.0 - 1e-6)
+    assert (section @ normal).max() >= 0.8 * RADIUS
     assert -(section @ normal).min() >= RADIUS * (1.0 - 1e-6)
+    assert np.ptp(section @ normal) >= 2.0 * RADIUS * (1.0 - 1e-6)
     assert np.ptp(section[:, 0]) >= 2.0 * RADIUS * (1.0 - 1e-6)
     edges = unique_edges(SURFACE.faces)
     stretch = Stretch.of(edge_stretch(SURFACE.vertices, points, edges))
-    assert stretch.smallest >= 0.65
-    assert stretch.largest < 2.0
+    assert stretch.smallest >= 0.5
+    assert stretch.largest < 1.6
     before = (SURFACE.vertices[:, 2] > skeleton.rest[1, 2])[:, None]
     carried = np.where(before, poses.rotations[0, 0], poses.rotations[0, 1])
     assert not reversed_edges(SURFACE.vertices, points, edges, carried).any()

@@ -7,7 +7,8 @@ r; a step of heat does:
     (A + L_τ) X = A X₀,   τ = (β r)²
 
 with A the vertices' areas and L_τ the cotangent Laplacian, each edge conducting by the mean τ of its ends. It is taken
-in two steps of τ / 2, whose tails are shorter than those of one. Constants stay as they are, so rows still sum to one,
+in two steps of τ / 2, whose tails are shorter than those of one, and conducted better around saddle corners, as domains
+are, or fields would get the steeper there the finer the mesh is. Constants stay as they are, so rows still sum to one,
 and nothing jumps that did not jump before. Heat runs over the surface, never through space: fingers side by side are
 far from each other.
 """

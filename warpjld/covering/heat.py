@@ -41,7 +41,8 @@ def conducting_laplacian(
     vertices: NDArray[np.float64], faces: NDArray[np.int32], conductivity: NDArray[np.float64]
 ) -> tuple[sp.csr_array, NDArray[np.float64]]:
     """The same where heat is conducted as well as each vertex says, shape (V,): an edge by the mean of its ends."""
-    return _cotangents(vertices, faces, lambda i, j: (conductivity[i] + conductivity[j]) / 2.0)
+    corner = corner_conductivity(vertices, faces)
+    return _cotangents(vertices, faces, lambda i, j: corner * (conductivity[i] + conductivity[j]) / 2.0)
 
 
 def _cotangents(
