@@ -27,7 +27,9 @@ def stiff() -> Covering:
     plain = replace(plain, inflation=zero, muscle=zero, proximity=np.full((3, 2), 0.2))
     beyond = surface.vertices[:, 2] < -SEGMENT
     domains = np.stack([~beyond, beyond], axis=1).astype(float)
-    return bind(skeleton, surface, parameters=plain, domains=domains)
+    # beyond the joint's surroundings all is bone, so that angles of contact are known exactly
+    bone = np.where(surface.vertices[:, 2] < -1.3 * SEGMENT, 1, -1).astype(np.int32)
+    return bind(skeleton, surface, parameters=plain, domains=domains, rigid=bone)
 
 
 def top(covering: Covering, ratio: float) -> int:
