@@ -15,8 +15,9 @@ far from each other.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 import scipy.sparse as sp
@@ -54,6 +55,10 @@ class Diffusion:
     radius: NDArray[np.float64]
     flesh: NDArray[np.int64]
 
+    def __getstate__(self) -> dict[str, Any]:
+        """Without what was computed: factorisations cannot be sent to another process."""
+        return {field.name: getattr(self, field.name) for field in fields(self)}
+
     @cached_property
     def _system(self) -> tuple[sp.csr_array, NDArray[np.float64], sp.csr_array]:
         """A + L of a single step, A, and the edges' lengths in lengths of decay."""
@@ -66,13 +71,13 @@ class Diffusion:
         graph = sp.coo_array((np.maximum(decay, 1e-9), (i, j)), shape=edges.shape).tocsr()
         return sp.csr_array(sp.diags_array(area) + laplacian), area, graph
 
-    def spread(self, fields: sp.csr_array, owner: NDArray[np.int64]) -> sp.csr_array:
+    def spread(self, coefficients: sp.csr_array, owner: NDArray[np.int64]) -> sp.csr_array:
         """Fields (all vertices, columns) after diffusion; those of one ``owner`` lie in one place, shape (columns,)."""
-        columns = fields.tocsc()
+        columns = coefficients.tocsc()
         present = np.flatnonzero(np.diff(columns.indptr))
         rows, places, values = [], [], []
-        hard = np.setdiff1d(np.arange(fields.shape[0]), self.flesh)
-        kept = fields[hard].tocoo()
+        hard = np.setdiff1d(np.arange(coefficients.shape[0]), self.flesh)
+        kept = coefficients[hard].tocoo()
         rows.append(hard[kept.coords[0]])
         places.append(kept.coords[1])
         values.append(kept.data)
@@ -84,13 +89,13 @@ class Diffusion:
             places.append(members[column])
             values.append(out[row, column])
         index = (np.concatenate(rows), np.concatenate(places))
-        return sp.coo_array((np.concatenate(values), index), shape=fields.shape).tocsr()
+        return sp.coo_array((np.concatenate(values), index), shape=coefficients.shape).tocsr()
 
     def adjoint(
-        self, slopes: NDArray[np.float64], fields: sp.csr_array, owner: NDArray[np.int64]
+        self, slopes: NDArray[np.float64], coefficients: sp.csr_array, owner: NDArray[np.int64]
     ) -> NDArray[np.float64]:
-        """Derivatives by ``fields`` of a number whose derivatives by ``spread(fields)`` are given, both dense."""
-        columns = fields.tocsc()
+        """Derivatives by ``coefficients`` of a number whose derivatives by ``spread`` of them are given, both dense."""
+        columns = coefficients.tocsc()
         present = np.flatnonzero(np.diff(columns.indptr))
         out = slopes.copy()
         out[self.flesh] = 0.0
