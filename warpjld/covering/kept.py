@@ -175,10 +175,12 @@ def _sources() -> str:
     """Hash of the programs that bind: a version under way changes without its number."""
     import warpjld_kernels
 
+    import warpjld
+
     digest = hashlib.sha256()
-    for folder in (Path(__file__).parent, Path(warpjld_kernels.__path__[0])):
-        for file in sorted(folder.glob("*.py")):
-            digest.update(file.name.encode())
+    for folder in (Path(warpjld.__path__[0]), Path(warpjld_kernels.__path__[0])):
+        for file in sorted(folder.rglob("*.py")):
+            digest.update(file.relative_to(folder).as_posix().encode())
             digest.update(file.read_bytes())
     return digest.hexdigest()
 
