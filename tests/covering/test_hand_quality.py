@@ -59,7 +59,7 @@ def test_without_inflation(rig: Rig, covering: Covering) -> None:
     zero = np.zeros(len(rig.skeleton))
     plain = covering.with_parameters(replace(covering.parameters, inflation=zero, muscle=zero, palm=zero))
     measured = measure(rig.surface, plain.deform(curled(rig.skeleton, CURLS)))[0.6]
-    assert measured.stretch.smallest >= 0.55
+    assert measured.stretch.smallest >= 0.5  # linear blend skinning: .27
     assert measured.stretch.largest <= 1.5
     assert not len(measured.crossings.pairs)
 
