@@ -49,7 +49,7 @@ __all__ = ["command"]
     type=click.Path(path_type=Path, dir_okay=False),
     help="Errors on poses that were not fitted, as .csv or .json.",
 )
-@click.option("--parameters", type=click.Path(path_type=Path), help="Covering parameters, as calibrate writes them.")
+@options.parameters
 @options.domains
 @options.json
 @options.quiet

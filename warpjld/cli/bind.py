@@ -18,7 +18,7 @@ __all__ = ["command"]
 @click.argument("rig")
 @click.option("-o", "--out", required=True, type=click.Path(path_type=Path, dir_okay=False), help=".npz to write.")
 @options.rig
-@click.option("--parameters", type=click.Path(path_type=Path), help="Covering parameters, as calibrate writes them.")
+@options.parameters
 @options.domains
 @options.json
 @options.quiet

@@ -71,7 +71,7 @@ __all__ = ["command"]
     show_default=True,
     help="CSV angles beyond a joint's limit.",
 )
-@click.option("--parameters", type=click.Path(path_type=Path), help="Covering parameters, as calibrate writes them.")
+@options.parameters
 @click.option("--binding", type=click.Path(path_type=Path), help="Binding of RIG, as bind writes it.")
 @options.domains
 @click.option(

@@ -8,7 +8,7 @@ from typing import Any
 
 import click
 
-__all__ = ["RIG", "commands", "device", "domains", "json", "out_folder", "quiet", "rig", "threads"]
+__all__ = ["RIG", "commands", "device", "domains", "json", "out_folder", "parameters", "quiet", "rig", "threads"]
 
 Decorator = Callable[[Callable[..., None]], Callable[..., None]]
 
@@ -28,6 +28,9 @@ domains: Decorator = click.option(
     default="geometry",
     show_default=True,
     help="Where a vertex's domain comes from: the surface alone, or painted weights.",
+)
+parameters: Decorator = click.option(
+    "--parameters", type=click.Path(path_type=Path), help="Covering parameters, as calibrate writes them."
 )
 json: Decorator = click.option("--json", "as_json", is_flag=True, help="Write the result to stdout as JSON.")
 quiet: Decorator = click.option("-q", "--quiet", is_flag=True, help="Say nothing but errors.")

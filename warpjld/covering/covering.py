@@ -17,7 +17,7 @@ from warpjld.covering.drivers import drive
 from warpjld.covering.fields import Fields, joint_of_column, operator_fields
 from warpjld.covering.launch import lane_of, launch_gathered, launch_runs
 from warpjld.covering.operators import Fan, fans
-from warpjld.covering.parameters import SHAPES, Parameters, default_parameters
+from warpjld.covering.parameters import Parameters, default_parameters
 from warpjld.covering.rigid import domains_of_rigid, flesh_of, part_of_surface
 from warpjld.covering.rows import Rows, pose_on, rows_of, rows_on
 from warpjld.covering.runs import Columns, Runs, pack_runs, palette
@@ -70,7 +70,7 @@ class Covering:
         other than amplitudes change."""
         parameters.check(self.skeleton)
         made = (self.skeleton, self.surface, parameters, self.fans, self.domains)
-        if all(np.array_equal(getattr(parameters, n), getattr(self.parameters, n)) for n in SHAPES):
+        if parameters.shapes_like(self.parameters):
             other = type(self)(*made, self.anchors)
             other.__dict__.update(
                 {n: self.__dict__[n] for n in ("diffusion", "spread", "fields") if n in self.__dict__}
@@ -93,7 +93,10 @@ class Covering:
     @cached_property
     def spread(self) -> Fields:
         """The operators' coefficients after diffusion."""
-        fields = operator_fields(self.anchors, self.parameters)
+        return self.diffused(operator_fields(self.anchors, self.parameters))
+
+    def diffused(self, fields: Fields) -> Fields:
+        """Fields of this surface after diffusion."""
         return fields.like(self.diffusion.spread(fields.stacked(), joint_of_column(self.anchors, len(self.skeleton))))
 
     @cached_property

@@ -9,6 +9,7 @@ left of c, so that the rest pose stays exact.
 
 from __future__ import annotations
 
+from contextlib import nullcontext
 from dataclasses import dataclass
 
 import numpy as np
@@ -94,12 +95,9 @@ class OperatorKernel:
             for a in (parameters.proximity, parameters.peak, parameters.exponents)
         ]
         self._tape = wp.Tape()
-        launch = {"dim": shape, "inputs": [*self._inputs, *self._values], "outputs": self._out, "device": device}
-        if requires_grad:
-            with self._tape:
-                wp.launch(kernels.operator_fields, **launch)
-        else:
-            wp.launch(kernels.operator_fields, **launch)
+        with self._tape if requires_grad else nullcontext():
+            inputs = [*self._inputs, *self._values]
+            wp.launch(kernels.operator_fields, dim=shape, inputs=inputs, outputs=self._out, device=device)
         self._layout(len(parameters.inflation))
 
     def _layout(self, joints: int) -> None:

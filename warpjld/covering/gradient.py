@@ -14,7 +14,7 @@ from warpjld.covering.device import checked_device
 from warpjld.covering.drivers import Drivers, drive
 from warpjld.covering.fields import Fields, OperatorKernel, joint_of_column
 from warpjld.covering.paper import PaperCovering
-from warpjld.covering.parameters import SHAPES, Parameters
+from warpjld.covering.parameters import Parameters
 from warpjld.covering.rows import Padded, Rows, palm_exponents, pose_on, rows_of, rows_on
 from warpjld.covering.thinning import thinned, thinned_slope
 from warpjld.errors import InputError
@@ -86,10 +86,9 @@ class Differentiable:
         chosen.check(covering.skeleton)
         shapes = None
         spread, thin = covering.spread, covering.fields
-        if any(not np.array_equal(getattr(chosen, n), getattr(covering.parameters, n)) for n in SHAPES):
+        if not chosen.shapes_like(covering.parameters):
             shapes = OperatorKernel(covering.anchors, chosen, requires_grad=True)
-            owner = joint_of_column(covering.anchors, len(covering.skeleton))
-            spread = shapes.fields.like(covering.diffusion.spread(shapes.fields.stacked(), owner))
+            spread = covering.diffused(shapes.fields)
             thin = thinned(spread)
         rows = rows_of(thin, covering.skeleton, covering.anchors, chosen)
         # a tape's backward reads arrays as they are then: inputs and outputs are made afresh at every step

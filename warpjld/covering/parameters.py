@@ -16,10 +16,9 @@ from warpjld.suggest import one_of
 from warpjld.text_file import read_json
 from warpjld.whole_file import whole_file
 
-__all__ = ["SHAPES", "Parameters", "default_parameters", "load_parameters", "save_parameters"]
+__all__ = ["Parameters", "default_parameters", "load_parameters", "save_parameters"]
 
-SHAPES = ("proximity", "peak", "exponents")
-"""Parameters that shape the fields on the surface; the others are amplitudes of them."""
+_SHAPES = ("proximity", "peak", "exponents")  # what shapes fields on the surface; the others are amplitudes of them
 
 # Amplitudes of a 90° joint: a tube of two segments, half as thick as they are long, then keeps its volume within 2 %.
 _INFLATION = 0.21
@@ -48,6 +47,10 @@ class Parameters:
     peak: NDArray[np.float64]
     exponents: NDArray[np.float64]
     palm: NDArray[np.float64]
+
+    def shapes_like(self, other: Parameters) -> bool:
+        """Whether fields are shaped alike: only amplitudes differ, if anything does."""
+        return all(np.array_equal(getattr(self, name), getattr(other, name)) for name in _SHAPES)
 
     def check(self, skeleton: Skeleton) -> None:
         """Raise InputError where a value is out of its range for this skeleton."""
