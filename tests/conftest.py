@@ -26,6 +26,13 @@ if worker := os.environ.get("PYTEST_XDIST_WORKER"):
 os.environ["WARPJLD_CACHE"] = "off"
 
 
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """Slow tests may take as long as they like."""
+    for item in items:
+        if item.get_closest_marker("slow"):
+            item.add_marker(pytest.mark.timeout(0))
+
+
 @pytest.fixture(scope="session")
 def data() -> Path:
     """Folder of third-party assets."""

@@ -3,6 +3,9 @@
 from __future__ import annotations
 
 import multiprocessing
+import os
+import sys
+import threading
 import time
 from dataclasses import dataclass
 from pathlib import Path
@@ -51,3 +54,52 @@ def test_an_interrupt_does_not_wait_for_jobs_and_leaves_no_half_of_a_file(tmp_pa
     assert time.monotonic() - began < 120.0
     assert not multiprocessing.active_children()
     assert [path.name for path in tmp_path.iterdir()] == ["0.txt"]
+
+
+@dataclass(frozen=True)
+class Deadly(Sleep):
+    """Job 1 ends its process; others go on whatever they are told, once."""
+
+    def do(self, job: int) -> str:
+        """Wait for one another, then end the process or ignore that it should end."""
+        first = not (self.folder / f"{job}.began").exists()
+        (self.folder / f"{job}.began").touch()
+        if job == 1:
+            while not (self.folder / "0.began").exists():
+                time.sleep(0.01)
+            os._exit(9)
+        until = time.monotonic() + 600.0 * first
+        while time.monotonic() < until:
+            try:
+                time.sleep(0.1)
+            except SystemExit:
+                continue
+        return "done"
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="signals of POSIX")
+def test_workers_that_do_not_heed_being_ended_are_not_waited_for(tmp_path: Path) -> None:
+    statuses = {}
+    began = time.monotonic()
+    run_jobs(Deadly(tmp_path), [0, 1], processes=2, done=statuses.__setitem__)
+    assert statuses == {0: "done", 1: "crashed"}
+    assert time.monotonic() - began < 120.0
+    assert not multiprocessing.active_children()
+
+
+def test_a_worker_started_while_others_are_ended_is_not_waited_for(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The pool's own thread ends workers as soon as one dies, and misses one that is started at that moment."""
+    from multiprocessing.process import BaseProcess
+
+    kill = BaseProcess.terminate
+
+    def missed(process: BaseProcess) -> None:
+        if threading.current_thread() is threading.main_thread():
+            kill(process)
+
+    monkeypatch.setattr(BaseProcess, "terminate", missed)
+    statuses = {}
+    run_jobs(Deadly(tmp_path), [0, 1], processes=2, done=statuses.__setitem__)
+    assert statuses == {0: "done", 1: "crashed"}

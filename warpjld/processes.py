@@ -17,10 +17,11 @@ from typing import Any, Protocol, TypeVar
 
 from warpjld.errors import WarpjldError
 
-__all__ = ["Work", "one_thread", "run_jobs", "worker_pool"]
+__all__ = ["Work", "Workers", "one_thread", "run_jobs", "worker_pool"]
 
 _AHEAD = 2  # jobs handed out for each process: keeps it busy, and few are suspected when it dies
 _LIVES = 2  # times a job may kill a worker that has nothing else to do
+_WATCH = 1.0  # seconds between looks at whether all workers live
 _PATIENCE = 5.0  # seconds that a worker has to put away what it was writing
 
 _THREADS = (
@@ -93,26 +94,85 @@ def one_thread() -> Iterator[None]:
                 os.environ[name] = value
 
 
+class Workers:
+    """Workers of a pool, watched over.
+
+    A pool of Python 3.11 misses the death of a worker that it started while nothing else happened, and then waits for
+    its result for ever; here deaths are looked for, too.
+    """
+
+    def __init__(self, pool: ProcessPoolExecutor) -> None:
+        self._pool = pool
+        self._others = set(multiprocessing.active_children())
+        self._alive: set[BaseProcess] = set()
+
+    def submit(self, do: Callable[..., Any], *arguments: Any) -> Future[Any]:
+        """Hand out work; this is when workers are started: they never hear of Ctrl-C, not even while they import, and
+        none is left half started, which would end in a traceback."""
+        block = hasattr(signal, "pthread_sigmask")
+        before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT, signal.SIGTERM}) if block else set()
+        try:
+            future = self._pool.submit(do, *arguments)
+            self._alive |= self._now()
+            return future
+        finally:
+            if block:
+                signal.pthread_sigmask(signal.SIG_SETMASK, before)
+
+    def finished(self, futures: Iterable[Future[Any]]) -> set[Future[Any]]:
+        """Those that are done, once one is.
+
+        Raises:
+            BrokenProcessPool: A worker has died.
+        """
+        while not (done := wait(futures, timeout=_WATCH, return_when=FIRST_COMPLETED).done):
+            now = self._now()
+            if self._alive - now:
+                raise BrokenProcessPool("a worker process ended")
+            self._alive |= now
+        return done
+
+    def result(self, future: Future[Any]) -> Any:
+        """Result of one future; raises as ``finished`` does, and what its work raised."""
+        self.finished([future])
+        return future.result()
+
+    def end(self) -> None:
+        """End workers, those that do not go by force."""
+        self._pool.shutdown(wait=False, cancel_futures=True)
+        workers = self._now()
+        for worker in workers:
+            worker.terminate()
+        for worker in workers:
+            worker.join(_PATIENCE)
+            if worker.is_alive():
+                worker.kill()
+
+    def _now(self) -> set[BaseProcess]:
+        return set(multiprocessing.active_children()) - self._others
+
+
 @contextmanager
-def worker_pool(work: Work[Any], processes: int) -> Iterator[ProcessPoolExecutor]:
+def worker_pool(work: Work[Any], processes: int) -> Iterator[Workers]:
     """Workers that have begun; left by an exception, they are ended, whatever they are doing.
+
+    Let ``BrokenProcessPool`` leave it too: the pool waits for its workers for ever where one was started while the
+    pool was ending the others, or does not heed being asked.
 
     Raises:
         WarpjldError: They do not start.
     """
-    before = set(multiprocessing.active_children())
-    with ProcessPoolExecutor(
-        processes, mp_context=multiprocessing.get_context("spawn"), initializer=_start, initargs=(work,)
-    ) as pool:
+    spawn = multiprocessing.get_context("spawn")
+    with ProcessPoolExecutor(processes, mp_context=spawn, initializer=_start, initargs=(work,)) as pool:
+        workers = Workers(pool)
         try:
             try:
-                _submit(pool, os.getpid).result()
+                workers.result(workers.submit(os.getpid))
             except BrokenProcessPool as error:
                 raise WarpjldError(f"worker processes do not start: {error}") from error
-            yield pool
+            yield workers
         except BaseException:
-            pool.shutdown(wait=False, cancel_futures=True)
-            _end(set(multiprocessing.active_children()) - before)
+            workers.end()
             raise
 
 
@@ -145,6 +205,8 @@ _doing = False
 def _ended(*_: object) -> None:
     if not _doing:
         os._exit(1)
+    # what is raised here may come to nothing: in a destructor, or just as a job ends
+    signal.alarm(int(_PATIENCE))
     raise SystemExit(1)  # lets whoever writes a file remove what is half of it
 
 
@@ -160,44 +222,21 @@ def _do(job: Any) -> str:
         _doing = False
 
 
-def _submit(pool: ProcessPoolExecutor, do: Callable[..., Any], *arguments: Any) -> Future[Any]:
-    """Hand out work; this is when workers are started: they never hear of Ctrl-C, not even while they import, and none
-    is left half started, which would end in a traceback."""
-    if not hasattr(signal, "pthread_sigmask"):
-        return pool.submit(do, *arguments)
-    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT, signal.SIGTERM})
-    try:
-        return pool.submit(do, *arguments)
-    finally:
-        signal.pthread_sigmask(signal.SIG_SETMASK, before)
-
-
-def _end(workers: Iterable[BaseProcess]) -> None:
-    """End workers, those that do not go by force."""
-    workers = list(workers)
-    for worker in workers:
-        worker.terminate()
-    for worker in workers:
-        worker.join(_PATIENCE)
-        if worker.is_alive():
-            worker.kill()
-
-
 def _together(work: Work[Job], waiting: deque[Job], processes: int, done: Callable[[Job, str], None]) -> list[Job]:
     """Work off ``waiting``; if the pool breaks, stop and return the jobs that were handed out."""
     out: dict[Future[str], Job] = {}
-    with worker_pool(work, min(processes, len(waiting))) as pool:
-        try:
+    try:
+        with worker_pool(work, min(processes, len(waiting))) as workers:
             while waiting or out:
                 while waiting and len(out) < _AHEAD * processes:
                     job = waiting[0]
-                    out[_submit(pool, _do, job)] = job
+                    out[workers.submit(_do, job)] = job
                     waiting.popleft()
-                for future in wait(out, return_when=FIRST_COMPLETED).done:
+                for future in workers.finished(out):
                     done(out[future], future.result())
                     del out[future]
-        except BrokenProcessPool:
-            return _settle(work, out.values(), done)
+    except BrokenProcessPool:
+        return _settle(work, out.values(), done)
     return []
 
 
@@ -216,16 +255,15 @@ def _settle(work: Work[Job], jobs: Iterable[Job], done: Callable[[Job, str], Non
 def _alone(work: Work[Job], suspects: list[Job], done: Callable[[Job, str], None]) -> None:
     lives = [(job, _LIVES) for job in suspects]
     while lives:
-        with worker_pool(work, 1) as pool:
-            while lives:
-                job, left = lives[0]
-                try:
-                    status = _submit(pool, _do, job).result()
-                except BrokenProcessPool:
-                    lives[0] = (job, left - 1)
-                    if left == 1:
-                        del lives[0]
-                        done(job, work.bury(job))
-                    break
+        try:
+            with worker_pool(work, 1) as workers:
+                while lives:
+                    job, left = lives[0]
+                    status = workers.result(workers.submit(_do, job))
+                    del lives[0]
+                    done(job, status)
+        except BrokenProcessPool:
+            lives[0] = (job, left - 1)
+            if left == 1:
                 del lives[0]
-                done(job, status)
+                done(job, work.bury(job))

@@ -72,8 +72,9 @@ def rerun_trial(
 
 def _in_a_worker(experiment: Experiment, trial: int, folder: Path) -> tuple[dict[str, Any], Outcome]:
     # not in this process: its libraries may sum on several threads, in another order
-    with one_thread(), worker_pool(TrialWork(experiment, folder), 1) as pool:
-        try:
-            return pool.submit(perform, experiment, trial).result()
-        except BrokenProcessPool as error:
-            raise WarpjldError(f"trial {trial} ended its process, as it may have done in the study") from error
+    try:
+        with one_thread(), worker_pool(TrialWork(experiment, folder), 1) as workers:
+            outcome: tuple[dict[str, Any], Outcome] = workers.result(workers.submit(perform, experiment, trial))
+            return outcome
+    except BrokenProcessPool as error:
+        raise WarpjldError(f"trial {trial} ended its process, as it may have done in the study") from error
