@@ -92,13 +92,17 @@ class Diffused:
             _place(self.skeleton, fans, muscled, vertex, domain, covering.parameters)
             for vertex, domain in zip(surface.vertices, covering.domains, strict=True)
         ]
-        self.heat = _heat(surface.vertices, surface.faces, covering.diffusion.radius)
+        heat = _heat(surface.vertices, surface.faces, covering.diffusion.radius)
+        found = covering.following  # what lies on what has tests of its own
+        self.bends = heat if found is None else found.bending.toarray() @ heat
+        self.heat = heat if found is None else found.follow.toarray() @ heat
 
     def rows(self, vertices: list[int], parameters: Parameters) -> list[Row]:
         """Coefficients of vertices after diffusion and thinning."""
         before = [row_of(p, parameters, self.ends, len(self.pairs)) for p in self.places]
         names = ("positions", "halfway", "bones", "roundings", "palm", "muscles")
-        after = {n: self.heat[vertices] @ np.array([getattr(r, n).ravel() for r in before]) for n in names}
+        heat = {n: self.heat if n in ("positions", "halfway", "bones") else self.bends for n in names}
+        after = {n: heat[n][vertices] @ np.array([getattr(r, n).ravel() for r in before]) for n in names}
         for n in ("positions", "roundings", "palm", "muscles"):
             after[n] = np.array([_shrunk(row) for row in after[n]])
         for k in range(len(vertices)):

@@ -7,6 +7,7 @@ from functools import cached_property
 from typing import Any, Literal
 
 import numpy as np
+import scipy.sparse as sp
 from numpy.typing import ArrayLike, NDArray
 
 from warpjld.covering.binding import Anchors, anchor
@@ -15,6 +16,7 @@ from warpjld.covering.diffusion import Diffusion
 from warpjld.covering.domains import domains_from_geometry, domains_from_skin
 from warpjld.covering.drivers import drive
 from warpjld.covering.fields import Fields, joint_of_column, operator_fields
+from warpjld.covering.following import Following, following
 from warpjld.covering.launch import lane_of, launch_gathered, launch_runs
 from warpjld.covering.operators import Fan, fans
 from warpjld.covering.parameters import Parameters, default_parameters
@@ -69,16 +71,14 @@ class Covering:
         """The same binding with other parameters; domains are not computed again, and fields only where parameters
         other than amplitudes change."""
         parameters.check(self.skeleton)
-        made = (self.skeleton, self.surface, parameters, self.fans, self.domains)
-        if parameters.shapes_like(self.parameters):
-            other = type(self)(*made, self.anchors)
-            other.__dict__.update(
-                {n: self.__dict__[n] for n in ("diffusion", "spread", "fields") if n in self.__dict__}
-            )
-            return other
-        rigid = self.anchors.rigid
-        anchors = anchor(self.surface.vertices, self.skeleton, self.fans, self.domains, parameters, rigid=rigid)
-        return type(self)(*made, anchors)
+        anchors, same = self.anchors, {"diffusion", "following", "spread", "fields"}
+        if not parameters.shapes_like(self.parameters):
+            rigid = anchors.rigid
+            anchors = anchor(self.surface.vertices, self.skeleton, self.fans, self.domains, parameters, rigid=rigid)
+            same = {"following"}
+        other = type(self)(self.skeleton, self.surface, parameters, self.fans, self.domains, anchors)
+        other.__dict__.update({name: self.__dict__[name] for name in same & self.__dict__.keys()})
+        return other
 
     @cached_property
     def diffusion(self) -> Diffusion:
@@ -91,13 +91,28 @@ class Covering:
         return Diffusion(vertices, faces, reach, flesh)
 
     @cached_property
+    def following(self) -> Following | None:
+        """What shells that lie on the skin follow; None where the flesh is one shell."""
+        lines = self.skeleton.rest[self.anchors.ends]
+        return following(self.surface.vertices, self.surface.faces, lines, self.anchors.rigid)
+
+    @cached_property
     def spread(self) -> Fields:
         """The operators' coefficients after diffusion."""
         return self.diffused(operator_fields(self.anchors, self.parameters))
 
     def diffused(self, fields: Fields) -> Fields:
-        """Fields of this surface after diffusion."""
-        return fields.like(self.diffusion.spread(fields.stacked(), joint_of_column(self.anchors, len(self.skeleton))))
+        """Fields of this surface after diffusion, where shells lie on others those of the skin under them."""
+        owner = joint_of_column(self.anchors, len(self.skeleton))
+        skin = fields.like(self.diffusion.spread(fields.stacked(), owner))
+        return skin if self.following is None else self.following.of(skin)
+
+    def before_diffusion(self, slopes: Fields, fields: Fields) -> Fields:
+        """Derivatives by ``fields`` of a number whose derivatives by ``diffused(fields)`` are given."""
+        skin = slopes if self.following is None else self.following.adjoint(slopes)
+        owner = joint_of_column(self.anchors, len(self.skeleton))
+        before = self.diffusion.adjoint(skin.stacked().toarray(), fields.stacked(), owner)
+        return slopes.like(sp.csr_array(before))
 
     @cached_property
     def fields(self) -> Fields:

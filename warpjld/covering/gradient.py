@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 from warpjld.covering.covering import Covering
 from warpjld.covering.device import checked_device
 from warpjld.covering.drivers import Drivers, drive
-from warpjld.covering.fields import Fields, OperatorKernel, joint_of_column
+from warpjld.covering.fields import Fields, OperatorKernel
 from warpjld.covering.paper import PaperCovering
 from warpjld.covering.parameters import Parameters
 from warpjld.covering.rows import Padded, Rows, palm_exponents, pose_on, rows_of, rows_on
@@ -180,9 +180,7 @@ class Differentiable:
             sp.csr_array(step.thin.palm.shape),
             sp.csr_array(by_muscle * chosen.muscle[first] * (step.thin.muscles.toarray() != 0.0)),
         )
-        owner = joint_of_column(anchors, joints)
-        before = covering.diffusion.adjoint(slopes.stacked().toarray(), shapes.fields.stacked(), owner)
-        undiffused = slopes.like(sp.csr_array(before))
+        undiffused = covering.before_diffusion(slopes, shapes.fields)
         proximity, peak, exponents = shapes.backward(
             undiffused.turns.toarray(), undiffused.roundings.toarray(), undiffused.muscles.toarray()
         )
