@@ -76,6 +76,7 @@ class Row:
     roundings: np.ndarray
     palm: np.ndarray
     muscles: np.ndarray
+    swellings: np.ndarray
 
 
 class Diffused:
@@ -83,6 +84,7 @@ class Diffused:
 
     def __init__(self, covering: Covering) -> None:
         self.skeleton = covering.skeleton
+        self.swelling = covering.swelling  # what it is for has tests of its own
         self.ends = [(s.proximal, s.distal) for fan in covering.fans for s in fan.segments]
         self.pairs = [(a[0], b[0]) for a, b in palm_pairs(covering)]
         fans = [[(s.proximal, s.distal) for s in fan.segments] for fan in covering.fans]
@@ -100,10 +102,10 @@ class Diffused:
     def rows(self, vertices: list[int], parameters: Parameters) -> list[Row]:
         """Coefficients of vertices after diffusion and thinning."""
         before = [row_of(p, parameters, self.ends, len(self.pairs)) for p in self.places]
-        names = ("positions", "halfway", "bones", "roundings", "palm", "muscles")
+        names = ("positions", "halfway", "bones", "roundings", "palm", "muscles", "swellings")
         heat = {n: self.heat if n in ("positions", "halfway", "bones") else self.bends for n in names}
         after = {n: heat[n][vertices] @ np.array([getattr(r, n).ravel() for r in before]) for n in names}
-        for n in ("positions", "roundings", "palm", "muscles"):
+        for n in ("positions", "roundings", "palm", "muscles", "swellings"):
             after[n] = np.array([_shrunk(row) for row in after[n]])
         for k in range(len(vertices)):
             after["positions"][k] /= after["positions"][k].sum()
@@ -118,18 +120,21 @@ class Diffused:
         return np.array([[self.point(r, f, parameters) for r in rows] for f in frames])
 
     def point(self, row: Row, frame: Frame, parameters: Parameters) -> np.ndarray:
-        return evaluate(row, frame, parameters, self.skeleton, self.ends, self.pairs)
+        return evaluate(row, frame, parameters, self.swelling, self.skeleton, self.ends, self.pairs)
 
 
 def row_of(place: Place, parameters: Parameters, ends: list[tuple[int, int]], pairs: int) -> Row:
     """What the operators give a vertex, for amplitudes of one."""
     joints = len(parameters.inflation)
-    c, half, bone, rounding = (np.zeros(joints) for _ in range(4))
+    c, half, bone, rounding, swells = (np.zeros(joints) for _ in range(5))
     palm, muscles = np.zeros((pairs, len(STATIONS))), np.zeros(len(ends))
     for o in place.operators:
         p, d, t = o.proximal, o.distal, min(max(o.ratio, 0.0), 1.0)
-        c[p] += o.weight * (1 - o.ratio)
-        c[d] += o.weight * o.ratio
+        middle = min(max((o.ratio - 0.15) / 0.7, 0.0), 1.0)
+        c[p] += o.weight * (1 - middle)
+        c[d] += o.weight * middle
+        swells[p] += o.weight * o.side * (1 - t**2 * (3 - 2 * t))
+        swells[d] += o.weight * o.side * t**2 * (3 - 2 * t)
         prox_p, prox_d = parameters.proximity[p, 0], parameters.proximity[d, 1]
         in_p = 1 - t / prox_p if t < prox_p else 0.0  # area 1, 1 at the joint
         in_d = 1 - (1 - t) / prox_d if 1 - t < prox_d else 0.0  # area 2
@@ -145,19 +150,20 @@ def row_of(place: Place, parameters: Parameters, ends: list[tuple[int, int]], pa
         low = min(int(b.place * 4), 3)
         palm[b.pair, low] += b.amount * (1 - (b.place * 4 - low))
         palm[b.pair, low + 1] += b.amount * (b.place * 4 - low)
-    return Row(place.rest, c, half, bone, rounding, palm, muscles)
+    return Row(place.rest, c, half, bone, rounding, palm, muscles, swells)
 
 
 def evaluate(
     row: Row,
     frame: Frame,
     parameters: Parameters,
+    swelling: np.ndarray,
     skeleton: Skeleton,
     ends: list[tuple[int, int]],
     pairs: list[tuple[int, int]],
 ) -> np.ndarray:
     """S' = Σ c J' + rot(normalise(Σ w q), g d + Σ m h)."""
-    grow = 1.0 + (row.roundings * parameters.inflation) @ frame.ratio
+    grow = 1.0 + (row.roundings * parameters.inflation + row.swellings * swelling) @ frame.ratio
     for n, (a, b) in enumerate(pairs):
         exponent = (parameters.palm[a] + parameters.palm[b]) / 2
         grow += row.palm[n] @ (np.exp(-exponent * frame.closing[n]) - 1)

@@ -52,13 +52,13 @@ def smooth_normal(skeleton: Skeleton, poses: Poses, t: float, parameters: Parame
     operator = oracle_smooth.Operator(1, 2, False, 1.0, t, float(external))
     frame = oracle_smooth.pose_frame(skeleton, poses, 0)
     foot = (1 - t) * skeleton.rest[1] + t * skeleton.rest[2]
-    still = oracle_smooth.Place(foot + UP, [operator], [])
     flat = Parameters(
         np.zeros(4), parameters.proximity, np.zeros(4), parameters.peak, parameters.exponents, np.zeros(4)
     )
-    row = oracle_smooth.row_of(still, flat, [(1, 2)], 0)
-    moved = oracle_smooth.evaluate(row, frame, flat, skeleton, [(1, 2)], [])
-    return moved - ((1 - t) * poses.positions[0, 1] + t * poses.positions[0, 2])
+    places = [oracle_smooth.Place(point, [operator], []) for point in (foot, foot + UP)]
+    rows = [oracle_smooth.row_of(place, flat, [(1, 2)], 0) for place in places]
+    start, end = (oracle_smooth.evaluate(r, frame, flat, np.zeros(4), skeleton, [(1, 2)], []) for r in rows)
+    return end - start
 
 
 @pytest.mark.parametrize("proximal", np.linspace(0.1, 1.0, 4) * KNUCKLE2)

@@ -49,7 +49,8 @@ class Case:
 
 @pytest.fixture(scope="module")
 def case(bound: Covering) -> Case:
-    return Case(bound)
+    """Muscles, which are left to the animator by default, are in use."""
+    return Case(bound.with_parameters(replace(bound.parameters, muscle=np.full(len(bound.skeleton), 0.15))))
 
 
 def test_forward_is_the_deformation(case: Case) -> None:

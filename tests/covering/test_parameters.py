@@ -96,5 +96,5 @@ def test_the_thumbs_base_counts_by_its_whole_swing() -> None:
     swing = np.hypot(flexion, abduction)
     loss = [1.0 - np.sin(x / 2) / (x / 2) for x in (swing, np.pi / 2)]
     assert abduction > flexion
-    assert inflation[thumb] == pytest.approx(3.0 * 0.21 * loss[0] / loss[1])
+    assert inflation[thumb] == pytest.approx(3.0 * 0.1 * loss[0] / loss[1])
     assert inflation[finger] < 0.1 * inflation[thumb]

@@ -41,6 +41,7 @@ class Anchors:
     Attributes:
         ends: Proximal and distal joint of every segment, shape (S, 2).
         muscle: Whether a segment's internal muscle inflates, shape (S,).
+        stiff: Whether all around a segment turns with its bone, as in a skull, shape (S,).
         rest: Vertices at rest [m], shape (V, 3).
         segment: Segments of a vertex, shape (V, 4).
         weight: Their weights, rows summing to one; unused ones are zero, shape (V, 4).
@@ -57,6 +58,7 @@ class Anchors:
 
     ends: NDArray[np.int32]
     muscle: NDArray[np.bool_]
+    stiff: NDArray[np.bool_]
     rest: NDArray[np.float64]
     segment: NDArray[np.int32]
     weight: NDArray[np.float64]
@@ -103,10 +105,11 @@ def anchor(
     joined = [np.concatenate(column) for column in zip(*rows, strict=True)]
     segment, weight, ratio, side, pair, between, station = joined
     muscle = np.array([fan.muscle for fan in groups for _ in fan.segments])
+    stiff = np.array([fan.stiff for fan in groups for _ in fan.segments])
     rigid = np.full(len(vertices), -1, dtype=np.int32) if rigid is None else rigid
     flesh = (rigid < 0)[:, None]
     weight, between = weight * flesh, between * flesh
-    return Anchors(ends, muscle, vertices, segment, weight, ratio, side, pairs, pair, between, station, rigid)
+    return Anchors(ends, muscle, stiff, vertices, segment, weight, ratio, side, pairs, pair, between, station, rigid)
 
 
 def _neighbour_pairs(groups: tuple[Fan, ...]) -> tuple[NDArray[np.int32], dict[int, int]]:

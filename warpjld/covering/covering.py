@@ -23,6 +23,7 @@ from warpjld.covering.parameters import Parameters, default_parameters
 from warpjld.covering.rigid import domains_of_rigid, flesh_of, part_of_surface
 from warpjld.covering.rows import Rows, pose_on, rows_of, rows_on
 from warpjld.covering.runs import Columns, Runs, pack_runs, palette
+from warpjld.covering.swelling import volume_keeping
 from warpjld.covering.thickness import thickness
 from warpjld.covering.thinning import thinned
 from warpjld.errors import InputError
@@ -71,7 +72,7 @@ class Covering:
         """The same binding with other parameters; domains are not computed again, and fields only where parameters
         other than amplitudes change."""
         parameters.check(self.skeleton)
-        anchors, same = self.anchors, {"diffusion", "following", "spread", "fields"}
+        anchors, same = self.anchors, {"diffusion", "following", "spread", "fields", "swelling"}
         if not parameters.shapes_like(self.parameters):
             rigid = anchors.rigid
             anchors = anchor(self.surface.vertices, self.skeleton, self.fans, self.domains, parameters, rigid=rigid)
@@ -122,7 +123,13 @@ class Covering:
     @cached_property
     def rows(self) -> Rows:
         """The coefficients with the amplitudes of the parameters."""
-        return rows_of(self.fields, self.skeleton, self.anchors, self.parameters)
+        return rows_of(self.fields, self.skeleton, self.anchors, self.parameters, self.swelling)
+
+    @cached_property
+    def swelling(self) -> NDArray[np.float64]:
+        """How much flesh swells around every joint at full flexion so that volume is kept, shape (J,); it follows from
+        all but the parameters' amplitudes."""
+        return volume_keeping(self)
 
     @cached_property
     def flesh(self) -> Surface:

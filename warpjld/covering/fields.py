@@ -1,6 +1,6 @@
 """Coefficients of the covering formula as fields on the surface: one number for each vertex and each pose input.
 
-    S' = Σ c_j J_j' + rot(normalise(Σ w_k q_k), (1 + Σ g_i f_i) d + Σ m_s f_s h_s),  d = S − Σ c_j J_j
+    S' = Σ c_j J_j' + rot(normalise(Σ w_k q_k), (1 + Σ (g_i + s_i) f_i) d + Σ m_s f_s h_s),  d = S − Σ c_j J_j
 
 with positions J', rotations q and flexion ratios f of a pose, and the height h_s of a vertex over a segment. Being
 fields they can be smoothed and thinned out before they are used, whatever they were made from; d is taken from what is
@@ -22,7 +22,11 @@ from warpjld.covering.parameters import Parameters
 
 __all__ = ["Fields", "OperatorKernel", "joint_of_column", "operator_fields"]
 
-_KINDS = ("positions", "turns", "roundings", "palm", "muscles")
+_PIVOT = 0.15
+"""Share of a segment at either end whose vertices turn about the joint itself. Sections then keep their distance from
+the joint while they turn, and with it their volume; joined by straight lines from joint to joint, middles of sections
+cut the corner. Larger shares gain little more, and knuckles get sharper."""
+_KINDS = ("positions", "turns", "roundings", "swellings", "palm", "muscles")
 
 
 @dataclass(frozen=True, eq=False)
@@ -33,6 +37,7 @@ class Fields:
         positions: Of the joints' positions, shape (V, J); rows sum to one.
         turns: Of the J halfway rotations, then of the J bones' rotations, shape (V, 2 J); rows sum to one.
         roundings: Of the joints' flexion ratios, shape (V, J).
+        swellings: Of the same, over the whole of a joint's segments: where flesh goes that bending pushes away.
         palm: Of the palm pairs' thickening at their stations, shape (V, N · STATIONS).
         muscles: Of the segments' muscles, shape (V, S).
     """
@@ -40,6 +45,7 @@ class Fields:
     positions: sp.csr_array
     turns: sp.csr_array
     roundings: sp.csr_array
+    swellings: sp.csr_array
     palm: sp.csr_array
     muscles: sp.csr_array
 
@@ -62,7 +68,7 @@ def joint_of_column(anchors: Anchors, joints: int) -> NDArray[np.int64]:
     """The joint that each column of all fields side by side belongs to: fields of one joint lie in one place."""
     own = np.arange(joints)
     pairs = anchors.ends[anchors.pairs[:, 0], 0] if len(anchors.pairs) else np.zeros(0, dtype=np.int64)
-    return np.concatenate([own, own, own, own, np.repeat(pairs, STATIONS), anchors.ends[:, 0]]).astype(np.int64)
+    return np.concatenate([own, own, own, own, own, np.repeat(pairs, STATIONS), anchors.ends[:, 0]]).astype(np.int64)
 
 
 def operator_fields(anchors: Anchors, parameters: Parameters) -> Fields:
@@ -106,9 +112,10 @@ class OperatorKernel:
         proximal, distal = anchors.ends[anchors.segment, 0], anchors.ends[anchors.segment, 1]
         hard = (anchors.rigid >= 0).astype(np.float64)[:, None]
         follows = np.maximum(anchors.rigid, 0)[:, None]
+        between = np.clip((anchors.ratio - _PIVOT) / (1.0 - 2.0 * _PIVOT), 0.0, 1.0)
         positions = [
-            (proximal, anchors.weight * (1.0 - anchors.ratio)),
-            (distal, anchors.weight * anchors.ratio),
+            (proximal, anchors.weight * (1.0 - between)),
+            (distal, anchors.weight * between),
             (follows, hard),
         ]
         self._turn_columns = (proximal, joints + proximal, distal)
@@ -124,6 +131,7 @@ class OperatorKernel:
             _sparse(positions, vertices, joints),
             _sparse(turns, vertices, 2 * joints),
             _sparse(roundings, vertices, joints),
+            _sparse(_swellings(anchors), vertices, joints),
             _sparse(palm if len(anchors.pairs) else [], vertices, STATIONS * len(anchors.pairs)),
             _sparse([(anchors.segment, muscle)], vertices, len(anchors.ends)),
         )
@@ -149,6 +157,19 @@ class OperatorKernel:
         self._tape.backward(grads=seeds)
         proximity, peak, exponents = (a.grad.numpy().astype(np.float64) for a in self._values)
         return proximity, peak, exponents
+
+
+def _swellings(anchors: Anchors) -> list[tuple[NDArray, NDArray]]:
+    """From 1 at a joint to 0 at the other end of its segment, without an edge at either. Outside and at the sides only:
+    inside a bend more flesh would be in the way. A skull does not swell."""
+    t = np.clip(anchors.ratio, 0.0, 1.0)
+    amount = anchors.weight * anchors.side * ~anchors.stiff[anchors.segment]
+    ends = (anchors.ends[anchors.segment, k] for k in (0, 1))
+    return [(end, amount * _smooth(near)) for end, near in zip(ends, (1.0 - t, t), strict=True)]
+
+
+def _smooth(x: NDArray[np.float64]) -> NDArray[np.float64]:
+    return np.asarray(x * x * (3.0 - 2.0 * x))
 
 
 def _sparse(entries: list[tuple[NDArray, NDArray]], rows: int, width: int) -> sp.csr_array:

@@ -34,6 +34,7 @@ class Following:
             self.follow @ fields.positions,
             self.follow @ fields.turns,
             self.bending @ fields.roundings,
+            self.bending @ fields.swellings,
             self.bending @ fields.palm,
             self.bending @ fields.muscles,
         )
@@ -44,6 +45,7 @@ class Following:
             sp.csr_array(self.follow.T @ slopes.positions),
             sp.csr_array(self.follow.T @ slopes.turns),
             sp.csr_array(self.bending.T @ slopes.roundings),
+            sp.csr_array(self.bending.T @ slopes.swellings),
             sp.csr_array(self.bending.T @ slopes.palm),
             sp.csr_array(self.bending.T @ slopes.muscles),
         )

@@ -45,8 +45,9 @@ class Differentiable:
     >>> gradients = deformation.backward(2.0 * (moved - goal))  # of Σ |moved − goal|²
     >>> gradients.parameters.muscle                            # (J,)
 
-    The places of the vertices are those of ``covering``: where parameters move them between palm segments
-    (proximities, A Fig. 7), that is neither followed nor differentiated. Take ``covering.with_parameters`` for it.
+    The places of the vertices and the swelling are those of ``covering``: where parameters move places between palm
+    segments (proximities, A Fig. 7), or change what swells, that is neither followed nor differentiated. Take
+    ``covering.with_parameters`` for it.
 
     Args:
         covering: A bound surface.
@@ -90,7 +91,7 @@ class Differentiable:
             shapes = OperatorKernel(covering.anchors, chosen, requires_grad=True)
             spread = covering.diffused(shapes.fields)
             thin = thinned(spread)
-        rows = rows_of(thin, covering.skeleton, covering.anchors, chosen)
+        rows = rows_of(thin, covering.skeleton, covering.anchors, chosen, covering.swelling)
         # a tape's backward reads arrays as they are then: inputs and outputs are made afresh at every step
         values = rows_on(self._device, rows, requires_grad=True)
         pose = pose_on(self._device, covering.anchors, chosen, self._drivers, requires_grad=True)
@@ -177,6 +178,7 @@ class Differentiable:
             sp.csr_array((vertices, joints)),
             sp.csr_array(thinned_slope(step.spread.turns, step.thin.turns, turns.toarray())),
             sp.csr_array(by_rounding * chosen.inflation * (step.thin.roundings.toarray() != 0.0)),
+            sp.csr_array((vertices, joints)),
             sp.csr_array(step.thin.palm.shape),
             sp.csr_array(by_muscle * chosen.muscle[first] * (step.thin.muscles.toarray() != 0.0)),
         )

@@ -20,9 +20,7 @@ __all__ = ["Parameters", "default_parameters", "load_parameters", "save_paramete
 
 _SHAPES = ("proximity", "peak", "exponents")  # what shapes fields on the surface; the others are amplitudes of them
 
-# Amplitudes of a 90° joint: a tube of two segments, half as thick as they are long, then keeps its volume within 2 %.
-_INFLATION = 0.21
-_MUSCLE = 0.20
+_INFLATION = 0.1  # of a 90° joint: knuckles are rounded, and half of the volume that a tube loses there is put back
 _PALM = 3.0
 _WIDEST = np.radians(135.0)  # wider limits say what a joint never does alone
 
@@ -73,16 +71,15 @@ class Parameters:
 
 
 def default_parameters(skeleton: Skeleton) -> Parameters:
-    """Defaults that keep the volume of a bent tube, whatever the limit of its joint.
+    """Defaults: joints round as much as their flexion asks for, muscles are left to the animator.
 
     A section turned by φ against its segment loses 1 − cos φ of its volume. The bisector turns sections by up to θ/2,
     so a joint bent by θ costs 1 − sin(θ/2)/(θ/2) of what lies around it. Inflation is relative to the maximal flexion
     (R59), so its amplitudes follow that loss at the maximal flexion: a 20° metacarpal joint gets a twentieth of a
-    knuckle. Growing with θ where the loss grows with θ², they gain a little on the way and end near zero.
+    knuckle. What a surface loses all the same, its swelling puts back (``warpjld.covering.swelling``); muscles that
+    bulge inside a bend (R63) would be folded in by it.
 
-    Where a finger meets the palm both amplitudes are three times as large: the palm loses volume at that joint too,
-    but has no internal inflation to make up for it (R50). A joint that
-    cannot bend leaves its segment's muscle to the joint at the other end.
+    Where a finger meets the palm inflation is three times as large: the palm loses volume at that joint too.
     """
     count = len(skeleton)
     largest = np.minimum(skeleton.limits[:, CHANNELS.index("flexion"), 1], _WIDEST)
@@ -93,17 +90,11 @@ def default_parameters(skeleton: Skeleton) -> Parameters:
     swings = bends & (swing > 1.01 * largest)
     balls = [s.proximal for s in skeleton.segments if s.palm and swings[s.proximal]]
     loss[balls] = _PALM * _volume_loss(swing[balls]) / _volume_loss(np.array(np.pi / 2.0))
-    muscle = np.zeros(count)
-    flat = {end for palm in skeleton.palms for segment in palm for end in segment}  # metacarpals and carpus
-    for segment in skeleton.segments:
-        ends = [j for j in (segment.proximal, segment.distal) if bends[j]]
-        if ends and segment.distal not in flat:
-            muscle[segment.proximal] = max(muscle[segment.proximal], loss[ends].mean())
     ones = np.ones(count)
     return Parameters(
         inflation=_INFLATION * loss,
         proximity=np.column_stack([0.3 * ones, 0.3 * ones]),
-        muscle=_MUSCLE * muscle,
+        muscle=np.zeros(count),
         peak=0.5 * ones,
         exponents=np.column_stack([0.6 * ones, 0.6 * ones]),
         palm=0.2 * ones,

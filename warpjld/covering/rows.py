@@ -41,19 +41,28 @@ class Rows:
     offset: NDArray[np.float64]
 
 
-def rows_of(fields: Fields, skeleton: Skeleton, anchors: Anchors, parameters: Parameters) -> Rows:
+def rows_of(
+    fields: Fields,
+    skeleton: Skeleton,
+    anchors: Anchors,
+    parameters: Parameters,
+    swelling: NDArray[np.float64] | None = None,
+) -> Rows:
     """Rows of diffused and thinned fields with these amplitudes (R58–R65).
 
-    Roundings scale with the inflation of their joint, muscles with that of the joint where the segment begins.
+    Roundings scale with the inflation of their joint, muscles with that of the joint where the segment begins, and
+    swellings with an amplitude of their own for each joint, shape (J,), without which nothing swells.
     """
     muscles = _times(fields.muscles, parameters.muscle[anchors.ends[:, 0]])
-    roundings = _times(fields.roundings, parameters.inflation)
+    scales = _times(fields.roundings, parameters.inflation)
+    if swelling is not None and swelling.any():
+        scales = _sum(scales, _times(fields.swellings, swelling))
     table = SegmentTable.build(skeleton, anchors.ends)
     vertex = np.repeat(np.arange(muscles.shape[0]), np.diff(muscles.indptr))
     return Rows(
         fields.positions,
         fields.turns,
-        sp.csr_array(sp.hstack([roundings, fields.palm], format="csr")),
+        sp.csr_array(sp.hstack([scales, fields.palm], format="csr")),
         muscles,
         table.heights(anchors.rest[vertex], muscles.indices),
         fields.offsets(anchors.rest, skeleton.rest),
@@ -64,6 +73,13 @@ def _times(fields: sp.csr_array, amplitudes: NDArray[np.float64]) -> sp.csr_arra
     """Columns times their amplitudes. Entries stay where that is zero: there are derivatives by it all the same."""
     data = fields.data * amplitudes[fields.indices]
     return sp.csr_array((data, fields.indices.copy(), fields.indptr.copy()), shape=fields.shape)
+
+
+def _sum(a: sp.csr_array, b: sp.csr_array) -> sp.csr_array:
+    """a + b with the entries of either, zeros too."""
+    parts = [m.tocoo() for m in (a, b)]
+    index = tuple(np.concatenate([part.coords[k] for part in parts]) for k in (0, 1))
+    return sp.coo_array((np.concatenate([part.data for part in parts]), index), shape=a.shape).tocsr()
 
 
 def scalar_inputs(anchors: Anchors, parameters: Parameters, drivers: Drivers) -> NDArray[np.float64]:

@@ -21,6 +21,7 @@ def thinned(fields: Fields) -> Fields:
         _summing_to_one(fields.positions),
         _summing_to_one(fields.turns),
         _shrunk(fields.roundings),
+        _shrunk(fields.swellings),
         _shrunk(fields.palm),
         _shrunk(fields.muscles),
     )

@@ -1,0 +1,184 @@
+"""How much the flesh around a joint swells when it bends, so that a surface keeps its volume whatever its shape is.
+
+A tube that bends about its middle keeps its volume but for a few hundredths. Flesh does not lie around its
+joints as a tube: where a joint lies near the outer side, most of the flesh is on the inside of the bend, and the wedge
+that closes there is larger than the one that opens outside; a thumb's ball or a buttock has no counterpart at all.
+What is lost is measured at binding, joint by joint, and put back over both its segments, outside and at the sides, as
+flesh that is pushed away finds room where there is some: in one place it would be a lump, and inside the bend it would
+only be folded in again.
+
+Flexing one joint moves what lies beyond it as a rigid body about the joint, so with the joint as the origin only faces
+that bend or grow change the sum Σ a · (b × c) / 6.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+import scipy.sparse as sp
+from numpy.typing import NDArray
+
+from warpjld.covering.drivers import drive
+from warpjld.covering.parameters import default_parameters
+from warpjld.covering.quality import closing_fans
+from warpjld.covering.rows import Rows, rows_of, scalar_inputs
+from warpjld.rotations import rotate, unit
+from warpjld.skeleton.kinematics import poses_from_angles
+from warpjld.skeleton.tree import CHANNELS
+
+if TYPE_CHECKING:
+    from warpjld.covering.covering import Covering
+
+__all__ = ["volume_keeping"]
+
+_PARTS = (
+    0.33,
+    0.67,
+    1.0,
+)  # of the largest flexion: what is lost grows faster than the flexion ratio, what swells as it does
+_WIDEST = np.radians(110.0)  # of what is measured: beyond, limbs lie on one another
+_MOST = 0.8  # amplitude at which it ends
+_STEPS = 4
+
+
+def volume_keeping(covering: Covering) -> NDArray[np.float64]:
+    """Amplitudes of swelling with which single flexed joints keep the volume of the flesh, shape (J,).
+
+    Between 0 and 4/5: a joint whose flesh gains volume is left alone, and where next to none lies outside the joint it
+    does not grow without end.
+    """
+    skeleton = covering.skeleton
+    flexion = CHANNELS.index("flexion")
+    largest = np.minimum(skeleton.limits[:, flexion, 1], _WIDEST)
+    bends = (skeleton.parents >= 0) & np.array([bool(c) for c in skeleton.children]) & (largest > 1e-6)
+    amplitudes = np.zeros(len(skeleton))
+    joints = np.flatnonzero(bends)
+    if not joints.size or not len(covering.flesh.faces):
+        return amplitudes
+    angles = np.zeros((len(joints), len(_PARTS), len(skeleton), len(CHANNELS)))
+    angles[np.arange(len(joints)), :, joints, flexion] = largest[joints, None] * np.array(_PARTS)
+    poses = poses_from_angles(skeleton, angles.reshape(-1, len(skeleton), len(CHANNELS)))
+    default = default_parameters(skeleton)
+    parameters = replace(covering.parameters, inflation=default.inflation, muscle=default.muscle, palm=default.palm)
+    bending = _Bending(covering, rows_of(covering.fields, skeleton, covering.anchors, parameters))
+    drivers = drive(skeleton, covering.anchors, poses)
+    scalars = scalar_inputs(covering.anchors, parameters, drivers)
+    turns = np.concatenate([drivers.halfway, drivers.rotations], axis=1)
+    for number, joint in enumerate(joints):
+        frames = len(_PARTS) * number + np.arange(len(_PARTS))
+        part = bending.around(int(joint))
+        if part is not None:
+            ratio = drivers.flexion_ratio[frames, joint]
+            amplitudes[joint] = part.amplitude(drivers.positions[frames], turns[frames], scalars[frames], ratio)
+    return amplitudes
+
+
+class _Bending:
+    """A surface of which any joint may be flexed."""
+
+    def __init__(self, covering: Covering, rows: Rows) -> None:
+        self._rows = rows
+        self._skeleton, self._swellings = covering.skeleton, covering.fields.swellings.tocsc()
+        self._rest, self._ends = covering.surface.vertices, covering.anchors.ends
+        count = len(self._rest)
+        boundary, loop = closing_fans(covering.flesh.faces)
+        fans = np.column_stack([boundary[:, ::-1], count + loop])  # around the mean of each open rim
+        self._faces = np.concatenate([covering.flesh.faces.astype(np.int64), fans])
+        rims = int(loop.max(initial=-1)) + 1
+        share = 1.0 / np.maximum(np.bincount(loop, minlength=rims), 1)[loop]
+        mean = sp.csr_array((share, (loop, boundary[:, 0])), shape=(rims, count))
+        self._corners = sp.vstack([sp.eye_array(count, format="csr"), mean], format="csr")
+
+    def around(self, joint: int) -> _Part | None:
+        """Faces that bend or grow with a joint; None where there are none."""
+        skeleton, rows, joints = self._skeleton, self._rows, len(self._skeleton)
+        beyond = np.zeros(joints)
+        beyond[joint] = 1.0
+        for child in range(joint + 1, joints):
+            if skeleton.parents[child] >= 0:
+                beyond[child] = beyond[skeleton.parents[child]]
+        places = beyond.copy()
+        places[joint] = 0.0
+        turned = rows.turns @ np.concatenate([places, beyond])
+        moved = rows.positions @ places
+        pivot = rows.positions[:, [joint]].toarray().ravel()
+        still = (turned == 0.0) & (moved == 0.0)
+        whole = (np.abs(turned - 1.0) < 1e-9) & (np.abs(moved + pivot - 1.0) < 1e-9)
+        grows = [rows.scales[:, [joint]], self._swellings[:, [joint]]]
+        grows.append(rows.muscles[:, np.flatnonzero((self._ends == joint).any(axis=1))])
+        grown = sum((np.diff(m.tocsr().indptr) for m in grows), np.zeros(len(self._rest))) > 0
+        bends = self._corners @ (~(still | whole) | grown).astype(np.float64) > 0.0
+        faces = self._faces[bends[self._faces].any(axis=1)]
+        if not len(faces):
+            return None
+        used = np.unique(faces)
+        number = np.zeros(len(bends), dtype=np.int64)
+        number[used] = np.arange(len(used))
+        corners = self._corners[used]
+        some = np.unique(corners.indices)
+        swelling = self._swellings[:, [joint]].toarray().ravel()[some]
+        entries = np.repeat(np.isin(np.arange(len(self._rest)), some), np.diff(rows.muscles.indptr))
+        return _Part(
+            skeleton.rest[joint],
+            self._rest[some],
+            number[faces],
+            corners[:, some],
+            swelling,
+            Rows(
+                rows.positions[some],
+                rows.turns[some],
+                rows.scales[some],
+                rows.muscles[some],
+                rows.heights[entries],
+                rows.offset[some],
+            ),
+        )
+
+
+@dataclass(frozen=True, eq=False)
+class _Part:
+    """What changes its shape with one joint: n vertices, which ``corners`` turns into those of faces, and the field of
+    the swelling."""
+
+    pivot: NDArray[np.float64]
+    rest: NDArray[np.float64]
+    faces: NDArray[np.int64]
+    corners: sp.csr_array
+    swelling: NDArray[np.float64]
+    rows: Rows
+
+    def amplitude(
+        self,
+        positions: NDArray[np.float64],
+        turns: NDArray[np.float64],
+        scalars: NDArray[np.float64],
+        ratio: NDArray[np.float64],
+    ) -> float:
+        """The one that leaves the least error of volume, by squares over frames of which inputs are given."""
+        rows, before = self.rows, self._volume(self.rest - self.pivot)
+        lines = []
+        for k in range(len(ratio)):
+            turn = unit(rows.turns @ turns[k])
+            out = rotate(turn, rows.offset)
+            grown = (1.0 + rows.scales @ scalars[k, : rows.scales.shape[1]])[:, None]
+            vertex = np.repeat(np.arange(len(rows.offset)), np.diff(rows.muscles.indptr))
+            driven = rows.muscles.data * scalars[k, rows.scales.shape[1] :][rows.muscles.indices]
+            muscle = [np.bincount(vertex, driven * height, len(rows.offset)) for height in rows.heights.T]
+            base = rows.positions @ positions[k] - self.pivot + grown * out + rotate(turn, np.stack(muscle, axis=1))
+            lines.append((base, (ratio[k] * self.swelling)[:, None] * out))
+        best = 0.0
+        for _ in range(_STEPS):
+            lost = np.array([self._volume(base + best * out) for base, out in lines]) - before
+            step = 1e-3
+            slope = np.array([self._volume(base + (best + step) * out) for base, out in lines]) - before - lost
+            square = float(slope @ slope) / step
+            if square <= 0.0:
+                return 0.0
+            best = min(max(best - float(slope @ lost) / square, 0.0), _MOST)
+        return best
+
+    def _volume(self, points: NDArray[np.float64]) -> float:
+        a, b, c = ((self.corners @ points)[self.faces[:, k]] for k in range(3))
+        return float(np.einsum("ti,ti->", a, np.cross(b, c))) / 6.0
