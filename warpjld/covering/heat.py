@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from scipy.sparse.linalg import LinearOperator, cg, splu
 
 from warpjld.covering.corners import corner_conductivity
+from warpjld.threads import one_blas_thread
 
 __all__ = ["Factor", "conducting_laplacian", "cotangent_laplacian", "solve", "spatial_order", "uniform_laplacian"]
 
@@ -124,7 +125,7 @@ def solve(
     ways = (_direct, _plain) if len(scale) <= _DIRECT_LIMIT else (_multigrid, _plain)
     for way in ways:
         # what a solver has to say of a broken mesh is no message for who gave it: the residual tells
-        with warnings.catch_warnings(), np.errstate(all="ignore"):
+        with warnings.catch_warnings(), np.errstate(all="ignore"), one_blas_thread():
             warnings.simplefilter("ignore")
             try:
                 found = way(scaled, goal, scale)
@@ -142,11 +143,13 @@ class Factor:
     def __init__(self, matrix: sp.sparray) -> None:
         self._scale = 1.0 / np.sqrt(matrix.diagonal())
         scaled = (sp.diags_array(self._scale) @ matrix @ sp.diags_array(self._scale)).tocsc()
-        self._factor = splu(scaled, permc_spec="MMD_AT_PLUS_A", options={"SymmetricMode": True})
+        with one_blas_thread():
+            self._factor = splu(scaled, permc_spec="MMD_AT_PLUS_A", options={"SymmetricMode": True})
 
     def solve(self, right: NDArray[np.float64]) -> NDArray[np.float64]:
         """X of A X = B, shape (V, n)."""
-        out: NDArray[np.float64] = self._scale[:, None] * self._factor.solve(self._scale[:, None] * right)
+        with one_blas_thread():
+            out: NDArray[np.float64] = self._scale[:, None] * self._factor.solve(self._scale[:, None] * right)
         return out
 
 
