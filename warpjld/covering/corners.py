@@ -7,9 +7,17 @@ r^((2π/θ)² − 1) it goes as r, and the slope stays finite: ν = 1 solves ν 
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 import numpy as np
 from numpy.typing import NDArray
-from scipy.spatial import cKDTree
+
+from warpjld.lazily import lazy_module
+
+if TYPE_CHECKING:
+    import scipy.spatial as spatial
+else:
+    spatial = lazy_module("scipy.spatial")
 
 __all__ = ["corner_conductivity"]
 
@@ -36,7 +44,7 @@ def corner_conductivity(vertices: NDArray[np.float64], faces: NDArray[np.int32])
         return np.exp(exponent)
     reach = _REACH * float(np.linalg.norm(np.ptp(vertices, axis=0)))
     centroids = vertices[faces].mean(axis=1)
-    tree = cKDTree(centroids)
+    tree = spatial.cKDTree(centroids)
     crowd = np.cumsum(tree.query_ball_point(vertices[corners], reach, return_length=True))
     corners = corners[crowd <= _MOST_PAIRS]
     near = tree.query_ball_point(vertices[corners], reach)

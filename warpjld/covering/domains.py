@@ -6,19 +6,26 @@ nearest segment that it sees from inside the surface, and the heat spreads along
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 import numpy as np
-import scipy.sparse as sp
 from numpy.typing import NDArray
 
 from warpjld.covering.heat import cotangent_laplacian, solve, spatial_order, uniform_laplacian
 from warpjld.covering.operators import Fan, segment_ends
 from warpjld.covering.skull import skull_lines
 from warpjld.errors import InputError
+from warpjld.lazily import lazy_module
 from warpjld.normals import vertex_normals
 from warpjld.rig import Skin
 from warpjld.skeleton.tree import Skeleton
 from warpjld.spread import spread
 from warpjld.threads import in_threads, threads_for
+
+if TYPE_CHECKING:
+    import scipy.sparse as sp
+else:
+    sp = lazy_module("scipy.sparse")
 
 __all__ = ["domains_from_geometry", "domains_from_skin"]
 

@@ -11,14 +11,20 @@ from __future__ import annotations
 
 from contextlib import nullcontext
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
-import scipy.sparse as sp
 from numpy.typing import NDArray
 
 from warpjld.covering.binding import STATIONS, Anchors
 from warpjld.covering.device import array_on, checked_device
 from warpjld.covering.parameters import Parameters
+from warpjld.lazily import lazy_module
+
+if TYPE_CHECKING:
+    import scipy.sparse as sp
+else:
+    sp = lazy_module("scipy.sparse")
 
 __all__ = ["Fields", "OperatorKernel", "joint_of_column", "operator_fields"]
 

@@ -7,11 +7,18 @@ joined from the smallest up wherever that costs least.
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 import numpy as np
-import scipy.sparse as sp
 from numpy.typing import NDArray
 
+from warpjld.lazily import lazy_module
 from warpjld.threads import one_blas_thread
+
+if TYPE_CHECKING:
+    import scipy.sparse as sp
+else:
+    sp = lazy_module("scipy.sparse")
 
 __all__ = ["FIXED", "group", "work"]
 
