@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from functools import cached_property
 from typing import Any, Literal
 
@@ -64,6 +64,12 @@ class Covering:
         self.domains = domains
         self.anchors = anchors
         self._resident: dict[str, list[Any]] = {}
+        self._kept: Callable[[], Fields] | None = None
+
+    def keeping(self, runs: Runs, fields: Callable[[], Fields]) -> Covering:
+        """This covering, with what was computed of it before: its runs, and its fields when they are wanted."""
+        self.runs, self._kept = runs, fields
+        return self
 
     def with_parameters(self, parameters: Parameters) -> Covering:
         """The same binding with other parameters; domains are not computed again, and fields only where parameters
@@ -75,6 +81,7 @@ class Covering:
             other.__dict__.update(
                 {n: self.__dict__[n] for n in ("diffusion", "spread", "fields") if n in self.__dict__}
             )
+            other._kept = self._kept
             return other
         rigid = self.anchors.rigid
         anchors = anchor(self.surface.vertices, self.skeleton, self.fans, self.domains, parameters, rigid=rigid)
@@ -102,7 +109,7 @@ class Covering:
     @cached_property
     def fields(self) -> Fields:
         """The coefficients in use: diffused, and thinned out."""
-        return thinned(self.spread)
+        return thinned(self.spread) if self._kept is None else self._kept()
 
     @cached_property
     def rows(self) -> Rows:
