@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -53,7 +54,11 @@ class Surface:
 
     def to_source(self, vertices: NDArray[np.float32]) -> NDArray[np.float32]:
         """Welded positions (…, V, 3) in the source's vertex order (…, W, 3)."""
-        return vertices[..., self.weld, :]
+        return vertices.copy() if self._welds_nothing else np.take(vertices, self.weld, axis=-2)
+
+    @cached_property
+    def _welds_nothing(self) -> bool:
+        return np.array_equal(self.weld, np.arange(len(self.vertices)))
 
     def split_at_seams(self) -> tuple[NDArray[np.int32], NDArray[np.int32], NDArray[np.float32] | None]:
         """Vertices that have one pair of texture coordinates each, for files that know no others.
