@@ -2,7 +2,10 @@
 
 import warp as wp
 
-wp.set_module_options({"enable_backward": False})
+from warpjld_kernels.lanes import VECTORISED
+
+# compiled as what deforms is, so that both take the same precompiled header, which costs more than either
+wp.set_module_options(VECTORISED)
 
 # part of the way to a segment that must be free: one that ends on the surface, as at a wrist, is seen all the same,
 # and not as float32 happens to put it before or behind

@@ -85,7 +85,11 @@ class OperatorKernel:
 
     def __init__(self, anchors: Anchors, parameters: Parameters, *, requires_grad: bool = False) -> None:
         import warp as wp
-        from warpjld_kernels import operator_fields as kernels
+
+        if requires_grad:
+            from warpjld_kernels.operator_fields_gradient import operator_fields_with_gradient as kernel
+        else:
+            from warpjld_kernels.operator_fields import operator_fields as kernel
 
         device = checked_device("cpu")
         self._anchors = anchors
@@ -103,7 +107,7 @@ class OperatorKernel:
         self._tape = wp.Tape()
         with self._tape if requires_grad else nullcontext():
             inputs = [*self._inputs, *self._values]
-            wp.launch(kernels.operator_fields, dim=shape, inputs=inputs, outputs=self._out, device=device)
+            wp.launch(kernel, dim=shape, inputs=inputs, outputs=self._out, device=device)
         self._layout(len(parameters.inflation))
 
     def _layout(self, joints: int) -> None:
