@@ -45,13 +45,13 @@ def corner_conductivity(vertices: NDArray[np.float64], faces: NDArray[np.int32])
     reach = _REACH * float(np.linalg.norm(np.ptp(vertices, axis=0)))
     centroids = vertices[faces].mean(axis=1)
     tree = spatial.cKDTree(centroids)
-    crowd = np.cumsum(tree.query_ball_point(vertices[corners], reach, return_length=True))
-    corners = corners[crowd <= _MOST_PAIRS]
-    near = tree.query_ball_point(vertices[corners], reach)
-    for corner, triangles in zip(corners, near, strict=True):
-        distance = np.linalg.norm(centroids[triangles] - vertices[corner], axis=1)
-        beta = _MARGIN * (turns[corner] ** -2.0 - 1.0)
-        exponent[triangles] += beta * np.log(np.maximum(distance, 1e-6 * reach) / reach)
+    crowd = tree.query_ball_point(vertices[corners], reach, return_length=True)
+    corners = corners[np.cumsum(crowd) <= _MOST_PAIRS]
+    if not corners.size:
+        return np.exp(exponent)
+    near = spatial.cKDTree(vertices[corners]).sparse_distance_matrix(tree, reach, output_type="ndarray")
+    beta = _MARGIN * (turns[corners] ** -2.0 - 1.0)
+    np.add.at(exponent, near["j"], beta[near["i"]] * np.log(np.maximum(near["v"], 1e-6 * reach) / reach))
     return np.exp(np.minimum(exponent, _BEST))
 
 
