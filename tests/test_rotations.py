@@ -5,7 +5,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation, Slerp
 
-from warpjld.rotations import conjugate, minimal_rotation, multiply, rotate, slerp, unit
+from warpjld.rotations import axis_turns, conjugate, matrices, minimal_rotation, multiply, rotate, slerp, unit
 
 EXACT = 1e-12
 
@@ -53,3 +53,17 @@ def test_slerp_holds_outside_and_takes_one_key() -> None:
     got = slerp(np.array([1.0, 2.0]), keys, np.array([-1.0, 5.0]))
     np.testing.assert_allclose(np.abs((got * keys).sum(-1)), 1, atol=EXACT)
     assert slerp(np.array([1.0]), keys[:1], np.zeros(4)).shape == (4, 3, 4)
+
+
+@given(seeds, st.sampled_from([1.0, 3.0]))
+def test_matrices_are_those_of_scipy(seed: int, length: float) -> None:
+    a = turns(seed, 6)
+    np.testing.assert_allclose(matrices(length * a), Rotation.from_quat(a).as_matrix(), atol=EXACT)
+    np.testing.assert_allclose(matrices(length * a[0]), Rotation.from_quat(a[0]).as_matrix(), atol=EXACT)
+
+
+def test_axis_turns_are_the_octahedral_group() -> None:
+    ours, theirs = axis_turns(), Rotation.create_group("O").as_quat()
+    assert ours.shape == (24, 4)
+    np.testing.assert_allclose(np.sort(np.abs(ours @ theirs.T), axis=1)[:, -1], 1.0, atol=EXACT)
+    np.testing.assert_allclose(np.abs(ours @ ours.T) > 1.0 - EXACT, np.eye(24, dtype=bool))

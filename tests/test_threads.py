@@ -4,7 +4,7 @@ import threading
 
 import pytest
 
-from warpjld.threads import cores, in_threads, threads_for
+from warpjld.threads import cores, in_threads, one_blas_thread, threads_for
 
 
 @pytest.mark.parametrize("threads", [-1, 1, 2, 3, 16])
@@ -38,3 +38,17 @@ def test_an_error_in_any_thread_is_raised() -> None:
 def test_little_work_is_not_split() -> None:
     assert threads_for(0, 100) == threads_for(199, 100) == 1
     assert threads_for(10**9, 1) == cores()
+
+
+def test_linear_algebra_is_kept_to_one_thread_and_let_go_again() -> None:
+    import scipy.linalg  # noqa: F401
+    from threadpoolctl import threadpool_info, threadpool_limits
+
+    def threads() -> set[int]:
+        return {library["num_threads"] for library in threadpool_info() if library["user_api"] == "blas"}
+
+    with threadpool_limits(2, user_api="blas"):
+        before = threads()
+        with one_blas_thread(), one_blas_thread():
+            assert threads() == {1}
+        assert threads() == before

@@ -2,10 +2,23 @@
 
 from __future__ import annotations
 
+from itertools import product
+
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-__all__ = ["about", "conjugate", "minimal_rotation", "multiply", "rotate", "slerp", "unit", "upright"]
+__all__ = [
+    "about",
+    "axis_turns",
+    "conjugate",
+    "matrices",
+    "minimal_rotation",
+    "multiply",
+    "rotate",
+    "slerp",
+    "unit",
+    "upright",
+]
 
 _PARALLEL = 1e-12
 
@@ -59,6 +72,20 @@ def rotate(a: NDArray[np.float64], vectors: ArrayLike) -> NDArray[np.float64]:
     twice = 2.0 / (x * x + y * y + z * z + w * w)
     turned = (vx + twice * (y * tz - z * ty), vy + twice * (z * tx - x * tz), vz + twice * (x * ty - y * tx))
     return np.stack(turned, axis=-1)
+
+
+def matrices(a: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Rotation matrices (…, 3, 3) of quaternions (…, 4) of any length but zero."""
+    return np.swapaxes(rotate(a[..., None, :], np.eye(3)), -1, -2)
+
+
+def axis_turns() -> NDArray[np.float64]:
+    """The 24 rotations that turn axes into axes, shape (24, 4); the last component that is not zero is positive."""
+    halves = np.array(list(product((-1.0, 0.0, 1.0), repeat=4)))
+    count = np.abs(halves).sum(axis=1)  # about axes by quarters and halves, about diagonals of faces and of the cube
+    turns = halves[(count == 1) | (count == 2) | (count == 4)]
+    last = np.take_along_axis(turns, 3 - (turns[:, ::-1] != 0.0).argmax(axis=1)[:, None], axis=1)
+    return unit(turns[last[:, 0] > 0.0])
 
 
 def minimal_rotation(start: ArrayLike, end: ArrayLike) -> NDArray[np.float64]:

@@ -2,11 +2,21 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 import numpy as np
-import scipy.sparse as sp
 from numpy.typing import NDArray
-from scipy.sparse.csgraph import connected_components
-from scipy.spatial import cKDTree
+
+from warpjld.lazily import lazy_module
+
+if TYPE_CHECKING:
+    import scipy.sparse as sp
+    import scipy.sparse.csgraph as csgraph
+    import scipy.spatial as spatial
+else:
+    sp = lazy_module("scipy.sparse")
+    csgraph = lazy_module("scipy.sparse.csgraph")
+    spatial = lazy_module("scipy.spatial")
 
 __all__ = ["spread"]
 
@@ -37,11 +47,11 @@ def spread(
     conducted = 1.0 / np.maximum(length, 1e-9 * max(float(length.max(initial=0.0)), 1e-30))
     graph = sp.coo_array((conducted, (edges[:, 0], edges[:, 1])), shape=(count, count)).tocsr()
     graph = (graph + graph.T).tocsr()
-    label = connected_components(graph, directed=False)[1]
+    label = csgraph.connected_components(graph, directed=False)[1]
     reached = np.isin(label[bare], np.unique(label[known]))
     out = values.copy()
     near = np.flatnonzero(known)
-    out[bare] = values[near[cKDTree(vertices[near]).query(vertices[bare])[1]]]
+    out[bare] = values[near[spatial.cKDTree(vertices[near]).query(vertices[bare])[1]]]
     inner = bare[reached]
     if inner.size:
         rows = graph[inner]

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from scipy.spatial import cKDTree
 
+from warpjld.coincident import close_pairs, connected_parts
 from warpjld.errors import InputError
 
 __all__ = ["Part", "Surface", "one_uv_a_vertex", "weld_surface"]
@@ -53,7 +54,11 @@ class Surface:
 
     def to_source(self, vertices: NDArray[np.float32]) -> NDArray[np.float32]:
         """Welded positions (…, V, 3) in the source's vertex order (…, W, 3)."""
-        return vertices[..., self.weld, :]
+        return vertices.copy() if self._welds_nothing else np.take(vertices, self.weld, axis=-2)
+
+    @cached_property
+    def _welds_nothing(self) -> bool:
+        return np.array_equal(self.weld, np.arange(len(self.vertices)))
 
     def split_at_seams(self) -> tuple[NDArray[np.int32], NDArray[np.int32], NDArray[np.float32] | None]:
         """Vertices that have one pair of texture coordinates each, for files that know no others.
@@ -138,15 +143,10 @@ def weld_surface(
     owner = np.arange(len(points))
     for part in parts:
         inside = points[part.vertices]
-        pairs = cKDTree(inside).query_pairs(max(tolerance * size, 1e-12), output_type="ndarray")
+        pairs = close_pairs(inside, max(tolerance * size, 1e-12))
         if len(pairs):
-            from scipy.sparse import coo_array
-            from scipy.sparse.csgraph import connected_components
-
-            links = coo_array((np.ones(len(pairs)), (pairs[:, 0], pairs[:, 1])), shape=(len(inside),) * 2)
-            label = connected_components(links, directed=False)[1]
-            first = np.full(label.max() + 1, len(inside))
-            np.minimum.at(first, label, np.arange(len(inside)))
+            label = connected_parts(pairs, len(inside))
+            first = np.unique(label, return_index=True)[1]
             owner[part.vertices] = part.vertices.start + first[label]
     kept, weld = np.unique(owner, return_inverse=True)
     welded = weld[triangles]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -13,9 +14,10 @@ __all__ = ["whole_file"]
 def whole_file(path: Path) -> Iterator[Path]:
     """A place to write to that becomes ``path`` when the statement ends, and is removed where that fails.
 
-    It lies beside and has the same suffix: ``out/.table.part.csv`` for ``out/table.csv``.
+    It lies beside and has the same suffix: ``out/.table.part123.csv`` for ``out/table.csv`` in process 123. Several
+    processes may write the same file: each writes a whole one, and the last one stays.
     """
-    part = path.with_name(f".{path.stem}.part{path.suffix}")
+    part = path.with_name(f".{path.stem}.part{os.getpid()}{path.suffix}")
     try:
         yield part
         part.replace(path)

@@ -3,8 +3,29 @@
 import warp as wp
 
 from warpjld_kernels.coefficients import muscle_profile, rotation_weights, rounding
+from warpjld_kernels.lanes import VECTORISED
 
-wp.set_module_options({"max_unroll": 1, "enable_backward": True})
+# compiled as what deforms is, so that both take the same precompiled header, which costs more than either
+wp.set_module_options({**VECTORISED, "max_unroll": 1})
+
+
+@wp.func
+def operator_coefficients(
+    weight: float,
+    ratio: float,
+    side: float,
+    muscular: float,
+    proximity: wp.vec2,
+    peak: float,
+    exponents: wp.vec2,
+):
+    """Weights of an operator's three rotations, its two roundings and its muscle, for amplitudes of one (R58–R65)."""
+    profile = muscle_profile(ratio, peak, exponents[0], exponents[1])
+    return (
+        weight * rotation_weights(ratio, side, proximity[0], proximity[1]),
+        weight * rounding(ratio, side, proximity[0], proximity[1]),
+        weight * muscular * (1.0 - side) * profile,
+    )
 
 
 @wp.kernel
@@ -25,14 +46,20 @@ def operator_fields(
     rounding_out: wp.array2d(dtype=wp.vec2),
     muscle_out: wp.array2d(dtype=float),
 ):
-    """Per operator of a vertex: weights of its three rotations, its two roundings and its muscle, for amplitudes of one
-    (R58–R65). See ``warpjld.covering.binding.Anchors`` for the places."""
+    """Coefficients per operator of a vertex. See ``warpjld.covering.binding.Anchors`` for the places."""
     v, k = wp.tid()
     s = segment[v, k]
     p = ends[s, 0]
     d = ends[s, 1]
-    w = weight[v, k]
-    turn_out[v, k] = w * rotation_weights(ratio[v, k], side[v, k], proximity[p, 0], proximity[d, 1])
-    rounding_out[v, k] = w * rounding(ratio[v, k], side[v, k], proximity[p, 0], proximity[d, 1])
-    profile = muscle_profile(ratio[v, k], peak[p], exponents[p, 0], exponents[p, 1])
-    muscle_out[v, k] = w * muscular[s] * (1.0 - side[v, k]) * profile
+    turn, rounded, muscle = operator_coefficients(
+        weight[v, k],
+        ratio[v, k],
+        side[v, k],
+        muscular[s],
+        wp.vec2(proximity[p, 0], proximity[d, 1]),
+        peak[p],
+        wp.vec2(exponents[p, 0], exponents[p, 1]),
+    )
+    turn_out[v, k] = turn
+    rounding_out[v, k] = rounded
+    muscle_out[v, k] = muscle

@@ -2,7 +2,10 @@
 
 import warp as wp
 
-wp.set_module_options({"enable_backward": False})
+from warpjld_kernels.lanes import VECTORISED
+
+# compiled as what deforms is, so that both take the same precompiled header, which costs more than either
+wp.set_module_options(VECTORISED)
 
 # part of the way to a segment that must be free: one that ends on the surface, as at a wrist, is seen all the same,
 # and not as float32 happens to put it before or behind
@@ -27,6 +30,8 @@ def nearest_visible_segment(
     # segments
     starts: wp.array(dtype=wp.vec3),
     ends: wp.array(dtype=wp.vec3),
+    # scratch
+    distances: wp.array2d(dtype=float),
     # out
     nearest_out: wp.array(dtype=wp.int32),
     distance_out: wp.array(dtype=float),
@@ -34,11 +39,14 @@ def nearest_visible_segment(
     """Nearest segment whose closest point is seen without crossing the surface; the nearest of all where none is.
 
     Of segments whose distances differ by less than ``tie`` the first one counts as nearest: at a joint two are equally
-    near, and rounding, which is the processor's, must not choose.
+    near, and rounding, which is the processor's, must not choose. ``distances`` is a row for each point: who sees
+    nothing looks for every segment in turn.
     """
     tid = wp.tid()
     point = points[tid]
     origin = point - inset * normals[tid]
+    for s in range(starts.shape[0]):
+        distances[tid, s] = wp.length(point - closest_on_segment(point, starts[s], ends[s]))
     first = int(-1)
     first_distance = float(0.0)
     found = int(-1)
@@ -49,14 +57,14 @@ def nearest_visible_segment(
         best = int(-1)
         best_distance = float(0.0)
         for s in range(last + 1, starts.shape[0]):
-            distance = wp.length(point - closest_on_segment(point, starts[s], ends[s]))
+            distance = distances[tid, s]
             if best < 0 and distance >= level and distance <= level + tie:
                 best = s
                 best_distance = distance
         if best < 0:  # all of them refused: on to the nearest of those further away
             further = float(1.0e30)
             for s in range(starts.shape[0]):
-                distance = wp.length(point - closest_on_segment(point, starts[s], ends[s]))
+                distance = distances[tid, s]
                 if distance > level + tie and distance < further:
                     further = distance
             if further == 1.0e30:

@@ -2,7 +2,11 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
+import os
+import pickle
+import subprocess
+import sys
+from dataclasses import fields, replace
 from pathlib import Path
 
 import numpy as np
@@ -12,12 +16,13 @@ from click.testing import CliRunner
 from warpjld.cli.bind import command as bind_command
 from warpjld.cli.deform import command as deform_command
 from warpjld.covering import bind_rig
-from warpjld.covering.kept import CACHE_VARIABLE, bind_kept, cache_folder, load_binding, save_binding
+from warpjld.covering.kept import CACHE_VARIABLE, _tidy, bind_kept, cache_folder, load_binding, save_binding
 from warpjld.covering.parameters import default_parameters
 from warpjld.errors import InputError
 from warpjld.hand import build_hand
 from warpjld.rig import Rig
 from warpjld.skeleton import CHANNELS, Poses, poses_from_angles
+from warpjld.whole_file import whole_file
 
 
 @pytest.fixture(scope="module")
@@ -52,9 +57,62 @@ def test_it_is_not_bound_again(hand: Rig, folder: Path, monkeypatch: pytest.Monk
     def refuse(*_: object, **__: object) -> None:
         raise AssertionError("bound again")
 
-    monkeypatch.setattr("warpjld.covering.covering.domains_from_geometry", refuse)
-    monkeypatch.setattr("warpjld.covering.covering.pack_runs", refuse)
-    bind_kept(hand)[0].deform(_poses(hand))
+    for work in ("domains_from_geometry", "anchor", "operator_fields", "Diffusion", "pack_runs"):
+        monkeypatch.setattr(f"warpjld.covering.covering.{work}", refuse)
+    kept = bind_kept(hand)[0]
+    kept.deform(_poses(hand))
+    kept.points(_poses(hand), [0, 7])
+    kept.with_parameters(replace(kept.parameters, inflation=0.5 * kept.parameters.inflation)).points(_poses(hand), [3])
+
+
+def test_all_that_is_kept_is_what_was_bound(hand: Rig, folder: Path) -> None:
+    bound = bind_kept(hand)[0]
+    kept = bind_kept(hand)[0]
+    assert kept is not bound
+    for name in ("anchors", "parameters"):
+        one, other = getattr(bound, name), getattr(kept, name)
+        for field in fields(one):
+            np.testing.assert_array_equal(getattr(one, field.name), getattr(other, field.name))
+    np.testing.assert_array_equal(kept.domains, bound.domains)
+    shaped = replace(bound.parameters, proximity=0.9 * bound.parameters.proximity)
+    poses = _poses(hand)
+    for one, other in ((bound, kept), (bound.with_parameters(shaped), kept.with_parameters(shaped))):
+        np.testing.assert_array_equal(one.fields.stacked().toarray(), other.fields.stacked().toarray())
+        np.testing.assert_array_equal(one.deform(poses), other.deform(poses))
+    again = pickle.loads(pickle.dumps(bind_kept(hand)[0]))  # as it is sent to a worker
+    np.testing.assert_array_equal(again.fields.stacked().toarray(), bound.fields.stacked().toarray())
+
+
+def test_the_cache_does_not_grow_for_ever(hand: Rig, folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    bind_kept(hand)
+    size = next(folder.iterdir()).stat().st_size
+    for age in range(1, 5):
+        old = folder / f"{age}.npz"
+        old.write_bytes(b"x" * size)
+        os.utime(old, (1e9 - age, 1e9 - age))
+    monkeypatch.setattr("warpjld.covering.kept._MOST_BYTES", 3 * size)
+    _tidy(folder)
+    assert sorted(file.name for file in folder.iterdir())[:2] == ["1.npz", "2.npz"]
+    assert len(list(folder.iterdir())) == 3
+    monkeypatch.setattr("warpjld.covering.kept._MOST_BYTES", 0)
+    _tidy(folder)
+    assert len(list(folder.iterdir())) == 1  # the newest stays, however large it is
+
+
+def test_two_processes_may_keep_the_same_binding(hand: Rig, tmp_path: Path) -> None:
+    place, covering = tmp_path / "hand.npz", bind_rig(hand)
+    with whole_file(place) as half:  # another process has begun
+        half.write_bytes(b"half")
+        script = (
+            "import sys; from pathlib import Path; from warpjld.whole_file import whole_file\n"
+            "with whole_file(Path(sys.argv[1])) as part: part.write_bytes(b'other')"
+        )
+        subprocess.run([sys.executable, "-c", script, place], check=True)
+        assert place.read_bytes() == b"other"
+        assert half.read_bytes() == b"half"
+        half.unlink()
+        save_binding(half, covering, hand)
+    load_binding(place, hand)
 
 
 def test_a_broken_file_is_made_anew_and_told_of(hand: Rig, folder: Path) -> None:

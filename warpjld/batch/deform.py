@@ -11,7 +11,6 @@ from typing import TYPE_CHECKING, Any, Literal
 from warpjld.errors import InputError
 from warpjld.motion.load import LoadedMotion, open_motion
 from warpjld.rig import Rig
-from warpjld.touch.contact import SkinContact
 
 if TYPE_CHECKING:
     from warpjld.covering import Covering, Parameters
@@ -114,8 +113,11 @@ def deform_clip(
     moved = open_motion(motion, rig, animation=animation, **how.reading)
     first, last = frame_span(how.span, len(moved.poses))
     poses = moved.poses[slice(first, last + 1)]
-    contact = None if how.touch == "off" else SkinContact(how.covering, limits=how.touch == "limit")
-    if contact is not None:
+    contact = None
+    if how.touch != "off":
+        from warpjld.touch.contact import SkinContact
+
+        contact = SkinContact(how.covering, limits=how.touch == "limit")
         poses = contact.poses(poses, first=first)
     caches = []
     with ExitStack() as opened:

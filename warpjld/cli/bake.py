@@ -79,7 +79,8 @@ def command(
     from warpjld.cli.progress import progress
     from warpjld.cli.rig_argument import open_rig, rig_files
     from warpjld.cli.warn import warn
-    from warpjld.covering import bind_rig, load_parameters
+    from warpjld.covering import load_parameters
+    from warpjld.covering.kept import bind_kept
     from warpjld.folders import make_folder
     from warpjld.io.identity import files_of
     from warpjld.motion import open_motion
@@ -105,7 +106,7 @@ def command(
     if opened.skin is None:
         warnings.append("the rig has no painted weights: the report has nothing to set the fitted ones beside")
     with progress(quiet) as report:
-        covering = bind_rig(opened, parameters=chosen, domains=domains)
+        covering, _ = bind_kept(opened, parameters=chosen, domains=domains)
         fitted, unseen = with_motions(opened.skeleton, [motion.poses for motion in loaded])
         baked = bake(opened, covering, fitted, influences=int(influences), correctives=correctives, progress=report)
         rows = accuracy(baked, covering, unseen)

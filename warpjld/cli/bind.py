@@ -52,7 +52,7 @@ def command(
     chosen = None if parameters is None else load_parameters(parameters, opened.skeleton)
     covering = bind_rig(opened, parameters=chosen, domains=domains)
     try:
-        save_binding(out, covering, opened, domains=domains)
+        save_binding(out, covering, opened, parameters=chosen, domains=domains)
     except OSError as error:
         raise InputError(f"cannot write the binding: {error.strerror}", path=out) from None
     seconds = round(time.perf_counter() - began, 3)

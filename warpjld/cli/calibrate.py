@@ -55,8 +55,8 @@ def command(
     builtin:right. Scripts load the file written with PARAMETERS. The result is never worse than the start."""
     from warpjld.cli.progress import progress
     from warpjld.cli.rig_argument import open_rig, rig_files
-    from warpjld.covering import bind_rig
     from warpjld.covering.calibrate import calibrate
+    from warpjld.covering.kept import bind_kept
     from warpjld.covering.parameters import load_parameters, save_parameters
     from warpjld.covering.pose_sets import calibration_poses
     from warpjld.errors import InputError
@@ -70,7 +70,7 @@ def command(
     opened = open_rig(rig, **how)
     begin = None if start is None else load_parameters(start, opened.skeleton)
     with progress(quiet) as report:
-        covering = bind_rig(opened, parameters=begin, domains=domains)
+        covering, _ = bind_kept(opened, parameters=begin, domains=domains)
         chosen = calibration_poses(opened.skeleton, poses)
         found = calibrate(covering, chosen, iterations=iterations, progress=report)
     save_parameters(out, opened.skeleton, found.parameters)

@@ -7,9 +7,17 @@ r^((2π/θ)² − 1) it goes as r, and the slope stays finite: ν = 1 solves ν 
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 import numpy as np
 from numpy.typing import NDArray
-from scipy.spatial import cKDTree
+
+from warpjld.lazily import lazy_module
+
+if TYPE_CHECKING:
+    import scipy.spatial as spatial
+else:
+    spatial = lazy_module("scipy.spatial")
 
 __all__ = ["corner_conductivity"]
 
@@ -36,14 +44,14 @@ def corner_conductivity(vertices: NDArray[np.float64], faces: NDArray[np.int32])
         return np.exp(exponent)
     reach = _REACH * float(np.linalg.norm(np.ptp(vertices, axis=0)))
     centroids = vertices[faces].mean(axis=1)
-    tree = cKDTree(centroids)
-    crowd = np.cumsum(tree.query_ball_point(vertices[corners], reach, return_length=True))
-    corners = corners[crowd <= _MOST_PAIRS]
-    near = tree.query_ball_point(vertices[corners], reach)
-    for corner, triangles in zip(corners, near, strict=True):
-        distance = np.linalg.norm(centroids[triangles] - vertices[corner], axis=1)
-        beta = _MARGIN * (turns[corner] ** -2.0 - 1.0)
-        exponent[triangles] += beta * np.log(np.maximum(distance, 1e-6 * reach) / reach)
+    tree = spatial.cKDTree(centroids)
+    crowd = tree.query_ball_point(vertices[corners], reach, return_length=True)
+    corners = corners[np.cumsum(crowd) <= _MOST_PAIRS]
+    if not corners.size:
+        return np.exp(exponent)
+    near = spatial.cKDTree(vertices[corners]).sparse_distance_matrix(tree, reach, output_type="ndarray")
+    beta = _MARGIN * (turns[corners] ** -2.0 - 1.0)
+    np.add.at(exponent, near["j"], beta[near["i"]] * np.log(np.maximum(near["v"], 1e-6 * reach) / reach))
     return np.exp(np.minimum(exponent, _BEST))
 
 

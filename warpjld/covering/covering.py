@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from functools import cached_property
 from typing import Any, Literal
 
 import numpy as np
-import scipy.sparse as sp
 from numpy.typing import ArrayLike, NDArray
 
 from warpjld.covering.binding import Anchors, anchor
@@ -67,12 +66,18 @@ class Covering:
         self.domains = domains
         self.anchors = anchors
         self._resident: dict[str, list[Any]] = {}
+        self._kept: Callable[[], Fields] | None = None
+
+    def keeping(self, runs: Runs, fields: Callable[[], Fields], swelling: NDArray[np.float64]) -> Covering:
+        """This covering, with what was computed of it before: its runs, its swelling, and its fields when wanted."""
+        self.runs, self._kept, self.swelling = runs, fields, swelling
+        return self
 
     def with_parameters(self, parameters: Parameters) -> Covering:
         """The same binding with other parameters; domains are not computed again, and fields only where parameters
         other than amplitudes change."""
         parameters.check(self.skeleton)
-        anchors, same = self.anchors, {"diffusion", "following", "spread", "fields", "swelling"}
+        anchors, same = self.anchors, {"diffusion", "following", "spread", "fields", "swelling", "_kept"}
         if not parameters.shapes_like(self.parameters):
             rigid = anchors.rigid
             anchors = anchor(self.surface.vertices, self.skeleton, self.fans, self.domains, parameters, rigid=rigid)
@@ -113,12 +118,12 @@ class Covering:
         skin = slopes if self.following is None else self.following.adjoint(slopes)
         owner = joint_of_column(self.anchors, len(self.skeleton))
         before = self.diffusion.adjoint(skin.stacked().toarray(), fields.stacked(), owner)
-        return slopes.like(sp.csr_array(before))
+        return slopes.like(before)
 
     @cached_property
     def fields(self) -> Fields:
         """The coefficients in use: diffused, and thinned out."""
-        return thinned(self.spread)
+        return thinned(self.spread) if self._kept is None else self._kept()
 
     @cached_property
     def rows(self) -> Rows:

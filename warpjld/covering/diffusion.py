@@ -17,14 +17,20 @@ from __future__ import annotations
 
 from dataclasses import dataclass, fields
 from functools import cached_property
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import scipy.sparse as sp
 from numpy.typing import NDArray
-from scipy.sparse.csgraph import dijkstra
 
 from warpjld.covering.heat import Factor, conducting_laplacian, spatial_order, uniform_laplacian
+from warpjld.lazily import lazy_module
+
+if TYPE_CHECKING:
+    import scipy.sparse as sp
+    import scipy.sparse.csgraph as csgraph
+else:
+    sp = lazy_module("scipy.sparse")
+    csgraph = lazy_module("scipy.sparse.csgraph")
 
 __all__ = ["BETA", "Diffusion"]
 
@@ -147,7 +153,7 @@ class Diffusion:
             touched = touched[touched >= 0]
             reached = np.zeros(count, dtype=bool)
             if touched.size:
-                reached = dijkstra(graph, directed=False, indices=touched, min_only=True, limit=_FAR) < np.inf
+                reached = csgraph.dijkstra(graph, directed=False, indices=touched, min_only=True, limit=_FAR) < np.inf
             size = int(reached.sum())
             # with the group that grows least, if that pays
             best, best_size = -1, 0

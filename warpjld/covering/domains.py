@@ -6,25 +6,33 @@ nearest segment that it sees from inside the surface, and the heat spreads along
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 import numpy as np
-import scipy.sparse as sp
 from numpy.typing import NDArray
 
 from warpjld.covering.heat import cotangent_laplacian, solve, spatial_order, uniform_laplacian
 from warpjld.covering.operators import Fan, segment_ends
 from warpjld.covering.skull import skull_lines
 from warpjld.errors import InputError
+from warpjld.lazily import lazy_module
 from warpjld.normals import vertex_normals
 from warpjld.rig import Skin
 from warpjld.skeleton.tree import Skeleton
 from warpjld.spread import spread
 from warpjld.threads import in_threads, threads_for
 
+if TYPE_CHECKING:
+    import scipy.sparse as sp
+else:
+    sp = lazy_module("scipy.sparse")
+
 __all__ = ["domains_from_geometry", "domains_from_skin"]
 
 _LARGEST = 10.0  # skeletons: what lies further out says nothing of how large a surface is
 _NOTHING = 1e-6  # painted weight below which a vertex counts as bare
 _THREAD = 2_000  # points that a thread must have to look from
+_TOGETHER = 4_096  # points whose distances from all segments are held at once
 _TIE = 1e-5  # of the surface's size: segments whose distances differ by less, as float32 does, are equally near
 
 
@@ -173,13 +181,16 @@ def _nearest_visible(
     distance = wp.empty(len(points), dtype=float, device=device)
 
     def span(begin: int, end: int) -> None:
-        wp.launch(
-            nearest_visible_segment,
-            dim=end - begin,
-            inputs=[mesh.id, places[begin:end], normals[begin:end], 1e-4 * size, _TIE * size, *tips],
-            outputs=[nearest[begin:end], distance[begin:end]],
-            device=device,
-        )
+        scratch = wp.empty((min(_TOGETHER, end - begin), len(lines)), dtype=float, device=device)
+        for first in range(begin, end, _TOGETHER):
+            some = slice(first, min(first + _TOGETHER, end))
+            wp.launch(
+                nearest_visible_segment,
+                dim=some.stop - first,
+                inputs=[mesh.id, places[some], normals[some], 1e-4 * size, _TIE * size, *tips, scratch],
+                outputs=[nearest[some], distance[some]],
+                device=device,
+            )
 
     in_threads(span, len(points), threads_for(len(points), _THREAD), nearest_visible_segment, device)
     return fan_of[nearest.numpy()], distance.numpy().astype(np.float64)

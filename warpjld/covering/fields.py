@@ -11,14 +11,20 @@ from __future__ import annotations
 
 from contextlib import nullcontext
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
-import scipy.sparse as sp
 from numpy.typing import NDArray
 
 from warpjld.covering.binding import STATIONS, Anchors
 from warpjld.covering.device import array_on, checked_device
 from warpjld.covering.parameters import Parameters
+from warpjld.lazily import lazy_module
+
+if TYPE_CHECKING:
+    import scipy.sparse as sp
+else:
+    sp = lazy_module("scipy.sparse")
 
 __all__ = ["Fields", "OperatorKernel", "joint_of_column", "operator_fields"]
 
@@ -53,10 +59,10 @@ class Fields:
         """All fields side by side, in the order of the attributes."""
         return sp.csr_array(sp.hstack([getattr(self, kind) for kind in _KINDS], format="csr"))
 
-    def like(self, stacked: sp.csr_array) -> Fields:
+    def like(self, stacked: sp.csr_array | NDArray[np.float64]) -> Fields:
         """Other fields, laid out as these are, from all of them side by side."""
         ends = np.cumsum([getattr(self, kind).shape[1] for kind in _KINDS])
-        columns = stacked.tocsc()
+        columns = sp.csc_array(stacked)
         return Fields(*(columns[:, a:b].tocsr() for a, b in zip([0, *ends[:-1]], ends, strict=True)))
 
     def offsets(self, rest: NDArray[np.float64], joints: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -85,7 +91,11 @@ class OperatorKernel:
 
     def __init__(self, anchors: Anchors, parameters: Parameters, *, requires_grad: bool = False) -> None:
         import warp as wp
-        from warpjld_kernels import operator_fields as kernels
+
+        if requires_grad:
+            from warpjld_kernels.operator_fields_gradient import operator_fields_with_gradient as kernel
+        else:
+            from warpjld_kernels.operator_fields import operator_fields as kernel
 
         device = checked_device("cpu")
         self._anchors = anchors
@@ -103,7 +113,7 @@ class OperatorKernel:
         self._tape = wp.Tape()
         with self._tape if requires_grad else nullcontext():
             inputs = [*self._inputs, *self._values]
-            wp.launch(kernels.operator_fields, dim=shape, inputs=inputs, outputs=self._out, device=device)
+            wp.launch(kernel, dim=shape, inputs=inputs, outputs=self._out, device=device)
         self._layout(len(parameters.inflation))
 
     def _layout(self, joints: int) -> None:

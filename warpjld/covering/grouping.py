@@ -7,9 +7,18 @@ joined from the smallest up wherever that costs least.
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 import numpy as np
-import scipy.sparse as sp
 from numpy.typing import NDArray
+
+from warpjld.lazily import lazy_module
+from warpjld.threads import one_blas_thread
+
+if TYPE_CHECKING:
+    import scipy.sparse as sp
+else:
+    sp = lazy_module("scipy.sparse")
 
 __all__ = ["FIXED", "group", "work"]
 
@@ -36,8 +45,9 @@ def group(
     present = np.flatnonzero(np.diff(kinds.tocsc().indptr))
     kinds = kinds[:, present].tocsr()
     prices = price[present].astype(np.float32)
-    part = _parted(kinds, sizes.astype(np.float32), prices, max(lanes, int(sizes.sum()) // _PARTS))
-    run = _joined(*_columns_of(kinds, sizes, part), prices, lanes)[part]
+    with one_blas_thread():  # thousands of small products
+        part = _parted(kinds, sizes.astype(np.float32), prices, max(lanes, int(sizes.sum()) // _PARTS))
+        run = _joined(*_columns_of(kinds, sizes, part), prices, lanes)[part]
     member = run[kind]
     members = np.split(np.argsort(member, kind="stable"), np.cumsum(np.bincount(member))[:-1])
     columns = [present[np.flatnonzero(row)] for row in _columns_of(kinds, sizes, run)[0]]

@@ -5,13 +5,21 @@ from __future__ import annotations
 import warnings
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from typing import TYPE_CHECKING
 
 import numpy as np
-import scipy.sparse as sp
 from numpy.typing import NDArray
-from scipy.sparse.linalg import LinearOperator, cg, splu
 
 from warpjld.covering.corners import corner_conductivity
+from warpjld.lazily import lazy_module
+from warpjld.threads import one_blas_thread
+
+if TYPE_CHECKING:
+    import scipy.sparse as sp
+    import scipy.sparse.linalg as linalg
+else:
+    sp = lazy_module("scipy.sparse")
+    linalg = lazy_module("scipy.sparse.linalg")
 
 __all__ = ["Factor", "conducting_laplacian", "cotangent_laplacian", "solve", "spatial_order", "uniform_laplacian"]
 
@@ -124,7 +132,7 @@ def solve(
     ways = (_direct, _plain) if len(scale) <= _DIRECT_LIMIT else (_multigrid, _plain)
     for way in ways:
         # what a solver has to say of a broken mesh is no message for who gave it: the residual tells
-        with warnings.catch_warnings(), np.errstate(all="ignore"):
+        with warnings.catch_warnings(), np.errstate(all="ignore"), one_blas_thread():
             warnings.simplefilter("ignore")
             try:
                 found = way(scaled, goal, scale)
@@ -142,11 +150,13 @@ class Factor:
     def __init__(self, matrix: sp.sparray) -> None:
         self._scale = 1.0 / np.sqrt(matrix.diagonal())
         scaled = (sp.diags_array(self._scale) @ matrix @ sp.diags_array(self._scale)).tocsc()
-        self._factor = splu(scaled, permc_spec="MMD_AT_PLUS_A", options={"SymmetricMode": True})
+        with one_blas_thread():
+            self._factor = linalg.splu(scaled, permc_spec="MMD_AT_PLUS_A", options={"SymmetricMode": True})
 
     def solve(self, right: NDArray[np.float64]) -> NDArray[np.float64]:
         """X of A X = B, shape (V, n)."""
-        out: NDArray[np.float64] = self._scale[:, None] * self._factor.solve(self._scale[:, None] * right)
+        with one_blas_thread():
+            out: NDArray[np.float64] = self._scale[:, None] * self._factor.solve(self._scale[:, None] * right)
         return out
 
 
@@ -162,7 +172,7 @@ def _drawn_alike() -> Iterator[None]:
 
 
 def _direct(matrix: sp.csc_array, right: NDArray[np.float64], scale: NDArray[np.float64]) -> NDArray[np.float64]:
-    factors = splu(matrix, diag_pivot_thresh=0.0, permc_spec="MMD_AT_PLUS_A", options={"SymmetricMode": True})
+    factors = linalg.splu(matrix, diag_pivot_thresh=0.0, permc_spec="MMD_AT_PLUS_A", options={"SymmetricMode": True})
     solution: NDArray[np.float64] = factors.solve(right)
     return solution
 
@@ -182,6 +192,6 @@ def _multigrid(matrix: sp.csc_array, right: NDArray[np.float64], scale: NDArray[
 
 
 def _plain(matrix: sp.csc_array, right: NDArray[np.float64], scale: NDArray[np.float64]) -> NDArray[np.float64]:
-    apply = LinearOperator(matrix.shape, matvec=matrix.tocsr().dot, dtype=np.float64)
-    columns = [cg(apply, b, rtol=_TOLERANCE, atol=0.0, maxiter=_PLAIN_STEPS)[0] for b in right.T]
+    apply = linalg.LinearOperator(matrix.shape, matvec=matrix.tocsr().dot, dtype=np.float64)
+    columns = [linalg.cg(apply, b, rtol=_TOLERANCE, atol=0.0, maxiter=_PLAIN_STEPS)[0] for b in right.T]
     return np.column_stack(columns)

@@ -1,38 +1,46 @@
 """Bindings kept in files: what was found out about a rig once need not be found out again by the next process.
 
-A file holds the domains and the packed operators with a hash of all that they follow from: the surface, the skeleton,
-the parameters, the settings and the program's version. A file of anything else is never used.
+A file holds the domains, the places of the vertices, the fields and the packed operators, with a hash of all that they
+follow from (:mod:`warpjld.covering.kept_key`). A file of anything else is never used.
 """
 
 from __future__ import annotations
 
-import hashlib
 import os
 import sys
 import zipfile
-from dataclasses import astuple, fields, is_dataclass
-from functools import cache
+from dataclasses import astuple, dataclass, fields
 from pathlib import Path
 from typing import Any, Literal
 
 import numpy as np
+from numpy.typing import NDArray
 
-from warpjld import __version__
-from warpjld.covering.covering import Covering, bind, bind_rig
-from warpjld.covering.parameters import Parameters, default_parameters
+from warpjld.covering.binding import Anchors
+from warpjld.covering.covering import Covering, bind_rig
+from warpjld.covering.fields import Fields
+from warpjld.covering.kept_key import binding_key
+from warpjld.covering.operators import fans
+from warpjld.covering.parameters import Parameters
 from warpjld.covering.runs import Columns, Runs
 from warpjld.errors import InputError
 from warpjld.rig import Rig
 from warpjld.skeleton.tree import Skeleton
+from warpjld.whole_file import whole_file
 
 __all__ = ["CACHE_VARIABLE", "bind_kept", "cache_folder", "load_binding", "save_binding"]
 
 CACHE_VARIABLE = "WARPJLD_CACHE"
 """Environment variable: the folder in which bindings are kept, or ``off``."""
 
-_FORMAT = "warpjld binding 1"
-_MOST = 32  # files in the cache; the ones longest unused go
-_ARRAYS = ("tiles", "runs", "slots", "coefficients", "order")
+_FORMAT = "warpjld binding 2"
+_MOST = 32  # files in the cache, and
+_MOST_BYTES = 2**30  # all together; the ones longest unused go
+_RUNS = ("tiles", "runs", "slots", "coefficients", "order")
+_ANCHORS = tuple(field.name for field in fields(Anchors) if field.name != "rest")  # that is the surface's
+_PARAMETERS = tuple(field.name for field in fields(Parameters))
+_FIELDS = tuple(field.name for field in fields(Fields))
+_SPARSE = ("data", "indices", "indptr", "shape")
 
 
 def bind_kept(
@@ -55,11 +63,11 @@ def bind_kept(
     if method != "smooth" or (path is None and folder is None):
         return bind_rig(rig, method=method, **how), ()
     notes: tuple[str, ...] = ()
-    key = _key(rig, **how)
+    key = binding_key(rig, **how)
     file = path if path is not None else folder / f"{key}.npz"  # type: ignore[operator]
     if path is not None or file.exists():
         try:
-            covering = load_binding(file, rig, **how)
+            covering = _load(file, key, rig, skeleton)
             if path is None:
                 os.utime(file)
             return covering, ()
@@ -69,7 +77,7 @@ def bind_kept(
     if path is None:
         try:
             file.parent.mkdir(parents=True, exist_ok=True)
-            save_binding(file, covering, rig, domains=domains)
+            _save(file, key, covering)
             _tidy(file.parent)
         except OSError:  # a cache that cannot be written is none
             pass
@@ -77,31 +85,20 @@ def bind_kept(
 
 
 def save_binding(
-    path: Path, covering: Covering, rig: Rig, *, domains: Literal["geometry", "skin"] = "geometry"
+    path: Path,
+    covering: Covering,
+    rig: Rig,
+    *,
+    skeleton: Skeleton | None = None,
+    parameters: Parameters | None = None,
+    domains: Literal["geometry", "skin"] = "geometry",
 ) -> None:
-    """Keep the binding of a rig in a file, written beside it and renamed.
+    """Keep the binding that ``bind_rig`` made of a rig with these settings in a file, whole or not at all.
 
     Raises:
         OSError: It cannot be written.
     """
-    runs = covering.runs
-    key = _key(rig, skeleton=covering.skeleton, parameters=covering.parameters, domains=domains)
-    arrays = {name: getattr(runs, name) for name in _ARRAYS}
-    beside = path.with_name(f".{path.name}.{os.getpid()}")
-    try:
-        with beside.open("wb") as file:
-            np.savez(
-                file,
-                format=np.array(_FORMAT),
-                key=np.array(key),
-                columns=np.array(astuple(runs.columns)),
-                domains=covering.domains,
-                **arrays,
-            )
-        beside.replace(path)
-    except BaseException:
-        beside.unlink(missing_ok=True)
-        raise
+    _save(path, binding_key(rig, skeleton=skeleton, parameters=parameters, domains=domains), covering)
 
 
 def load_binding(
@@ -117,23 +114,58 @@ def load_binding(
     Raises:
         InputError: No such file, not a binding, or that of something else.
     """
-    key = _key(rig, skeleton=skeleton, parameters=parameters, domains=domains)
+    return _load(path, binding_key(rig, skeleton=skeleton, parameters=parameters, domains=domains), rig, skeleton)
+
+
+def _save(path: Path, key: str, covering: Covering) -> None:
+    parts = {"runs": (covering.runs, _RUNS), "anchors": (covering.anchors, _ANCHORS)}
+    parts["parameters"] = (covering.parameters, _PARAMETERS)
+    parts |= {f"fields.{kind}": (getattr(covering.fields, kind), _SPARSE) for kind in _FIELDS}
+    arrays: dict[str, Any] = {
+        f"{part}.{name}": np.asarray(getattr(value, name)) for part, (value, names) in parts.items() for name in names
+    }
+    arrays |= {"columns": np.array(astuple(covering.runs.columns)), "domains": covering.domains}
+    arrays["swelling"] = covering.swelling
+    with whole_file(path) as place, place.open("wb") as file:
+        np.savez(file, format=np.array(_FORMAT), key=np.array(key), **arrays)
+
+
+def _load(path: Path, key: str, rig: Rig, skeleton: Skeleton | None) -> Covering:
     try:
         with np.load(path, allow_pickle=False) as file:
             if str(file["format"]) != _FORMAT:
                 raise InputError("not a binding of this version", path=path)
             if str(file["key"]) != key:
                 raise InputError("is the binding of another rig, other settings or another version", path=path)
-            weights = file["domains"]
-            runs = Runs(Columns(*file["columns"].tolist()), **{name: file[name] for name in _ARRAYS})
+            arrays = {name: file[name] for name in file.files}
+        anchors = Anchors(rest=rig.surface.vertices, **_part(arrays, "anchors", _ANCHORS))
+        runs = Runs(Columns(*arrays["columns"].tolist()), **_part(arrays, "runs", _RUNS))
+        parameters = Parameters(**_part(arrays, "parameters", _PARAMETERS))
+        kept = _KeptFields({kind: _part(arrays, f"fields.{kind}", _SPARSE) for kind in _FIELDS})
+        domains, swelling = arrays["domains"], arrays["swelling"]
     except FileNotFoundError:
         raise InputError("no such file", path=path) from None
     except (OSError, ValueError, KeyError, EOFError, TypeError, zipfile.BadZipFile) as error:
         raise InputError(f"not a binding as 'warpjld bind' writes them ({error})", path=path) from None
     chosen = rig.skeleton if skeleton is None else skeleton
-    covering = bind(chosen, rig.surface, parameters=parameters, rigid=rig.rigid, domains=weights)
-    covering.runs = runs
-    return covering
+    return Covering(chosen, rig.surface, parameters, fans(chosen), domains, anchors).keeping(runs, kept, swelling)
+
+
+def _part(arrays: dict[str, NDArray[Any]], prefix: str, names: tuple[str, ...]) -> dict[str, NDArray[Any]]:
+    return {name: arrays[f"{prefix}.{name}"] for name in names}
+
+
+@dataclass(frozen=True, eq=False)
+class _KeptFields:
+    """Fields as arrays, by kind: sparse matrices of SciPy's are made of them when they are wanted."""
+
+    arrays: dict[str, dict[str, NDArray[Any]]]
+
+    def __call__(self) -> Fields:
+        import scipy.sparse as sp
+
+        parts = (self.arrays[kind] for kind in _FIELDS)
+        return Fields(*(sp.csr_array((p["data"], p["indices"], p["indptr"]), shape=tuple(p["shape"])) for p in parts))
 
 
 def cache_folder() -> Path | None:
@@ -154,55 +186,15 @@ def cache_folder() -> Path | None:
     return base / "warpjld" / "bindings"
 
 
-def _key(
-    rig: Rig,
-    *,
-    skeleton: Skeleton | None = None,
-    parameters: Parameters | None = None,
-    domains: str = "geometry",
-) -> str:
-    skeleton = rig.skeleton if skeleton is None else skeleton
-    digest = hashlib.sha256(f"{_FORMAT} {__version__} {_sources()} {domains}".encode())
-    surface = (rig.surface.vertices, rig.surface.faces)
-    chosen = default_parameters(skeleton) if parameters is None else parameters
-    for part in (surface, skeleton, chosen, rig.rigid, rig.skin if domains == "skin" else None):
-        _feed(digest, part)
-    return digest.hexdigest()
-
-
-@cache
-def _sources() -> str:
-    """Hash of the programs that bind: a version under way changes without its number."""
-    import warpjld_kernels
-
-    import warpjld
-
-    digest = hashlib.sha256()
-    for folder in (Path(warpjld.__path__[0]), Path(warpjld_kernels.__path__[0])):
-        for file in sorted(folder.rglob("*.py")):
-            digest.update(file.relative_to(folder).as_posix().encode())
-            digest.update(file.read_bytes())
-    return digest.hexdigest()
-
-
-def _feed(digest: Any, value: Any) -> None:
-    """Every number that a value holds, and what it is: values that differ feed different bytes."""
-    if isinstance(value, np.ndarray):
-        digest.update(f"{value.dtype.str}{value.shape}".encode())
-        digest.update(np.ascontiguousarray(value).tobytes())
-    elif is_dataclass(value):
-        for field in fields(value):
-            digest.update(field.name.encode())
-            _feed(digest, getattr(value, field.name))
-    elif isinstance(value, (tuple, list)):
-        digest.update(f"({len(value)}".encode())
-        for part in value:
-            _feed(digest, part)
-    else:
-        digest.update(f"{type(value).__name__}:{value!r};".encode())
-
-
 def _tidy(folder: Path) -> None:
-    files = sorted(folder.glob("*.npz"), key=lambda file: file.stat().st_mtime, reverse=True)
-    for old in files[_MOST:]:
-        old.unlink(missing_ok=True)
+    used = []
+    for file in folder.glob("*.npz"):
+        try:
+            used.append((file.stat().st_mtime, file.stat().st_size, file))
+        except FileNotFoundError:  # another process tidies too
+            continue
+    kept = 0
+    for place, (_, size, file) in enumerate(sorted(used, key=lambda one: one[0], reverse=True)):
+        kept += size
+        if place >= _MOST or (place and kept > _MOST_BYTES):
+            file.unlink(missing_ok=True)

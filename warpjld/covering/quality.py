@@ -3,12 +3,21 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from scipy.sparse import coo_array
-from scipy.sparse.csgraph import connected_components
-from scipy.spatial.transform import Rotation
+
+from warpjld.lazily import lazy_module
+
+if TYPE_CHECKING:
+    import scipy.sparse as sp
+    from scipy.sparse import csgraph
+    from scipy.spatial import transform
+else:
+    sp = lazy_module("scipy.sparse")
+    csgraph = lazy_module("scipy.sparse.csgraph")
+    transform = lazy_module("scipy.spatial.transform")
 
 __all__ = [
     "Stretch",
@@ -56,8 +65,8 @@ def closing_fans(faces: NDArray[np.int32]) -> tuple[NDArray[np.int64], NDArray[n
         return boundary, np.zeros(0, dtype=np.int64)
     rims, compact = np.unique(boundary, return_inverse=True)
     compact = compact.reshape(boundary.shape)
-    links = coo_array((np.ones(len(compact)), (compact[:, 0], compact[:, 1])), shape=(len(rims),) * 2)
-    label = connected_components(links, directed=False)[1]
+    links = sp.coo_array((np.ones(len(compact)), (compact[:, 0], compact[:, 1])), shape=(len(rims),) * 2)
+    label = csgraph.connected_components(links, directed=False)[1]
     return boundary, label[compact[:, 0]].astype(np.int64)
 
 
@@ -152,5 +161,7 @@ def _carry(vectors: NDArray[np.float64], rotations: NDArray[np.float64], corners
     """Vectors at rest (N, 3) turned by the mean rotation of their corners (N, k), shape (..., N, 3)."""
     turn = rotations[..., corners, :].sum(axis=-2)
     shape = (*turn.shape[:-1], 3)
-    flat = Rotation.from_quat(turn.reshape(-1, 4)).apply(np.broadcast_to(vectors, shape).reshape(-1, 3).copy())
+    flat = transform.Rotation.from_quat(turn.reshape(-1, 4)).apply(
+        np.broadcast_to(vectors, shape).reshape(-1, 3).copy()
+    )
     return np.asarray(flat.reshape(shape))

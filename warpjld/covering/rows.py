@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import scipy.sparse as sp
 from numpy.typing import NDArray
 
 from warpjld.covering.binding import STATIONS, Anchors
@@ -15,7 +14,13 @@ from warpjld.covering.drivers import Drivers
 from warpjld.covering.fields import Fields
 from warpjld.covering.parameters import Parameters
 from warpjld.covering.segment_table import SegmentTable
+from warpjld.lazily import lazy_module
 from warpjld.skeleton.tree import Skeleton
+
+if TYPE_CHECKING:
+    import scipy.sparse as sp
+else:
+    sp = lazy_module("scipy.sparse")
 
 __all__ = ["Padded", "Rows", "palm_exponents", "pose_on", "rows_of", "rows_on", "scalar_inputs"]
 

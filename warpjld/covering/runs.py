@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
-import scipy.sparse as sp
 from numpy.typing import NDArray
 
 from warpjld.covering.binding import STATIONS, Anchors
@@ -13,6 +13,12 @@ from warpjld.covering.drivers import Drivers
 from warpjld.covering.grouping import group
 from warpjld.covering.parameters import Parameters
 from warpjld.covering.rows import Rows, scalar_inputs
+from warpjld.lazily import lazy_module
+
+if TYPE_CHECKING:
+    import scipy.sparse as sp
+else:
+    sp = lazy_module("scipy.sparse")
 
 __all__ = ["Columns", "Runs", "pack", "pack_runs", "palette"]
 

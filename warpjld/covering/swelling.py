@@ -17,19 +17,23 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
-import scipy.sparse as sp
 from numpy.typing import NDArray
 
 from warpjld.covering.drivers import drive
 from warpjld.covering.parameters import default_parameters
 from warpjld.covering.quality import closing_fans
 from warpjld.covering.rows import Rows, rows_of, scalar_inputs
+from warpjld.lazily import lazy_module
 from warpjld.rotations import rotate, unit
 from warpjld.skeleton.kinematics import poses_from_angles
 from warpjld.skeleton.tree import CHANNELS
 
 if TYPE_CHECKING:
+    import scipy.sparse as sp
+
     from warpjld.covering.covering import Covering
+else:
+    sp = lazy_module("scipy.sparse")
 
 __all__ = ["volume_keeping"]
 

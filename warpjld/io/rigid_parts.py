@@ -12,11 +12,9 @@ The largest piece is always flesh. Clothes, which go around several bones, are n
 from __future__ import annotations
 
 import numpy as np
-import scipy.sparse as sp
 from numpy.typing import NDArray
-from scipy.sparse.csgraph import connected_components
-from scipy.spatial import cKDTree
 
+from warpjld.coincident import close_pairs, connected_parts
 from warpjld.listed import first_few
 from warpjld.rig import Skin
 from warpjld.skeleton.tree import Skeleton
@@ -46,17 +44,9 @@ def rigid_parts(
     out = np.full(count, -1, dtype=np.int32) if rigid is None else rigid.copy()
     pieces = [p for p in _pieces(surface) if (out[p[0]] < 0).all()]
     pieces.sort(key=lambda p: -_area(surface, p[1]))
-    painted = (
-        None
-        if skin is None
-        else sp.coo_array(
-            (skin.weights.ravel(), (np.repeat(np.arange(count), skin.joints.shape[1]), skin.joints.ravel())),
-            shape=(count, len(skeleton)),
-        ).tocsr()
-    )
     found: dict[int, list[str]] = {}
     for vertices, faces in pieces[1:]:
-        joint = _nearest_bone(surface, skeleton, vertices, faces) if painted is None else _painted(painted, vertices)
+        joint = _nearest_bone(surface, skeleton, vertices, faces) if skin is None else _painted(skin, vertices)
         if joint < 0 or _holds_a_bone(surface, skeleton, vertices, faces):
             continue
         out[vertices] = joint
@@ -72,10 +62,9 @@ def rigid_parts(
 def _pieces(surface: Surface) -> list[tuple[NDArray[np.int64], NDArray[np.int64]]]:
     """Vertices and faces of every piece."""
     count = len(surface.vertices)
-    pairs = cKDTree(surface.vertices).query_pairs(_SAME_PLACE * surface.size, output_type="ndarray")
-    links = np.concatenate([surface.faces[:, :2], surface.faces[:, 1:], pairs])
-    graph = sp.coo_array((np.ones(len(links), np.int8), (links[:, 0], links[:, 1])), shape=(count, count))
-    number, label = connected_components(graph, directed=False)
+    pairs = close_pairs(surface.vertices, _SAME_PLACE * surface.size)
+    label = connected_parts(np.concatenate([surface.faces[:, :2], surface.faces[:, 1:], pairs]), count)
+    number = int(label.max()) + 1
     of_face = label[surface.faces[:, 0]]
     vertices = np.split(np.argsort(label, kind="stable"), np.cumsum(np.bincount(label, minlength=number))[:-1])
     faces = np.split(np.argsort(of_face, kind="stable"), np.cumsum(np.bincount(of_face, minlength=number))[:-1])
@@ -87,9 +76,9 @@ def _area(surface: Surface, faces: NDArray[np.int64]) -> float:
     return float(np.linalg.norm(np.cross(b - a, c - a), axis=1).sum()) / 2.0
 
 
-def _painted(painted: sp.csr_array, vertices: NDArray[np.int64]) -> int:
+def _painted(skin: Skin, vertices: NDArray[np.int64]) -> int:
     """The joint that has nearly all the weight of a piece, or -1."""
-    total = np.asarray(painted[vertices].sum(axis=0)).ravel()
+    total = np.bincount(skin.joints[vertices].ravel(), weights=skin.weights[vertices].ravel())
     joint = int(total.argmax())
     return joint if total[joint] > _SHARE * total.sum() else -1
 

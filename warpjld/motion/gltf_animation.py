@@ -7,9 +7,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.spatial.transform import Rotation
 
 from warpjld.errors import InputError
+from warpjld.lazily import lazy_module
 from warpjld.motion.animations import choose_animation
 from warpjld.motion.frame_times import frame_rate, frame_times, merged_times
 from warpjld.motion.joint_animation import JointAnimation
@@ -18,6 +18,11 @@ from warpjld.scales import TINY, never_zero
 
 if TYPE_CHECKING:
     from warpjld.io.gltf.document import Document
+
+if TYPE_CHECKING:
+    import scipy.spatial.transform as transform
+else:
+    transform = lazy_module("scipy.spatial.transform")
 
 __all__ = ["gltf_animation_names", "read_gltf_animation"]
 
@@ -225,7 +230,7 @@ def _animated(
     without, shape (F, 3, 3), and the first such frame."""
     fixed = dict(zip(_PATHS, document.parts(node), strict=True))
     values = {p: keys[p](at) if p in keys else np.tile(fixed[p], (len(at), 1)) for p in _PATHS}
-    turn = Rotation.from_quat(values["rotation"]).as_matrix()
+    turn = transform.Rotation.from_quat(values["rotation"]).as_matrix()
     out = np.zeros((len(at), 4, 4))
     out[:, :3, :3] = turn * never_zero(values["scale"])[:, None, :]
     out[:, :3, 3] = values["translation"]

@@ -5,17 +5,23 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import pairwise
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.spatial.transform import Rotation
 
 from warpjld.errors import InputError
+from warpjld.lazily import lazy_module
 from warpjld.motion.finger_bends import finger_bends, leaning
 from warpjld.motion.hand_motion import IDENTITY, HandTurns, carried, hand_joints
 from warpjld.rotations import conjugate, minimal_rotation, multiply, rotate
 from warpjld.skeleton import DIGITS, Skeleton
 from warpjld.skeleton.hand import FINGER_JOINTS
+
+if TYPE_CHECKING:
+    import scipy.spatial.transform as transform
+else:
+    transform = lazy_module("scipy.spatial.transform")
 
 __all__ = ["HandTrack"]
 
@@ -118,7 +124,7 @@ def _fit(rest: NDArray[np.float64], places: NDArray[np.float64]) -> tuple[NDArra
     u, _, vt = np.linalg.svd(np.einsum("fpi,pj->fij", b, a))
     proper = np.ones(u.shape[:2])
     proper[:, 2] = np.sign(np.linalg.det(u) * np.linalg.det(vt))
-    turn = Rotation.from_matrix((u * proper[:, None, :]) @ vt).as_quat()
+    turn = transform.Rotation.from_matrix((u * proper[:, None, :]) @ vt).as_quat()
     return turn, float(np.linalg.norm(b, axis=(1, 2)).mean() / np.linalg.norm(a))
 
 

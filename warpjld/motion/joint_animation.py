@@ -3,15 +3,21 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.spatial.transform import Rotation
 
+from warpjld.lazily import lazy_module
 from warpjld.motion.clip import Clip
 from warpjld.rotations import upright
 from warpjld.scales import polar
 from warpjld.skeleton.recognise.tree import SourceTree
+
+if TYPE_CHECKING:
+    import scipy.spatial.transform as transform
+else:
+    transform = lazy_module("scipy.spatial.transform")
 
 __all__ = ["JointAnimation"]
 
@@ -61,6 +67,6 @@ class JointAnimation:
             parents=np.where(parents >= 0, place[parents], -1),
             rest=rest[:, :3, 3],
             positions=worlds[..., :3, 3],
-            rotations=Rotation.from_matrix(turned.reshape(-1, 3, 3)).as_quat().reshape(*worlds.shape[:2], 4),
+            rotations=transform.Rotation.from_matrix(turned.reshape(-1, 3, 3)).as_quat().reshape(*worlds.shape[:2], 4),
             rate=self.rate,
         )

@@ -10,11 +10,12 @@ world in their files, the flesh on it moves by
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.spatial.transform import Rotation
 
+from warpjld.lazily import lazy_module
 from warpjld.listed import first_few
 from warpjld.motion.joint_animation import JointAnimation
 from warpjld.motion.same_skeleton import match_joints, same_bones, same_rest
@@ -24,6 +25,11 @@ from warpjld.scales import polar
 from warpjld.skeleton import Poses, poses_from_world
 from warpjld.skeleton.recognise.names import read_name
 from warpjld.skeleton.recognise.tree import SourceTree
+
+if TYPE_CHECKING:
+    import scipy.spatial.transform as transform
+else:
+    transform = lazy_module("scipy.spatial.transform")
 
 __all__ = ["OwnMotion", "own_poses"]
 
@@ -75,7 +81,7 @@ def own_poses(animation: JointAnimation, rig: Rig) -> OwnMotion | None:
             moved[:, j] = moved[:, parent] if parent >= 0 else np.eye(4)
     turned, stretch = polar(moved[..., :3, :3])
     positions = np.einsum("fjab,jb->fja", moved[..., :3, :3], rig.skeleton.rest) + moved[..., :3, 3]
-    rotations = Rotation.from_matrix(turned.reshape(-1, 3, 3)).as_quat().reshape(*moved.shape[:2], 4)
+    rotations = transform.Rotation.from_matrix(turned.reshape(-1, 3, 3)).as_quat().reshape(*moved.shape[:2], 4)
     if unknown := [rig.source.names[rig.sources[j]] for j in joints if j not in known]:
         notes.append(f"not in the animation's file, follow the joints above them: {first_few(unknown)}")
     warnings = [*_widened(rig, stretch), *_merged(rig, worlds, match, turned)]
@@ -157,7 +163,7 @@ def _merged(rig: Rig, worlds: NDArray[np.float64], match: NDArray[np.int64], tur
         if over is None or s in of_source or match[s] < 0 or read_name(name).kind == "helper":
             continue
         own, _ = polar(_flesh(rig, worlds[:, [s]], np.array([s]))[:, 0, :3, :3])
-        relative = Rotation.from_matrix(np.swapaxes(turned[:, over], 1, 2) @ own)
+        relative = transform.Rotation.from_matrix(np.swapaxes(turned[:, over], 1, 2) @ own)
         below = next((of_source[k] for k in rig.source.subtree(s) if k in of_source), None)
         if below is None:
             apart = float(relative.magnitude().max())

@@ -15,11 +15,12 @@ from __future__ import annotations
 import re
 from collections import Counter
 from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.spatial.transform import Rotation
 
+from warpjld.lazily import lazy_module
 from warpjld.motion.clip import Clip
 from warpjld.motion.joint_animation import JointAnimation
 from warpjld.motion.landmarks import Landmarks
@@ -28,6 +29,11 @@ from warpjld.motion.same_skeleton import match_joints
 from warpjld.rig import Rig
 from warpjld.scales import polar
 from warpjld.skeleton.recognise.tree import SourceTree
+
+if TYPE_CHECKING:
+    import scipy.spatial.transform as transform
+else:
+    transform = lazy_module("scipy.spatial.transform")
 
 __all__ = ["OwnRecording", "own_recording", "with_own_joints"]
 
@@ -84,7 +90,7 @@ def own_recording(clip: Clip, rig: Rig) -> OwnRecording | None:
         turn, notes = turn_of_rest(clip, _landmarks(clip, rig, match))
         if turn is not None:
             clip = clip.turned_rest(turn)
-            fit = replace(fit, turn=fit.turn * Rotation.from_quat(turn).inv())
+            fit = replace(fit, turn=fit.turn * transform.Rotation.from_quat(turn).inv())
     top = [k for k in match[match >= 0].tolist() if clip.parents[k] < 0]
     if top and not clip.rest[top].any():  # else a node of the file's own, such as Reference, stands at the origin
         fit = replace(fit, shift=np.zeros(3))
@@ -103,7 +109,7 @@ class _Fit:
     """What takes a recording's places to those of a rig [m]: ``scale`` times ``turn`` of them, and ``shift``."""
 
     scale: float
-    turn: Rotation
+    turn: transform.Rotation
     shift: NDArray[np.float64]
 
 
@@ -114,10 +120,10 @@ def _similarity(theirs: NDArray[np.float64], own: NDArray[np.float64]) -> _Fit |
     if not np.linalg.norm(a) > 0.0:
         return None
     scale = float(np.linalg.norm(b) / np.linalg.norm(a))
-    quarter = Rotation.create_group("O")
+    quarter = transform.Rotation.create_group("O")
     turns = [quarter[int(k)] for k in np.argsort(quarter.magnitude(), kind="stable")]
     left, _, right = np.linalg.svd(b.T @ a)
-    turns.append(Rotation.from_matrix(left @ np.diag([1.0, 1.0, np.linalg.det(left @ right)]) @ right))
+    turns.append(transform.Rotation.from_matrix(left @ np.diag([1.0, 1.0, np.linalg.det(left @ right)]) @ right))
     near = _SAME * float(np.linalg.norm(np.ptp(own, axis=0)))
     for turn in turns:
         if np.linalg.norm(scale * turn.apply(a) - b, axis=1).max() <= near:
@@ -137,7 +143,7 @@ def _worlds(
     back = np.asarray(np.linalg.inv(placing), dtype=np.float64)
     turn, _ = polar(back[:3, :3])
     axes = turn @ fit.turn.as_matrix()
-    turns = Rotation.from_quat(clip.rotations[:, joints].reshape(-1, 4)).as_matrix().reshape(*shape, 3, 3)
+    turns = transform.Rotation.from_quat(clip.rotations[:, joints].reshape(-1, 4)).as_matrix().reshape(*shape, 3, 3)
     places = fit.scale * clip.positions[:, joints] @ fit.turn.as_matrix().T + fit.shift
     out = np.tile(np.eye(4), (*shape, 1, 1))
     out[..., :3, :3] = axes @ turns @ axes.T @ rest[:, :3, :3]

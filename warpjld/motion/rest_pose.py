@@ -10,14 +10,20 @@ the frames, where a root carries all of them from one to the other; the floor te
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.spatial.transform import Rotation
 
+from warpjld.lazily import lazy_module
 from warpjld.motion.clip import Clip
 from warpjld.motion.landmarks import Landmarks, landmarks_of_clip
 from warpjld.rotations import minimal_rotation, rotate, slerp, unit
+
+if TYPE_CHECKING:
+    import scipy.spatial.transform as transform
+else:
+    transform = lazy_module("scipy.spatial.transform")
 
 __all__ = ["turn_of_rest", "with_usable_rest"]
 
@@ -179,7 +185,7 @@ def _turns(marks: Landmarks, places: NDArray[np.float64], up: NDArray[np.float64
     if known is None:
         return np.tile([0.0, 0.0, 0.0, 1.0], (len(places), 1))
     upright = _standing(up, known)
-    ends = np.array([Rotation.from_matrix((known if f is None else f) @ upright.T).as_quat() for f in frames])
+    ends = np.array([transform.Rotation.from_matrix((known if f is None else f) @ upright.T).as_quat() for f in frames])
     pelvis, chest = marks.pelvis, marks.chest
     spine = () if pelvis is None or chest is None else marks.path(pelvis, chest)
     spread = slerp(np.array([0.0, 1.0]), ends, np.arange(1, len(spine) + 1) / max(len(spine), 1))
@@ -198,7 +204,7 @@ def _standing(up: NDArray[np.float64], body: NDArray[np.float64]) -> NDArray[np.
         return np.eye(3)
     if up[2] > 0.5:
         return np.array([[1.0, 0.0, 0.0], [0.0, 0.0, -1.0], [0.0, 1.0, 0.0]])
-    standing = [g for g in Rotation.create_group("O").as_matrix() if g[:, 1] @ up > 0.5]
+    standing = [g for g in transform.Rotation.create_group("O").as_matrix() if g[:, 1] @ up > 0.5]
     return np.asarray(max(standing, key=lambda g: float((g * body).sum())))
 
 
@@ -227,8 +233,8 @@ def turn_of_rest(clip: Clip, marks: Landmarks) -> tuple[NDArray[np.float64] | No
         return None, (f"the recorded figure {told}: it is taken to lie, not to stand",)
     turn = minimal_rotation(own, found)
     if own @ found < -0.5:  # head down: which way round, only the frames tell
-        mean_turn = Rotation.from_quat(clip.rotations[:, pelvis]).mean()
-        fitting = [g for g in Rotation.create_group("O") if g.apply(own) @ found > 0.5]
+        mean_turn = transform.Rotation.from_quat(clip.rotations[:, pelvis]).mean()
+        fitting = [g for g in transform.Rotation.create_group("O") if g.apply(own) @ found > 0.5]
         turn = np.asarray(min(fitting, key=lambda g: float((mean_turn * g.inv()).magnitude())).as_quat())
     return turn, (f"the recorded figure {told}: the latter is taken as up",)
 

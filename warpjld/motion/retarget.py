@@ -28,13 +28,12 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.spatial.transform import Rotation
 
 from warpjld.errors import InputError
 from warpjld.motion.clip import Clip
 from warpjld.motion.landmarks import Landmarks
 from warpjld.motion.pairs import limb_names, pair_joints
-from warpjld.rotations import conjugate, minimal_rotation, multiply, rotate, slerp, unit
+from warpjld.rotations import axis_turns, conjugate, matrices, minimal_rotation, multiply, rotate, slerp, unit
 from warpjld.skeleton import Poses, Skeleton, poses_from_rotations
 
 __all__ = ["Retargeted", "correspondence", "retarget", "retarget_and_tell"]
@@ -169,9 +168,8 @@ def _axes(source: Landmarks, target: Landmarks) -> NDArray[np.float64]:
     if frames[0] is None or frames[1] is None:
         return _IDENTITY
     turn = frames[1] @ frames[0].T
-    group = Rotation.create_group("O")
-    best = int(np.argmax(np.einsum("gij,ij->g", group.as_matrix(), turn)))
-    return np.asarray(group[best].as_quat())
+    group = axis_turns()
+    return np.asarray(group[np.argmax(np.einsum("gij,ij->g", matrices(group), turn))])
 
 
 def _body_frame(marks: Landmarks) -> NDArray[np.float64] | None:

@@ -14,14 +14,14 @@ __all__ = ["cover"]
 
 def cover(actor: Actor) -> Covering:
     """The covering of an actor with its parameters, method and domains."""
-    from warpjld.covering import bind_rig
+    from warpjld.covering.kept import bind_kept
 
     old = actor.covering
     if old is not None and old.skeleton is actor.skeleton and actor.covered == (actor.method, actor.domains):
         if old.parameters is not actor.parameters:
             actor.covering = old.with_parameters(actor.parameters)
     else:
-        actor.covering = bind_rig(
+        actor.covering, _ = bind_kept(
             actor.rig,
             skeleton=actor.skeleton,
             parameters=actor.parameters,

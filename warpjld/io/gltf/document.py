@@ -6,18 +6,24 @@ import base64
 import binascii
 from functools import cached_property
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 from urllib.parse import unquote, unquote_to_bytes
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.spatial.transform import Rotation
 
 from warpjld.errors import InputError
 from warpjld.io.gltf.accessor import read_accessor
 from warpjld.io.gltf.container import read_container
 from warpjld.io.gltf.extensions import check_extensions, packed_view
+from warpjld.lazily import lazy_module
+from warpjld.rotations import matrices
 from warpjld.scales import never_zero, regular_linear
+
+if TYPE_CHECKING:
+    import scipy.spatial.transform as transform
+else:
+    transform = lazy_module("scipy.spatial.transform")
 
 __all__ = ["Document", "open_document"]
 
@@ -145,7 +151,7 @@ class Document:
             out[:3, :3] = regular_linear(out[:3, :3])
         elif record.matrix is None:
             _, rotation, scale = self.parts(node)
-            out[:3, :3] = Rotation.from_quat(rotation).as_matrix() * never_zero(scale)
+            out[:3, :3] = matrices(rotation) * never_zero(scale)
         return out
 
     def parts(self, node: int) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
@@ -165,7 +171,7 @@ class Document:
                 raise InputError(
                     f"node '{self.name(node)}' is animated, yet has a matrix with shear or zero scale", path=self.path
                 )
-            return matrix[:3, 3], Rotation.from_matrix(turned).as_quat(), scale
+            return matrix[:3, 3], transform.Rotation.from_matrix(turned).as_quat(), scale
         quaternion = np.array(record.rotation or (0.0, 0.0, 0.0, 1.0), dtype=np.float64)
         length = np.linalg.norm(quaternion)
         if not length > 0.0:
@@ -180,7 +186,7 @@ class Document:
             return np.array(record.matrix, dtype=np.float64).reshape(4, 4).T  # glTF stores columns
         local = np.eye(4)
         local[:3, 3], rotation, scale = self.parts(node)
-        local[:3, :3] = Rotation.from_quat(rotation).as_matrix() * scale
+        local[:3, :3] = matrices(rotation) * scale
         return local
 
     def _buffer(self, index: int, buffer: Any) -> bytes:

@@ -2,16 +2,24 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import scipy.sparse as sp
 from numpy.typing import NDArray
-from scipy.sparse.csgraph import dijkstra
-from scipy.spatial import cKDTree
 
+from warpjld.coincident import close_pairs
 from warpjld.errors import InputError
 from warpjld.io.gltf.document import Document
+from warpjld.lazily import lazy_module
+
+if TYPE_CHECKING:
+    import scipy.sparse as sp
+    import scipy.sparse.csgraph as csgraph
+    import scipy.spatial as spatial
+else:
+    sp = lazy_module("scipy.sparse")
+    csgraph = lazy_module("scipy.sparse.csgraph")
+    spatial = lazy_module("scipy.spatial")
 
 __all__ = ["read_influences"]
 
@@ -93,16 +101,16 @@ def _nearest_weighted(
     wanted = np.flatnonzero(bare)
     # vertices doubled at a seam are one: joined by edges without length (tiny: zero means "no edge" to scipy)
     size = float(np.linalg.norm(np.ptp(points, axis=0))) or 1.0
-    seams = cKDTree(points).query_pairs(1e-7 * size, output_type="ndarray")
+    seams = close_pairs(points, 1e-7 * size)
     edges = np.concatenate([faces[:, [0, 1]], faces[:, [1, 2]], faces[:, [2, 0]], seams])
     length = np.linalg.norm(points[edges[:, 0]] - points[edges[:, 1]], axis=1) + 1e-12 * size
     # of an edge that two triangles share one entry must stay: duplicates would be added up
     shortest = {(min(a, b), max(a, b)): d for (a, b), d in zip(edges.tolist(), length.tolist(), strict=True) if a != b}
     pairs = np.array(list(shortest), dtype=np.int64).reshape(-1, 2)
     graph = sp.csr_array((list(shortest.values()), (pairs[:, 0], pairs[:, 1])), shape=(len(points),) * 2)
-    far, _, source = dijkstra(graph, directed=False, indices=weighted, min_only=True, return_predecessors=True)
+    far, _, source = csgraph.dijkstra(graph, directed=False, indices=weighted, min_only=True, return_predecessors=True)
     out = source[wanted]
     apart = ~np.isfinite(far[wanted])
     if apart.any():
-        out[apart] = weighted[cKDTree(points[weighted]).query(points[wanted[apart]])[1]]
+        out[apart] = weighted[spatial.cKDTree(points[weighted]).query(points[wanted[apart]])[1]]
     return np.asarray(out, dtype=np.int64)

@@ -15,17 +15,23 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.spatial.transform import Rotation
 
 from warpjld.errors import InputError
+from warpjld.lazily import lazy_module
 from warpjld.listed import first_few
 from warpjld.rig import Rig
 from warpjld.rotations import rotate
 from warpjld.skeleton import Poses
 from warpjld.skeleton.recognise.tree import SourceTree
+
+if TYPE_CHECKING:
+    import scipy.spatial.transform as transform
+else:
+    transform = lazy_module("scipy.spatial.transform")
 
 __all__ = ["SourceMotion", "source_motion"]
 
@@ -81,7 +87,9 @@ class SourceMotion:
         """The rigid motion M of every joint from rest in the rig's frame, shape (f, N, 4, 4)."""
         turns = self.rotations(frames)
         out = np.zeros((*turns.shape[:2], 4, 4))
-        out[..., :3, :3] = Rotation.from_quat(turns.reshape(-1, 4)).as_matrix().reshape(*turns.shape[:2], 3, 3)
+        out[..., :3, :3] = (
+            transform.Rotation.from_quat(turns.reshape(-1, 4)).as_matrix().reshape(*turns.shape[:2], 3, 3)
+        )
         rest = self.rest_frames[:, :3, 3]
         out[..., :3, 3] = self.positions(frames) - np.einsum("fnab,nb->fna", out[..., :3, :3], rest)
         out[..., 3, 3] = 1.0

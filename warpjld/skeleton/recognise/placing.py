@@ -6,8 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.spatial import cKDTree
 
+from warpjld.coincident import close_pairs, connected_parts
 from warpjld.skeleton.recognise.section import first_hits
 from warpjld.skeleton.tree import Skeleton
 from warpjld.winding import winding_numbers
@@ -70,7 +70,7 @@ def check_placing(skeleton: Skeleton, vertices: NDArray[np.float64], faces: NDAr
 
 def _coincident(skeleton: Skeleton, vertices: NDArray[np.float64]) -> list[Finding]:
     size = float(np.linalg.norm(np.ptp(vertices, axis=0)))
-    pairs = cKDTree(skeleton.rest).query_pairs(1e-3 * size, output_type="ndarray")
+    pairs = close_pairs(skeleton.rest, 1e-3 * size)
     out = []
     for a, b in sorted(map(tuple, pairs)):
         gap = float(np.linalg.norm(skeleton.rest[a] - skeleton.rest[b]))
@@ -85,11 +85,7 @@ def _open_ends(vertices: NDArray[np.float64], faces: NDArray[np.int32]) -> list[
     rim = unique[count == 1]
     if not len(rim):
         return []
-    from scipy.sparse import coo_array
-    from scipy.sparse.csgraph import connected_components
-
-    graph = coo_array((np.ones(len(rim)), (rim[:, 0], rim[:, 1])), shape=(len(vertices),) * 2)
-    label = connected_components(graph, directed=False)[1]
+    label = connected_parts(rim, len(vertices))
     out = []
     for loop in np.unique(label[rim[:, 0]]):
         points = vertices[label == loop]

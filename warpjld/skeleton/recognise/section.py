@@ -33,10 +33,9 @@ def nearby(
     vertices: NDArray[np.float64], faces: NDArray[np.int32], centre: NDArray[np.float64], radius: float
 ) -> NDArray[np.int32]:
     """Faces that may reach within ``radius`` of ``centre``: what a hand needs of a body."""
-    corners = vertices[faces]
-    middle = corners.mean(axis=1)
-    extent = np.linalg.norm(corners - middle[:, None], axis=2).max(axis=1)
-    return faces[np.linalg.norm(middle - centre, axis=1) < radius + extent]
+    middle, extent = _spheres(vertices[faces])
+    away = middle - centre
+    return faces[np.sqrt(np.einsum("tk,tk->t", away, away)) < radius + extent]
 
 
 def first_hits(
@@ -51,19 +50,28 @@ def first_hits(
     if not len(faces):
         return out
     corners = vertices[faces]
-    middle = corners.mean(axis=1)
-    extent = np.linalg.norm(corners - middle[:, None], axis=2).max(axis=1) * (1 + 1e-9)
+    middle, extent = _spheres(corners)
+    extent *= 1 + 1e-9
+    # rays that start in one place see every triangle in the same direction
+    apart = slice(None) if (origins != origins[0]).any() else slice(1)
     rows = max(1, _CHUNK // len(faces))
     for start in range(0, len(origins), rows):
         origin, direction = origins[start : start + rows], directions[start : start + rows]
         # only triangles whose bounding sphere a ray meets are looked at closely
-        away = middle - origin[:, None]
-        along = np.einsum("rtk,rk->rt", away, direction)
+        away = middle - origin[apart, None]
+        along = (away @ direction[..., None])[..., 0] if len(away) > 1 else direction @ away[0].T
         aside = np.einsum("rtk,rtk->rt", away, away) - along**2
         ray, triangle = np.nonzero((aside <= extent**2) & (along >= -extent))
         distance = _distances(corners[triangle], origin[ray], direction[ray])
         np.minimum.at(out, start + ray, distance)
     return out
+
+
+def _spheres(corners: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Middles (T, 3) and radii (T,) of spheres around triangles (T, 3, 3)."""
+    middle = (corners[:, 0] + corners[:, 1] + corners[:, 2]) / 3.0
+    spokes = corners - middle[:, None]
+    return middle, np.sqrt(np.einsum("tnk,tnk->tn", spokes, spokes).max(axis=1))
 
 
 def _distances(

@@ -9,7 +9,8 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from warpjld.covering import Covering, bind_rig
+from warpjld.covering import Covering
+from warpjld.covering.kept import bind_kept
 from warpjld.errors import InputError
 from warpjld.grasp import GraspObject, ObjectSet
 from warpjld.grasp.finer import FinerSkin
@@ -92,7 +93,7 @@ def hand_of(choice: HandChoice) -> Hand:
     sides = [side for side in sides if f"{side}.middle.base" in rig.skeleton.names]
     if len(sides) != 1:
         raise InputError(f"hand {choice.name}: want a rig of one hand, this one has {len(sides)}", path=rig.path)
-    covering = bind_rig(rig)
+    covering, _ = bind_kept(rig)
     finer = FinerSkin(rig.surface.vertices, rig.surface.faces, _SPACING)
     parts = vertex_segments(covering)[finer.parents]
     return Hand(rig, covering, sides[0], palm_of(rig.skeleton).on_skin(rig.surface.vertices), finer, parts)

@@ -1,0 +1,58 @@
+"""A kept binding is made anew when any program that binding runs through has changed."""
+
+from __future__ import annotations
+
+import ast
+import importlib.util
+from pathlib import Path
+
+from warpjld.covering.kept_key import binding_key, binding_sources
+from warpjld.hand import build_hand
+
+_PACKAGES = ("warpjld", "warpjld_kernels")
+_ROOTS = ("warpjld.covering.covering", "warpjld.covering.kept")
+
+
+def _imported(module: str, file: Path) -> set[str]:
+    """Modules of the packages that a file imports anywhere, inside functions too."""
+    found = set()
+    for node in ast.walk(ast.parse(file.read_text(encoding="utf-8"))):
+        if isinstance(node, ast.Import):
+            found |= {alias.name for alias in node.names}
+        elif isinstance(node, ast.ImportFrom):
+            assert not node.level, f"{module}: relative import"
+            assert node.module is not None
+            found |= {node.module, *(f"{node.module}.{alias.name}" for alias in node.names)}
+    return {name for name in found if name.partition(".")[0] in _PACKAGES}
+
+
+def _file(module: str) -> Path | None:
+    try:
+        spec = importlib.util.find_spec(module)
+    except ModuleNotFoundError:  # a function or class: not a module
+        return None
+    return None if spec is None or spec.origin is None else Path(spec.origin)
+
+
+def test_every_module_that_binding_runs_through_counts() -> None:
+    counted = {file.resolve() for _, file in binding_sources()}
+    reached: dict[str, Path] = {}
+    todo = list(_ROOTS)
+    while todo:
+        module = todo.pop()
+        file = _file(module)
+        if module in reached or file is None:
+            continue
+        reached[module] = file
+        # packages' own files only gather names: what they import is imported by name where it is wanted
+        todo += [] if file.name == "__init__.py" else _imported(module, file)
+    assert len(reached) > 40
+    missing = {module for module, file in reached.items() if file.resolve() not in counted}
+    assert missing <= set(_PACKAGES), f"binding imports {sorted(missing)}, of which kept_key.py knows nothing"
+
+
+def test_all_that_is_given_counts() -> None:
+    hand = build_hand("left", resolution=1500)
+    assert binding_key(hand) == binding_key(hand)
+    assert binding_key(hand) != binding_key(build_hand("right", resolution=1500))
+    assert binding_key(hand) != binding_key(hand, domains="skin")

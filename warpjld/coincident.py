@@ -1,0 +1,57 @@
+"""Points that lie in the same place, and what hangs together by them.
+
+SciPy's k-d tree and graph search give the same, but importing them takes a quarter of the time in which a command
+deforms a clip, and every rig that is read is searched so.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+__all__ = ["close_pairs", "connected_parts"]
+
+# in no direction that a modeller gives points: few lie beside each other along it that do not lie near each other
+_ASKEW = np.array([0.5257, 0.6180, 0.5846])
+_ROUNDING = 1e-14  # of the largest coordinate
+
+
+def close_pairs(points: NDArray[np.float64], distance: float) -> NDArray[np.int64]:
+    """All pairs of points no further from each other than a distance, the lower number first, shape (m, 2).
+
+    Points are sorted along a line, and each is compared with those that follow it there.
+
+    Args:
+        points: Shape (n, 3).
+        distance: Small beside the distances of most points.
+    """
+    along = points @ (_ASKEW / np.linalg.norm(_ASKEW))
+    order = np.argsort(along, kind="stable")
+    along = along[order]
+    reach = distance + _ROUNDING * float(np.abs(points).max(initial=0.0))
+    first = np.arange(len(points))
+    found = []
+    step = 0
+    while first.size:
+        step += 1
+        first = first[: np.searchsorted(first, len(points) - step)]
+        first = first[along[first + step] - along[first] <= reach]
+        pairs = np.column_stack([order[first], order[first + step]])
+        apart = points[pairs[:, 0]] - points[pairs[:, 1]]
+        found.append(pairs[(apart * apart).sum(axis=1) <= distance * distance])
+    return np.sort(np.concatenate(found), axis=1) if found else np.zeros((0, 2), dtype=np.int64)
+
+
+def connected_parts(links: NDArray[np.integer], count: int) -> NDArray[np.int64]:
+    """Part of every one of ``count`` things that links (m, 2) join, numbered by the first thing of each."""
+    lowest = np.arange(count)
+    while True:
+        a, b = lowest[links[:, 0]], lowest[links[:, 1]]
+        apart = a != b
+        if not apart.any():
+            return np.unique(lowest, return_inverse=True)[1].ravel()
+        # whatever is lowest in either of two joined parts becomes lowest in both
+        links, a, b = links[apart], a[apart], b[apart]
+        np.minimum.at(lowest, np.maximum(a, b), np.minimum(a, b))
+        while (further := lowest[lowest]).tobytes() != lowest.tobytes():
+            lowest = further
