@@ -89,14 +89,15 @@ def test_pose(case: Case, name: str) -> None:
 
 def test_a_step_down_the_gradient_lowers_a_cost(bound: Covering) -> None:
     poses = random_poses(bound.skeleton, 3, 11)
-    goal = bound.with_parameters(replace(bound.parameters, muscle=1.5 * bound.parameters.muscle)).deform(poses)
-    operator = Differentiable(bound, poses)
+    begin = replace(bound.parameters, muscle=np.full(len(bound.skeleton), 0.15))
+    goal = bound.with_parameters(replace(begin, muscle=1.5 * begin.muscle)).deform(poses)
+    operator = Differentiable(bound.with_parameters(begin), poses)
     residual = operator.forward() - goal
     slope = operator.backward(2 * residual).parameters.muscle
     cost = float((residual**2).sum())
     step = 0.1 * cost / float(slope @ slope)
-    better = replace(bound.parameters, muscle=np.maximum(bound.parameters.muscle - step * slope, 0.0))
-    predicted = cost - float(slope @ (bound.parameters.muscle - better.muscle))
+    better = replace(begin, muscle=np.maximum(begin.muscle - step * slope, 0.0))
+    predicted = cost - float(slope @ (begin.muscle - better.muscle))
     assert float(((operator.forward(better) - goal) ** 2).sum()) == pytest.approx(predicted, rel=0.01)
     assert predicted < cost
 
