@@ -32,6 +32,7 @@ if TYPE_CHECKING:
     import scipy.sparse as sp
 
     from warpjld.covering.covering import Covering
+    from warpjld.skeleton.tree import Skeleton
 else:
     sp = lazy_module("scipy.sparse")
 
@@ -45,6 +46,7 @@ _PARTS = (
 _WIDEST = np.radians(110.0)  # of what is measured: beyond, limbs lie on one another
 _MOST = 0.8  # amplitude at which it ends
 _STEPS = 4
+_FLEXION, _ABDUCTION = CHANNELS.index("flexion"), CHANNELS.index("abduction")
 
 
 def volume_keeping(covering: Covering) -> NDArray[np.float64]:
@@ -54,29 +56,41 @@ def volume_keeping(covering: Covering) -> NDArray[np.float64]:
     does not grow without end.
     """
     skeleton = covering.skeleton
-    flexion = CHANNELS.index("flexion")
-    largest = np.minimum(skeleton.limits[:, flexion, 1], _WIDEST)
+    largest = np.minimum(skeleton.limits[:, _FLEXION, 1], _WIDEST)
     bends = (skeleton.parents >= 0) & np.array([bool(c) for c in skeleton.children]) & (largest > 1e-6)
     amplitudes = np.zeros(len(skeleton))
     joints = np.flatnonzero(bends)
     if not joints.size or not len(covering.flesh.faces):
         return amplitudes
-    angles = np.zeros((len(joints), len(_PARTS), len(skeleton), len(CHANNELS)))
-    angles[np.arange(len(joints)), :, joints, flexion] = largest[joints, None] * np.array(_PARTS)
-    poses = poses_from_angles(skeleton, angles.reshape(-1, len(skeleton), len(CHANNELS)))
+    angles = [_measured(skeleton, int(joint), largest[joint]) for joint in joints]
+    poses = poses_from_angles(skeleton, np.concatenate(angles))
+    last = np.cumsum([len(a) for a in angles])
     default = default_parameters(skeleton)
     parameters = replace(covering.parameters, inflation=default.inflation, muscle=default.muscle, palm=default.palm)
     bending = _Bending(covering, rows_of(covering.fields, skeleton, covering.anchors, parameters))
     drivers = drive(skeleton, covering.anchors, poses)
     scalars = scalar_inputs(covering.anchors, parameters, drivers)
     turns = np.concatenate([drivers.halfway, drivers.rotations], axis=1)
-    for number, joint in enumerate(joints):
-        frames = len(_PARTS) * number + np.arange(len(_PARTS))
+    for joint, own, end in zip(joints, angles, last, strict=True):
+        frames = np.arange(end - len(own), end)
         part = bending.around(int(joint))
         if part is not None:
             ratio = drivers.flexion_ratio[frames, joint]
             amplitudes[joint] = part.amplitude(drivers.positions[frames], turns[frames], scalars[frames], ratio)
     return amplitudes
+
+
+def _measured(skeleton: Skeleton, joint: int, largest: float) -> NDArray[np.float64]:
+    """Angles of the poses that one joint is measured in, shape (F, J, channels): flexed; and where it goes further to
+    its sides than it flexes, as a thumb does, with both at once."""
+    angles = np.zeros((len(_PARTS), len(skeleton), len(CHANNELS)))
+    angles[:, joint, _FLEXION] = largest * np.array(_PARTS)
+    sideways = skeleton.limits[joint, _ABDUCTION]
+    if sideways[1] <= largest:
+        return angles
+    both = np.repeat(angles[None], 2, axis=0)
+    both[:, :, joint, _ABDUCTION] = 0.5 * sideways[:, None] * np.array(_PARTS)
+    return np.concatenate([angles, *both])
 
 
 class _Bending:
@@ -172,8 +186,12 @@ class _Part:
             muscle = [np.bincount(vertex, driven * height, len(rows.offset)) for height in rows.heights.T]
             base = rows.positions @ positions[k] - self.pivot + grown * out + rotate(turn, np.stack(muscle, axis=1))
             lines.append((base, (ratio[k] * self.swelling)[:, None] * out))
+        gained = np.array([self._volume(base) for base, _ in lines]) - before
+        # to one side a thumb may gain what it loses to the other: that is not made up for
+        loses = gained.reshape(-1, len(_PARTS)).sum(axis=1) < 0.0
+        lines = [line for line, counts in zip(lines, np.repeat(loses, len(_PARTS)), strict=True) if counts]
         best = 0.0
-        for _ in range(_STEPS):
+        for _ in range(_STEPS if lines else 0):
             lost = np.array([self._volume(base + best * out) for base, out in lines]) - before
             step = 1e-3
             slope = np.array([self._volume(base + (best + step) * out) for base, out in lines]) - before - lost
