@@ -1,7 +1,7 @@
 """How skin looks by measure: every rig × pose × method, one table.
 
     python -m tests.benchmarks.skin [--rigs godot_low,webxr] [--poses curl] [--methods lbs,ours] [--csv FILE]
-        [--sheet DIR]
+        [--sheet DIR] [--summary FILE]
 
 Names may be cut short (``curl`` is all curls, ``shoulder_150`` all of them). Without options everything is run but the
 calibrated covering (--calibrated).
@@ -25,6 +25,7 @@ from tests.benchmarks.skin.methods import METHODS, Deform
 from tests.benchmarks.skin.poses import POSES, pose
 from tests.benchmarks.skin.rigs import RIGS, load
 from tests.benchmarks.skin.sheet import draw_sheet
+from tests.benchmarks.skin.summary import summary
 from warpjld.quiet import silence_warp
 
 _COLUMNS = ("rig", "pose", "method", *(f.name for f in fields(Measured)), "ms")
@@ -37,7 +38,16 @@ _COLUMNS = ("rig", "pose", "method", *(f.name for f in fields(Measured)), "ms")
 @click.option("--calibrated", is_flag=True, help="Calibrate too (minutes a rig).")
 @click.option("--sheet", "sheets", type=click.Path(path_type=Path), help="Draw a sheet of every rig into this folder.")
 @click.option("--csv", "csv_file", type=click.Path(path_type=Path), help="Write the table there too.")
-def main(rigs: str, poses: str, methods: str, calibrated: bool, sheets: Path | None, csv_file: Path | None) -> None:
+@click.option("--summary", "short", type=click.Path(path_type=Path), help="Write a line a rig and method there.")
+def main(
+    rigs: str,
+    poses: str,
+    methods: str,
+    calibrated: bool,
+    sheets: Path | None,
+    csv_file: Path | None,
+    short: Path | None,
+) -> None:
     """Print the table in Markdown."""
     silence_warp()
     chosen = [m for m in _chosen("methods", methods, METHODS) if methods or m != "calibrated"]
@@ -45,6 +55,7 @@ def main(rigs: str, poses: str, methods: str, calibrated: bool, sheets: Path | N
         chosen.append("calibrated")
     wanted = _chosen("poses", poses, POSES)
     rows: list[tuple[str | float, ...]] = []
+    kept: list[tuple[str, str, str, Measured, float]] = []
     _print_row(_COLUMNS)
     _print_row(["---"] * len(_COLUMNS))
     for name in _chosen("rigs", rigs, RIGS):
@@ -68,7 +79,8 @@ def main(rigs: str, poses: str, methods: str, calibrated: bool, sheets: Path | N
                 start = time.perf_counter()
                 points = deform(posed.poses)[0]
                 took = 1e3 * (time.perf_counter() - start)
-                rows.append((name, pose_name, method, *astuple(measuring.measure(points, posed)), took))
+                kept.append((name, pose_name, method, measuring.measure(points, posed), took))
+                rows.append((name, pose_name, method, *astuple(kept[-1][3]), took))
                 _print_row(rows[-1])
                 drawn.setdefault(pose_name, []).append(points)
         if sheets is not None and drawn:
@@ -76,6 +88,8 @@ def main(rigs: str, poses: str, methods: str, calibrated: bool, sheets: Path | N
     if csv_file is not None:
         with csv_file.open("w", newline="") as out:
             csv.writer(out).writerows([_COLUMNS, *rows])
+    if short is not None:
+        short.write_text("\n".join(summary(kept)) + "\n", encoding="utf-8")
 
 
 def _chosen(option: str, text: str, names: Iterable[str]) -> list[str]:
