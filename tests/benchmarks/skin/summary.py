@@ -27,8 +27,8 @@ HEAD = (
 def summary(rows: Iterable[tuple[str, str, str, Measured, float]]) -> list[str]:
     """A Markdown table of rows of rig, pose, method, measured and milliseconds.
 
-    Means of volumes are of their sizes; stretch is the least and largest of all poses; folds are faces that cross within
-    a part or at a joint, contact all others, both summed over poses; roughness is the root of the mean square.
+    Means of volumes are of their sizes; stretch is the least and largest of all poses; folds are faces that cross
+    within a part or at a joint, contact all others, both summed over poses; roughness is the root of the mean square.
     """
     groups: dict[tuple[str, str], list[tuple[Measured, float]]] = {}
     for rig, _, method, measured, took in rows:
