@@ -43,6 +43,8 @@ knee, elbow): .3 leaves roughness behind at knuckles and shoulders, beyond .5 hi
 
 _STEPS = 2
 _FAR = 8.0  # lengths of decay beyond which a field is not followed: less is left of it than the threshold takes away
+_NOTHING = 1e-10  # what is left of a field where it is kept no more: far less than the threshold takes away
+_BLOCK = 16_000_000  # values solved for at once, which bounds memory
 _SHARED = 1.6  # joints share a factorisation where it grows by no more than this over the largest one's
 _ALL = 3_000  # vertices up to which all joints share one
 
@@ -83,21 +85,39 @@ class Diffusion:
         """Fields (all vertices, columns) after diffusion; those of one ``owner`` lie in one place, shape (columns,)."""
         columns = coefficients.tocsc()
         present = np.flatnonzero(np.diff(columns.indptr))
-        rows, places, values = [], [], []
-        hard = np.setdiff1d(np.arange(coefficients.shape[0]), self.flesh)
-        kept = coefficients[hard].tocoo()
-        rows.append(hard[kept.coords[0]])
-        places.append(kept.coords[1])
-        values.append(kept.data)
-        for members, where, factor in self._clusters(columns, present, owner):
-            dense = columns[:, members].tocsr()[self.flesh[where]].toarray()
-            out = self._solved(factor, where, dense)
-            row, column = np.nonzero(out)
-            rows.append(self.flesh[where[row]])
-            places.append(members[column])
-            values.append(out[row, column])
-        index = (np.concatenate(rows), np.concatenate(places))
-        return sp.coo_array((np.concatenate(values), index), shape=coefficients.shape).tocsr()
+        members, spread = [], []
+        for some, where, factor in self._clusters(columns, present, owner):
+            together = max(_BLOCK // len(where), 1)
+            for first in range(0, len(some), together):
+                members.append(some[first : first + together])
+                spread.append(self._spread(columns[:, members[-1]], where, factor))
+        hard = np.ones(coefficients.shape[0])
+        hard[self.flesh] = 0.0
+        kept = sp.csr_array(sp.diags_array(hard) @ coefficients)
+        if not spread:
+            return kept
+        column = np.concatenate(members)
+        ordered = sp.csc_array(sp.hstack(spread, format="csc"))[:, np.argsort(column)]
+        length = np.zeros(coefficients.shape[1], dtype=np.int64)
+        length[np.sort(column)] = np.diff(ordered.indptr)
+        starts = np.concatenate([[0], np.cumsum(length)])
+        out = sp.csc_array((ordered.data, ordered.indices, starts), shape=coefficients.shape).tocsr()
+        return out + kept if hard.any() else out
+
+    def _spread(self, columns: sp.csc_array, where: NDArray[np.int64], factor: Factor) -> sp.csc_array:
+        """Some columns after diffusion on these vertices of the flesh."""
+        place = np.full(columns.shape[0], -1)
+        place[self.flesh[where]] = np.arange(len(where))
+        row, column = place[columns.indices], np.repeat(np.arange(columns.shape[1]), np.diff(columns.indptr))
+        inside = row >= 0
+        dense = np.zeros((len(where), columns.shape[1]))
+        dense[row[inside], column[inside]] = columns.data[inside]
+        dense = factor.solve(dense, weight=self._system[1][where], times=_STEPS)
+        order = np.argsort(where)
+        found = np.ascontiguousarray(dense[order].T)
+        left = np.abs(found) > _NOTHING
+        starts = np.concatenate([[0], np.cumsum(left.sum(axis=1))])
+        return sp.csc_array((found[left], self.flesh[where[order]][np.nonzero(left)[1]], starts), shape=columns.shape)
 
     def adjoint(
         self, slopes: NDArray[np.float64], coefficients: sp.csr_array, owner: NDArray[np.int64]
@@ -114,12 +134,6 @@ class Diffusion:
                 part = area[where, None] * factor.solve(part)
             out[np.ix_(rows, members)] = part
         return out
-
-    def _solved(self, factor: Factor, where: NDArray[np.int64], dense: NDArray[np.float64]) -> NDArray[np.float64]:
-        area = self._system[1][where, None]
-        for _ in range(_STEPS):
-            dense = factor.solve(area * dense)
-        return dense
 
     def _clusters(
         self, columns: sp.csc_array, present: NDArray[np.int64], owner: NDArray[np.int64]

@@ -23,6 +23,7 @@ __all__ = ["binding_key", "binding_sources"]
 _MODULES = (
     "covering/*.py",
     "skeleton/**/*.py",
+    "coincident.py",
     "errors.py",
     "lazily.py",
     "listed.py",
