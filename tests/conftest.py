@@ -58,9 +58,9 @@ def bound(hands: dict[str, Rig]) -> Covering:
 @pytest.fixture
 def quick_hands(monkeypatch: pytest.MonkeyPatch) -> None:
     """Built-in hands are built once a session: what a test does with them is not what building them costs."""
-    from warpjld import hand
+    from warpjld.hand import kept
 
-    monkeypatch.setattr(hand, "build_hand", _built)
+    monkeypatch.setattr(kept, "kept_hand", _built)
 
 
 @cache

@@ -108,7 +108,7 @@ def test_interrupted_work_leaves_nothing_behind(
 def test_rig_argument_names_files_and_built_in_hands(monkeypatch: pytest.MonkeyPatch) -> None:
     from warpjld.cli.rig_argument import open_rig
 
-    monkeypatch.setattr("warpjld.hand.build_hand", lambda side: side)
+    monkeypatch.setattr("warpjld.hand.kept.kept_hand", lambda side: side)
     monkeypatch.setattr(
         "warpjld.io.load_rig", lambda path, **options: SimpleNamespace(name=f"rig of {path}", suspicious=())
     )

@@ -41,9 +41,9 @@ def open_rig(text: str, **how: Any) -> Rig:
     given = [f"--{_OPTIONS.get(name, name)}" for name, value in how.items() if value is not None]
     if given:
         raise InputError(f"{text}: {', '.join(given)} only work for files")
-    from warpjld.hand import build_hand
+    from warpjld.hand.kept import kept_hand
 
-    return build_hand(which)
+    return kept_hand(which)
 
 
 def rig_files(text: str, how: dict[str, Any]) -> list[Path]:

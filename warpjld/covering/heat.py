@@ -159,9 +159,7 @@ class Factor:
         scale = 1.0 / np.sqrt(matrix.diagonal())
         scaled = (sp.diags_array(scale) @ matrix @ sp.diags_array(scale)).tocsc()
         with one_blas_thread():
-            factors = linalg.splu(
-                scaled, diag_pivot_thresh=0.0, permc_spec="MMD_AT_PLUS_A", options={"SymmetricMode": True}
-            )
+            factors = _factorised(scaled)
         # a dominant diagonal is its own pivot: U = D Lᵀ, and rows are ordered as columns are
         if not np.array_equal(factors.perm_r, factors.perm_c):
             raise ArithmeticError("matrix: its diagonal does not dominate")
@@ -216,7 +214,14 @@ def _drawn_alike() -> Iterator[None]:
 
 
 def _direct(matrix: sp.csc_array, right: NDArray[np.float64], scale: NDArray[np.float64]) -> NDArray[np.float64]:
-    return Factor(matrix).solve(right)
+    factors = _factorised(matrix)
+    solution: NDArray[np.float64] = factors.solve(right)
+    return solution
+
+
+def _factorised(matrix: sp.csc_array) -> linalg.SuperLU:
+    """Of a matrix whose diagonal dominates: no row changes places."""
+    return linalg.splu(matrix, diag_pivot_thresh=0.0, permc_spec="MMD_AT_PLUS_A", options={"SymmetricMode": True})
 
 
 def _multigrid(matrix: sp.csc_array, right: NDArray[np.float64], scale: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -6,8 +6,6 @@ follow from (:mod:`warpjld.covering.kept_key`). A file of anything else is never
 
 from __future__ import annotations
 
-import os
-import sys
 import zipfile
 from dataclasses import astuple, dataclass, fields
 from pathlib import Path
@@ -24,18 +22,14 @@ from warpjld.covering.operators import fans
 from warpjld.covering.parameters import Parameters
 from warpjld.covering.runs import Columns, Runs
 from warpjld.errors import InputError
+from warpjld.kept_files import keep, kept_folder, used
 from warpjld.rig import Rig
 from warpjld.skeleton.tree import Skeleton
 from warpjld.whole_file import whole_file
 
-__all__ = ["CACHE_VARIABLE", "bind_kept", "cache_folder", "load_binding", "save_binding"]
-
-CACHE_VARIABLE = "WARPJLD_CACHE"
-"""Environment variable: the folder in which bindings are kept, or ``off``."""
+__all__ = ["bind_kept", "load_binding", "save_binding"]
 
 _FORMAT = "warpjld binding 2"
-_MOST = 32  # files in the cache, and
-_MOST_BYTES = 2**30  # all together; the ones longest unused go
 _RUNS = ("tiles", "runs", "slots", "coefficients", "order")
 _ANCHORS = tuple(field.name for field in fields(Anchors) if field.name != "rest")  # that is the surface's
 _PARAMETERS = tuple(field.name for field in fields(Parameters))
@@ -59,7 +53,7 @@ def bind_kept(
         path: A file that ``save_binding`` wrote; by default one in the cache, which is written if it is missing.
     """
     how: dict[str, Any] = {"skeleton": skeleton, "parameters": parameters, "domains": domains}
-    folder = cache_folder()
+    folder = kept_folder()
     if method != "smooth" or (path is None and folder is None):
         return bind_rig(rig, method=method, **how), ()
     notes: tuple[str, ...] = ()
@@ -69,18 +63,13 @@ def bind_kept(
         try:
             covering = _load(file, key, rig, skeleton)
             if path is None:
-                os.utime(file)
+                used(file)
             return covering, ()
         except (InputError, OSError) as error:
             notes = (f"binding made anew: {error}",)
     covering = bind_rig(rig, method=method, **how)
     if path is None:
-        try:
-            file.parent.mkdir(parents=True, exist_ok=True)
-            _save(file, key, covering)
-            _tidy(file.parent)
-        except OSError:  # a cache that cannot be written is none
-            pass
+        keep(file, lambda place: _write(place, key, covering))
     return covering, notes
 
 
@@ -98,7 +87,9 @@ def save_binding(
     Raises:
         OSError: It cannot be written.
     """
-    _save(path, binding_key(rig, skeleton=skeleton, parameters=parameters, domains=domains), covering)
+    key = binding_key(rig, skeleton=skeleton, parameters=parameters, domains=domains)
+    with whole_file(path) as part:
+        _write(part, key, covering)
 
 
 def load_binding(
@@ -117,7 +108,7 @@ def load_binding(
     return _load(path, binding_key(rig, skeleton=skeleton, parameters=parameters, domains=domains), rig, skeleton)
 
 
-def _save(path: Path, key: str, covering: Covering) -> None:
+def _write(path: Path, key: str, covering: Covering) -> None:
     parts = {"runs": (covering.runs, _RUNS), "anchors": (covering.anchors, _ANCHORS)}
     parts["parameters"] = (covering.parameters, _PARAMETERS)
     parts |= {f"fields.{kind}": (getattr(covering.fields, kind), _SPARSE) for kind in _FIELDS}
@@ -126,7 +117,7 @@ def _save(path: Path, key: str, covering: Covering) -> None:
     }
     arrays |= {"columns": np.array(astuple(covering.runs.columns)), "domains": covering.domains}
     arrays["swelling"] = covering.swelling
-    with whole_file(path) as place, place.open("wb") as file:
+    with path.open("wb") as file:
         np.savez(file, format=np.array(_FORMAT), key=np.array(key), **arrays)
 
 
@@ -166,35 +157,3 @@ class _KeptFields:
 
         parts = (self.arrays[kind] for kind in _FIELDS)
         return Fields(*(sp.csr_array((p["data"], p["indices"], p["indptr"]), shape=tuple(p["shape"])) for p in parts))
-
-
-def cache_folder() -> Path | None:
-    """Where bindings are kept; None where they are not."""
-    stated = os.environ.get(CACHE_VARIABLE)
-    if stated is not None:
-        return None if stated.strip().lower() in ("", "0", "off", "no") else Path(stated)
-    try:
-        home = Path.home()
-    except RuntimeError:
-        return None
-    if sys.platform == "win32":
-        base = Path(os.environ.get("LOCALAPPDATA", home / "AppData" / "Local"))
-    elif sys.platform == "darwin":
-        base = home / "Library" / "Caches"
-    else:
-        base = Path(os.environ.get("XDG_CACHE_HOME") or home / ".cache")
-    return base / "warpjld" / "bindings"
-
-
-def _tidy(folder: Path) -> None:
-    used = []
-    for file in folder.glob("*.npz"):
-        try:
-            used.append((file.stat().st_mtime, file.stat().st_size, file))
-        except FileNotFoundError:  # another process tidies too
-            continue
-    kept = 0
-    for place, (_, size, file) in enumerate(sorted(used, key=lambda one: one[0], reverse=True)):
-        kept += size
-        if place >= _MOST or (place and kept > _MOST_BYTES):
-            file.unlink(missing_ok=True)

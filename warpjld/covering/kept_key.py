@@ -25,6 +25,7 @@ _MODULES = (
     "skeleton/**/*.py",
     "coincident.py",
     "errors.py",
+    "kept_files.py",
     "lazily.py",
     "listed.py",
     "normals.py",

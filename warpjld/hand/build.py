@@ -3,15 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
 from warpjld.errors import InputError
-from warpjld.hand.fit import fit_plan
-from warpjld.hand.flesh import Flesh
-from warpjld.hand.plan import Plan
-from warpjld.hand.triangulate import triangulate
 from warpjld.rig import Rig
 from warpjld.rotations import unit
 from warpjld.skeleton import DIGITS, PALM_SEGMENTS, Skeleton, default_limits, hand_joint_names
@@ -20,7 +17,10 @@ from warpjld.skeleton.recognise.tree import SourceTree
 from warpjld.suggest import one_of
 from warpjld.surface import Part, Surface
 
-__all__ = ["build_hand"]
+if TYPE_CHECKING:
+    from warpjld.hand.plan import Plan
+
+__all__ = ["build_hand", "hand_rig"]
 
 Array = NDArray[np.float64]
 
@@ -54,16 +54,26 @@ def build_hand(
     Raises:
         InputError: An unknown side or digit, or a measure out of range.
     """
+    # SciPy's splines, which shape it, take as long to import as a whole hand takes to be read
+    from warpjld.hand.fit import fit_plan
+    from warpjld.hand.flesh import Flesh
+    from warpjld.hand.triangulate import triangulate
+
     _check(side, length, breadth, resolution)
     flesh = Flesh(fit_plan(length / _MILLIMETRE, breadth / _MILLIMETRE, _scales(proportions)))
     vertices, faces = triangulate(flesh, resolution)
     skeleton = _skeleton(flesh.plan)
     if side == "right":
         vertices, faces, skeleton = vertices * (-1.0, 1.0, 1.0), faces[:, ::-1], _mirrored(skeleton)
+    return hand_rig(side, skeleton, vertices * _MILLIMETRE, np.ascontiguousarray(faces, dtype=np.int32))
+
+
+def hand_rig(side: str, skeleton: Skeleton, vertices: Array, faces: NDArray[np.int32]) -> Rig:
+    """The rig of a built hand's skeleton and surface [m]."""
     return Rig(
         name=f"{side} hand",
         skeleton=skeleton,
-        surface=_surface(vertices * _MILLIMETRE, np.ascontiguousarray(faces, dtype=np.int32)),
+        surface=_surface(vertices, faces),
         source=_source(skeleton),
         sources=tuple(range(len(skeleton))),
         owner=np.arange(len(skeleton)),

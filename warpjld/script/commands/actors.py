@@ -34,7 +34,7 @@ def hand(scene: Scene, arguments: Arguments) -> None:
     """R7."""
     side: Literal["left", "right"] = "left" if arguments.choice("the side", SIDES) == "LEFT" else "right"
     if arguments.keyword("BUILTIN"):
-        from warpjld.hand import build_hand
+        from warpjld.hand.kept import kept_hand
 
         options = arguments.options(
             length=lambda: arguments.number("the hand's length in metres"),
@@ -43,7 +43,7 @@ def hand(scene: Scene, arguments: Arguments) -> None:
             name=lambda: arguments.name("the actor's name"),
         )
         name = options.pop("name", side)
-        rig = build_hand(side, **options)  # type: ignore[arg-type]
+        rig = kept_hand(side, **options)
     else:
         if not arguments.has_text():
             raise arguments.expected("BUILTIN or a rig file in quotes")

@@ -49,11 +49,9 @@ class HandChoice:
     def load(self) -> Rig:
         """Build or read the hand."""
         if self.file is None:
-            from warpjld.hand import build_hand
+            from warpjld.hand.kept import kept_hand
 
-            return build_hand(
-                self.side or "right", length=self.length, breadth=self.breadth, resolution=self.resolution
-            )
+            return kept_hand(self.side or "right", length=self.length, breadth=self.breadth, resolution=self.resolution)
         from warpjld.io import load_rig
 
         return load_rig(
