@@ -2,14 +2,15 @@
 
 Coefficient fields, places and rotations do not depend on the amplitudes a, so the covering formula (``fields.py``) is
 
-    S'(a) = B + Σ_p a_p D_p,   D_p = FR g_p rot(q, d)  of a joint's rounding,   f m_p rot(q, h)  of a muscle
+    S'(a) = S'(a₀) + Σ_p (a_p − a₀_p) D_p,   D_p = FR g_p rot(q, d)  of a joint's rounding,   f m_p rot(q, h)  of a muscle
 
-with one sparse direction D_p a parameter: fitting amplitudes takes no diffusion, no packing and no kernel.
+with one sparse direction D_p for each of them: fitting amplitudes takes no diffusion, no packing and no kernel.
 """
 
 from __future__ import annotations
 
-from dataclasses import replace
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
 
 import numpy as np
 import scipy.sparse as sp
@@ -23,7 +24,7 @@ from warpjld.covering.segment_table import SegmentTable
 from warpjld.rotations import rotate, unit
 from warpjld.skeleton.kinematics import Poses
 
-__all__ = ["LinearDeformation", "amplitudes_of", "with_amplitudes"]
+__all__ = ["Frame", "LinearDeformation", "amplitudes_of", "with_amplitudes"]
 
 _STILL = 1e-6  # flexion ratio below which a joint does not bend: rounding leaves as much
 
@@ -39,11 +40,27 @@ def with_amplitudes(parameters: Parameters, amplitudes: NDArray[np.float64]) -> 
     return replace(parameters, inflation=inflation, muscle=muscle)
 
 
-class LinearDeformation:
-    """A covering over F poses as a function of its 2 J amplitudes; all else is as its parameters have it.
+@dataclass(frozen=True, eq=False)
+class Frame:
+    """One pose.
 
     Attributes:
-        ratio: Flexion ratios that drive the roundings, shape (F, J).
+        number: Of the pose.
+        points: S'(a₀) [m], shape (V, 3).
+        moved: Vertices that amplitudes move in it, shape (n,).
+        directions: D of those [m], shape (3 n, 2 J); rows are x, y, z of a vertex.
+        ratio: Flexion ratios of the joints, shape (J,).
+    """
+
+    number: int
+    points: NDArray[np.float32]
+    moved: NDArray[np.int64]
+    directions: sp.csr_array
+    ratio: NDArray[np.float64]
+
+
+class LinearDeformation:
+    """A covering over F poses as a function of its 2 J amplitudes; all else is as its parameters have it.
 
     Args:
         covering: A bound surface.
@@ -55,61 +72,58 @@ class LinearDeformation:
 
     def __init__(self, covering: Covering, poses: Poses) -> None:
         covering.check(poses)
-        self.covering = covering
+        self.covering, self.poses = covering, poses
         anchors, fields, skeleton = covering.anchors, covering.fields, covering.skeleton
+        self.amplitudes = amplitudes_of(covering.parameters)
         self._drivers = drive(skeleton, anchors, poses)
         scalars = scalar_inputs(anchors, covering.parameters, self._drivers)
         joints = len(skeleton)
-        middle = joints + fields.palm.shape[1]
-        self.ratio, self._palm, self._driven = scalars[:, :joints], scalars[:, joints:middle], scalars[:, middle:]
-        for driven in (self.ratio, self._driven):
+        self._ratio, self._driven = scalars[:, :joints].copy(), scalars[:, joints + fields.palm.shape[1] :].copy()
+        for driven in (self._ratio, self._driven):
             driven[driven < _STILL] = 0.0
         self._offset = fields.offsets(anchors.rest, skeleton.rest)
-        self._roundings, self._muscles = fields.roundings.tocoo(), fields.muscles.tocoo()
+        self._roundings, self._muscles = fields.roundings.tocsc(), fields.muscles.tocsc()
         table = SegmentTable.build(skeleton, anchors.ends)
-        self._heights = table.heights(anchors.rest[self._muscles.coords[0]], self._muscles.coords[1])
-        self._begins = anchors.ends[:, 0]
+        segment = np.repeat(np.arange(len(anchors.ends)), np.diff(self._muscles.indptr))
+        self._heights = table.heights(anchors.rest[self._muscles.indices], segment)
 
     def __len__(self) -> int:
-        return len(self.ratio)
+        return len(self._ratio)
 
-    @property
-    def count(self) -> int:
-        """Amplitudes: 2 J."""
-        return 2 * len(self.covering.skeleton)
+    def frames(self, block: int = 16) -> Iterator[Frame]:
+        """All poses, one after another."""
+        for start, points in self.covering.blocks(self.poses, frames=block):
+            for k, surface in enumerate(points):
+                yield self._frame(start + k, surface.copy())
 
-    def frame(self, frame: int) -> tuple[NDArray[np.float64], sp.csr_array]:
-        """B [m], shape (V, 3), and D [m], shape (3 V, 2 J), of one pose; rows of D are x, y, z of a vertex."""
-        drivers, fields = self._drivers, self.covering.fields
-        turns = np.concatenate([drivers.halfway[frame], drivers.rotations[frame]])
-        turn = unit(fields.turns @ turns)
-        thick = 1.0 + fields.palm @ self._palm[frame]
-        offset = rotate(turn, self._offset)
-        base = fields.positions @ drivers.positions[frame] + thick[:, None] * offset
+    def _frame(self, number: int, points: NDArray[np.float32]) -> Frame:
+        fields, drivers, joints = self.covering.fields, self._drivers, len(self.covering.skeleton)
+        round_row, round_column, round_value, _ = _scaled(self._roundings, self._ratio[number])
+        muscle_row, segment, muscle_value, entry = _scaled(self._muscles, self._driven[number])
+        moved, place = np.unique(np.concatenate([round_row, muscle_row]), return_inverse=True)
+        turns = np.concatenate([drivers.halfway[number], drivers.rotations[number]])
+        turn = unit(fields.turns[moved] @ turns)
+        first = place[: len(round_row)]
+        value = np.concatenate(
+            [
+                round_value[:, None] * rotate(turn, self._offset[moved])[first],
+                muscle_value[:, None] * rotate(turn[place[len(round_row) :]], self._heights[entry]),
+            ]
+        )
+        column = np.concatenate([round_column, joints + self.covering.anchors.ends[segment, 0]])
+        rows = 3 * place[:, None] + np.arange(3)
+        shape = (3 * len(moved), 2 * joints)
+        directions = sp.coo_array((value.ravel(), (rows.ravel(), np.repeat(column, 3))), shape=shape).tocsr()
+        return Frame(number, points, moved, directions, self._ratio[number])
 
-        row, joint = self._roundings.coords
-        strength = self._roundings.data * self.ratio[frame, joint]
-        kept = np.flatnonzero(strength)
-        rounding = strength[kept, None] * offset[row[kept]]
-        rows, columns = [row[kept]], [joint[kept]]
 
-        row, segment = self._muscles.coords
-        strength = self._muscles.data * self._driven[frame, segment]
-        kept = np.flatnonzero(strength)
-        muscle = strength[kept, None] * rotate(turn[row[kept]], self._heights[kept])
-        rows.append(row[kept])
-        columns.append(len(self.covering.skeleton) + self._begins[segment[kept]])
-
-        value = np.concatenate([rounding, muscle])
-        place = 3 * np.concatenate(rows)[:, None] + np.arange(3)
-        column = np.repeat(np.concatenate(columns), 3)
-        shape = (3 * len(base), self.count)
-        return base, sp.coo_array((value.ravel(), (place.ravel(), column)), shape=shape).tocsr()
-
-    def points(self, amplitudes: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Final positions of all vertices [m], shape (F, V, 3)."""
-        out = np.empty((len(self), len(self.covering.surface.vertices), 3))
-        for f in range(len(self)):
-            base, directions = self.frame(f)
-            out[f] = base + (directions @ amplitudes).reshape(-1, 3)
-        return out
+def _scaled(
+    fields: sp.csc_array, by: NDArray[np.float64]
+) -> tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.float64], NDArray[np.int64]]:
+    """Row, column, value times ``by`` of its column, and place of all entries in columns where that is not 0."""
+    columns = np.flatnonzero(by)
+    length = np.diff(fields.indptr)[columns]
+    before = np.cumsum(length) - length
+    entry = np.arange(length.sum()) + np.repeat(fields.indptr[columns] - before, length)
+    column = np.repeat(columns, length)
+    return fields.indices[entry].astype(np.int64), column, fields.data[entry] * by[column], entry

@@ -1,7 +1,8 @@
-"""What calibration makes small, pose by pose: lost volume, stretched and squeezed edges, sharp edges that were not there.
+"""What calibration makes small, pose by pose: lost volume, stretched and squeezed edges, edges sharper than at rest.
 
 Everything is summed up over what the amplitudes move in a pose, and in proportion to it: a finger of a body counts as
-much as one of a hand, and refining a mesh changes little.
+much as one of a hand, and refining a mesh changes little. A pose is also held to what it was at first: neither its
+roughness nor its volume error shall grow.
 """
 
 from __future__ import annotations
@@ -12,8 +13,10 @@ import numpy as np
 import scipy.sparse as sp
 from numpy.typing import NDArray
 
+from warpjld.covering.amplitudes import Frame
 from warpjld.covering.dihedral import dihedral_angles, dihedral_slopes, hinges
-from warpjld.covering.quality import closing_fans, enclosed_volume, unique_edges
+from warpjld.covering.quality import unique_edges
+from warpjld.covering.volume_form import ClosedSurface, VolumeForm
 from warpjld.surface import Surface
 
 __all__ = ["LossTerms", "LossWeights", "PoseLoss", "SurfaceLoss"]
@@ -22,35 +25,48 @@ _STRETCHED = 0.5  # logarithm of stretch, and
 _SHARP = 1.0  # growth of a dihedral angle [rad], from which on edges weigh with the fourth power: creases and folds
 _SHORTEST = 1e-3  # stretch at which the logarithm is cut off
 _THINNEST = 0.05  # height of a face, of that at rest, below which dihedral angles are not followed more steeply
+_SLENDER = 60.0  # stiffness of a hinge between faces that have no height
+_SAMPLE = 6000
+"""Edges and hinges of a pose that are looked at; of more, those that are stretched or sharp and a part of the others
+stand for all."""
 
 
 @dataclass(frozen=True)
 class LossWeights:
-    """Weights of the terms.
+    """Weights of the terms, and what a pose may have of each beyond what it had at first.
 
     Attributes:
         volume: Of the squared volume error, of the volume that is moved.
         stretch: Of the mean squared logarithm of edge stretch.
         roughness: Of the squared growth of dihedral angles [rad²], by edge length over the height of the faces beside
             it: the bending energy of a discrete shell (Grinspun et al. 2003), of each joint that bends.
+        rougher: Of the squared share by which the squared roughness exceeds ``roughness_kept`` times what it was.
+        emptier: Of the squared volume error beyond what it was, or ``volume_kept`` where that is more.
+        roughness_kept: As a factor.
+        volume_kept: Of the volume that is moved.
     """
 
     volume: float = 100.0
     stretch: float = 1.0
     roughness: float = 0.01
+    rougher: float = 1000.0
+    emptier: float = 1000.0
+    roughness_kept: float = 1.02
+    volume_kept: float = 0.02
 
 
 @dataclass(frozen=True)
 class LossTerms:
-    """The terms of one pose, weighted."""
+    """The terms of one pose, weighted; ``held`` is what it is worse by."""
 
     volume: float
     stretch: float
     roughness: float
+    held: float = 0.0
 
     @property
     def total(self) -> float:
-        """Their sum."""
+        """What is measured: all but ``held``."""
         return self.volume + self.stretch + self.roughness
 
 
@@ -63,134 +79,128 @@ class SurfaceLoss:
         weights: Weights of the terms.
     """
 
-    def __init__(
-        self, surface: Surface, axis: NDArray[np.float64], weights: LossWeights | None = None
-    ) -> None:
+    def __init__(self, surface: Surface, axis: NDArray[np.float64], weights: LossWeights | None = None) -> None:
         self.weights = weights or LossWeights()
-        self.rest = np.asarray(surface.vertices, dtype=np.float64)
-        self.volume = float(enclosed_volume(self.rest, surface.faces))
-        boundary, loop = closing_fans(surface.faces)
-        count, rims = len(self.rest), int(loop.max(initial=-1)) + 1
-        members = np.bincount(loop, minlength=rims)
-        mean = sp.csr_array((1.0 / members[loop], (loop, boundary[:, 0])), shape=(rims, count))
-        self.closed = sp.csr_array(sp.vstack([sp.eye_array(count, format="csr"), mean], format="csr"))
-        fans = np.column_stack([boundary[:, ::-1], count + loop])
-        self.faces = np.concatenate([surface.faces.astype(np.int64), fans])
+        rest = np.asarray(surface.vertices, dtype=np.float64)
+        self.closed = ClosedSurface(surface)
         edges = unique_edges(surface.faces)
-        length = np.linalg.norm(self.rest[edges[:, 1]] - self.rest[edges[:, 0]], axis=1)
+        length = _lengths(rest, edges)
         solid = length > 1e-9 * length.max()
         self.edges, self.length = edges[solid], length[solid]
         self.hinges = hinges(surface.faces)
-        self.dihedral = dihedral_angles(self.rest, self.hinges)
-        self.stiffness, self.least = _stiffness(self.rest, self.hinges)
-        self.behind = _volume_behind(self.rest, surface.faces, axis)
+        self.dihedral = dihedral_angles(rest, self.hinges)
+        self.stiffness, self.least = _stiffness(rest, self.hinges)
+        self.behind = _volume_behind(rest, surface.faces, axis)
 
-    def pose(self, base: NDArray[np.float64], directions: sp.csr_array, bent: float) -> PoseLoss | None:
+    def region(self, frame: Frame) -> float:
+        """Volume that a pose moves [m³]: what lies between the skeleton and the vertices that amplitudes move."""
+        return float(max(self.behind[frame.moved].sum(), 1e-9 * abs(self.closed.volume)))
+
+    def pose(self, frame: Frame, start: NDArray[np.float64], first: NDArray[np.floating]) -> PoseLoss | None:
         """The loss of a pose as a function of amplitudes; None where they move nothing.
 
         Args:
-            base: B [m], shape (V, 3), and
-            directions: D, shape (3 V, P), of ``LinearDeformation.frame``.
-            bent: Sum of the flexion ratios: how many joints bend.
+            frame: The pose.
+            start: Amplitudes at which ``frame.points`` are, shape (P,).
+            first: Positions [m] that it is held to, shape (V, 3).
         """
-        moved = np.diff(directions.indptr).reshape(-1, 3).any(axis=1)
-        return PoseLoss(self, base, directions, moved, bent) if moved.any() else None
+        return PoseLoss(self, frame, start, first) if len(frame.moved) else None
 
 
 class PoseLoss:
-    """The loss of one pose, over the faces, edges and hinges that its amplitudes move; made by ``SurfaceLoss.pose``.
+    """The loss of one pose, over the edges and hinges that its amplitudes move; made by ``SurfaceLoss.pose``.
 
     Attributes:
         parameters: Amplitudes that move anything, shape (p,).
+        before: Its terms in the positions that it is held to.
     """
 
     def __init__(
-        self,
-        shared: SurfaceLoss,
-        base: NDArray[np.float64],
-        directions: sp.csr_array,
-        moved: NDArray[np.bool_],
-        bent: float,
+        self, shared: SurfaceLoss, frame: Frame, start: NDArray[np.float64], first: NDArray[np.floating]
     ) -> None:
-        self._weights = shared.weights
-        self._rest_volume = shared.volume
-        closed = shared.closed
-        rim = (closed @ moved.astype(np.float64)) != 0.0
-        faces = shared.faces[rim[shared.faces].any(axis=1)]
-        edge = moved[shared.edges].any(axis=1)
-        hinge = moved[shared.hinges].any(axis=1)
-        edges, hinged = shared.edges[edge], shared.hinges[hinge]
-        used = np.unique(np.concatenate([faces.ravel(), edges.ravel(), hinged.ravel()]))
-        number = np.full(closed.shape[0], -1)
-        number[used] = np.arange(len(used))
-        self._faces, self._edges, self._hinges = number[faces], number[edges], number[hinged]
-        everywhere = closed @ base
-        origin = base[moved].mean(axis=0)
-        self._base = everywhere[used] - origin
-        still = shared.faces[~rim[shared.faces].any(axis=1)]
-        self._still_volume = _six_volumes(everywhere - origin, still).sum() / 6.0
-        self.parameters = np.unique(directions.indices)
-        some = directions.tocsc()[:, self.parameters].tocsr()
-        axes = [closed[used] @ some[k::3] for k in range(3)]
-        rows = sp.csr_array(sp.vstack(axes, format="csr"))
-        order = (np.arange(3) * len(used) + np.arange(len(used))[:, None]).ravel()
-        self._directions = sp.csr_array(rows[order])
+        w = self._weights = shared.weights
+        self.parameters = np.unique(frame.directions.indices)
+        directions = frame.directions.tocsc()[:, self.parameters].tocsr()
+        self._start = start[self.parameters]
+        points, before = (np.asarray(a, dtype=np.float64) for a in (frame.points, first))
+        moved = np.zeros(len(points), dtype=bool)
+        moved[frame.moved] = True
+
+        self._volume = VolumeForm.of(shared.closed, points, frame.moved, directions)
+        region = shared.region(frame)
+        self._of_volume = np.sqrt(w.volume) / region
+        lost = abs(shared.closed.volume_of(before) - shared.closed.volume)
+        self._volume_kept = max(lost, w.volume_kept * region)
+        self._of_emptier = np.sqrt(w.emptier) / region
+
+        edge = np.flatnonzero(moved[shared.edges].any(axis=1))
+        log = np.log(_lengths(points, shared.edges[edge]) / shared.length[edge])
+        edge, times = _sampled(edge, shared.length[edge] * _steeper(log, _STRETCHED)[0] ** 2)
         self._length = shared.length[edge]
+        self._of_stretch = np.sqrt(w.stretch * times * self._length / (times * self._length).sum())
+
+        hinge = np.flatnonzero(moved[shared.hinges].any(axis=1))
+        grown = np.maximum(dihedral_angles(points, shared.hinges[hinge]) - shared.dihedral[hinge], 0.0)
+        hinge, self._times = _sampled(hinge, grown**2)
         self._dihedral, self._least = shared.dihedral[hinge], shared.least[hinge]
-        w = self._weights
-        self._region = float(shared.behind[moved].sum())
-        self._of_volume = np.sqrt(w.volume) / self._region
-        self._of_stretch = np.sqrt(w.stretch * self._length / self._length.sum())
-        self._of_roughness = np.sqrt(w.roughness * shared.stiffness[hinge] / max(bent, 1.0))
+        bent = max(float(frame.ratio.sum()), 1.0)
+        self._of_roughness = np.sqrt(w.roughness * self._times * shared.stiffness[hinge] / bent)
+
+        edges, hinged = shared.edges[edge], shared.hinges[hinge]
+        used = np.unique(np.concatenate([edges.ravel(), hinged.ravel()]))
+        number = np.full(len(points), -1)
+        number[used] = np.arange(len(used))
+        self._edges, self._hinges, self._points = number[edges], number[hinged], points[used]
+        self._directions = _renumbered(directions, number[frame.moved], len(used))
+
+        growth = self._growth(before[used])
+        self._rough_kept = float((self._times * growth**2).sum()) * w.roughness_kept**2 + 1e-5 * self._times.sum()
+        self.before = self._terms(before[used], shared.closed.volume_of(before) - shared.closed.volume)
 
     def terms(self, amplitudes: NDArray[np.float64]) -> LossTerms:
         """Of all amplitudes, shape (P,)."""
-        points = self._points(amplitudes)
-        volume, log, growth = self._volume_error(points), self._logarithms(points)[0], self._growth(points)
+        change = amplitudes[self.parameters] - self._start
+        return self._terms(self._at(change), self._volume.lost(change)[0])
+
+    def _terms(self, points: NDArray[np.float64], lost: float) -> LossTerms:
+        log, growth = self._logarithms(points)[0], self._growth(points)
         return LossTerms(
-            float((self._of_volume * volume) ** 2),
+            float((self._of_volume * lost) ** 2),
             float(((self._of_stretch * _steeper(log, _STRETCHED)[0]) ** 2).sum()),
             float(((self._of_roughness * _steeper(growth, _SHARP)[0]) ** 2).sum()),
+            self._rougher(growth) ** 2 + self._emptier(lost) ** 2,
         )
 
     def residuals(self, amplitudes: NDArray[np.float64]) -> tuple[NDArray[np.float64], sp.csr_array]:
         """Numbers whose squares sum to the loss, shape (N,), and their derivatives by ``parameters``, (N, p)."""
-        points = self._points(amplitudes)
-        volume = self._of_volume * self._volume_error(points)
-        by_points = [sp.csr_array((self._of_volume * self._volume_slope(points)).reshape(1, -1))]
+        change = amplitudes[self.parameters] - self._start
+        points = self._at(change)
+        lost, by_lost = self._volume.lost(change)
+        emptier = self._emptier(lost)
+        of_emptier = self._of_emptier * np.sign(lost) * (emptier > 0.0)
+
         log, along, squared = self._logarithms(points)
-        value, slope = _steeper(log, _STRETCHED)
-        stretch = self._of_stretch * value
+        stretch, slope = _steeper(log, _STRETCHED)
         pull = (self._of_stretch * slope / squared)[:, None] * along
-        by_points.append(_by_points(self._edges, np.stack([-pull, pull], axis=1), len(points)))
+        by_stretch = _by_points(self._edges, np.stack([-pull, pull], axis=1), len(points)) @ self._directions
+
         growth = self._growth(points)
-        value, slope = _steeper(growth, _SHARP)
-        rough = self._of_roughness * value
         grows = np.flatnonzero(growth > 0.0)
+        rough, slope = _steeper(growth[grows], _SHARP)
         turn = dihedral_slopes(points, self._hinges[grows], self._least[grows])
-        turn *= (self._of_roughness * slope)[grows, None, None]
-        by_points.append(_by_points(self._hinges[grows], turn, len(points)))
-        jacobian = sp.csr_array(sp.vstack(by_points, format="csr") @ self._directions)
-        return np.concatenate([[volume], stretch, rough[grows]]), jacobian
+        by_angle = _by_points(self._hinges[grows], turn, len(points)) @ self._directions
+        rougher = self._rougher(growth)
+        of_rougher = 2.0 * np.sqrt(self._weights.rougher) / self._rough_kept * (rougher > 0.0)
+        by_rougher = of_rougher * ((self._times * growth)[grows] @ by_angle)
 
-    def volume(self, amplitudes: NDArray[np.float64]) -> tuple[float, float]:
-        """Change of volume, relative to the whole and to what is moved."""
-        error = self._volume_error(self._points(amplitudes))
-        return error / self._rest_volume, error / self._region
+        of_rough = self._of_roughness[grows]
+        few = sp.csr_array(np.stack([self._of_volume * by_lost, of_emptier * by_lost, by_rougher]))
+        jacobian = sp.vstack([few, by_stretch, sp.diags_array(of_rough * slope) @ by_angle], format="csr")
+        values = np.concatenate([[self._of_volume * lost, emptier, rougher], self._of_stretch * stretch, of_rough * rough])
+        return values, sp.csr_array(jacobian)
 
-    def _points(self, amplitudes: NDArray[np.float64]) -> NDArray[np.float64]:
-        return self._base + (self._directions @ amplitudes[self.parameters]).reshape(-1, 3)
-
-    def _volume_error(self, points: NDArray[np.float64]) -> float:
-        return float(_six_volumes(points, self._faces).sum() / 6.0 + self._still_volume - self._rest_volume)
-
-    def _volume_slope(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
-        a, b, c = (points[self._faces[:, k]] for k in range(3))
-        slope = np.zeros_like(points)
-        for k, normal in enumerate((np.cross(b, c), np.cross(c, a), np.cross(a, b))):
-            for axis in range(3):
-                slope[:, axis] += np.bincount(self._faces[:, k], normal[:, axis], minlength=len(points))
-        return slope / 6.0
+    def _at(self, change: NDArray[np.float64]) -> NDArray[np.float64]:
+        return np.asarray(self._points + (self._directions @ change).reshape(-1, 3))
 
     def _logarithms(
         self, points: NDArray[np.float64]
@@ -201,6 +211,35 @@ class PoseLoss:
 
     def _growth(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
         return np.maximum(dihedral_angles(points, self._hinges) - self._dihedral, 0.0)
+
+    def _rougher(self, growth: NDArray[np.float64]) -> float:
+        over = max(float((self._times * growth**2).sum()) / self._rough_kept - 1.0, 0.0)
+        return float(np.sqrt(self._weights.rougher) * over)
+
+    def _emptier(self, lost: float) -> float:
+        return float(self._of_emptier * max(abs(lost) - self._volume_kept, 0.0))
+
+
+def _renumbered(directions: sp.csr_array, number: NDArray[np.int64], count: int) -> sp.csr_array:
+    """Rows x, y, z of vertices as those of numbered points; those of number -1 are left out."""
+    entries = directions.tocoo()
+    row, axis = np.divmod(entries.coords[0], 3)
+    kept = number[row] >= 0
+    rows = 3 * number[row[kept]] + axis[kept]
+    index = (rows, entries.coords[1][kept])
+    return sp.coo_array((entries.data[kept], index), shape=(3 * count, directions.shape[1])).tocsr()
+
+
+def _sampled(
+    chosen: NDArray[np.int64], weight: NDArray[np.float64]
+) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
+    """At most about ``_SAMPLE`` of what is chosen, those that weigh most for certain, and how many each stands for."""
+    if len(chosen) <= _SAMPLE:
+        return chosen, np.ones(len(chosen))
+    likely = weight / max(float(weight.sum()), 1e-30) + 1.0 / len(chosen)
+    chance = np.minimum(0.5 * _SAMPLE * likely, 1.0)
+    kept = np.flatnonzero(np.random.default_rng(0).uniform(size=len(chosen)) < chance)
+    return chosen[kept], 1.0 / chance[kept]
 
 
 def _steeper(x: NDArray[np.float64], beyond: float) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
@@ -218,9 +257,9 @@ def _by_points(corners: NDArray[np.int64], slopes: NDArray[np.float64], count: i
     return sp.csr_array((slopes.ravel(), column.ravel(), start), shape=(rows, 3 * count))
 
 
-def _six_volumes(points: NDArray[np.float64], faces: NDArray[np.int64]) -> NDArray[np.float64]:
-    a, b, c = (points[faces[:, k]] for k in range(3))
-    return np.asarray((a * np.cross(b, c)).sum(axis=1))
+def _lengths(points: NDArray[np.float64], edges: NDArray[np.int64]) -> NDArray[np.float64]:
+    along = points[edges[:, 1]] - points[edges[:, 0]]
+    return np.asarray(np.maximum(np.sqrt((along**2).sum(axis=1)), 1e-30))
 
 
 def _volume_behind(
@@ -242,7 +281,7 @@ def _stiffness(
     i, j, k, m = (rest[hinge[:, n]] for n in range(4))
     along = np.linalg.norm(j - i, axis=1)
     areas = np.stack([np.linalg.norm(np.cross(j - i, other - i), axis=1) for other in (k, m)], axis=1)
-    height = areas.sum(axis=1) / np.maximum(along, 1e-30)
+    height = areas.sum(axis=1) / np.maximum(2.0 * along, 1e-30)
     solid = height > 1e-3 * along
-    stiffness = np.where(solid, 6.0 * along / np.where(solid, height, 1.0), 0.0)
-    return np.minimum(stiffness, 60.0), np.maximum(_THINNEST * areas, 1e-12 * along[:, None] ** 2)
+    stiffness = np.where(solid, 3.0 * along / np.where(solid, height, 1.0), 0.0)
+    return np.minimum(stiffness, _SLENDER), np.maximum(_THINNEST * areas, 1e-12 * along[:, None] ** 2)

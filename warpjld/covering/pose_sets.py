@@ -10,15 +10,16 @@ from warpjld.skeleton.hand import DIGITS
 from warpjld.skeleton.kinematics import Poses, poses_from_angles
 from warpjld.skeleton.tree import CHANNELS, Skeleton
 
-__all__ = ["CURL", "calibration_poses", "curled"]
+__all__ = ["CURL", "calibration_poses", "curled", "guard_poses"]
 
 CURL = {"base": 80.0, "knuckle2": 97.0, "knuckle3": 63.0}
 """Flexion [degrees] of a finger's joints in a full curl; the thumb takes no part."""
 
 _FLEXION, _ABDUCTION = CHANNELS.index("flexion"), CHANNELS.index("abduction")
-_WIDEST = np.radians(100.0)  # shoulders, hips, knees and elbows in full are poses of their own kind
+_WIDEST = np.radians(120.0)  # shoulders, knees and elbows in full are contact of the limbs
 _UNKNOWN = np.radians(30.0)  # where limits are as wide one way as the other: nothing is known of the joint
 _CURLS = (0.3, 0.6, 0.9)
+_ONE_BY_ONE = (0.45, 0.9)
 
 
 def curled(skeleton: Skeleton, amounts: NDArray[np.float64] | list[float] | tuple[float, ...]) -> Poses:
@@ -26,32 +27,26 @@ def curled(skeleton: Skeleton, amounts: NDArray[np.float64] | list[float] | tupl
     return poses_from_angles(skeleton, _curls(skeleton, amounts))
 
 
-def calibration_poses(skeleton: Skeleton, count: int | None = None, *, seed: int = 0) -> Poses:
-    """Poses over the joint ranges of a skeleton, in the order in which they matter.
+def calibration_poses(skeleton: Skeleton, count: int | None = None) -> Poses:
+    """Poses to fit to, over the joint ranges of a skeleton, in the order in which they matter.
 
-    Curls of 0.3, 0.6 and 0.9 first, then fists (every joint of index to pinky at 0.5 and 0.8 of its flexion) and the
-    thumb opposed and spread, random poses within the limits, and every joint alone at its full and half flexion.
+    Curls of 0.3, 0.6 and 0.9, digits curled one by one, thumbs opposed and spread, every joint alone at its full and
+    half flexion: in each pose what is lost belongs to few joints, so none has to make up for others.
 
     Args:
         skeleton: The rest skeleton.
         count: How many to take: the first of each kind in turn; by default all.
-        seed: Of the random poses.
 
     Raises:
         InputError: A skeleton whose joints cannot flex, or a count below 1.
     """
     if count is not None and count < 1:
         raise InputError(f"count: want at least 1 pose, got {count}")
-    low, high = np.moveaxis(skeleton.limits[:, _FLEXION], -1, 0)
-    largest = np.minimum(high, np.where(low <= -high, _UNKNOWN, _WIDEST))
-    inner = (skeleton.parents >= 0) & np.array([bool(c) for c in skeleton.children])
-    bends = np.flatnonzero(inner & (largest > 1e-6))
-    if not bends.size:
-        raise InputError("skeleton: none of its joints may flex; its limits are closed")
+    bends, largest = _range(skeleton)
     kinds = [
         _curls(skeleton, _CURLS),
-        _fists(skeleton, bends, largest),
-        _random(skeleton, bends, largest, seed),
+        _digits(skeleton),
+        _thumbs(skeleton, bends, largest),
         _alone(skeleton, bends, largest, 1.0),
         _alone(skeleton, bends, largest, 0.5),
     ]
@@ -60,6 +55,32 @@ def calibration_poses(skeleton: Skeleton, count: int | None = None, *, seed: int
         turn = np.concatenate([np.arange(len(k)) + 0.1 * i for i, k in enumerate(kinds) if len(k)])
         angles = angles[np.sort(np.argsort(turn, kind="stable")[:count])]
     return poses_from_angles(skeleton, angles)
+
+
+def guard_poses(skeleton: Skeleton, *, seed: int = 0) -> Poses:
+    """Poses of many joints at once, that nothing is fitted to but none of which may get worse.
+
+    Fists (every joint of index to pinky at 0.5 and 0.8 of its flexion), and random poses within the limits, alike on
+    both sides of a body.
+
+    Raises:
+        InputError: A skeleton whose joints cannot flex.
+    """
+    bends, largest = _range(skeleton)
+    return poses_from_angles(
+        skeleton, np.concatenate([_fists(skeleton, bends, largest), _random(skeleton, bends, largest, seed)])
+    )
+
+
+def _range(skeleton: Skeleton) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
+    """Joints that flex, and the largest flexion [rad] of all joints."""
+    low, high = np.moveaxis(skeleton.limits[:, _FLEXION], -1, 0)
+    largest = np.minimum(high, np.where(low <= -high, _UNKNOWN, _WIDEST))
+    inner = (skeleton.parents >= 0) & np.array([bool(c) for c in skeleton.children])
+    bends = np.flatnonzero(inner & (largest > 1e-6))
+    if not bends.size:
+        raise InputError("skeleton: none of its joints may flex; its limits are closed")
+    return bends, largest
 
 
 def _curls(skeleton: Skeleton, amounts: NDArray[np.float64] | list[float] | tuple[float, ...]) -> NDArray[np.float64]:
@@ -76,18 +97,36 @@ def _curls(skeleton: Skeleton, amounts: NDArray[np.float64] | list[float] | tupl
     return angles
 
 
+def _digits(skeleton: Skeleton) -> NDArray[np.float64]:
+    """Index to pinky one by one, half and nearly curled, on all hands at once."""
+    out = []
+    for digit in DIGITS[:-1]:
+        angles = _curls(skeleton, _ONE_BY_ONE)
+        others = [j for j, name in enumerate(skeleton.names) if _digit(name) != digit]
+        if angles.any():
+            angles[:, others] = 0.0
+            out.append(angles)
+    out = [a for a in out if a.any()]
+    return np.concatenate(out) if out else np.zeros((0, len(skeleton), len(CHANNELS)))
+
+
 def _fists(skeleton: Skeleton, bends: NDArray[np.int64], largest: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Metacarpals and fingers half and nearly closed; then thumbs opposed and spread, by themselves: their large roots
-    lose what no parameter gives back, and fingers must not make up for them."""
+    """Metacarpals and fingers half and nearly closed."""
     fingers = [j for j in bends if _digit(skeleton.names[j]) in DIGITS[:-1]]
-    roots = [j for j in bends if skeleton.names[j].endswith("thumb.base")]
-    angles = np.zeros((4, len(skeleton), len(CHANNELS)))
+    angles = np.zeros((2, len(skeleton), len(CHANNELS)))
     for frame, amount in enumerate((0.5, 0.8)):
         angles[frame, fingers, _FLEXION] = amount * largest[fingers]
-    for frame, end in ((2, 0), (3, 1)):
+    return angles[[bool(fingers)] * 2]
+
+
+def _thumbs(skeleton: Skeleton, bends: NDArray[np.int64], largest: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Thumbs opposed and spread."""
+    roots = [j for j in bends if skeleton.names[j].endswith("thumb.base")]
+    angles = np.zeros((2, len(skeleton), len(CHANNELS)))
+    for frame, end in ((0, 0), (1, 1)):
         angles[frame, roots, _ABDUCTION] = 0.5 * skeleton.limits[roots, _ABDUCTION, end]
-    angles[2, roots, _FLEXION] = largest[roots]
-    return angles[[bool(fingers)] * 2 + [bool(roots)] * 2]
+    angles[0, roots, _FLEXION] = largest[roots]
+    return angles[[bool(roots)] * 2]
 
 
 def _random(
@@ -95,10 +134,13 @@ def _random(
 ) -> NDArray[np.float64]:
     """Flexion anywhere up to the limit, abduction in the inner half of its range."""
     generator = np.random.default_rng(seed)
+    names = [skeleton.names[j].removeprefix("left.").removeprefix("right.") for j in bends]
+    kind = np.unique(names, return_inverse=True)[1]
     angles = np.zeros((frames, len(skeleton), len(CHANNELS)))
-    angles[:, bends, _FLEXION] = generator.uniform(0.0, 1.0, (frames, len(bends))) * largest[bends]
+    part = generator.uniform(0.0, 1.0, (frames, 2, len(bends)))[:, :, kind]
+    angles[:, bends, _FLEXION] = part[:, 0] * largest[bends]
     low, high = (np.clip(skeleton.limits[bends, _ABDUCTION, k], -_WIDEST / 4, _WIDEST / 4) for k in (0, 1))
-    angles[:, bends, _ABDUCTION] = generator.uniform(0.5 * low, 0.5 * high, (frames, len(bends)))
+    angles[:, bends, _ABDUCTION] = 0.5 * (low + part[:, 1] * (high - low))
     return angles
 
 
