@@ -1,7 +1,7 @@
 """What calibration makes small, pose by pose: lost volume, stretched and squeezed edges, edges sharper than at rest.
 
 Everything is summed up over what the amplitudes move in a pose, and in proportion to it: a finger of a body counts as
-much as one of a hand, and refining a mesh changes little. A pose is also held to what it was at first: neither its
+much as one of a hand, and refining a mesh changes little. A pose is also held to what it was at the start: neither its
 roughness nor its volume error shall grow.
 """
 
@@ -14,6 +14,8 @@ import scipy.sparse as sp
 from numpy.typing import NDArray
 
 from warpjld.covering.amplitudes import Frame
+from warpjld.covering.calibration_guard import TOLERANCES, Tolerances
+from warpjld.covering.constrained_least_squares import Linearised
 from warpjld.covering.dihedral import dihedral_angles, dihedral_slopes, hinges
 from warpjld.covering.quality import unique_edges
 from warpjld.covering.volume_form import ClosedSurface, VolumeForm
@@ -33,40 +35,31 @@ stand for all."""
 
 @dataclass(frozen=True)
 class LossWeights:
-    """Weights of the terms, and what a pose may have of each beyond what it had at first.
+    """Weights of the terms.
 
     Attributes:
         volume: Of the squared volume error, of the volume that is moved.
         stretch: Of the mean squared logarithm of edge stretch.
         roughness: Of the squared growth of dihedral angles [rad²], by edge length over the height of the faces beside
             it: the bending energy of a discrete shell (Grinspun et al. 2003), of each joint that bends.
-        rougher: Of the squared share by which the squared roughness exceeds ``roughness_kept`` times what it was.
-        emptier: Of the squared volume error beyond what it was, or ``volume_kept`` where that is more.
-        roughness_kept: As a factor.
-        volume_kept: Of the volume that is moved.
     """
 
     volume: float = 100.0
     stretch: float = 1.0
     roughness: float = 0.01
-    rougher: float = 1000.0
-    emptier: float = 1000.0
-    roughness_kept: float = 1.02
-    volume_kept: float = 0.02
 
 
 @dataclass(frozen=True)
 class LossTerms:
-    """The terms of one pose, weighted; ``held`` is what it is worse by."""
+    """The terms of one pose, weighted."""
 
     volume: float
     stretch: float
     roughness: float
-    held: float = 0.0
 
     @property
     def total(self) -> float:
-        """What is measured: all but ``held``."""
+        """Their sum."""
         return self.volume + self.stretch + self.roughness
 
 
@@ -77,10 +70,17 @@ class SurfaceLoss:
         surface: The rest surface.
         axis: Where each vertex hangs on the skeleton at rest [m], shape (V, 3): says which volume lies behind it.
         weights: Weights of the terms.
+        tolerances: What a pose may be worse by.
     """
 
-    def __init__(self, surface: Surface, axis: NDArray[np.float64], weights: LossWeights | None = None) -> None:
-        self.weights = weights or LossWeights()
+    def __init__(
+        self,
+        surface: Surface,
+        axis: NDArray[np.float64],
+        weights: LossWeights | None = None,
+        tolerances: Tolerances = TOLERANCES,
+    ) -> None:
+        self.weights, self.tolerances = weights or LossWeights(), tolerances
         rest = np.asarray(surface.vertices, dtype=np.float64)
         self.closed = ClosedSurface(surface)
         edges = unique_edges(surface.faces)
@@ -96,15 +96,15 @@ class SurfaceLoss:
         """Volume that a pose moves [m³]: what lies between the skeleton and the vertices that amplitudes move."""
         return float(max(self.behind[frame.moved].sum(), 1e-9 * abs(self.closed.volume)))
 
-    def pose(self, frame: Frame, start: NDArray[np.float64], first: NDArray[np.floating]) -> PoseLoss | None:
+    def pose(self, frame: Frame, start: NDArray[np.float64], *, only_held: bool = False) -> PoseLoss | None:
         """The loss of a pose as a function of amplitudes; None where they move nothing.
 
         Args:
             frame: The pose.
             start: Amplitudes at which ``frame.points`` are, shape (P,).
-            first: Positions [m] that it is held to, shape (V, 3).
+            only_held: Whether it is only not to get worse.
         """
-        return PoseLoss(self, frame, start, first) if len(frame.moved) else None
+        return PoseLoss(self, frame, start, only_held) if len(frame.moved) else None
 
 
 class PoseLoss:
@@ -112,26 +112,24 @@ class PoseLoss:
 
     Attributes:
         parameters: Amplitudes that move anything, shape (p,).
-        before: Its terms in the positions that it is held to.
+        before: Its terms at the start.
     """
 
-    def __init__(
-        self, shared: SurfaceLoss, frame: Frame, start: NDArray[np.float64], first: NDArray[np.floating]
-    ) -> None:
-        w = self._weights = shared.weights
+    def __init__(self, shared: SurfaceLoss, frame: Frame, start: NDArray[np.float64], only_held: bool) -> None:
+        w, may = shared.weights, shared.tolerances
+        self._only_held = only_held
         self.parameters = np.unique(frame.directions.indices)
         directions = frame.directions.tocsc()[:, self.parameters].tocsr()
         self._start = start[self.parameters]
-        points, before = (np.asarray(a, dtype=np.float64) for a in (frame.points, first))
+        points = frame.points.astype(np.float64)
         moved = np.zeros(len(points), dtype=bool)
         moved[frame.moved] = True
 
         self._volume = VolumeForm.of(shared.closed, points, frame.moved, directions)
-        region = shared.region(frame)
+        self._region = region = shared.region(frame)
         self._of_volume = np.sqrt(w.volume) / region
-        lost = abs(shared.closed.volume_of(before) - shared.closed.volume)
-        self._volume_kept = max(lost, w.volume_kept * region)
-        self._of_emptier = np.sqrt(w.emptier) / region
+        free = min(may.volume_free * shared.closed.volume, may.region_free * region)
+        self._volume_kept = max(abs(self._volume.constant), free)
 
         edge = np.flatnonzero(moved[shared.edges].any(axis=1))
         log = np.log(_lengths(points, shared.edges[edge]) / shared.length[edge])
@@ -151,11 +149,13 @@ class PoseLoss:
         number = np.full(len(points), -1)
         number[used] = np.arange(len(used))
         self._edges, self._hinges, self._points = number[edges], number[hinged], points[used]
-        self._directions = _renumbered(directions, number[frame.moved], len(used))
+        self._directions = _dense(directions, number[frame.moved], len(used))
 
-        growth = self._growth(before[used])
-        self._rough_kept = float((self._times * growth**2).sum()) * w.roughness_kept**2 + 1e-5 * self._times.sum()
-        self.before = self._terms(before[used], shared.closed.volume_of(before) - shared.closed.volume)
+        rough = float((self._times * self._growth(self._points) ** 2).sum())
+        # half-way to what counts as worse: what is sampled here is not all there is
+        growth, more = (1.0 + may.roughness) / 2.0, len(shared.hinges) * (may.roughness_more / 2.0) ** 2
+        self._rough_kept = rough * growth**2 + more
+        self.before = self._terms(self._points, self._volume.constant)
 
     def terms(self, amplitudes: NDArray[np.float64]) -> LossTerms:
         """Of all amplitudes, shape (P,)."""
@@ -168,39 +168,46 @@ class PoseLoss:
             float((self._of_volume * lost) ** 2),
             float(((self._of_stretch * _steeper(log, _STRETCHED)[0]) ** 2).sum()),
             float(((self._of_roughness * _steeper(growth, _SHARP)[0]) ** 2).sum()),
-            self._rougher(growth) ** 2 + self._emptier(lost) ** 2,
         )
 
-    def residuals(self, amplitudes: NDArray[np.float64]) -> tuple[NDArray[np.float64], sp.csr_array]:
-        """Numbers whose squares sum to the loss, shape (N,), and their derivatives by ``parameters``, (N, p)."""
+    def linearised(self, amplitudes: NDArray[np.float64]) -> Linearised:
+        """Numbers whose squares sum to the loss; squared roughness and volume error, beyond what they may be, as
+        shares of that and of what is moved."""
         change = amplitudes[self.parameters] - self._start
         points = self._at(change)
         lost, by_lost = self._volume.lost(change)
-        emptier = self._emptier(lost)
-        of_emptier = self._of_emptier * np.sign(lost) * (emptier > 0.0)
+        growth = self._growth(points)
+        grows = np.flatnonzero(growth > 0.0)
+        by_angle = self._by_amplitude(
+            self._hinges[grows], dihedral_slopes(points, self._hinges[grows], self._least[grows])
+        )
+        rough = float((self._times * growth**2).sum()) / self._rough_kept
+        by_rough = 2.0 / self._rough_kept * ((self._times * growth)[grows] @ by_angle)
+        kept = self._volume_kept
+        constraints = np.array([rough - 1.0, (lost - kept) / self._region, (-lost - kept) / self._region])
+        slopes = np.stack([by_rough, by_lost / self._region, -by_lost / self._region])
+        if self._only_held:
+            return Linearised(np.zeros(0), np.zeros((0, len(change))), constraints, slopes)
 
         log, along, squared = self._logarithms(points)
         stretch, slope = _steeper(log, _STRETCHED)
         pull = (self._of_stretch * slope / squared)[:, None] * along
-        by_stretch = _by_points(self._edges, np.stack([-pull, pull], axis=1), len(points)) @ self._directions
-
-        growth = self._growth(points)
-        grows = np.flatnonzero(growth > 0.0)
-        rough, slope = _steeper(growth[grows], _SHARP)
-        turn = dihedral_slopes(points, self._hinges[grows], self._least[grows])
-        by_angle = _by_points(self._hinges[grows], turn, len(points)) @ self._directions
-        rougher = self._rougher(growth)
-        of_rougher = 2.0 * np.sqrt(self._weights.rougher) / self._rough_kept * (rougher > 0.0)
-        by_rougher = of_rougher * ((self._times * growth)[grows] @ by_angle)
-
-        of_rough = self._of_roughness[grows]
-        few = sp.csr_array(np.stack([self._of_volume * by_lost, of_emptier * by_lost, by_rougher]))
-        jacobian = sp.vstack([few, by_stretch, sp.diags_array(of_rough * slope) @ by_angle], format="csr")
-        values = np.concatenate([[self._of_volume * lost, emptier, rougher], self._of_stretch * stretch, of_rough * rough])
-        return values, sp.csr_array(jacobian)
+        by_stretch = self._by_amplitude(self._edges, np.stack([-pull, pull], axis=1))
+        sharp, slope = _steeper(growth[grows], _SHARP)
+        of_sharp = self._of_roughness[grows]
+        residuals = [[self._of_volume * lost], self._of_stretch * stretch, of_sharp * sharp]
+        by_amplitude = [self._of_volume * by_lost[None], by_stretch, (of_sharp * slope)[:, None] * by_angle]
+        return Linearised(np.concatenate(residuals), np.concatenate(by_amplitude), constraints, slopes)
 
     def _at(self, change: NDArray[np.float64]) -> NDArray[np.float64]:
-        return np.asarray(self._points + (self._directions @ change).reshape(-1, 3))
+        return np.asarray(self._points + self._directions @ change)
+
+    def _by_amplitude(self, corners: NDArray[np.int64], slopes: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Derivatives by amplitudes, (N, p), from those by the positions of corners (N, k): (N, k, 3)."""
+        out = np.zeros((len(corners), len(self.parameters)))
+        for k in range(corners.shape[1]):
+            out += np.matmul(slopes[:, k, None, :], self._directions[corners[:, k]])[:, 0]
+        return out
 
     def _logarithms(
         self, points: NDArray[np.float64]
@@ -212,22 +219,15 @@ class PoseLoss:
     def _growth(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
         return np.maximum(dihedral_angles(points, self._hinges) - self._dihedral, 0.0)
 
-    def _rougher(self, growth: NDArray[np.float64]) -> float:
-        over = max(float((self._times * growth**2).sum()) / self._rough_kept - 1.0, 0.0)
-        return float(np.sqrt(self._weights.rougher) * over)
 
-    def _emptier(self, lost: float) -> float:
-        return float(self._of_emptier * max(abs(lost) - self._volume_kept, 0.0))
-
-
-def _renumbered(directions: sp.csr_array, number: NDArray[np.int64], count: int) -> sp.csr_array:
-    """Rows x, y, z of vertices as those of numbered points; those of number -1 are left out."""
+def _dense(directions: sp.csr_array, number: NDArray[np.int64], count: int) -> NDArray[np.float64]:
+    """D of vertices, rows x, y, z (3 n, p), as D of numbered points, (count, 3, p); those of number -1 are left out."""
+    out = np.zeros((count, 3, directions.shape[1]))
     entries = directions.tocoo()
     row, axis = np.divmod(entries.coords[0], 3)
     kept = number[row] >= 0
-    rows = 3 * number[row[kept]] + axis[kept]
-    index = (rows, entries.coords[1][kept])
-    return sp.coo_array((entries.data[kept], index), shape=(3 * count, directions.shape[1])).tocsr()
+    out[number[row[kept]], axis[kept], entries.coords[1][kept]] = entries.data[kept]
+    return out
 
 
 def _sampled(
@@ -247,14 +247,6 @@ def _steeper(x: NDArray[np.float64], beyond: float) -> tuple[NDArray[np.float64]
     ratio = (x / beyond) ** 2
     root = np.sqrt(1.0 + ratio)
     return x * root, (1.0 + 2.0 * ratio) / root
-
-
-def _by_points(corners: NDArray[np.int64], slopes: NDArray[np.float64], count: int) -> sp.csr_array:
-    """Rows of derivatives by the positions of their corners: (N, k) and (N, k, 3) → (N, 3 · count)."""
-    rows, width = len(corners), 3 * corners.shape[1]
-    column = (3 * corners[:, :, None] + np.arange(3)).reshape(rows, width)
-    start = np.arange(rows + 1) * width
-    return sp.csr_array((slopes.ravel(), column.ravel(), start), shape=(rows, 3 * count))
 
 
 def _lengths(points: NDArray[np.float64], edges: NDArray[np.int64]) -> NDArray[np.float64]:

@@ -24,7 +24,8 @@ def hinges(faces: NDArray[np.integer]) -> NDArray[np.int64]:
 def dihedral_angles(points: NDArray[np.float64], hinge: NDArray[np.int64]) -> NDArray[np.float64]:
     """Unsigned angle [rad] between the normals of the two faces of each hinge, 0 where flat, shape (H,)."""
     one, other = _normals(points, hinge)
-    return np.asarray(np.arctan2(np.linalg.norm(np.cross(one, other), axis=1), (one * other).sum(axis=1)))
+    sine = np.sqrt((_cross(one, other) ** 2).sum(axis=1))
+    return np.asarray(np.arctan2(sine, (one * other).sum(axis=1)))
 
 
 def dihedral_slopes(
@@ -44,7 +45,7 @@ def dihedral_slopes(
     # a face turns about the edge by height⁻¹ = length / |n| of how far its corner moves along its normal
     a = one / np.maximum((one**2).sum(axis=1), least[:, 0] ** 2)[:, None]
     b = other / np.maximum((other**2).sum(axis=1), least[:, 1] ** 2)[:, None]
-    sign = np.where((np.cross(one, other) * along).sum(axis=1) > 0.0, -1.0, 1.0)[:, None]
+    sign = np.where((_cross(one, other) * along).sum(axis=1) > 0.0, -1.0, 1.0)[:, None]
 
     def share(corner: NDArray[np.float64], end: NDArray[np.float64]) -> NDArray[np.float64]:
         return np.asarray(((corner - end) * along).sum(axis=1, keepdims=True) / length)
@@ -58,4 +59,11 @@ def _normals(
     points: NDArray[np.float64], hinge: NDArray[np.int64]
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     i, j, k, m = (points[hinge[:, n]] for n in range(4))
-    return np.cross(j - i, k - i), np.cross(m - i, j - i)
+    along = j - i
+    return _cross(along, k - i), _cross(m - i, along)
+
+
+def _cross(a: NDArray[np.float64], b: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Cross products of rows; of many short arrays far quicker than NumPy's."""
+    (ax, ay, az), (bx, by, bz) = a.T, b.T
+    return np.column_stack([ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx])
