@@ -15,9 +15,10 @@ from enum import Enum
 import numpy as np
 from numpy.typing import NDArray
 
-from warpjld.covering.amplitudes import LinearDeformation, amplitudes_of, with_amplitudes
+from warpjld.covering.amplitudes import amplitudes_of, with_amplitudes
 from warpjld.covering.calibration_guard import Guard, PoseMeasures
-from warpjld.covering.calibration_loss import LossWeights, PoseLoss, SurfaceLoss
+from warpjld.covering.calibration_loss import LossWeights, PoseLosses
+from warpjld.covering.calibration_retreat import retreat
 from warpjld.covering.covering import Covering
 from warpjld.covering.constrained_least_squares import minimise
 from warpjld.covering.parameters import Parameters
@@ -29,8 +30,7 @@ __all__ = ["Calibration", "CalibrationStatus", "calibrate"]
 
 _HIGHEST = 1.0  # amplitude at full flexion: the skin then is twice as far from the bone
 _PULL = 0.3  # of the squared change of an amplitude: keeps at the start what the surface does not determine
-_BENT = 0.05  # flexion ratio from which a joint takes part in a pose
-_BACK = (1.0, 0.7, 0.4, 0.0)  # what is left of a joint's change, each time that a pose in which it bends is worse
+
 
 
 class CalibrationStatus(Enum):
@@ -53,7 +53,7 @@ class Calibration:
         seconds: Time taken.
         poses: Poses fitted to.
         guards: Poses guarded besides.
-        kept: Joints that were taken back to the start or part of the way, since poses got worse.
+        kept: Joints that were taken back towards the start, since poses in which they bend got worse.
         loss: What is made small, at the start and with ``parameters``.
         before: Measures of all poses at the start, those fitted to first, and
         after: with ``parameters``.
@@ -106,8 +106,10 @@ def calibrate(
     started = time.perf_counter()
     tell = progress or (lambda what, done, total: None)
     every = _both(poses, guards)
-    losses = _Losses(covering, every, len(poses), weights, tell)
-    guard = Guard(covering, every, losses.moved, losses.regions)
+    losses = PoseLosses(covering, every, len(poses), weights, lambda done, total: tell("posing", done, total))
+    guard = Guard(
+        covering, every, losses.moved, losses.regions, progress=lambda done, total: tell("measuring", done, total)
+    )
     start = amplitudes_of(covering.parameters)
     fit = minimise(
         losses.parts,
@@ -117,11 +119,11 @@ def calibrate(
         evaluations=iterations,
         progress=lambda done, total: tell("fitting", done, total),
     )
-    amplitudes, after, kept = _retreat(covering, fit.x, losses.ratios, guard, tell)
+    amplitudes, after, kept = retreat(covering, fit.x, losses, guard, tell)
     status = CalibrationStatus.CONVERGED if fit.converged else CalibrationStatus.ITERATION_LIMIT
     if np.array_equal(amplitudes, start):
         status = CalibrationStatus.UNCHANGED
-    fitted = losses.parts[: losses.fitted]
+    fitted = losses.fitted
     return Calibration(
         with_amplitudes(covering.parameters, amplitudes),
         status,
@@ -145,57 +147,3 @@ def _both(poses: Poses, more: Poses) -> Poses:
     )
 
 
-class _Losses:
-    """The losses of all poses, those after the first ``fitted`` only held, and what amplitudes move in each."""
-
-    def __init__(
-        self,
-        covering: Covering,
-        poses: Poses,
-        fitted: int,
-        weights: LossWeights | None,
-        tell: Callable[[str, int, int], None],
-    ) -> None:
-        shared = SurfaceLoss(covering.flesh, covering.fields.positions @ covering.skeleton.rest, weights)
-        deformation = LinearDeformation(covering, poses)
-        self.parts: list[PoseLoss] = []
-        self.fitted = 0
-        self.moved: list[NDArray[np.int64]] = []
-        self.regions = np.zeros(len(poses))
-        self.ratios = np.zeros((len(poses), len(covering.skeleton)))
-        for frame in deformation.frames():
-            self.moved.append(frame.moved)
-            self.regions[frame.number] = shared.region(frame)
-            self.ratios[frame.number] = frame.ratio
-            part = shared.pose(frame, deformation.amplitudes, only_held=frame.number >= fitted)
-            self.parts += [part] if part else []
-            self.fitted += int(part is not None and frame.number < fitted)
-            tell("posing", frame.number + 1, len(poses))
-
-
-def _retreat(
-    covering: Covering,
-    amplitudes: NDArray[np.float64],
-    ratios: NDArray[np.float64],
-    guard: Guard,
-    tell: Callable[[str, int, int], None],
-) -> tuple[NDArray[np.float64], PoseMeasures, tuple[str, ...]]:
-    """Amplitudes between those fitted and those at the start with which no pose is worse, their measures, and the
-    joints that did not go all the way."""
-    start = amplitudes_of(covering.parameters)
-    names = covering.skeleton.names
-    step = np.zeros(len(names), dtype=np.int64)
-    while True:
-        part = np.array(_BACK)[step]
-        driven = part.copy()
-        for segment in covering.skeleton.segments:  # both its joints drive a muscle
-            driven[segment.proximal] = min(driven[segment.proximal], part[segment.distal])
-        found = start + np.concatenate([part, driven]) * (amplitudes - start)
-        other = covering.with_parameters(with_amplitudes(covering.parameters, found))
-        measured = guard.measure(other, lambda done, total: tell("comparing", done, total))
-        worse = guard.worse(measured)
-        if not worse.any():
-            return found, measured, tuple(names[j] for j in np.flatnonzero(step))
-        step[(ratios[worse] > _BENT).any(axis=0)] += 1
-        if step.max() >= len(_BACK):
-            step = np.minimum(step, len(_BACK) - 1)

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import dataclass
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,13 +12,13 @@ from warpjld.covering.covering import Covering
 from warpjld.covering.dihedral import dihedral_angles, hinges
 from warpjld.covering.intersections import Crossings, crossing_faces, surface_parts
 from warpjld.covering.quality import edge_stretch, unique_edges
-from warpjld.covering.volume_form import ClosedSurface
+from warpjld.covering.volume_form import ClosedSurface, any_of
 from warpjld.skeleton.kinematics import Poses
 
-__all__ = ["Guard", "PoseMeasures", "TOLERANCES", "Tolerances"]
+__all__ = ["TOLERANCES", "Guard", "PoseMeasures", "Tolerances"]
 
 _SHARP = np.radians(60.0)  # faces cross where the skin has been bent; poses that bend none so far are not searched
-_FACES_CHECKED = 1_000_000  # faces searched for crossings, all poses together
+_FACES_SEARCHED = 1_000_000  # for crossings, in all poses together
 
 
 @dataclass(frozen=True)
@@ -27,8 +27,9 @@ class Tolerances:
 
     Attributes:
         volume: Growth of the volume error, of the whole; and
-        volume_free: error of the whole, and
-        region_free: of what the pose moves, below which it may grow at will: all three have to be passed.
+        region: of what the pose moves, that do not count.
+        volume_free: Error of the whole, and
+        region_free: of what the pose moves, up to which it may grow at will.
         folds: Faces that fold, as a factor and
         folds_more: as a number.
         roughness: As a factor, and
@@ -36,12 +37,13 @@ class Tolerances:
     """
 
     volume: float = 0.001
+    region: float = 0.01
     volume_free: float = 0.009
     region_free: float = 0.05
-    folds: float = 1.02
-    folds_more: float = 2.0
-    roughness: float = 1.03
-    roughness_more: float = float(np.radians(0.05))
+    folds: float = 1.0
+    folds_more: int = 0
+    roughness: float = 1.04
+    roughness_more: float = float(np.radians(0.07))
 
 
 TOLERANCES = Tolerances()
@@ -53,27 +55,31 @@ class PoseMeasures:
 
     Attributes:
         volume: Relative change of the volume of the flesh, shape (F,).
+        roughness: RMS growth of dihedral angles beyond rest [rad], shape (F,).
+        least, largest: Edge stretch of what amplitudes move, shape (F,).
         folds: Faces that cross others of the same part or of one that it joins on to, more than at rest, shape (F,).
         contacts: Faces that cross those of another part, likewise.
-        roughness: RMS growth of dihedral angles beyond rest [rad], shape (F,).
-        least, largest: Edge stretch, shape (F,).
+        folded: Vertices of the former in each pose.
+        sharper: Squared growth of the dihedral angles that amplitudes change [rad²], in each pose.
     """
 
     volume: NDArray[np.float64]
-    folds: NDArray[np.int64]
-    contacts: NDArray[np.int64]
     roughness: NDArray[np.float64]
     least: NDArray[np.float64]
     largest: NDArray[np.float64]
+    folds: NDArray[np.int64]
+    contacts: NDArray[np.int64]
+    folded: list[NDArray[np.int64]]
+    sharper: list[NDArray[np.float64]]
 
 
 class Guard:
     """Measures coverings of one surface in the same poses, and compares them to the first.
 
     Args:
-        covering: What others are compared to.
+        covering: What others are compared to; they differ from it in amplitudes.
         poses: F poses.
-        moved: Vertices that amplitudes move in each pose: folds are looked for among them.
+        moved: Vertices that amplitudes move in each pose: nothing else is looked at.
         region: Volume that each pose moves [m³], shape (F,).
         tolerances: What counts as worse.
     """
@@ -82,73 +88,95 @@ class Guard:
         self,
         covering: Covering,
         poses: Poses,
-        moved: list[NDArray[np.int64]],
+        moved: Sequence[NDArray[np.int64]],
         region: NDArray[np.float64],
         tolerances: Tolerances = TOLERANCES,
+        progress: Callable[[int, int], None] | None = None,
     ) -> None:
         surface, flesh = covering.surface, covering.flesh
         self._poses, self._moved, self._tolerances = poses, moved, tolerances
         self._closed = ClosedSurface(flesh)
         self._rest, self._faces = np.asarray(surface.vertices, dtype=np.float64), flesh.faces
-        self._edges, self._hinges = unique_edges(flesh.faces), hinges(flesh.faces)
-        self._dihedral = dihedral_angles(self._rest, self._hinges)
-        owner = {tuple(f): n for n, f in enumerate(surface.faces.tolist())}
+        self._edges, self.hinges = unique_edges(flesh.faces), hinges(flesh.faces)
+        self._dihedral = dihedral_angles(self._rest, self.hinges)
         parts = surface_parts(covering)
-        self._parts = parts.of_face[[owner[tuple(f)] for f in flesh.faces.tolist()]]
+        # faces of the flesh are some of the surface's, in its order
+        soft = (covering.anchors.rigid[surface.faces] < 0).any(axis=1)
+        self._parts = parts.of_face[soft]
         self._joined = _joined(parts.names, covering.skeleton.names, covering.skeleton.parents)
         self._crossing = _keys(crossing_faces(self._rest, flesh.faces), len(flesh.faces))
         self._relative = self._closed.volume / region
-        self._searched = np.zeros(len(poses), dtype=bool)
-        self.first: PoseMeasures
-        self.first = self.measure(covering)
+        self._searched = np.cumsum([2 * len(points) for points in moved]) <= _FACES_SEARCHED
+        self._still = np.zeros(len(poses))
+        self.first = self._empty(len(poses))
+        self.measure(covering, np.arange(len(poses)), self.first, progress)
 
-    def measure(self, covering: Covering, progress: Callable[[int, int], None] | None = None) -> PoseMeasures:
-        """Of another covering of the surface."""
-        count = len(self._poses)
-        out = PoseMeasures(
-            *(np.zeros(count, dtype=kind) for kind in (float, np.int64, np.int64, float, float, float))
-        )
-        left = _FACES_CHECKED
-        for start, block in covering.blocks(self._poses):
-            for k, surface in enumerate(block):
-                f, points = start + k, surface.astype(np.float64)
-                out.volume[f] = self._closed.volume_of(points) / self._closed.volume - 1.0
-                stretch = edge_stretch(self._rest, points, self._edges)
-                out.least[f], out.largest[f] = stretch.min(), stretch.max()
-                growth = np.maximum(dihedral_angles(points, self._hinges) - self._dihedral, 0.0)
-                out.roughness[f] = np.sqrt((growth**2).mean())
-                if growth.max(initial=0.0) > _SHARP and left > 0:
-                    out.folds[f], out.contacts[f], searched = self._crossings(points, self._moved[f])
-                    left -= searched
-                if progress:
-                    progress(f + 1, count)
-        return out
+    @staticmethod
+    def _empty(count: int) -> PoseMeasures:
+        numbers = [np.zeros(count, dtype=kind) for kind in (float, float, float, float, np.int64, np.int64)]
+        none = [np.zeros(0, dtype=np.int64)] * count
+        return PoseMeasures(*numbers, list(none), list(none))
 
-    def worse(self, measured: PoseMeasures) -> NDArray[np.bool_]:
-        """Poses that are worse than at first, shape (F,)."""
+    def measure(
+        self,
+        covering: Covering,
+        which: NDArray[np.int64],
+        into: PoseMeasures,
+        progress: Callable[[int, int], None] | None = None,
+    ) -> None:
+        """Measure some poses of a covering."""
+        for done, f in enumerate(which.tolist()):
+            points = covering.deform(self._poses[f : f + 1])[0].astype(np.float64)
+            inside = np.zeros(len(points), dtype=bool)
+            inside[self._moved[f]] = True
+            local = any_of(inside, self.hinges)
+            if into is self.first:
+                self._still[f] = (self._growth(points, ~local) ** 2).sum()
+            growth = self._growth(points, local)
+            into.sharper[f] = growth**2
+            into.volume[f] = self._closed.volume_of(points) / self._closed.volume - 1.0
+            into.roughness[f] = np.sqrt((self._still[f] + into.sharper[f].sum()) / max(len(self.hinges), 1))
+            edges = self._edges[any_of(inside, self._edges)]
+            stretch = edge_stretch(self._rest, points, edges) if len(edges) else np.ones(1)
+            into.least[f], into.largest[f] = stretch.min(), stretch.max()
+            if self._searched[f] and growth.max(initial=0.0) > _SHARP:
+                self._search(points, inside, f, into)
+            if progress:
+                progress(done + 1, len(which))
+
+    def local_hinges(self, pose: int) -> NDArray[np.int64]:
+        """The hinges of ``PoseMeasures.sharper``, shape (H, 4)."""
+        inside = np.zeros(len(self._rest), dtype=bool)
+        inside[self._moved[pose]] = True
+        return self.hinges[any_of(inside, self.hinges)]
+
+    def _growth(self, points: NDArray[np.float64], which: NDArray[np.bool_]) -> NDArray[np.float64]:
+        return np.maximum(dihedral_angles(points, self.hinges[which]) - self._dihedral[which], 0.0)
+
+    def worse(self, measured: PoseMeasures) -> tuple[NDArray[np.bool_], NDArray[np.bool_], NDArray[np.bool_]]:
+        """Poses that have lost volume, that fold more and that are rougher than at first, shape (F,) each."""
         t, first = self._tolerances, self.first
         error, before = np.abs(measured.volume), np.abs(first.volume)
-        more = error - before
-        emptier = (more > 0.0) & (more > t.volume) & (error > t.volume_free)
-        emptier |= (more * self._relative > 0.01) & (error * self._relative > t.region_free)
+        emptier = error > np.maximum(before + t.volume, t.volume_free)
+        emptier |= error * self._relative > np.maximum(before * self._relative + t.region, t.region_free)
         folded = measured.folds > t.folds * first.folds + t.folds_more
         rougher = measured.roughness > t.roughness * first.roughness + t.roughness_more
-        import os
-        if os.environ.get("GUARD"):
-            for f in np.flatnonzero(emptier | folded | rougher):
-                print("worse", f, "EMPTY" if emptier[f] else "", "FOLD" if folded[f] else "", "ROUGH" if rougher[f] else "", first.volume[f].round(4), measured.volume[f].round(4), self._relative[f].round(1), first.folds[f], measured.folds[f], np.degrees(first.roughness[f]).round(3), np.degrees(measured.roughness[f]).round(3))
-        return np.asarray(emptier | folded | rougher)
+        return emptier, folded, rougher
 
-    def _crossings(self, points: NDArray[np.float64], moved: NDArray[np.int64]) -> tuple[int, int, int]:
-        """Faces that fold, faces in contact, and faces searched."""
-        inside = np.zeros(len(points), dtype=bool)
-        inside[moved] = True
-        faces = np.flatnonzero(inside[self._faces].any(axis=1))
+    def _search(self, points: NDArray[np.float64], inside: NDArray[np.bool_], f: int, into: PoseMeasures) -> None:
+        faces = np.flatnonzero(any_of(inside, self._faces))
         pairs = faces[crossing_faces(points, self._faces[faces]).pairs].reshape(-1, 2)
         pairs = pairs[~np.isin(pairs[:, 0] * len(self._faces) + pairs[:, 1], self._crossing)]
         a, b = self._parts[pairs].T
         folds = self._joined[a, b]
-        return len(np.unique(pairs[folds])), len(np.unique(pairs[~folds])), len(faces)
+        folded = np.unique(pairs[folds])
+        into.folds[f], into.contacts[f] = len(folded), len(np.unique(pairs[~folds]))
+        into.folded[f] = np.unique(self._faces[folded])
+
+
+def copy_of(measures: PoseMeasures) -> PoseMeasures:
+    """Measures of other poses can be written into, one by one."""
+    return replace(measures, **{name: value.copy() for name, value in vars(measures).items()})
 
 
 def _keys(crossings: Crossings, faces: int) -> NDArray[np.int64]:

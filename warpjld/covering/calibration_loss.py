@@ -7,21 +7,24 @@ roughness nor its volume error shall grow.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
 import scipy.sparse as sp
 from numpy.typing import NDArray
 
-from warpjld.covering.amplitudes import Frame
+from warpjld.covering.amplitudes import Frame, LinearDeformation
 from warpjld.covering.calibration_guard import TOLERANCES, Tolerances
 from warpjld.covering.constrained_least_squares import Linearised
+from warpjld.covering.covering import Covering
 from warpjld.covering.dihedral import dihedral_angles, dihedral_slopes, hinges
 from warpjld.covering.quality import unique_edges
-from warpjld.covering.volume_form import ClosedSurface, VolumeForm
+from warpjld.covering.volume_form import ClosedSurface, VolumeForm, any_of
+from warpjld.skeleton.kinematics import Poses
 from warpjld.surface import Surface
 
-__all__ = ["LossTerms", "LossWeights", "PoseLoss", "SurfaceLoss"]
+__all__ = ["LossTerms", "LossWeights", "PoseLoss", "PoseLosses", "SurfaceLoss"]
 
 _STRETCHED = 0.5  # logarithm of stretch, and
 _SHARP = 1.0  # growth of a dihedral angle [rad], from which on edges weigh with the fourth power: creases and folds
@@ -131,13 +134,13 @@ class PoseLoss:
         free = min(may.volume_free * shared.closed.volume, may.region_free * region)
         self._volume_kept = max(abs(self._volume.constant), free)
 
-        edge = np.flatnonzero(moved[shared.edges].any(axis=1))
+        edge = np.flatnonzero(any_of(moved, shared.edges))
         log = np.log(_lengths(points, shared.edges[edge]) / shared.length[edge])
         edge, times = _sampled(edge, shared.length[edge] * _steeper(log, _STRETCHED)[0] ** 2)
         self._length = shared.length[edge]
         self._of_stretch = np.sqrt(w.stretch * times * self._length / (times * self._length).sum())
 
-        hinge = np.flatnonzero(moved[shared.hinges].any(axis=1))
+        hinge = np.flatnonzero(any_of(moved, shared.hinges))
         grown = np.maximum(dihedral_angles(points, shared.hinges[hinge]) - shared.dihedral[hinge], 0.0)
         hinge, self._times = _sampled(hinge, grown**2)
         self._dihedral, self._least = shared.dihedral[hinge], shared.least[hinge]
@@ -199,6 +202,10 @@ class PoseLoss:
         by_amplitude = [self._of_volume * by_lost[None], by_stretch, (of_sharp * slope)[:, None] * by_angle]
         return Linearised(np.concatenate(residuals), np.concatenate(by_amplitude), constraints, slopes)
 
+    def volume_slope(self, amplitudes: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Derivative of the volume by ``parameters`` [m³], shape (p,)."""
+        return self._volume.lost(amplitudes[self.parameters] - self._start)[1]
+
     def _at(self, change: NDArray[np.float64]) -> NDArray[np.float64]:
         return np.asarray(self._points + self._directions @ change)
 
@@ -213,11 +220,62 @@ class PoseLoss:
         self, points: NDArray[np.float64]
     ) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
         along = points[self._edges[:, 1]] - points[self._edges[:, 0]]
-        squared = np.maximum((along**2).sum(axis=1), (_SHORTEST * self._length) ** 2)
+        squared = np.maximum(np.einsum("ij,ij->i", along, along), (_SHORTEST * self._length) ** 2)
         return 0.5 * np.log(squared) - np.log(self._length), along, squared
 
     def _growth(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
         return np.maximum(dihedral_angles(points, self._hinges) - self._dihedral, 0.0)
+
+
+class PoseLosses:
+    """The losses of all poses of a covering, and what amplitudes move in each.
+
+    Attributes:
+        of_pose: Loss of each pose; None where amplitudes move nothing.
+        moved: Vertices that they move.
+        regions: Volume that they move [m³], shape (F,).
+        ratios: Flexion ratios, shape (F, J).
+
+    Args:
+        covering: At the amplitudes to start from.
+        poses: F poses.
+        fitted: The first that many are fitted to, the others are only held.
+        weights: Weights of the terms.
+        progress: Called with poses done, and how many there are.
+    """
+
+    def __init__(
+        self,
+        covering: Covering,
+        poses: Poses,
+        fitted: int,
+        weights: LossWeights | None = None,
+        progress: Callable[[int, int], None] | None = None,
+    ) -> None:
+        shared = SurfaceLoss(covering.flesh, covering.fields.positions @ covering.skeleton.rest, weights)
+        deformation = LinearDeformation(covering, poses)
+        self.of_pose: list[PoseLoss | None] = []
+        self.moved: list[NDArray[np.int64]] = []
+        self.regions = np.zeros(len(poses))
+        self.ratios = np.zeros((len(poses), len(covering.skeleton)))
+        self._fitted = fitted
+        for frame in deformation.frames():
+            self.of_pose.append(shared.pose(frame, deformation.amplitudes, only_held=frame.number >= fitted))
+            self.moved.append(frame.moved)
+            self.regions[frame.number] = shared.region(frame)
+            self.ratios[frame.number] = frame.ratio
+            if progress:
+                progress(frame.number + 1, len(poses))
+
+    @property
+    def parts(self) -> list[PoseLoss]:
+        """Of all poses in which amplitudes move anything."""
+        return [part for part in self.of_pose if part is not None]
+
+    @property
+    def fitted(self) -> list[PoseLoss]:
+        """Those of them that are fitted to."""
+        return [part for part in self.of_pose[: self._fitted] if part is not None]
 
 
 def _dense(directions: sp.csr_array, number: NDArray[np.int64], count: int) -> NDArray[np.float64]:
@@ -251,7 +309,7 @@ def _steeper(x: NDArray[np.float64], beyond: float) -> tuple[NDArray[np.float64]
 
 def _lengths(points: NDArray[np.float64], edges: NDArray[np.int64]) -> NDArray[np.float64]:
     along = points[edges[:, 1]] - points[edges[:, 0]]
-    return np.asarray(np.maximum(np.sqrt((along**2).sum(axis=1)), 1e-30))
+    return np.asarray(np.maximum(np.sqrt(np.einsum("ij,ij->i", along, along)), 1e-30))
 
 
 def _volume_behind(

@@ -24,8 +24,8 @@ def hinges(faces: NDArray[np.integer]) -> NDArray[np.int64]:
 def dihedral_angles(points: NDArray[np.float64], hinge: NDArray[np.int64]) -> NDArray[np.float64]:
     """Unsigned angle [rad] between the normals of the two faces of each hinge, 0 where flat, shape (H,)."""
     one, other = _normals(points, hinge)
-    sine = np.sqrt((_cross(one, other) ** 2).sum(axis=1))
-    return np.asarray(np.arctan2(sine, (one * other).sum(axis=1)))
+    across = _cross(one, other)
+    return np.asarray(np.arctan2(np.sqrt(_dot(across, across)), _dot(one, other)))
 
 
 def dihedral_slopes(
@@ -41,14 +41,14 @@ def dihedral_slopes(
     one, other = _normals(points, hinge)
     i, j, k, m = (points[hinge[:, n]] for n in range(4))
     along = j - i
-    length = np.maximum(np.linalg.norm(along, axis=1, keepdims=True), 1e-30)
+    length = np.maximum(np.sqrt(_dot(along, along)), 1e-30)[:, None]
     # a face turns about the edge by height⁻¹ = length / |n| of how far its corner moves along its normal
-    a = one / np.maximum((one**2).sum(axis=1), least[:, 0] ** 2)[:, None]
-    b = other / np.maximum((other**2).sum(axis=1), least[:, 1] ** 2)[:, None]
-    sign = np.where((_cross(one, other) * along).sum(axis=1) > 0.0, -1.0, 1.0)[:, None]
+    a = one / np.maximum(_dot(one, one), least[:, 0] ** 2)[:, None]
+    b = other / np.maximum(_dot(other, other), least[:, 1] ** 2)[:, None]
+    sign = np.where(_dot(_cross(one, other), along) > 0.0, -1.0, 1.0)[:, None]
 
     def share(corner: NDArray[np.float64], end: NDArray[np.float64]) -> NDArray[np.float64]:
-        return np.asarray(((corner - end) * along).sum(axis=1, keepdims=True) / length)
+        return _dot(corner - end, along)[:, None] / length
 
     by_i = share(k, j) * a + share(m, j) * b
     by_j = -share(k, i) * a - share(m, i) * b
@@ -67,3 +67,7 @@ def _cross(a: NDArray[np.float64], b: NDArray[np.float64]) -> NDArray[np.float64
     """Cross products of rows; of many short arrays far quicker than NumPy's."""
     (ax, ay, az), (bx, by, bz) = a.T, b.T
     return np.column_stack([ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx])
+
+
+def _dot(a: NDArray[np.float64], b: NDArray[np.float64]) -> NDArray[np.float64]:
+    return np.asarray(np.einsum("ij,ij->i", a, b))

@@ -130,14 +130,13 @@ def _thumbs(skeleton: Skeleton, bends: NDArray[np.int64], largest: NDArray[np.fl
 
 
 def _random(
-    skeleton: Skeleton, bends: NDArray[np.int64], largest: NDArray[np.float64], seed: int, frames: int = 8
+    skeleton: Skeleton, bends: NDArray[np.int64], largest: NDArray[np.float64], seed: int, frames: int = 4
 ) -> NDArray[np.float64]:
     """Flexion anywhere up to the limit, abduction in the inner half of its range."""
     generator = np.random.default_rng(seed)
-    names = [skeleton.names[j].removeprefix("left.").removeprefix("right.") for j in bends]
-    kind = np.unique(names, return_inverse=True)[1]
+    known, kind = _without_side(skeleton, bends)
     angles = np.zeros((frames, len(skeleton), len(CHANNELS)))
-    part = generator.uniform(0.0, 1.0, (frames, 2, len(bends)))[:, :, kind]
+    part = generator.uniform(0.0, 1.0, (frames, 2, len(known)))[:, :, kind]
     angles[:, bends, _FLEXION] = part[:, 0] * largest[bends]
     low, high = (np.clip(skeleton.limits[bends, _ABDUCTION, k], -_WIDEST / 4, _WIDEST / 4) for k in (0, 1))
     angles[:, bends, _ABDUCTION] = 0.5 * (low + part[:, 1] * (high - low))
@@ -147,9 +146,18 @@ def _random(
 def _alone(
     skeleton: Skeleton, bends: NDArray[np.int64], largest: NDArray[np.float64], part: float
 ) -> NDArray[np.float64]:
-    angles = np.zeros((len(bends), len(skeleton), len(CHANNELS)))
-    angles[np.arange(len(bends)), bends, _FLEXION] = part * largest[bends]
+    """One joint a frame, on both sides of a body at once."""
+    _, kind = _without_side(skeleton, bends)
+    angles = np.zeros((int(kind.max()) + 1, len(skeleton), len(CHANNELS)))
+    angles[kind, bends, _FLEXION] = part * largest[bends]
     return angles
+
+
+def _without_side(skeleton: Skeleton, joints: NDArray[np.int64]) -> tuple[list[str], NDArray[np.int64]]:
+    """Names of joints without their side, in the order in which they come, and which of them each joint is."""
+    names = [skeleton.names[j].removeprefix("left.").removeprefix("right.") for j in joints]
+    known = list(dict.fromkeys(names))
+    return known, np.array([known.index(name) for name in names])
 
 
 def _digit(name: str) -> str:
