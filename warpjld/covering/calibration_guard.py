@@ -17,7 +17,9 @@ from warpjld.skeleton.kinematics import Poses
 
 __all__ = ["TOLERANCES", "Guard", "PoseMeasures", "Tolerances"]
 
-_SHARP = np.radians(60.0)  # faces cross where the skin has been bent; poses that bend none so far are not searched
+_SHARP = np.radians(40.0)  # growth of a dihedral angle without which skin does not cross itself, and
+_RINGS = 4  # of faces around such hinges, among which crossings are looked for
+_BLOCK = 16  # poses deformed at once
 _FACES_SEARCHED = 1_000_000  # for crossings, in all poses together
 
 
@@ -40,8 +42,8 @@ class Tolerances:
     region: float = 0.01
     volume_free: float = 0.009
     region_free: float = 0.05
-    folds: float = 1.0
-    folds_more: int = 0
+    folds: float = 1.01
+    folds_more: int = 1
     roughness: float = 1.04
     roughness_more: float = float(np.radians(0.07))
 
@@ -57,7 +59,8 @@ class PoseMeasures:
         volume: Relative change of the volume of the flesh, shape (F,).
         roughness: RMS growth of dihedral angles beyond rest [rad], shape (F,).
         least, largest: Edge stretch of what amplitudes move, shape (F,).
-        folds: Faces that cross others of the same part or of one that it joins on to, more than at rest, shape (F,).
+        folds: Faces that cross others of the same part or of one that it joins on to, and did not at rest, shape (F,).
+            They are looked for where the skin is sharply bent, in as many poses as are quickly searched.
         contacts: Faces that cross those of another part, likewise.
         folded: Vertices of the former in each pose.
         sharper: Squared growth of the dihedral angles that amplitudes change [rad²], in each pose.
@@ -126,23 +129,31 @@ class Guard:
     ) -> None:
         """Measure some poses of a covering."""
         for done, f in enumerate(which.tolist()):
-            points = covering.deform(self._poses[f : f + 1])[0].astype(np.float64)
-            inside = np.zeros(len(points), dtype=bool)
-            inside[self._moved[f]] = True
-            local = any_of(inside, self.hinges)
-            if into is self.first:
-                self._still[f] = (self._growth(points, ~local) ** 2).sum()
-            growth = self._growth(points, local)
-            into.sharper[f] = growth**2
-            into.volume[f] = self._closed.volume_of(points) / self._closed.volume - 1.0
-            into.roughness[f] = np.sqrt((self._still[f] + into.sharper[f].sum()) / max(len(self.hinges), 1))
-            edges = self._edges[any_of(inside, self._edges)]
-            stretch = edge_stretch(self._rest, points, edges) if len(edges) else np.ones(1)
-            into.least[f], into.largest[f] = stretch.min(), stretch.max()
-            if self._searched[f] and growth.max(initial=0.0) > _SHARP:
-                self._search(points, inside, f, into)
+            if done % _BLOCK == 0:
+                some = which[done : done + _BLOCK]
+                p = self._poses
+                block = covering.deform(Poses(p.positions[some], p.rotations[some], p.flexion[some]))
+            self._measure(block[done % _BLOCK].astype(np.float64), f, into)
             if progress:
                 progress(done + 1, len(which))
+
+    def _measure(self, points: NDArray[np.float64], f: int, into: PoseMeasures) -> None:
+        inside = np.zeros(len(points), dtype=bool)
+        inside[self._moved[f]] = True
+        local = any_of(inside, self.hinges)
+        if into is self.first:
+            self._still[f] = (self._growth(points, ~local) ** 2).sum()
+        growth = self._growth(points, local)
+        into.sharper[f] = growth**2
+        into.volume[f] = self._closed.volume_of(points) / self._closed.volume - 1.0
+        into.roughness[f] = np.sqrt((self._still[f] + into.sharper[f].sum()) / max(len(self.hinges), 1))
+        edges = self._edges[any_of(inside, self._edges)]
+        stretch = edge_stretch(self._rest, points, edges) if len(edges) else np.ones(1)
+        into.least[f], into.largest[f] = stretch.min(), stretch.max()
+        into.folds[f], into.contacts[f], into.folded[f] = 0, 0, np.zeros(0, dtype=np.int64)
+        sharp = self.hinges[local][growth > _SHARP]
+        if self._searched[f] and len(sharp):
+            self._search(points, sharp, f, into)
 
     def local_hinges(self, pose: int) -> NDArray[np.int64]:
         """The hinges of ``PoseMeasures.sharper``, shape (H, 4)."""
@@ -163,8 +174,13 @@ class Guard:
         rougher = measured.roughness > t.roughness * first.roughness + t.roughness_more
         return emptier, folded, rougher
 
-    def _search(self, points: NDArray[np.float64], inside: NDArray[np.bool_], f: int, into: PoseMeasures) -> None:
-        faces = np.flatnonzero(any_of(inside, self._faces))
+    def _search(self, points: NDArray[np.float64], sharp: NDArray[np.int64], f: int, into: PoseMeasures) -> None:
+        """Count crossings near hinges that have become sharp."""
+        near = np.zeros(len(points), dtype=bool)
+        near[sharp] = True
+        for _ in range(_RINGS):
+            near[self._faces[any_of(near, self._faces)]] = True
+        faces = np.flatnonzero(any_of(near, self._faces))
         pairs = faces[crossing_faces(points, self._faces[faces]).pairs].reshape(-1, 2)
         pairs = pairs[~np.isin(pairs[:, 0] * len(self._faces) + pairs[:, 1], self._crossing)]
         a, b = self._parts[pairs].T

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from itertools import count
 
 import numpy as np
 import scipy.sparse as sp
@@ -15,7 +16,8 @@ from warpjld.covering.covering import Covering
 
 __all__ = ["retreat"]
 
-_LEFT = (1.0, 0.7, 0.4, 0.0)  # of an amplitude's change, each time that it makes a pose worse
+_ROUNDS = 3  # after which what makes a pose worse goes back all the way
+_LEFT = (1.0, 0.5, 0.0)  # of an amplitude's change, each time that it makes a pose worse
 _SHARE = 0.3  # of what the amplitude does that does most in the same place, from which on one is held responsible
 
 
@@ -44,7 +46,7 @@ def retreat(
     level = np.zeros(len(start), dtype=np.int64)
     measured = copy_of(guard.first)
     changed = change != 0.0
-    while True:
+    for attempt in count():
         amplitudes = start + np.array(_LEFT)[level] * change
         other = covering.with_parameters(with_amplitudes(covering.parameters, amplitudes))
         again = np.array([f for f, p in enumerate(losses.of_pose) if p is not None and changed[p.parameters].any()])
@@ -71,7 +73,7 @@ def retreat(
             doing = np.zeros(len(start))
             doing[part.parameters] = np.abs((fields.T @ weight) * change)[part.parameters]
             blame += _relative(doing * (level < len(_LEFT) - 1))
-            level[(blame >= _SHARE) & (level == before)] += 1
+            level[(blame >= _SHARE) & (level == before)] += 1 if attempt < _ROUNDS else len(_LEFT)
         level = np.minimum(level, len(_LEFT) - 1)
         changed = level != before
         if not changed.any():  # what is left to go back does nothing for the poses that are worse

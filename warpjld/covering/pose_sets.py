@@ -45,7 +45,7 @@ def calibration_poses(skeleton: Skeleton, count: int | None = None) -> Poses:
     bends, largest = _range(skeleton)
     kinds = [
         _curls(skeleton, _CURLS),
-        _digits(skeleton),
+        _digits(skeleton, bends, largest),
         _thumbs(skeleton, bends, largest),
         _alone(skeleton, bends, largest, 1.0),
         _alone(skeleton, bends, largest, 0.5),
@@ -60,16 +60,20 @@ def calibration_poses(skeleton: Skeleton, count: int | None = None) -> Poses:
 def guard_poses(skeleton: Skeleton, *, seed: int = 0) -> Poses:
     """Poses of many joints at once, that nothing is fitted to but none of which may get worse.
 
-    Fists (every joint of index to pinky at 0.5 and 0.8 of its flexion), and random poses within the limits, alike on
-    both sides of a body.
+    Fists (every joint of the digits at 0.5 and 0.8 of its flexion), joints of trunk, arms and legs alone at three
+    quarters, and random poses within the limits, alike on both sides of a body.
 
     Raises:
         InputError: A skeleton whose joints cannot flex.
     """
     bends, largest = _range(skeleton)
-    return poses_from_angles(
-        skeleton, np.concatenate([_fists(skeleton, bends, largest), _random(skeleton, bends, largest, seed)])
-    )
+    limbs = np.array([j for j in bends if "." not in skeleton.names[j].partition(".")[2]], dtype=np.int64)
+    kinds = [
+        _fists(skeleton, bends, largest),
+        _alone(skeleton, limbs, largest, 0.75),
+        _random(skeleton, bends, largest, seed),
+    ]
+    return poses_from_angles(skeleton, np.concatenate(kinds))
 
 
 def _range(skeleton: Skeleton) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
@@ -97,26 +101,26 @@ def _curls(skeleton: Skeleton, amounts: NDArray[np.float64] | list[float] | tupl
     return angles
 
 
-def _digits(skeleton: Skeleton) -> NDArray[np.float64]:
-    """Index to pinky one by one, half and nearly curled, on all hands at once."""
-    out = []
-    for digit in DIGITS[:-1]:
-        angles = _curls(skeleton, _ONE_BY_ONE)
-        others = [j for j, name in enumerate(skeleton.names) if _digit(name) != digit]
-        if angles.any():
-            angles[:, others] = 0.0
-            out.append(angles)
-    out = [a for a in out if a.any()]
-    return np.concatenate(out) if out else np.zeros((0, len(skeleton), len(CHANNELS)))
+def _digits(skeleton: Skeleton, bends: NDArray[np.int64], largest: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Digits one by one, half and nearly curled, on all hands at once."""
+    full = _curls(skeleton, [1.0])[0] if _curls(skeleton, [1.0]).size else np.zeros((len(skeleton), len(CHANNELS)))
+    thumbs = [j for j in bends if _digit(skeleton.names[j]) == DIGITS[-1] and not skeleton.names[j].endswith(".base")]
+    full[thumbs, _FLEXION] = largest[thumbs]
+    digit = np.array([_digit(name) for name in skeleton.names])
+    alone = [np.where((digit == d)[:, None], full, 0.0) for d in DIGITS]
+    angles = [part * one for one in alone if one.any() for part in _ONE_BY_ONE]
+    return np.array(angles).reshape(-1, len(skeleton), len(CHANNELS))
 
 
 def _fists(skeleton: Skeleton, bends: NDArray[np.int64], largest: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Metacarpals and fingers half and nearly closed."""
-    fingers = [j for j in bends if _digit(skeleton.names[j]) in DIGITS[:-1]]
+    """Metacarpals and fingers half and nearly closed, the thumb opposed and bent beside them."""
+    digits = [j for j in bends if _digit(skeleton.names[j])]
+    roots = [j for j in bends if skeleton.names[j].endswith("thumb.base")]
     angles = np.zeros((2, len(skeleton), len(CHANNELS)))
     for frame, amount in enumerate((0.5, 0.8)):
-        angles[frame, fingers, _FLEXION] = amount * largest[fingers]
-    return angles[[bool(fingers)] * 2]
+        angles[frame, digits, _FLEXION] = amount * largest[digits]
+        angles[frame, roots, _ABDUCTION] = 0.5 * amount * skeleton.limits[roots, _ABDUCTION, 0]
+    return angles[[bool(digits)] * 2]
 
 
 def _thumbs(skeleton: Skeleton, bends: NDArray[np.int64], largest: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -147,8 +151,8 @@ def _alone(
     skeleton: Skeleton, bends: NDArray[np.int64], largest: NDArray[np.float64], part: float
 ) -> NDArray[np.float64]:
     """One joint a frame, on both sides of a body at once."""
-    _, kind = _without_side(skeleton, bends)
-    angles = np.zeros((int(kind.max()) + 1, len(skeleton), len(CHANNELS)))
+    known, kind = _without_side(skeleton, bends)
+    angles = np.zeros((len(known), len(skeleton), len(CHANNELS)))
     angles[kind, bends, _FLEXION] = part * largest[bends]
     return angles
 
@@ -157,7 +161,7 @@ def _without_side(skeleton: Skeleton, joints: NDArray[np.int64]) -> tuple[list[s
     """Names of joints without their side, in the order in which they come, and which of them each joint is."""
     names = [skeleton.names[j].removeprefix("left.").removeprefix("right.") for j in joints]
     known = list(dict.fromkeys(names))
-    return known, np.array([known.index(name) for name in names])
+    return known, np.array([known.index(name) for name in names], dtype=np.int64)
 
 
 def _digit(name: str) -> str:
