@@ -114,7 +114,7 @@ def calibrate(
     fit = minimise(
         losses.parts,
         start,
-        (np.zeros_like(start), np.where(start > 0.0, np.maximum(start, _HIGHEST), 0.0)),
+        (np.zeros_like(start), np.maximum(start, _HIGHEST)),
         np.full(len(start), _PULL),
         evaluations=iterations,
         progress=lambda done, total: tell("fitting", done, total),

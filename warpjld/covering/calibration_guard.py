@@ -75,6 +75,21 @@ class PoseMeasures:
     folded: list[NDArray[np.int64]]
     sharper: list[NDArray[np.float64]]
 
+    def summary(self) -> dict[str, float | int]:
+        """Of all poses: volume error as a root of the mean square and the worst one [%], roughness as a root of the
+        mean square and the worst [degrees], stretch, and faces summed up."""
+        worst = int(np.abs(self.volume).argmax())
+        return {
+            "volume_rms": 100.0 * float(np.sqrt((self.volume**2).mean())),
+            "volume_worst": 100.0 * float(self.volume[worst]),
+            "roughness_rms": float(np.degrees(np.sqrt((self.roughness**2).mean()))),
+            "roughness_worst": float(np.degrees(self.roughness.max())),
+            "stretch_least": float(self.least.min()),
+            "stretch_largest": float(self.largest.max()),
+            "faces_folded": int(self.folds.sum()),
+            "faces_in_contact": int(self.contacts.sum()),
+        }
+
 
 class Guard:
     """Measures coverings of one surface in the same poses, and compares them to the first.
