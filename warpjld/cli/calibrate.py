@@ -149,7 +149,8 @@ def _table(found: Calibration, before: dict[str, Any], after: dict[str, Any]) ->
         f"{found.poses} poses, {found.guards} more guarded, {found.iterations} iterations, {found.seconds:.1f} s",
         f"{'':30}{'before':>9}{'after':>9}",
     ]
-    lines += [f"{name:30}{before[key]:>9{form}}{after[key]:>9{form}}" for key, (name, form) in _ROWS.items()]
+    for key, (name, form) in _ROWS.items():
+        lines.append(f"{name:30}{format(before[key], form):>9}{format(after[key], form):>9}")
     if found.kept:
         joints = f"{len(found.kept)} joint{'s' * (len(found.kept) != 1)}"
         lines.append(f"note: {joints} went back towards the start, or poses would have got worse")
@@ -166,7 +167,7 @@ def _fitted(
     wanted = read_targets(targets, rig, motion=motion)
     warn(wanted.warnings)
     found = fit_targets(covering, wanted.poses, wanted.vertices, iterations=iterations, progress=report)
-    before, after = ({"rms_mm": 1e3 * rms, "largest_mm": 1e3 * far} for rms, far in zip(found.rms, found.farthest))
+    before, after = ({"rms_mm": 1e3 * rms, "largest_mm": 1e3 * far} for rms, far in zip(found.rms, found.farthest, strict=True))
     summary = {
         "targets": str(targets),
         "poses": len(wanted.poses),
