@@ -1,4 +1,4 @@
-"""``warpjld calibrate``: fit the covering's parameters to a rig, or to shapes it shall have, and write them to a file."""
+"""``warpjld calibrate``: fit the covering's parameters to a rig, or to shapes that it shall have."""
 
 from __future__ import annotations
 
@@ -123,9 +123,7 @@ def _calibrated(
     from warpjld.covering.calibrate import calibrate
     from warpjld.covering.pose_sets import calibration_poses
 
-    found = calibrate(
-        covering, calibration_poses(covering.skeleton, poses), iterations=iterations, progress=report
-    )
+    found = calibrate(covering, calibration_poses(covering.skeleton, poses), iterations=iterations, progress=report)
     before, after = (
         {"loss": loss, **measures.summary()}
         for loss, measures in zip(found.loss, (found.before, found.after), strict=True)
@@ -167,7 +165,7 @@ def _fitted(
     wanted = read_targets(targets, rig, motion=motion)
     warn(wanted.warnings)
     found = fit_targets(covering, wanted.poses, wanted.vertices, iterations=iterations, progress=report)
-    before, after = ({"rms_mm": 1e3 * rms, "largest_mm": 1e3 * far} for rms, far in zip(found.rms, found.farthest, strict=True))
+    before, after = ({"rms_mm": 1e3 * found.rms[k], "largest_mm": 1e3 * found.farthest[k]} for k in (0, 1))
     summary = {
         "targets": str(targets),
         "poses": len(wanted.poses),

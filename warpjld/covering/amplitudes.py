@@ -2,7 +2,7 @@
 
 Coefficient fields, places and rotations do not depend on the amplitudes a, so the covering formula (``fields.py``) is
 
-    S'(a) = S'(a₀) + Σ_p (a_p − a₀_p) D_p,   D_p = FR g_p rot(q, d)  of a joint's rounding,   f m_p rot(q, h)  of a muscle
+    S'(a) = S'(a₀) + Σ_p (a_p − a₀_p) D_p,   D_p = FR g_p rot(q, d) of a rounding, f m_p rot(q, h) of a muscle
 
 with one sparse direction D_p for each of them: fitting amplitudes takes no diffusion, no packing and no kernel.
 """

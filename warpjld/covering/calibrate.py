@@ -1,26 +1,27 @@
 """Fitting the parameters to a rig: volume kept over its joint ranges, without folds, roughness or stretch.
 
-Only amplitudes are fitted: positions are linear in them, so Gauss–Newton takes a few steps and nothing is diffused anew.
-What shapes the fields (proximities, peaks, exponents) changes little once they are diffused. Where a pose comes out
-worse than it was, the joints that bend in it go back towards the start, all the way if need be.
+Only amplitudes are fitted: positions are linear in them, so Gauss–Newton takes a few steps and nothing is diffused
+anew. What shapes the fields (proximities, peaks, exponents) changes little once they are diffused. No pose may get
+rougher or lose volume on the way; folds, which have no derivative, are counted afterwards, and what makes them goes
+back towards the start.
 """
 
 from __future__ import annotations
 
 import time
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from enum import Enum
 
 import numpy as np
-from numpy.typing import NDArray
 
 from warpjld.covering.amplitudes import amplitudes_of, with_amplitudes
 from warpjld.covering.calibration_guard import Guard, PoseMeasures
-from warpjld.covering.calibration_loss import LossWeights, PoseLosses
+from warpjld.covering.calibration_loss import LossWeights
 from warpjld.covering.calibration_retreat import retreat
-from warpjld.covering.covering import Covering
 from warpjld.covering.constrained_least_squares import minimise
+from warpjld.covering.covering import Covering
+from warpjld.covering.pose_losses import PoseLosses
 from warpjld.covering.parameters import Parameters
 from warpjld.covering.pose_sets import calibration_poses, guard_poses
 from warpjld.errors import InputError
@@ -30,7 +31,6 @@ __all__ = ["Calibration", "CalibrationStatus", "calibrate"]
 
 _HIGHEST = 1.0  # amplitude at full flexion: the skin then is twice as far from the bone
 _PULL = 0.3  # of the squared change of an amplitude: keeps at the start what the surface does not determine
-
 
 
 class CalibrationStatus(Enum):
@@ -145,5 +145,3 @@ def _both(poses: Poses, more: Poses) -> Poses:
         np.concatenate([poses.rotations, more.rotations]),
         np.concatenate([poses.flexion, more.flexion]),
     )
-
-

@@ -75,6 +75,14 @@ class PoseMeasures:
     folded: list[NDArray[np.int64]]
     sharper: list[NDArray[np.float64]]
 
+    @staticmethod
+    def of_none(poses: int) -> PoseMeasures:
+        """Of poses that are not measured yet."""
+        volume, roughness, least, largest = np.zeros((4, poses))
+        folds, contacts = np.zeros((2, poses), dtype=np.int64)
+        folded, sharper = [np.zeros(0, dtype=np.int64)] * poses, [np.zeros(0)] * poses
+        return PoseMeasures(volume, roughness, least, largest, folds, contacts, folded, sharper)
+
     def summary(self) -> dict[str, float | int]:
         """Of all poses: volume error as a root of the mean square and the worst one [%], roughness as a root of the
         mean square and the worst [degrees], stretch, and faces summed up."""
@@ -126,14 +134,8 @@ class Guard:
         self._relative = self._closed.volume / region
         self._searched = np.cumsum([2 * len(points) for points in moved]) <= _FACES_SEARCHED
         self._still = np.zeros(len(poses))
-        self.first = self._empty(len(poses))
+        self.first = PoseMeasures.of_none(len(poses))
         self.measure(covering, np.arange(len(poses)), self.first, progress)
-
-    @staticmethod
-    def _empty(count: int) -> PoseMeasures:
-        numbers = [np.zeros(count, dtype=kind) for kind in (float, float, float, float, np.int64, np.int64)]
-        none = [np.zeros(0, dtype=np.int64)] * count
-        return PoseMeasures(*numbers, list(none), list(none))
 
     def measure(
         self,

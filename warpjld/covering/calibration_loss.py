@@ -7,24 +7,21 @@ roughness nor its volume error shall grow.
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
 import scipy.sparse as sp
 from numpy.typing import NDArray
 
-from warpjld.covering.amplitudes import Frame, LinearDeformation
+from warpjld.covering.amplitudes import Frame
 from warpjld.covering.calibration_guard import TOLERANCES, Tolerances
 from warpjld.covering.constrained_least_squares import Linearised
-from warpjld.covering.covering import Covering
 from warpjld.covering.dihedral import dihedral_angles, dihedral_slopes, hinges
 from warpjld.covering.quality import unique_edges
 from warpjld.covering.volume_form import ClosedSurface, VolumeForm, any_of
-from warpjld.skeleton.kinematics import Poses
 from warpjld.surface import Surface
 
-__all__ = ["LossTerms", "LossWeights", "PoseLoss", "PoseLosses", "SurfaceLoss"]
+__all__ = ["LossTerms", "LossWeights", "PoseLoss", "SurfaceLoss"]
 
 _STRETCHED = 0.5  # logarithm of stretch, and
 _SHARP = 1.0  # growth of a dihedral angle [rad], from which on edges weigh with the fourth power: creases and folds
@@ -227,57 +224,6 @@ class PoseLoss:
         return np.maximum(dihedral_angles(points, self._hinges) - self._dihedral, 0.0)
 
 
-class PoseLosses:
-    """The losses of all poses of a covering, and what amplitudes move in each.
-
-    Attributes:
-        of_pose: Loss of each pose; None where amplitudes move nothing.
-        moved: Vertices that they move.
-        regions: Volume that they move [m³], shape (F,).
-        ratios: Flexion ratios, shape (F, J).
-
-    Args:
-        covering: At the amplitudes to start from.
-        poses: F poses.
-        fitted: The first that many are fitted to, the others are only held.
-        weights: Weights of the terms.
-        progress: Called with poses done, and how many there are.
-    """
-
-    def __init__(
-        self,
-        covering: Covering,
-        poses: Poses,
-        fitted: int,
-        weights: LossWeights | None = None,
-        progress: Callable[[int, int], None] | None = None,
-    ) -> None:
-        shared = SurfaceLoss(covering.flesh, covering.fields.positions @ covering.skeleton.rest, weights)
-        deformation = LinearDeformation(covering, poses)
-        self.of_pose: list[PoseLoss | None] = []
-        self.moved: list[NDArray[np.int64]] = []
-        self.regions = np.zeros(len(poses))
-        self.ratios = np.zeros((len(poses), len(covering.skeleton)))
-        self._fitted = fitted
-        for frame in deformation.frames():
-            self.of_pose.append(shared.pose(frame, deformation.amplitudes, only_held=frame.number >= fitted))
-            self.moved.append(frame.moved)
-            self.regions[frame.number] = shared.region(frame)
-            self.ratios[frame.number] = frame.ratio
-            if progress:
-                progress(frame.number + 1, len(poses))
-
-    @property
-    def parts(self) -> list[PoseLoss]:
-        """Of all poses in which amplitudes move anything."""
-        return [part for part in self.of_pose if part is not None]
-
-    @property
-    def fitted(self) -> list[PoseLoss]:
-        """Those of them that are fitted to."""
-        return [part for part in self.of_pose[: self._fitted] if part is not None]
-
-
 def _dense(directions: sp.csr_array, number: NDArray[np.int64], count: int) -> NDArray[np.float64]:
     """D of vertices, rows x, y, z (3 n, p), as D of numbered points, (count, 3, p); those of number -1 are left out."""
     out = np.zeros((count, 3, directions.shape[1]))
@@ -288,9 +234,7 @@ def _dense(directions: sp.csr_array, number: NDArray[np.int64], count: int) -> N
     return out
 
 
-def _sampled(
-    chosen: NDArray[np.int64], weight: NDArray[np.float64]
-) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
+def _sampled(chosen: NDArray[np.int64], weight: NDArray[np.float64]) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
     """At most about ``_SAMPLE`` of what is chosen, those that weigh most for certain, and how many each stands for."""
     if len(chosen) <= _SAMPLE:
         return chosen, np.ones(len(chosen))
@@ -323,9 +267,7 @@ def _volume_behind(
     return np.maximum(out, 0.0)
 
 
-def _stiffness(
-    rest: NDArray[np.float64], hinge: NDArray[np.int64]
-) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+def _stiffness(rest: NDArray[np.float64], hinge: NDArray[np.int64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Edge length over a third of the mean height of the faces beside it, and the least doubled areas of those faces
     that slopes may divide by [m²], shape (H, 2)."""
     i, j, k, m = (rest[hinge[:, n]] for n in range(4))

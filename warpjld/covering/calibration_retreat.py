@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 
 from warpjld.covering.amplitudes import amplitudes_of, with_amplitudes
 from warpjld.covering.calibration_guard import Guard, PoseMeasures, copy_of
-from warpjld.covering.calibration_loss import PoseLosses
 from warpjld.covering.covering import Covering
+from warpjld.covering.pose_losses import PoseLosses
 
 __all__ = ["retreat"]
 

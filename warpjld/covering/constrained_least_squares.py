@@ -21,6 +21,7 @@ from numpy.typing import NDArray
 __all__ = ["Fit", "Linearised", "Part", "minimise"]
 
 _SETTLED = 1e-3  # relative gain of a step below which the next is not taken
+_VIOLATED = 1e-3  # by all constraints together, above which one more step is taken all the same
 _HALVINGS = 4  # of a step that makes things worse
 _TOUCH = 1e-9  # by which a step may pass a constraint
 _MULTIPLIED = 2.0  # weight of violated constraints in what a step has to gain, of the largest multiplier
@@ -148,7 +149,7 @@ def minimise(
         if gain <= 0.0:
             return Fit(x, taken, done, done < evaluations)
         x, here, taken = candidate, there, taken + 1
-        if gain < _SETTLED * merit:
+        if gain < _SETTLED * merit and here.violated < _VIOLATED:
             return Fit(x, taken, done, True)
     return Fit(x, taken, done, False)
 
@@ -170,7 +171,9 @@ def _step(here: _Sum, low: NDArray[np.float64], high: NDArray[np.float64]) -> tu
         chosen |= beyond
         whitened = np.linalg.solve(lower, rows[chosen].T)
         short = whitened.T @ target - room[chosen]
-        found, residual = nnls(np.vstack([-whitened, short]), np.append(np.zeros(len(low)), 1.0), maxiter=50 * len(rows))
+        found, residual = nnls(
+            np.vstack([-whitened, short]), np.append(np.zeros(len(low)), 1.0), maxiter=50 * len(rows)
+        )
         if residual < 1e-12:
             return np.zeros(len(low)), 0.0  # no step is within all of them
         multipliers[chosen] = found / (1.0 - short @ found)

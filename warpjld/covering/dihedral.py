@@ -55,9 +55,7 @@ def dihedral_slopes(
     return np.stack([sign * s for s in (by_i, by_j, length * a, length * b)], axis=1)
 
 
-def _normals(
-    points: NDArray[np.float64], hinge: NDArray[np.int64]
-) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+def _normals(points: NDArray[np.float64], hinge: NDArray[np.int64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     i, j, k, m = (points[hinge[:, n]] for n in range(4))
     along = j - i
     return _cross(along, k - i), _cross(m - i, along)

@@ -98,9 +98,7 @@ def fit_targets(
     return TargetFit(best.parameters, before, after, (far, farthest), time.perf_counter() - started)
 
 
-def _distances(
-    covering: Covering, poses: Poses, targets: NDArray[np.float64]
-) -> tuple[NDArray[np.float64], float]:
+def _distances(covering: Covering, poses: Poses, targets: NDArray[np.float64]) -> tuple[NDArray[np.float64], float]:
     """Root of the mean squared distance in every pose, shape (F,), and the largest distance [m]."""
     rms, largest = np.zeros(len(poses)), 0.0
     for start, block in covering.blocks(poses):

@@ -15,6 +15,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
+import scipy.sparse as sp
 from numpy.typing import NDArray
 
 from warpjld.errors import InputError
@@ -83,10 +84,9 @@ def _vertices(arrays: dict[str, NDArray], rig: Rig) -> NDArray[np.float64]:
         frame, vertex, _ = np.argwhere(~np.isfinite(array))[0]
         raise InputError(f"'vertices': vertex {vertex} is not finite at frame {frame}")
     # source vertices that are one point of the surface: their mean
-    share = 1.0 / np.bincount(surface.weld, minlength=len(surface.vertices))
-    out = np.zeros((len(array), len(surface.vertices), 3))
-    np.add.at(out, (slice(None), surface.weld), array * share[surface.weld, None])
-    return out
+    share = 1.0 / np.bincount(surface.weld, minlength=len(surface.vertices))[surface.weld]
+    mean = sp.csr_array((share, (surface.weld, np.arange(count))), shape=(len(surface.vertices), count))
+    return np.stack([mean @ shape for shape in array])
 
 
 def _poses(arrays: dict[str, NDArray], frames: int, rig: Rig) -> Poses:
