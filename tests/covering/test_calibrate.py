@@ -12,7 +12,7 @@ from tests.covering.tube import bend, tube, tube_skeleton
 from warpjld.covering import Covering, bind
 from warpjld.covering.amplitudes import LinearDeformation, amplitudes_of
 from warpjld.covering.calibrate import CalibrationStatus, calibrate
-from warpjld.covering.calibration_guard import Guard, PoseMeasures
+from warpjld.covering.calibration_guard import Guard, PoseMeasures, Tolerances
 from warpjld.covering.calibration_loss import LossWeights, SurfaceLoss
 from warpjld.covering.parameters import Parameters, default_parameters
 from warpjld.covering.pose_losses import PoseLosses
@@ -94,12 +94,13 @@ def test_a_fine_mesh_weighs_as_much_as_a_coarse_one() -> None:
     assert fine.roughness == pytest.approx(coarse.roughness, rel=0.35)
 
 
-def test_a_tube_without_inflation_gets_its_volume_back(flat: Covering) -> None:
+def test_a_tube_without_inflation_gets_volume_back(flat: Covering) -> None:
+    """As much as can be had without making it rougher."""
     calls: list[tuple[str, int, int]] = []
     found = calibrate(flat, POSES, guards=NONE, iterations=30, progress=lambda *c: calls.append(c))
     before, after = (np.sqrt((m.volume**2).mean()) for m in (found.before, found.after))
     assert before > 0.03
-    assert after < 0.6 * before
+    assert after < 0.8 * before
     assert found.loss[1] < found.loss[0]
     assert {what for what, _, _ in calls} == {"posing", "measuring", "fitting", "comparing"}
     assert all(0 < done <= total for _, done, total in calls)
@@ -109,8 +110,18 @@ def test_a_tube_without_inflation_gets_its_volume_back(flat: Covering) -> None:
     found.parameters.check(SKELETON)
 
 
-def test_it_says_when_it_was_stopped(flat: Covering) -> None:
-    assert calibrate(flat, POSES, guards=NONE, iterations=2).status is CalibrationStatus.ITERATION_LIMIT
+def test_without_tolerances_it_gets_most_of_it_back(flat: Covering) -> None:
+    """Not all: what is lost grows with the square of the angle, inflation with the angle."""
+    anything = Tolerances(roughness=10.0, folds=10.0)
+    found = calibrate(flat, POSES, guards=NONE, iterations=30, tolerances=anything)
+    assert np.sqrt((found.after.volume**2).mean()) < 0.3 * np.sqrt((found.before.volume**2).mean())
+
+
+def test_it_says_when_it_was_stopped(bound: Covering) -> None:
+    poses = calibration_poses(bound.skeleton, 6)
+    found = calibrate(bound, poses, guards=poses[:0], iterations=2)
+    assert found.status is CalibrationStatus.ITERATION_LIMIT
+    assert found.evaluations == 2
 
 
 def test_what_cannot_get_better_stays(flat: Covering) -> None:
@@ -165,11 +176,13 @@ def test_the_guard_measures_and_objects(bound: Covering) -> None:
     assert summary["roughness_worst"] == pytest.approx(max(roughness_of(swollen, poses)))
 
 
-def test_bad_arguments(flat: Covering) -> None:
+def test_bad_arguments(flat: Covering, bound: Covering) -> None:
     with pytest.raises(InputError, match="iterations: want at least 1"):
         calibrate(flat, POSES, iterations=0)
     with pytest.raises(InputError, match="at least one"):
         calibrate(flat, POSES[:0])
+    with pytest.raises(InputError, match="want 3 joints, got 26"):
+        calibrate(flat, POSES, guards=curled(bound.skeleton, [0.5]))
     with pytest.raises(InputError, match="none of its joints may flex"):
         calibration_poses(replace(SKELETON, limits=np.zeros_like(SKELETON.limits)))
     with pytest.raises(InputError, match="at least 1 pose"):

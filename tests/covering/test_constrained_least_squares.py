@@ -35,9 +35,7 @@ class Curved:
 def parts(seed: int, bend: float) -> list[Curved]:
     rng = np.random.default_rng(seed)
     chosen = [np.sort(rng.choice(6, 3, replace=False)) for _ in range(4)]
-    return [
-        Curved(c, rng.normal(size=(7, 3)), 3.0 * rng.normal(size=7), bend, rng.uniform(0.2, 3.0)) for c in chosen
-    ]
+    return [Curved(c, rng.normal(size=(7, 3)), 3.0 * rng.normal(size=7), bend, rng.uniform(0.2, 3.0)) for c in chosen]
 
 
 @pytest.mark.parametrize("bend", [0.0, 0.2])

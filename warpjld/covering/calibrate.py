@@ -16,13 +16,13 @@ from enum import Enum
 import numpy as np
 
 from warpjld.covering.amplitudes import amplitudes_of, with_amplitudes
-from warpjld.covering.calibration_guard import Guard, PoseMeasures
+from warpjld.covering.calibration_guard import TOLERANCES, Guard, PoseMeasures, Tolerances
 from warpjld.covering.calibration_loss import LossWeights
 from warpjld.covering.calibration_retreat import retreat
 from warpjld.covering.constrained_least_squares import minimise
 from warpjld.covering.covering import Covering
-from warpjld.covering.pose_losses import PoseLosses
 from warpjld.covering.parameters import Parameters
+from warpjld.covering.pose_losses import PoseLosses
 from warpjld.covering.pose_sets import calibration_poses, guard_poses
 from warpjld.errors import InputError
 from warpjld.skeleton.kinematics import Poses
@@ -79,6 +79,7 @@ def calibrate(
     guards: Poses | None = None,
     iterations: int = 12,
     weights: LossWeights | None = None,
+    tolerances: Tolerances = TOLERANCES,
     progress: Callable[[str, int, int], None] | None = None,
 ) -> Calibration:
     """Fit the parameters of a covering to its surface.
@@ -90,6 +91,7 @@ def calibrate(
         guards: More poses that may not get worse; by default :func:`~warpjld.covering.pose_sets.guard_poses`.
         iterations: Most steps of the minimiser.
         weights: Weights of the loss.
+        tolerances: What makes a pose worse.
         progress: Called with what is being done, how much of it is done, and how much there is.
 
     Raises:
@@ -103,12 +105,16 @@ def calibrate(
         raise InputError("poses: want at least one to calibrate on")
     if not len(covering.flesh.faces):
         raise InputError("calibrate: all of this surface is rigid, nothing is deformed")
+    for some in (poses, guards):
+        covering.check(some)
     started = time.perf_counter()
     tell = progress or (lambda what, done, total: None)
     every = _both(poses, guards)
-    losses = PoseLosses(covering, every, len(poses), weights, lambda done, total: tell("posing", done, total))
+    losses = PoseLosses(
+        covering, every, len(poses), weights, tolerances, lambda done, total: tell("posing", done, total)
+    )
     guard = Guard(
-        covering, every, losses.moved, losses.regions, progress=lambda done, total: tell("measuring", done, total)
+        covering, every, losses.moved, losses.regions, tolerances, lambda done, total: tell("measuring", done, total)
     )
     start = amplitudes_of(covering.parameters)
     fit = minimise(

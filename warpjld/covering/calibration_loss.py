@@ -28,6 +28,7 @@ _SHARP = 1.0  # growth of a dihedral angle [rad], from which on edges weigh with
 _SHORTEST = 1e-3  # stretch at which the logarithm is cut off
 _THINNEST = 0.05  # height of a face, of that at rest, below which dihedral angles are not followed more steeply
 _SLENDER = 60.0  # stiffness of a hinge between faces that have no height
+_AIM = 0.8  # of the roughness that a pose may gain
 _SAMPLE = 6000
 """Edges and hinges of a pose that are looked at; of more, those that are stretched or sharp and a part of the others
 stand for all."""
@@ -152,8 +153,9 @@ class PoseLoss:
         self._directions = _dense(directions, number[frame.moved], len(used))
 
         rough = float((self._times * self._growth(self._points) ** 2).sum())
-        # half-way to what counts as worse: what is sampled here is not all there is
-        growth, more = (1.0 + may.roughness) / 2.0, len(shared.hinges) * (may.roughness_more / 2.0) ** 2
+        # a little less than what counts as worse: what is sampled here is not all there is
+        growth = 1.0 + _AIM * (may.roughness - 1.0)
+        more = len(shared.hinges) * (_AIM * may.roughness_more) ** 2
         self._rough_kept = rough * growth**2 + more
         self.before = self._terms(self._points, self._volume.constant)
 

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from warpjld.covering.amplitudes import LinearDeformation
+from warpjld.covering.calibration_guard import TOLERANCES, Tolerances
 from warpjld.covering.calibration_loss import LossWeights, PoseLoss, SurfaceLoss
 from warpjld.covering.covering import Covering
 from warpjld.skeleton.kinematics import Poses
@@ -29,6 +30,7 @@ class PoseLosses:
         poses: F poses.
         fitted: The first that many are fitted to, the others are only held.
         weights: Weights of the terms.
+        tolerances: What a pose may be worse by.
         progress: Called with poses done, and how many there are.
     """
 
@@ -38,9 +40,10 @@ class PoseLosses:
         poses: Poses,
         fitted: int,
         weights: LossWeights | None = None,
+        tolerances: Tolerances = TOLERANCES,
         progress: Callable[[int, int], None] | None = None,
     ) -> None:
-        shared = SurfaceLoss(covering.flesh, covering.fields.positions @ covering.skeleton.rest, weights)
+        shared = SurfaceLoss(covering.flesh, covering.fields.positions @ covering.skeleton.rest, weights, tolerances)
         deformation = LinearDeformation(covering, poses)
         self.of_pose: list[PoseLoss | None] = []
         self.moved: list[NDArray[np.int64]] = []
