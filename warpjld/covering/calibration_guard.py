@@ -44,8 +44,8 @@ class Tolerances:
     region_free: float = 0.05
     folds: float = 1.01
     folds_more: int = 1
-    roughness: float = 1.04
-    roughness_more: float = float(np.radians(0.07))
+    roughness: float = 1.045
+    roughness_more: float = float(np.radians(0.09))
 
 
 TOLERANCES = Tolerances()
@@ -169,8 +169,8 @@ class Guard:
         into.least[f], into.largest[f] = stretch.min(), stretch.max()
         into.folds[f], into.contacts[f], into.folded[f] = 0, 0, np.zeros(0, dtype=np.int64)
         sharp = self.hinges[local][growth > _SHARP]
-        if self._searched[f] and len(sharp):
-            self._search(points, sharp, f, into)
+        if self._searched[f] and (len(sharp) or len(self._crossing)):
+            self._search(points, self._near(inside, sharp), f, into)
 
     def local_hinges(self, pose: int) -> NDArray[np.int64]:
         """The hinges of ``PoseMeasures.sharper``, shape (H, 4)."""
@@ -191,12 +191,19 @@ class Guard:
         rougher = measured.roughness > t.roughness * first.roughness + t.roughness_more
         return emptier, folded, rougher
 
-    def _search(self, points: NDArray[np.float64], sharp: NDArray[np.int64], f: int, into: PoseMeasures) -> None:
-        """Count crossings near hinges that have become sharp."""
-        near = np.zeros(len(points), dtype=bool)
+    def _near(self, inside: NDArray[np.bool_], sharp: NDArray[np.int64]) -> NDArray[np.bool_]:
+        """Vertices near hinges that have become sharp. Of a surface that crosses itself at rest, as a doll's of plates,
+        all that move: plates pass into each other without bending."""
+        if len(self._crossing):
+            return inside
+        near = np.zeros(len(inside), dtype=bool)
         near[sharp] = True
         for _ in range(_RINGS):
             near[self._faces[any_of(near, self._faces)]] = True
+        return near
+
+    def _search(self, points: NDArray[np.float64], near: NDArray[np.bool_], f: int, into: PoseMeasures) -> None:
+        """Count crossings of faces near some vertices."""
         faces = np.flatnonzero(any_of(near, self._faces))
         pairs = faces[crossing_faces(points, self._faces[faces]).pairs].reshape(-1, 2)
         pairs = pairs[~np.isin(pairs[:, 0] * len(self._faces) + pairs[:, 1], self._crossing)]

@@ -28,7 +28,7 @@ _SHARP = 1.0  # growth of a dihedral angle [rad], from which on edges weigh with
 _SHORTEST = 1e-3  # stretch at which the logarithm is cut off
 _THINNEST = 0.05  # height of a face, of that at rest, below which dihedral angles are not followed more steeply
 _SLENDER = 60.0  # stiffness of a hinge between faces that have no height
-_AIM = 0.8  # of the roughness that a pose may gain
+_AIM = 0.9  # of the roughness that a pose may gain
 _SAMPLE = 6000
 """Edges and hinges of a pose that are looked at; of more, those that are stretched or sharp and a part of the others
 stand for all."""
@@ -93,6 +93,11 @@ class SurfaceLoss:
         self.stiffness, self.least = _stiffness(rest, self.hinges)
         self.behind = _volume_behind(rest, surface.faces, axis)
 
+    def sharpness(self, points: NDArray[np.float64], which: NDArray[np.bool_]) -> float:
+        """Sum of the squared growth of some dihedral angles [rad²]."""
+        growth = np.maximum(dihedral_angles(points, self.hinges[which]) - self.dihedral[which], 0.0)
+        return float((growth**2).sum())
+
     def region(self, frame: Frame) -> float:
         """Volume that a pose moves [m³]: what lies between the skeleton and the vertices that amplitudes move."""
         return float(max(self.behind[frame.moved].sum(), 1e-9 * abs(self.closed.volume)))
@@ -152,11 +157,13 @@ class PoseLoss:
         self._edges, self._hinges, self._points = number[edges], number[hinged], points[used]
         self._directions = _dense(directions, number[frame.moved], len(used))
 
-        rough = float((self._times * self._growth(self._points) ** 2).sum())
         # a little less than what counts as worse: what is sampled here is not all there is
         growth = 1.0 + _AIM * (may.roughness - 1.0)
-        more = len(shared.hinges) * (_AIM * may.roughness_more) ** 2
-        self._rough_kept = rough * growth**2 + more
+        still = shared.sharpness(points, ~any_of(moved, shared.hinges))
+        rough = float((self._times * self._growth(self._points) ** 2).sum())
+        count = max(len(shared.hinges), 1)
+        most = growth * np.sqrt((rough + still) / count) + _AIM * may.roughness_more
+        self._rough_kept = count * float(most) ** 2 - still
         self.before = self._terms(self._points, self._volume.constant)
 
     def terms(self, amplitudes: NDArray[np.float64]) -> LossTerms:

@@ -1,4 +1,5 @@
-"""Sums of squares minimised under inequalities: Gauss–Newton steps that keep to the linearised constraints.
+"""Sums of squares minimised under inequalities: Gauss–Newton steps that keep to the linearised constraints, damped as
+by Levenberg and Marquardt where they make things worse.
 
 Each step solves the quadratic program
 
@@ -22,7 +23,9 @@ __all__ = ["Fit", "Linearised", "Part", "minimise"]
 
 _SETTLED = 1e-3  # relative gain of a step below which the next is not taken
 _VIOLATED = 1e-3  # by all constraints together, above which one more step is taken all the same
-_HALVINGS = 4  # of a step that makes things worse
+_LEAST, _MOST, _DAMPED = 0.1, 1e3, 10.0
+"""Least and largest damping, of the diagonal of H, once a step has made things worse, and the factor between two."""
+
 _TOUCH = 1e-9  # by which a step may pass a constraint
 _MULTIPLIED = 2.0  # weight of violated constraints in what a step has to gain, of the largest multiplier
 
@@ -130,31 +133,33 @@ def minimise(
     if not moved.size:
         return Fit(x, 0, 0, True)
     here = summed(x)
-    done, taken, weight = 1, 0, 0.0
+    done, taken, weight, damping = 1, 0, 0.0, 0.0
     while done < evaluations:
-        step, largest = _step(here, low - x[moved], high - x[moved])
+        step, largest = _step(here, damping, low - x[moved], high - x[moved])
         weight = max(weight, _MULTIPLIED * largest)
         merit = here.loss + weight * here.violated
-        for _ in range(_HALVINGS):
-            candidate = x.copy()
-            candidate[moved] = np.clip(x[moved] + step, low, high)
-            there = summed(candidate)
-            done += 1
-            if progress:
-                progress(done, evaluations)
-            gain = merit - there.loss - weight * there.violated
-            if gain > 0.0 or done >= evaluations:
-                break
-            step = step / 2.0
-        if gain <= 0.0:
-            return Fit(x, taken, done, done < evaluations)
-        x, here, taken = candidate, there, taken + 1
-        if gain < _SETTLED * merit and here.violated < _VIOLATED:
-            return Fit(x, taken, done, True)
+        candidate = x.copy()
+        candidate[moved] = np.clip(x[moved] + step, low, high)
+        there = summed(candidate)
+        done += 1
+        if progress:
+            progress(done, evaluations)
+        gain = merit - there.loss - weight * there.violated
+        if gain > 0.0:
+            x, here, taken = candidate, there, taken + 1
+            damping = damping / _DAMPED if damping > _LEAST else 0.0
+            if gain < _SETTLED * merit and here.violated < _VIOLATED:
+                return Fit(x, taken, done, True)
+        else:
+            damping = max(_DAMPED * damping, _LEAST)
+            if damping > _MOST:
+                return Fit(x, taken, done, True)
     return Fit(x, taken, done, False)
 
 
-def _step(here: _Sum, low: NDArray[np.float64], high: NDArray[np.float64]) -> tuple[NDArray[np.float64], float]:
+def _step(
+    here: _Sum, damping: float, low: NDArray[np.float64], high: NDArray[np.float64]
+) -> tuple[NDArray[np.float64], float]:
     """The step of the quadratic program, and the largest multiplier of a constraint that is no bound."""
     from scipy.optimize import nnls
 
@@ -162,7 +167,7 @@ def _step(here: _Sum, low: NDArray[np.float64], high: NDArray[np.float64]) -> tu
     rows = np.concatenate([here.slopes, unit, -unit])
     room = np.concatenate([-here.constraints, high, -low])
     # y = Lᵀ s − t is made short under G y ≥ h
-    lower = np.linalg.cholesky(here.square)
+    lower = np.linalg.cholesky(here.square + damping * np.diag(np.diag(here.square)))
     target = np.linalg.solve(lower, -here.gradient)
     step = np.linalg.solve(lower.T, target)
     chosen = np.zeros(len(rows), dtype=bool)
