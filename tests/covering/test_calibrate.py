@@ -12,12 +12,13 @@ from tests.covering.tube import bend, tube, tube_skeleton
 from warpjld.covering import Covering, bind
 from warpjld.covering.amplitudes import LinearDeformation, amplitudes_of
 from warpjld.covering.calibrate import CalibrationStatus, calibrate
-from warpjld.covering.calibration_guard import Guard, PoseMeasures, Tolerances
+from warpjld.covering.calibration_guard import Guard, PoseMeasures
 from warpjld.covering.calibration_loss import LossWeights, SurfaceLoss
 from warpjld.covering.parameters import Parameters, default_parameters
 from warpjld.covering.pose_losses import PoseLosses
 from warpjld.covering.pose_sets import calibration_poses, curled, guard_poses
 from warpjld.covering.quality import edge_stretch, enclosed_volume, unique_edges
+from warpjld.covering.tolerances import Tolerances
 from warpjld.errors import InputError
 from warpjld.skeleton import CHANNELS, Skeleton
 from warpjld.skeleton.kinematics import Poses
@@ -48,7 +49,7 @@ def test_derivatives_of_the_loss(open_end: bool, only_held: bool) -> None:
     direction = np.random.default_rng(3).normal(size=len(amplitudes))
     step = 1e-6 * direction
     for frame in deformation.frames():
-        part = shared.pose(frame, deformation.amplitudes, only_held=only_held)
+        part = shared.pose(frame, deformation.amplitudes, shared.still(frame), only_held=only_held)
         assert part is not None
         here = part.linearised(amplitudes)
         ahead, behind = part.linearised(amplitudes + step), part.linearised(amplitudes - step)
@@ -68,7 +69,7 @@ def test_the_loss_is_what_it_says() -> None:
     deformation = LinearDeformation(covering, POSES)
     shared = SurfaceLoss(SURFACE, covering.fields.positions @ SKELETON.rest, LossWeights(2.0, 3.0, 5.0))
     for frame in deformation.frames():
-        part = shared.pose(frame, deformation.amplitudes)
+        part = shared.pose(frame, deformation.amplitudes, shared.still(frame))
         assert part is not None
         moved = np.isin(np.arange(len(SURFACE.vertices)), frame.moved)
         lost = enclosed_volume(frame.points, SURFACE.faces) - enclosed_volume(SURFACE.vertices, SURFACE.faces)
@@ -158,7 +159,7 @@ def test_no_pose_gets_worse_whatever_is_weighted(bound: Covering, weights: LossW
 def test_the_guard_measures_and_objects(bound: Covering) -> None:
     poses = curled(bound.skeleton, [0.3, 0.6, 0.9])
     losses = PoseLosses(bound, poses, 3)
-    guard = Guard(bound, poses, losses.moved, losses.regions)
+    guard = Guard(bound, poses, losses)
     np.testing.assert_allclose(np.degrees(guard.first.roughness), roughness_of(bound, poses), rtol=1e-6)
     rest = enclosed_volume(bound.surface.vertices, bound.surface.faces)
     volume = enclosed_volume(bound.deform(poses), bound.surface.faces) / rest - 1.0

@@ -16,7 +16,7 @@ from enum import Enum
 import numpy as np
 
 from warpjld.covering.amplitudes import amplitudes_of, with_amplitudes
-from warpjld.covering.calibration_guard import TOLERANCES, Guard, PoseMeasures, Tolerances
+from warpjld.covering.calibration_guard import Guard, PoseMeasures
 from warpjld.covering.calibration_loss import LossWeights
 from warpjld.covering.calibration_retreat import retreat
 from warpjld.covering.constrained_least_squares import minimise
@@ -24,6 +24,7 @@ from warpjld.covering.covering import Covering
 from warpjld.covering.parameters import Parameters
 from warpjld.covering.pose_losses import PoseLosses
 from warpjld.covering.pose_sets import calibration_poses, guard_poses
+from warpjld.covering.tolerances import TOLERANCES, Tolerances
 from warpjld.errors import InputError
 from warpjld.skeleton.kinematics import Poses
 
@@ -113,9 +114,7 @@ def calibrate(
     losses = PoseLosses(
         covering, every, len(poses), weights, tolerances, lambda done, total: tell("posing", done, total)
     )
-    guard = Guard(
-        covering, every, losses.moved, losses.regions, tolerances, lambda done, total: tell("measuring", done, total)
-    )
+    guard = Guard(covering, every, losses, tolerances, lambda done, total: tell("measuring", done, total))
     start = amplitudes_of(covering.parameters)
     fit = minimise(
         losses.parts,

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -11,44 +11,18 @@ from numpy.typing import NDArray
 from warpjld.covering.covering import Covering
 from warpjld.covering.dihedral import dihedral_angles, hinges
 from warpjld.covering.intersections import Crossings, crossing_faces, surface_parts
+from warpjld.covering.pose_losses import PoseLosses
 from warpjld.covering.quality import edge_stretch, unique_edges
+from warpjld.covering.tolerances import TOLERANCES, Tolerances
 from warpjld.covering.volume_form import ClosedSurface, any_of
 from warpjld.skeleton.kinematics import Poses
 
-__all__ = ["TOLERANCES", "Guard", "PoseMeasures", "Tolerances"]
+__all__ = ["Guard", "PoseMeasures", "copy_of"]
 
 _SHARP = np.radians(40.0)  # growth of a dihedral angle without which skin does not cross itself, and
 _RINGS = 4  # of faces around such hinges, among which crossings are looked for
 _BLOCK = 16  # poses deformed at once
 _FACES_SEARCHED = 1_000_000  # for crossings, in all poses together
-
-
-@dataclass(frozen=True)
-class Tolerances:
-    """What a pose may differ by and still not be worse.
-
-    Attributes:
-        volume: Growth of the volume error, of the whole; and
-        region: of what the pose moves, that do not count.
-        volume_free: Error of the whole, and
-        region_free: of what the pose moves, up to which it may grow at will.
-        folds: Faces that fold, as a factor and
-        folds_more: as a number.
-        roughness: As a factor, and
-        roughness_more: RMS of dihedral angles [rad].
-    """
-
-    volume: float = 0.001
-    region: float = 0.01
-    volume_free: float = 0.009
-    region_free: float = 0.05
-    folds: float = 1.01
-    folds_more: int = 1
-    roughness: float = 1.045
-    roughness_more: float = float(np.radians(0.09))
-
-
-TOLERANCES = Tolerances()
 
 
 @dataclass(frozen=True, eq=False)
@@ -105,8 +79,7 @@ class Guard:
     Args:
         covering: What others are compared to; they differ from it in amplitudes.
         poses: F poses.
-        moved: Vertices that amplitudes move in each pose: nothing else is looked at.
-        region: Volume that each pose moves [m³], shape (F,).
+        losses: Of these poses: what amplitudes move in each, nothing else is looked at.
         tolerances: What counts as worse.
     """
 
@@ -114,13 +87,12 @@ class Guard:
         self,
         covering: Covering,
         poses: Poses,
-        moved: Sequence[NDArray[np.int64]],
-        region: NDArray[np.float64],
+        losses: PoseLosses,
         tolerances: Tolerances = TOLERANCES,
         progress: Callable[[int, int], None] | None = None,
     ) -> None:
         surface, flesh = covering.surface, covering.flesh
-        self._poses, self._moved, self._tolerances = poses, moved, tolerances
+        self._poses, self._moved, self._tolerances = poses, losses.moved, tolerances
         self._closed = ClosedSurface(flesh)
         self._rest, self._faces = np.asarray(surface.vertices, dtype=np.float64), flesh.faces
         self._edges, self.hinges = unique_edges(flesh.faces), hinges(flesh.faces)
@@ -131,9 +103,9 @@ class Guard:
         self._parts = parts.of_face[soft]
         self._joined = _joined(parts.names, covering.skeleton.names, covering.skeleton.parents)
         self._crossing = _keys(crossing_faces(self._rest, flesh.faces), len(flesh.faces))
-        self._relative = self._closed.volume / region
-        self._searched = np.cumsum([2 * len(points) for points in moved]) <= _FACES_SEARCHED
-        self._still = np.zeros(len(poses))
+        self._relative = self._closed.volume / losses.regions
+        self._searched = np.cumsum([2 * len(points) for points in losses.moved]) <= _FACES_SEARCHED
+        self._still = losses.still
         self.first = PoseMeasures.of_none(len(poses))
         self.measure(covering, np.arange(len(poses)), self.first, progress)
 
@@ -158,8 +130,6 @@ class Guard:
         inside = np.zeros(len(points), dtype=bool)
         inside[self._moved[f]] = True
         local = any_of(inside, self.hinges)
-        if into is self.first:
-            self._still[f] = (self._growth(points, ~local) ** 2).sum()
         growth = self._growth(points, local)
         into.sharper[f] = growth**2
         into.volume[f] = self._closed.volume_of(points) / self._closed.volume - 1.0

@@ -14,10 +14,10 @@ import scipy.sparse as sp
 from numpy.typing import NDArray
 
 from warpjld.covering.amplitudes import Frame
-from warpjld.covering.calibration_guard import TOLERANCES, Tolerances
 from warpjld.covering.constrained_least_squares import Linearised
 from warpjld.covering.dihedral import dihedral_angles, dihedral_slopes, hinges
 from warpjld.covering.quality import unique_edges
+from warpjld.covering.tolerances import TOLERANCES, Tolerances
 from warpjld.covering.volume_form import ClosedSurface, VolumeForm, any_of
 from warpjld.surface import Surface
 
@@ -93,24 +93,30 @@ class SurfaceLoss:
         self.stiffness, self.least = _stiffness(rest, self.hinges)
         self.behind = _volume_behind(rest, surface.faces, axis)
 
-    def sharpness(self, points: NDArray[np.float64], which: NDArray[np.bool_]) -> float:
-        """Sum of the squared growth of some dihedral angles [rad²]."""
-        growth = np.maximum(dihedral_angles(points, self.hinges[which]) - self.dihedral[which], 0.0)
-        return float((growth**2).sum())
+    def still(self, frame: Frame) -> float:
+        """Sum of the squared growth of the dihedral angles that amplitudes do not change [rad²]."""
+        moved = np.zeros(len(frame.points), dtype=bool)
+        moved[frame.moved] = True
+        which = ~any_of(moved, self.hinges)
+        growth = dihedral_angles(frame.points.astype(np.float64), self.hinges[which]) - self.dihedral[which]
+        return float((np.maximum(growth, 0.0) ** 2).sum())
 
     def region(self, frame: Frame) -> float:
         """Volume that a pose moves [m³]: what lies between the skeleton and the vertices that amplitudes move."""
         return float(max(self.behind[frame.moved].sum(), 1e-9 * abs(self.closed.volume)))
 
-    def pose(self, frame: Frame, start: NDArray[np.float64], *, only_held: bool = False) -> PoseLoss | None:
+    def pose(
+        self, frame: Frame, start: NDArray[np.float64], still: float, *, only_held: bool = False
+    ) -> PoseLoss | None:
         """The loss of a pose as a function of amplitudes; None where they move nothing.
 
         Args:
             frame: The pose.
             start: Amplitudes at which ``frame.points`` are, shape (P,).
+            still: Sharpness of what they do not move [rad²].
             only_held: Whether it is only not to get worse.
         """
-        return PoseLoss(self, frame, start, only_held) if len(frame.moved) else None
+        return PoseLoss(self, frame, start, still, only_held) if len(frame.moved) else None
 
 
 class PoseLoss:
@@ -121,7 +127,9 @@ class PoseLoss:
         before: Its terms at the start.
     """
 
-    def __init__(self, shared: SurfaceLoss, frame: Frame, start: NDArray[np.float64], only_held: bool) -> None:
+    def __init__(
+        self, shared: SurfaceLoss, frame: Frame, start: NDArray[np.float64], still: float, only_held: bool
+    ) -> None:
         w, may = shared.weights, shared.tolerances
         self._only_held = only_held
         self.parameters = np.unique(frame.directions.indices)
@@ -159,7 +167,6 @@ class PoseLoss:
 
         # a little less than what counts as worse: what is sampled here is not all there is
         growth = 1.0 + _AIM * (may.roughness - 1.0)
-        still = shared.sharpness(points, ~any_of(moved, shared.hinges))
         rough = float((self._times * self._growth(self._points) ** 2).sum())
         count = max(len(shared.hinges), 1)
         most = growth * np.sqrt((rough + still) / count) + _AIM * may.roughness_more

@@ -16,8 +16,8 @@ from warpjld.covering.pose_losses import PoseLosses
 
 __all__ = ["retreat"]
 
-_ROUNDS = 3  # after which what makes a pose worse goes back all the way
-_LEFT = (1.0, 0.5, 0.0)  # of an amplitude's change, each time that it makes a pose worse
+_ROUNDS = 2  # after which what makes a pose worse goes back all the way
+_LEFT = (1.0, 0.4, 0.0)  # of an amplitude's change, each time that it makes a pose worse
 _SHARE = 0.3  # of what the amplitude does that does most in the same place, from which on one is held responsible
 
 

@@ -27,6 +27,8 @@ _LEAST, _MOST, _DAMPED = 0.1, 1e3, 10.0
 """Least and largest damping, of the diagonal of H, once a step has made things worse, and the factor between two."""
 
 _TOUCH = 1e-9  # by which a step may pass a constraint
+_IMPOSSIBLE = 1e-9  # residual of the least distance problem where nothing is within its constraints
+_SLACK = 0.02  # of one constraint, beyond which a step is not taken unless it lessens what is violated
 _MULTIPLIED = 2.0  # weight of violated constraints in what a step has to gain, of the largest multiplier
 
 
@@ -84,6 +86,10 @@ class _Sum:
     slopes: NDArray[np.float64]
 
     @property
+    def worst(self) -> float:
+        return float(self.constraints.max(initial=0.0))
+
+    @property
     def violated(self) -> float:
         return float(np.maximum(self.constraints, 0.0).sum())
 
@@ -138,6 +144,8 @@ def minimise(
         step, largest = _step(here, damping, low - x[moved], high - x[moved])
         weight = max(weight, _MULTIPLIED * largest)
         merit = here.loss + weight * here.violated
+        if _predicted(here, step) + weight * here.violated < _SETTLED * merit and here.violated < _VIOLATED:
+            return Fit(x, taken, done, True)
         candidate = x.copy()
         candidate[moved] = np.clip(x[moved] + step, low, high)
         there = summed(candidate)
@@ -145,7 +153,7 @@ def minimise(
         if progress:
             progress(done, evaluations)
         gain = merit - there.loss - weight * there.violated
-        if gain > 0.0:
+        if gain > 0.0 and there.worst <= max(here.worst, _SLACK):
             x, here, taken = candidate, there, taken + 1
             damping = damping / _DAMPED if damping > _LEAST else 0.0
             if gain < _SETTLED * merit and here.violated < _VIOLATED:
@@ -157,18 +165,38 @@ def minimise(
     return Fit(x, taken, done, False)
 
 
+def _predicted(here: _Sum, step: NDArray[np.float64]) -> float:
+    """What a step gains if nothing curves."""
+    return -float(here.gradient @ step + 0.5 * step @ (here.square @ step))
+
+
 def _step(
     here: _Sum, damping: float, low: NDArray[np.float64], high: NDArray[np.float64]
 ) -> tuple[NDArray[np.float64], float]:
-    """The step of the quadratic program, and the largest multiplier of a constraint that is no bound."""
-    from scipy.optimize import nnls
+    """The step of the quadratic program, and the largest multiplier of a constraint that is no bound.
 
+    Where no step satisfies what is violated, one that violates it no more.
+    """
     unit = np.eye(len(low))
     rows = np.concatenate([here.slopes, unit, -unit])
-    room = np.concatenate([-here.constraints, high, -low])
-    # y = Lᵀ s − t is made short under G y ≥ h
     lower = np.linalg.cholesky(here.square + damping * np.diag(np.diag(here.square)))
-    target = np.linalg.solve(lower, -here.gradient)
+    for constraints in (here.constraints, np.minimum(here.constraints, 0.0)):
+        found = _least_distance(lower, here.gradient, rows, np.concatenate([-constraints, high, -low]))
+        if found is not None:
+            step, multipliers = found
+            return step, float(multipliers[: len(constraints)].max(initial=0.0))
+    return np.zeros(len(low)), 0.0
+
+
+def _least_distance(
+    lower: NDArray[np.floating], gradient: NDArray[np.float64], rows: NDArray[np.float64], room: NDArray[np.float64]
+) -> tuple[NDArray[np.float64], NDArray[np.float64]] | None:
+    """The s with rows · s ≤ room that makes ½ |Lᵀ s|² + g·s least, and the multipliers of the rows; None where there is
+    no such s."""
+    from scipy.optimize import nnls
+
+    # y = Lᵀ s − t is made short under G y ≥ h
+    target = np.linalg.solve(lower, -gradient)
     step = np.linalg.solve(lower.T, target)
     chosen = np.zeros(len(rows), dtype=bool)
     multipliers = np.zeros(len(rows))
@@ -176,11 +204,10 @@ def _step(
         chosen |= beyond
         whitened = np.linalg.solve(lower, rows[chosen].T)
         short = whitened.T @ target - room[chosen]
-        found, residual = nnls(
-            np.vstack([-whitened, short]), np.append(np.zeros(len(low)), 1.0), maxiter=50 * len(rows)
-        )
-        if residual < 1e-12:
-            return np.zeros(len(low)), 0.0  # no step is within all of them
+        wanted = np.append(np.zeros(len(gradient)), 1.0)
+        found, residual = nnls(np.vstack([-whitened, short]), wanted, maxiter=50 * len(rows))
+        if residual < _IMPOSSIBLE:
+            return None
         multipliers[chosen] = found / (1.0 - short @ found)
         step = np.linalg.solve(lower.T, target - whitened @ multipliers[chosen])
-    return step, float(multipliers[: len(here.constraints)].max(initial=0.0))
+    return step, multipliers

@@ -8,9 +8,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from warpjld.covering.amplitudes import LinearDeformation
-from warpjld.covering.calibration_guard import TOLERANCES, Tolerances
 from warpjld.covering.calibration_loss import LossWeights, PoseLoss, SurfaceLoss
 from warpjld.covering.covering import Covering
+from warpjld.covering.tolerances import TOLERANCES, Tolerances
 from warpjld.skeleton.kinematics import Poses
 
 __all__ = ["PoseLosses"]
@@ -23,6 +23,7 @@ class PoseLosses:
         of_pose: Loss of each pose; None where amplitudes move nothing.
         moved: Vertices that they move.
         regions: Volume that they move [m³], shape (F,).
+        still: Sum of the squared growth of the dihedral angles that they do not change [rad²], shape (F,).
         ratios: Flexion ratios, shape (F, J).
 
     Args:
@@ -48,13 +49,14 @@ class PoseLosses:
         self.of_pose: list[PoseLoss | None] = []
         self.moved: list[NDArray[np.int64]] = []
         self.regions = np.zeros(len(poses))
-        self.ratios = np.zeros((len(poses), len(covering.skeleton)))
+        self.still = np.zeros(len(poses))
         self._fitted = fitted
         for frame in deformation.frames():
-            self.of_pose.append(shared.pose(frame, deformation.amplitudes, only_held=frame.number >= fitted))
+            still = self.still[frame.number] = shared.still(frame)
+            only_held = frame.number >= fitted
+            self.of_pose.append(shared.pose(frame, deformation.amplitudes, still, only_held=only_held))
             self.moved.append(frame.moved)
             self.regions[frame.number] = shared.region(frame)
-            self.ratios[frame.number] = frame.ratio
             if progress:
                 progress(frame.number + 1, len(poses))
 
