@@ -19,8 +19,9 @@ from warpjld.skeleton.kinematics import Poses
 
 __all__ = ["Guard", "PoseMeasures", "copy_of"]
 
-_SHARP = np.radians(40.0)  # growth of a dihedral angle without which skin does not cross itself, and
-_RINGS = 4  # of faces around such hinges, among which crossings are looked for
+_SHARP = np.radians(70.0)  # growth of a dihedral angle without which skin does not cross itself, and
+_RINGS = 3  # of faces around such hinges, among which crossings are looked for
+_PLATES = 0.02  # of all faces: so many cross others at rest where a surface is made of plates
 _BLOCK = 16  # poses deformed at once
 _FACES_SEARCHED = 1_000_000  # for crossings, in all poses together
 
@@ -102,7 +103,9 @@ class Guard:
         soft = (covering.anchors.rigid[surface.faces] < 0).any(axis=1)
         self._parts = parts.of_face[soft]
         self._joined = _joined(parts.names, covering.skeleton.names, covering.skeleton.parents)
-        self._crossing = _keys(crossing_faces(self._rest, flesh.faces), len(flesh.faces))
+        crossing = crossing_faces(self._rest, flesh.faces)
+        self._crossing = _keys(crossing, len(flesh.faces))
+        self._plates = len(crossing.faces) > _PLATES * len(flesh.faces)
         self._relative = self._closed.volume / losses.regions
         self._searched = np.cumsum([2 * len(points) for points in losses.moved]) <= _FACES_SEARCHED
         self._still = losses.still
@@ -139,7 +142,7 @@ class Guard:
         into.least[f], into.largest[f] = stretch.min(), stretch.max()
         into.folds[f], into.contacts[f], into.folded[f] = 0, 0, np.zeros(0, dtype=np.int64)
         sharp = self.hinges[local][growth > _SHARP]
-        if self._searched[f] and (len(sharp) or len(self._crossing)):
+        if self._searched[f] and (len(sharp) or self._plates):
             self._search(points, self._near(inside, sharp), f, into)
 
     def local_hinges(self, pose: int) -> NDArray[np.int64]:
@@ -162,9 +165,9 @@ class Guard:
         return emptier, folded, rougher
 
     def _near(self, inside: NDArray[np.bool_], sharp: NDArray[np.int64]) -> NDArray[np.bool_]:
-        """Vertices near hinges that have become sharp. Of a surface that crosses itself at rest, as a doll's of plates,
-        all that move: plates pass into each other without bending."""
-        if len(self._crossing):
+        """Vertices near hinges that have become sharp. Of a doll of plates, which cross at rest, all that move: they
+        pass into each other without bending."""
+        if self._plates:
             return inside
         near = np.zeros(len(inside), dtype=bool)
         near[sharp] = True

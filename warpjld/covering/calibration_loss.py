@@ -224,10 +224,12 @@ class PoseLoss:
 
     def _by_amplitude(self, corners: NDArray[np.int64], slopes: NDArray[np.float64]) -> NDArray[np.float64]:
         """Derivatives by amplitudes, (N, p), from those by the positions of corners (N, k): (N, k, 3)."""
-        out = np.zeros((len(corners), len(self.parameters)))
-        for k in range(corners.shape[1]):
-            out += np.matmul(slopes[:, k, None, :], self._directions[corners[:, k]])[:, 0]
-        return out
+        count, width = len(corners), 3 * corners.shape[1]
+        column = (3 * corners[:, :, None] + np.arange(3)).ravel()
+        directions = self._directions.reshape(-1, len(self.parameters))
+        shape = (count, len(directions))
+        rows = sp.csr_array((slopes.ravel(), column, np.arange(count + 1) * width), shape=shape)
+        return np.asarray(rows @ directions)
 
     def _logarithms(
         self, points: NDArray[np.float64]

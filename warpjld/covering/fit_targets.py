@@ -59,7 +59,7 @@ def fit_targets(
     poses: Poses,
     targets: NDArray[np.float64],
     *,
-    iterations: int = 12,
+    iterations: int = 10,
     progress: Callable[[str, int, int], None] | None = None,
 ) -> TargetFit:
     """Fit the parameters of a covering to target shapes.

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import re
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -18,6 +20,7 @@ CURL = {"base": 80.0, "knuckle2": 97.0, "knuckle3": 63.0}
 _FLEXION, _ABDUCTION = CHANNELS.index("flexion"), CHANNELS.index("abduction")
 _WIDEST = np.radians(120.0)  # shoulders, knees and elbows in full are contact of the limbs
 _UNKNOWN = np.radians(30.0)  # where limits are as wide one way as the other: nothing is known of the joint
+_TOE = re.compile(r"^toe\d")
 _CURLS = (0.3, 0.6, 0.9)
 _ONE_BY_ONE = (0.45, 0.9)
 
@@ -158,8 +161,9 @@ def _alone(
 
 
 def _without_side(skeleton: Skeleton, joints: NDArray[np.int64]) -> tuple[list[str], NDArray[np.int64]]:
-    """Names of joints without their side, in the order in which they come, and which of them each joint is."""
-    names = [skeleton.names[j].removeprefix("left.").removeprefix("right.") for j in joints]
+    """Names of joints without their side, in the order in which they come, and which of them each joint is. Toes, which
+    nobody looks at one by one, are one."""
+    names = [_TOE.sub("toe", skeleton.names[j].removeprefix("left.").removeprefix("right.")) for j in joints]
     known = list(dict.fromkeys(names))
     return known, np.array([known.index(name) for name in names], dtype=np.int64)
 
