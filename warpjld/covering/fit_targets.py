@@ -25,6 +25,7 @@ __all__ = ["TargetFit", "fit_targets"]
 
 _HIGHEST = 3.0  # amplitude: somebody modelled these shapes
 _PULL = 1e-6  # to the start, of what the average amplitude moves: keeps what the shapes do not determine
+_ROUNDS = 4  # of fields and amplitudes in turn
 _GAIN = 0.02  # of the root of the mean square, for which fields are worth changing
 _BOUNDS = {"proximity": (0.05, 0.5), "peak": (0.1, 0.9), "exponents": (0.2, 3.0), "palm": (0.0, 0.5)}
 
@@ -89,9 +90,11 @@ def fit_targets(
         )
     best = _solved(covering, poses, targets, tell)
     after, farthest = _distances(best, poses, targets)
-    other = _solved(_reshaped(best, poses, targets, iterations, tell), poses, targets, tell)
-    reshaped, its_farthest = _distances(other, poses, targets)
-    if np.sqrt((reshaped**2).sum()) < (1.0 - _GAIN) * np.sqrt((after**2).sum()):
+    for _ in range(_ROUNDS):
+        other = _solved(_reshaped(best, poses, targets, iterations, tell), poses, targets, tell)
+        reshaped, its_farthest = _distances(other, poses, targets)
+        if np.sqrt((reshaped**2).sum()) >= (1.0 - _GAIN) * np.sqrt((after**2).sum()):
+            break
         best, after, farthest = other, reshaped, its_farthest
     if (after**2).sum() >= (before**2).sum():
         best, after, farthest = covering, before, far

@@ -98,9 +98,12 @@ def _poses(arrays: dict[str, NDArray], frames: int, rig: Rig) -> Poses:
     angles = _numbers(arrays, "angles", f"({frames}, {len(channels)})")
     if angles.shape != (frames, len(channels)):
         raise InputError(f"'angles': want shape ({frames}, {len(channels)}), shapes and channels, got {angles.shape}")
+    named = [name.strip().lower() for name in channels.tolist()]
+    if twice := [name for name in named if named.count(name) > 1]:
+        raise InputError(f"'channels': '{twice[0]}' stands twice")
     motion = Motion(span=(0.0, float(frames - 1)))
-    for column, name in enumerate(channels.tolist()):
-        moves = name.strip().lower() in ROOT_CHANNELS
+    for column, name in enumerate(named):
+        moves = name in ROOT_CHANNELS
         for frame, value in enumerate(angles[:, column].tolist()):
             if not np.isfinite(value):
                 raise InputError(f"'angles': {name} is not finite at frame {frame}")
