@@ -1,4 +1,9 @@
-"""What calibration makes small: lost volume and stretched edges over a set of poses, with the gradient by positions."""
+"""What calibration makes small, pose by pose: lost volume, stretched and squeezed edges, edges sharper than at rest.
+
+Everything is summed up over what the amplitudes move in a pose, and in proportion to it: a finger of a body counts as
+much as one of a hand, and refining a mesh changes little. A pose is also held to what it was at the start: neither its
+roughness nor its volume error shall grow.
+"""
 
 from __future__ import annotations
 
@@ -8,15 +13,25 @@ import numpy as np
 import scipy.sparse as sp
 from numpy.typing import NDArray
 
-from warpjld.covering.quality import closing_fans, enclosed_volume, unique_edges
+from warpjld.covering.amplitudes import Frame
+from warpjld.covering.constrained_least_squares import Linearised
+from warpjld.covering.dihedral import dihedral_angles, dihedral_slopes, hinges
+from warpjld.covering.quality import unique_edges
+from warpjld.covering.tolerances import TOLERANCES, Tolerances
+from warpjld.covering.volume_form import ClosedSurface, VolumeForm, any_of
 from warpjld.surface import Surface
 
-__all__ = ["DeformationLoss", "LossWeights"]
+__all__ = ["LossTerms", "LossWeights", "PoseLoss", "SurfaceLoss"]
 
-_POWER = 8
-"""Exponent of the mean that stands for the worst edges: smooth, and near the largest of some thousand values."""
-
+_STRETCHED = 0.5  # logarithm of stretch, and
+_SHARP = 1.0  # growth of a dihedral angle [rad], from which on edges weigh with the fourth power: creases and folds
 _SHORTEST = 1e-3  # stretch at which the logarithm is cut off
+_THINNEST = 0.05  # height of a face, of that at rest, below which dihedral angles are not followed more steeply
+_SLENDER = 60.0  # stiffness of a hinge between faces that have no height
+_AIM = 0.9  # of the roughness that a pose may gain
+_SAMPLE = 6000
+"""Edges and hinges of a pose that are looked at; of more, those that are stretched or sharp and a part of the others
+stand for all."""
 
 
 @dataclass(frozen=True)
@@ -24,83 +39,259 @@ class LossWeights:
     """Weights of the terms.
 
     Attributes:
-        volume: Of the mean squared relative volume error; 1 % of volume then weighs like an all-over stretch of 10 %
-            with the default.
+        volume: Of the squared volume error, of the volume that is moved.
         stretch: Of the mean squared logarithm of edge stretch.
-        worst: Of the same, as a mean of a high power: the worst creases.
+        roughness: Of the squared growth of dihedral angles [rad²], by edge length over the height of the faces beside
+            it: the bending energy of a discrete shell (Grinspun et al. 2003), of each joint that bends.
     """
 
     volume: float = 100.0
     stretch: float = 1.0
-    worst: float = 0.3
+    roughness: float = 0.01
 
 
-class DeformationLoss:
-    """L = w_v ⟨e²⟩ + w_s ⟨⟨s²⟩⟩ + w_w ⟨⟨s^p⟩^(2/p)⟩ with e = V/V₀ − 1 and s = log(l/l₀), means over edges and poses.
+@dataclass(frozen=True)
+class LossTerms:
+    """The terms of one pose, weighted."""
 
-    Edges are weighted by their length at rest, so that a finely meshed nail does not outvote a palm.
+    volume: float
+    stretch: float
+    roughness: float
+
+    @property
+    def total(self) -> float:
+        """Their sum."""
+        return self.volume + self.stretch + self.roughness
+
+
+class SurfaceLoss:
+    """What the losses of all poses of a surface share.
 
     Args:
         surface: The rest surface.
+        axis: Where each vertex hangs on the skeleton at rest [m], shape (V, 3): says which volume lies behind it.
         weights: Weights of the terms.
+        tolerances: What a pose may be worse by.
     """
 
-    def __init__(self, surface: Surface, weights: LossWeights | None = None) -> None:
-        self._weights = weights or LossWeights()
-        count = len(surface.vertices)
+    def __init__(
+        self,
+        surface: Surface,
+        axis: NDArray[np.float64],
+        weights: LossWeights | None = None,
+        tolerances: Tolerances = TOLERANCES,
+    ) -> None:
+        self.weights, self.tolerances = weights or LossWeights(), tolerances
+        rest = np.asarray(surface.vertices, dtype=np.float64)
+        self.closed = ClosedSurface(surface)
         edges = unique_edges(surface.faces)
-        rest = np.linalg.norm(surface.vertices[edges[:, 1]] - surface.vertices[edges[:, 0]], axis=1)
-        edges, rest = edges[rest > 1e-9 * rest.max()], rest[rest > 1e-9 * rest.max()]
-        self._rest_length = rest
-        self._share = rest / rest.sum()
-        row = np.arange(len(edges))
-        signs = np.concatenate([-np.ones(len(edges)), np.ones(len(edges))])
-        self._difference = sp.csr_array((signs, (np.tile(row, 2), edges.T.ravel())), shape=(len(edges), count))
-        self._corners = _corner_matrices(surface.faces, count)
-        self._volume = float(enclosed_volume(surface.vertices, surface.faces))
+        length = _lengths(rest, edges)
+        solid = length > 1e-9 * length.max()
+        self.edges, self.length = edges[solid], length[solid]
+        self.hinges = hinges(surface.faces)
+        self.dihedral = dihedral_angles(rest, self.hinges)
+        self.stiffness, self.least = _stiffness(rest, self.hinges)
+        self.behind = _volume_behind(rest, surface.faces, axis)
 
-    def __call__(self, points: NDArray) -> tuple[float, NDArray[np.float64]]:
-        """The loss of P poses and its derivative by the positions, both of shape (P, V, 3)."""
-        poses, count = points.shape[:2]
-        columns = np.ascontiguousarray(points.transpose(1, 0, 2), dtype=np.float64).reshape(count, 3 * poses)
-        volume, volume_slope = self._volume_term(columns, poses)
-        stretch, stretch_slope = self._stretch_term(columns, poses)
-        slope = (volume_slope + stretch_slope).reshape(count, poses, 3).transpose(1, 0, 2)
-        return volume + stretch, slope
+    def still(self, frame: Frame) -> float:
+        """Sum of the squared growth of the dihedral angles that amplitudes do not change [rad²]."""
+        moved = np.zeros(len(frame.points), dtype=bool)
+        moved[frame.moved] = True
+        which = ~any_of(moved, self.hinges)
+        growth = dihedral_angles(frame.points.astype(np.float64), self.hinges[which]) - self.dihedral[which]
+        return float((np.maximum(growth, 0.0) ** 2).sum())
 
-    def _volume_term(self, columns: NDArray[np.float64], poses: int) -> tuple[float, NDArray[np.float64]]:
-        a, b, c = ((m @ columns).reshape(-1, poses, 3) for m in self._corners)
-        across = (np.cross(b, c), np.cross(c, a), np.cross(a, b))
-        error = np.einsum("tpi,tpi->p", a, across[0]) / (6.0 * self._volume) - 1.0
-        scale = (self._weights.volume * 2.0 / (6.0 * poses * self._volume)) * error
-        slope = np.zeros_like(columns)
-        for corner, normal in zip(self._corners, across, strict=True):
-            slope += corner.T @ (scale[:, None] * normal).reshape(-1, 3 * poses)
-        return self._weights.volume * float((error**2).mean()), slope
+    def region(self, frame: Frame) -> float:
+        """Volume that a pose moves [m³]: what lies between the skeleton and the vertices that amplitudes move."""
+        return float(max(self.behind[frame.moved].sum(), 1e-9 * abs(self.closed.volume)))
 
-    def _stretch_term(self, columns: NDArray[np.float64], poses: int) -> tuple[float, NDArray[np.float64]]:
-        along = (self._difference @ columns).reshape(-1, poses, 3)
-        squared = np.maximum((along**2).sum(axis=2), (_SHORTEST * self._rest_length[:, None]) ** 2)
-        log = 0.5 * np.log(squared) - np.log(self._rest_length)[:, None]
-        share = self._share[:, None]
-        high = share * np.abs(log) ** _POWER
-        norm = np.maximum(high.sum(axis=0), 1e-60)
-        worst = norm ** (2.0 / _POWER)
-        w = self._weights
-        value = w.stretch * (share * log**2).sum() + w.worst * worst.sum()
-        # d(norm^(2/p))/ds = 2 norm^(2/p - 1) share s |s|^(p - 2)
-        by_log = w.stretch * 2.0 * share * log
-        by_log += w.worst * 2.0 * (worst / norm) * share * log * np.abs(log) ** (_POWER - 2)
-        slope = self._difference.T @ ((by_log / squared)[..., None] * along).reshape(-1, 3 * poses)
-        return float(value) / poses, slope / poses
+    def pose(
+        self, frame: Frame, start: NDArray[np.float64], still: float, *, only_held: bool = False
+    ) -> PoseLoss | None:
+        """The loss of a pose as a function of amplitudes; None where they move nothing.
+
+        Args:
+            frame: The pose.
+            start: Amplitudes at which ``frame.points`` are, shape (P,).
+            still: Sharpness of what they do not move [rad²].
+            only_held: Whether it is only not to get worse.
+        """
+        return PoseLoss(self, frame, start, still, only_held) if len(frame.moved) else None
 
 
-def _corner_matrices(faces: NDArray[np.int32], count: int) -> list[sp.csr_array]:
-    """Three matrices that take vertices to the corners of all faces, those that close open rims included."""
-    boundary, loop = closing_fans(faces)
-    rims = int(loop.max()) + 1 if len(loop) else 0
-    members = np.bincount(loop, minlength=rims)
-    pick = sp.eye_array(count, format="csr")
-    mean = sp.csr_array((1.0 / members[loop], (loop, boundary[:, 0])), shape=(rims, count))
-    ends = (pick[boundary[:, 1]], pick[boundary[:, 0]], mean[loop])
-    return [sp.vstack([pick[faces[:, k]], ends[k]], format="csr") if rims else pick[faces[:, k]] for k in range(3)]
+class PoseLoss:
+    """The loss of one pose, over the edges and hinges that its amplitudes move; made by ``SurfaceLoss.pose``.
+
+    Attributes:
+        parameters: Amplitudes that move anything, shape (p,).
+        before: Its terms at the start.
+    """
+
+    def __init__(
+        self, shared: SurfaceLoss, frame: Frame, start: NDArray[np.float64], still: float, only_held: bool
+    ) -> None:
+        w, may = shared.weights, shared.tolerances
+        self._only_held = only_held
+        self.parameters = np.unique(frame.directions.indices)
+        directions = frame.directions.tocsc()[:, self.parameters].tocsr()
+        self._start = start[self.parameters]
+        points = frame.points.astype(np.float64)
+        moved = np.zeros(len(points), dtype=bool)
+        moved[frame.moved] = True
+
+        self._volume = VolumeForm.of(shared.closed, points, frame.moved, directions)
+        self._region = region = shared.region(frame)
+        self._of_volume = np.sqrt(w.volume) / region
+        free = min(may.volume_free * shared.closed.volume, may.region_free * region)
+        self._volume_kept = max(abs(self._volume.constant), free)
+
+        edge = np.flatnonzero(any_of(moved, shared.edges))
+        log = np.log(_lengths(points, shared.edges[edge]) / shared.length[edge])
+        edge, times = _sampled(edge, shared.length[edge] * _steeper(log, _STRETCHED)[0] ** 2)
+        self._length = shared.length[edge]
+        self._of_stretch = np.sqrt(w.stretch * times * self._length / (times * self._length).sum())
+
+        hinge = np.flatnonzero(any_of(moved, shared.hinges))
+        grown = np.maximum(dihedral_angles(points, shared.hinges[hinge]) - shared.dihedral[hinge], 0.0)
+        hinge, self._times = _sampled(hinge, grown**2)
+        self._dihedral, self._least = shared.dihedral[hinge], shared.least[hinge]
+        bent = max(float(frame.ratio.sum()), 1.0)
+        self._of_roughness = np.sqrt(w.roughness * self._times * shared.stiffness[hinge] / bent)
+
+        edges, hinged = shared.edges[edge], shared.hinges[hinge]
+        used = np.unique(np.concatenate([edges.ravel(), hinged.ravel()]))
+        number = np.full(len(points), -1)
+        number[used] = np.arange(len(used))
+        self._edges, self._hinges, self._points = number[edges], number[hinged], points[used]
+        self._directions = _dense(directions, number[frame.moved], len(used))
+
+        # a little less than what counts as worse: what is sampled here is not all there is
+        growth = 1.0 + _AIM * (may.roughness - 1.0)
+        rough = float((self._times * self._growth(self._points) ** 2).sum())
+        count = max(len(shared.hinges), 1)
+        most = growth * np.sqrt((rough + still) / count) + _AIM * may.roughness_more
+        self._rough_kept = count * float(most) ** 2 - still
+        self.before = self._terms(self._points, self._volume.constant)
+
+    def terms(self, amplitudes: NDArray[np.float64]) -> LossTerms:
+        """Of all amplitudes, shape (P,)."""
+        change = amplitudes[self.parameters] - self._start
+        return self._terms(self._at(change), self._volume.lost(change)[0])
+
+    def _terms(self, points: NDArray[np.float64], lost: float) -> LossTerms:
+        log, growth = self._logarithms(points)[0], self._growth(points)
+        return LossTerms(
+            float((self._of_volume * lost) ** 2),
+            float(((self._of_stretch * _steeper(log, _STRETCHED)[0]) ** 2).sum()),
+            float(((self._of_roughness * _steeper(growth, _SHARP)[0]) ** 2).sum()),
+        )
+
+    def linearised(self, amplitudes: NDArray[np.float64]) -> Linearised:
+        """Numbers whose squares sum to the loss; squared roughness and volume error, beyond what they may be, as
+        shares of that and of what is moved."""
+        change = amplitudes[self.parameters] - self._start
+        points = self._at(change)
+        lost, by_lost = self._volume.lost(change)
+        growth = self._growth(points)
+        grows = np.flatnonzero(growth > 0.0)
+        by_angle = self._by_amplitude(
+            self._hinges[grows], dihedral_slopes(points, self._hinges[grows], self._least[grows])
+        )
+        rough = float((self._times * growth**2).sum()) / self._rough_kept
+        by_rough = 2.0 / self._rough_kept * ((self._times * growth)[grows] @ by_angle)
+        kept = self._volume_kept
+        constraints = np.array([rough - 1.0, (lost - kept) / self._region, (-lost - kept) / self._region])
+        slopes = np.stack([by_rough, by_lost / self._region, -by_lost / self._region])
+        if self._only_held:
+            return Linearised(np.zeros(0), np.zeros((0, len(change))), constraints, slopes)
+
+        log, along, squared = self._logarithms(points)
+        stretch, slope = _steeper(log, _STRETCHED)
+        pull = (self._of_stretch * slope / squared)[:, None] * along
+        by_stretch = self._by_amplitude(self._edges, np.stack([-pull, pull], axis=1))
+        sharp, slope = _steeper(growth[grows], _SHARP)
+        of_sharp = self._of_roughness[grows]
+        residuals = [[self._of_volume * lost], self._of_stretch * stretch, of_sharp * sharp]
+        by_amplitude = [self._of_volume * by_lost[None], by_stretch, (of_sharp * slope)[:, None] * by_angle]
+        return Linearised(np.concatenate(residuals), np.concatenate(by_amplitude), constraints, slopes)
+
+    def volume_slope(self, amplitudes: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Derivative of the volume by ``parameters`` [m³], shape (p,)."""
+        return self._volume.lost(amplitudes[self.parameters] - self._start)[1]
+
+    def _at(self, change: NDArray[np.float64]) -> NDArray[np.float64]:
+        return np.asarray(self._points + self._directions @ change)
+
+    def _by_amplitude(self, corners: NDArray[np.int64], slopes: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Derivatives by amplitudes, (N, p), from those by the positions of corners (N, k): (N, k, 3)."""
+        count, width = len(corners), 3 * corners.shape[1]
+        column = (3 * corners[:, :, None] + np.arange(3)).ravel()
+        directions = self._directions.reshape(-1, len(self.parameters))
+        shape = (count, len(directions))
+        rows = sp.csr_array((slopes.ravel(), column, np.arange(count + 1) * width), shape=shape)
+        return np.asarray(rows @ directions)
+
+    def _logarithms(
+        self, points: NDArray[np.float64]
+    ) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
+        along = points[self._edges[:, 1]] - points[self._edges[:, 0]]
+        squared = np.maximum(np.einsum("ij,ij->i", along, along), (_SHORTEST * self._length) ** 2)
+        return 0.5 * np.log(squared) - np.log(self._length), along, squared
+
+    def _growth(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
+        return np.maximum(dihedral_angles(points, self._hinges) - self._dihedral, 0.0)
+
+
+def _dense(directions: sp.csr_array, number: NDArray[np.int64], count: int) -> NDArray[np.float64]:
+    """D of vertices, rows x, y, z (3 n, p), as D of numbered points, (count, 3, p); those of number -1 are left out."""
+    out = np.zeros((count, 3, directions.shape[1]))
+    entries = directions.tocoo()
+    row, axis = np.divmod(entries.coords[0], 3)
+    kept = number[row] >= 0
+    out[number[row[kept]], axis[kept], entries.coords[1][kept]] = entries.data[kept]
+    return out
+
+
+def _sampled(chosen: NDArray[np.int64], weight: NDArray[np.float64]) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
+    """At most about ``_SAMPLE`` of what is chosen, those that weigh most for certain, and how many each stands for."""
+    if len(chosen) <= _SAMPLE:
+        return chosen, np.ones(len(chosen))
+    likely = weight / max(float(weight.sum()), 1e-30) + 1.0 / len(chosen)
+    chance = np.minimum(0.5 * _SAMPLE * likely, 1.0)
+    kept = np.flatnonzero(np.random.default_rng(0).uniform(size=len(chosen)) < chance)
+    return chosen[kept], 1.0 / chance[kept]
+
+
+def _steeper(x: NDArray[np.float64], beyond: float) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """x √(1 + (x / beyond)²) and its derivative: squared, x² for small x and x⁴ for large ones."""
+    ratio = (x / beyond) ** 2
+    root = np.sqrt(1.0 + ratio)
+    return x * root, (1.0 + 2.0 * ratio) / root
+
+
+def _lengths(points: NDArray[np.float64], edges: NDArray[np.int64]) -> NDArray[np.float64]:
+    along = points[edges[:, 1]] - points[edges[:, 0]]
+    return np.asarray(np.maximum(np.sqrt(np.einsum("ij,ij->i", along, along)), 1e-30))
+
+
+def _volume_behind(
+    rest: NDArray[np.float64], faces: NDArray[np.int32], axis: NDArray[np.float64]
+) -> NDArray[np.float64]:
+    """Volume between each vertex's share of the surface and the skeleton [m³], shape (V,)."""
+    a, b, c = (rest[faces[:, k]] for k in range(3))
+    height = (a + b + c - axis[faces].sum(axis=1)) / 3.0
+    third = (height * np.cross(b - a, c - a)).sum(axis=1) / 18.0
+    out = sum(np.bincount(faces[:, k], third, minlength=len(rest)) for k in range(3))
+    return np.maximum(out, 0.0)
+
+
+def _stiffness(rest: NDArray[np.float64], hinge: NDArray[np.int64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Edge length over a third of the mean height of the faces beside it, and the least doubled areas of those faces
+    that slopes may divide by [m²], shape (H, 2)."""
+    i, j, k, m = (rest[hinge[:, n]] for n in range(4))
+    along = np.linalg.norm(j - i, axis=1)
+    areas = np.stack([np.linalg.norm(np.cross(j - i, other - i), axis=1) for other in (k, m)], axis=1)
+    height = areas.sum(axis=1) / np.maximum(2.0 * along, 1e-30)
+    solid = height > 1e-3 * along
+    stiffness = np.where(solid, 3.0 * along / np.where(solid, height, 1.0), 0.0)
+    return np.minimum(stiffness, _SLENDER), np.maximum(_THINNEST * areas, 1e-12 * along[:, None] ** 2)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import re
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -10,15 +12,17 @@ from warpjld.skeleton.hand import DIGITS
 from warpjld.skeleton.kinematics import Poses, poses_from_angles
 from warpjld.skeleton.tree import CHANNELS, Skeleton
 
-__all__ = ["CURL", "calibration_poses", "curled"]
+__all__ = ["CURL", "calibration_poses", "curled", "guard_poses"]
 
 CURL = {"base": 80.0, "knuckle2": 97.0, "knuckle3": 63.0}
 """Flexion [degrees] of a finger's joints in a full curl; the thumb takes no part."""
 
 _FLEXION, _ABDUCTION = CHANNELS.index("flexion"), CHANNELS.index("abduction")
-_WIDEST = np.radians(100.0)  # shoulders, hips, knees and elbows in full are poses of their own kind
+_WIDEST = np.radians(120.0)  # shoulders, knees and elbows in full are contact of the limbs
 _UNKNOWN = np.radians(30.0)  # where limits are as wide one way as the other: nothing is known of the joint
+_TOE = re.compile(r"^toe\d")
 _CURLS = (0.3, 0.6, 0.9)
+_ONE_BY_ONE = (0.45, 0.9)
 
 
 def curled(skeleton: Skeleton, amounts: NDArray[np.float64] | list[float] | tuple[float, ...]) -> Poses:
@@ -26,32 +30,26 @@ def curled(skeleton: Skeleton, amounts: NDArray[np.float64] | list[float] | tupl
     return poses_from_angles(skeleton, _curls(skeleton, amounts))
 
 
-def calibration_poses(skeleton: Skeleton, count: int | None = None, *, seed: int = 0) -> Poses:
-    """Poses over the joint ranges of a skeleton, in the order in which they matter.
+def calibration_poses(skeleton: Skeleton, count: int | None = None) -> Poses:
+    """Poses to fit to, over the joint ranges of a skeleton, in the order in which they matter.
 
-    Curls of 0.3, 0.6 and 0.9 first, then fists (every joint of index to pinky at 0.5 and 0.8 of its flexion) and the
-    thumb opposed and spread, random poses within the limits, and every joint alone at its full and half flexion.
+    Curls of 0.3, 0.6 and 0.9, digits curled one by one, thumbs opposed and spread, every joint alone at its full and
+    half flexion: in each pose what is lost belongs to few joints, so none has to make up for others.
 
     Args:
         skeleton: The rest skeleton.
         count: How many to take: the first of each kind in turn; by default all.
-        seed: Of the random poses.
 
     Raises:
         InputError: A skeleton whose joints cannot flex, or a count below 1.
     """
     if count is not None and count < 1:
         raise InputError(f"count: want at least 1 pose, got {count}")
-    low, high = np.moveaxis(skeleton.limits[:, _FLEXION], -1, 0)
-    largest = np.minimum(high, np.where(low <= -high, _UNKNOWN, _WIDEST))
-    inner = (skeleton.parents >= 0) & np.array([bool(c) for c in skeleton.children])
-    bends = np.flatnonzero(inner & (largest > 1e-6))
-    if not bends.size:
-        raise InputError("skeleton: none of its joints may flex; its limits are closed")
+    bends, largest = _range(skeleton)
     kinds = [
         _curls(skeleton, _CURLS),
-        _fists(skeleton, bends, largest),
-        _random(skeleton, bends, largest, seed),
+        _digits(skeleton, bends, largest),
+        _thumbs(skeleton, bends, largest),
         _alone(skeleton, bends, largest, 1.0),
         _alone(skeleton, bends, largest, 0.5),
     ]
@@ -60,6 +58,36 @@ def calibration_poses(skeleton: Skeleton, count: int | None = None, *, seed: int
         turn = np.concatenate([np.arange(len(k)) + 0.1 * i for i, k in enumerate(kinds) if len(k)])
         angles = angles[np.sort(np.argsort(turn, kind="stable")[:count])]
     return poses_from_angles(skeleton, angles)
+
+
+def guard_poses(skeleton: Skeleton, *, seed: int = 0) -> Poses:
+    """Poses of many joints at once, that nothing is fitted to but none of which may get worse.
+
+    Fists (every joint of the digits at 0.5 and 0.8 of its flexion), joints of trunk, arms and legs alone at three
+    quarters, and random poses within the limits, alike on both sides of a body.
+
+    Raises:
+        InputError: A skeleton whose joints cannot flex.
+    """
+    bends, largest = _range(skeleton)
+    limbs = np.array([j for j in bends if "." not in skeleton.names[j].partition(".")[2]], dtype=np.int64)
+    kinds = [
+        _fists(skeleton, bends, largest),
+        _alone(skeleton, limbs, largest, 0.75),
+        _random(skeleton, bends, largest, seed),
+    ]
+    return poses_from_angles(skeleton, np.concatenate(kinds))
+
+
+def _range(skeleton: Skeleton) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
+    """Joints that flex, and the largest flexion [rad] of all joints."""
+    low, high = np.moveaxis(skeleton.limits[:, _FLEXION], -1, 0)
+    largest = np.minimum(high, np.where(low <= -high, _UNKNOWN, _WIDEST))
+    inner = (skeleton.parents >= 0) & np.array([bool(c) for c in skeleton.children])
+    bends = np.flatnonzero(inner & (largest > 1e-6))
+    if not bends.size:
+        raise InputError("skeleton: none of its joints may flex; its limits are closed")
+    return bends, largest
 
 
 def _curls(skeleton: Skeleton, amounts: NDArray[np.float64] | list[float] | tuple[float, ...]) -> NDArray[np.float64]:
@@ -76,38 +104,68 @@ def _curls(skeleton: Skeleton, amounts: NDArray[np.float64] | list[float] | tupl
     return angles
 
 
+def _digits(skeleton: Skeleton, bends: NDArray[np.int64], largest: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Digits one by one, half and nearly curled, on all hands at once."""
+    full = _curls(skeleton, [1.0])[0] if _curls(skeleton, [1.0]).size else np.zeros((len(skeleton), len(CHANNELS)))
+    thumbs = [j for j in bends if _digit(skeleton.names[j]) == DIGITS[-1] and not skeleton.names[j].endswith(".base")]
+    full[thumbs, _FLEXION] = largest[thumbs]
+    digit = np.array([_digit(name) for name in skeleton.names])
+    alone = [np.where((digit == d)[:, None], full, 0.0) for d in DIGITS]
+    angles = [part * one for one in alone if one.any() for part in _ONE_BY_ONE]
+    return np.array(angles).reshape(-1, len(skeleton), len(CHANNELS))
+
+
 def _fists(skeleton: Skeleton, bends: NDArray[np.int64], largest: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Metacarpals and fingers half and nearly closed; then thumbs opposed and spread, by themselves: their large roots
-    lose what no parameter gives back, and fingers must not make up for them."""
-    fingers = [j for j in bends if _digit(skeleton.names[j]) in DIGITS[:-1]]
+    """Metacarpals and fingers half and nearly closed, the thumb opposed and bent beside them."""
+    digits = [j for j in bends if _digit(skeleton.names[j])]
     roots = [j for j in bends if skeleton.names[j].endswith("thumb.base")]
-    angles = np.zeros((4, len(skeleton), len(CHANNELS)))
+    angles = np.zeros((2, len(skeleton), len(CHANNELS)))
     for frame, amount in enumerate((0.5, 0.8)):
-        angles[frame, fingers, _FLEXION] = amount * largest[fingers]
-    for frame, end in ((2, 0), (3, 1)):
+        angles[frame, digits, _FLEXION] = amount * largest[digits]
+        angles[frame, roots, _ABDUCTION] = 0.5 * amount * skeleton.limits[roots, _ABDUCTION, 0]
+    return angles[[bool(digits)] * 2]
+
+
+def _thumbs(skeleton: Skeleton, bends: NDArray[np.int64], largest: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Thumbs opposed and spread."""
+    roots = [j for j in bends if skeleton.names[j].endswith("thumb.base")]
+    angles = np.zeros((2, len(skeleton), len(CHANNELS)))
+    for frame, end in ((0, 0), (1, 1)):
         angles[frame, roots, _ABDUCTION] = 0.5 * skeleton.limits[roots, _ABDUCTION, end]
-    angles[2, roots, _FLEXION] = largest[roots]
-    return angles[[bool(fingers)] * 2 + [bool(roots)] * 2]
+    angles[0, roots, _FLEXION] = largest[roots]
+    return angles[[bool(roots)] * 2]
 
 
 def _random(
-    skeleton: Skeleton, bends: NDArray[np.int64], largest: NDArray[np.float64], seed: int, frames: int = 8
+    skeleton: Skeleton, bends: NDArray[np.int64], largest: NDArray[np.float64], seed: int, frames: int = 4
 ) -> NDArray[np.float64]:
     """Flexion anywhere up to the limit, abduction in the inner half of its range."""
     generator = np.random.default_rng(seed)
+    known, kind = _without_side(skeleton, bends)
     angles = np.zeros((frames, len(skeleton), len(CHANNELS)))
-    angles[:, bends, _FLEXION] = generator.uniform(0.0, 1.0, (frames, len(bends))) * largest[bends]
+    part = generator.uniform(0.0, 1.0, (frames, 2, len(known)))[:, :, kind]
+    angles[:, bends, _FLEXION] = part[:, 0] * largest[bends]
     low, high = (np.clip(skeleton.limits[bends, _ABDUCTION, k], -_WIDEST / 4, _WIDEST / 4) for k in (0, 1))
-    angles[:, bends, _ABDUCTION] = generator.uniform(0.5 * low, 0.5 * high, (frames, len(bends)))
+    angles[:, bends, _ABDUCTION] = 0.5 * (low + part[:, 1] * (high - low))
     return angles
 
 
 def _alone(
     skeleton: Skeleton, bends: NDArray[np.int64], largest: NDArray[np.float64], part: float
 ) -> NDArray[np.float64]:
-    angles = np.zeros((len(bends), len(skeleton), len(CHANNELS)))
-    angles[np.arange(len(bends)), bends, _FLEXION] = part * largest[bends]
+    """One joint a frame, on both sides of a body at once."""
+    known, kind = _without_side(skeleton, bends)
+    angles = np.zeros((len(known), len(skeleton), len(CHANNELS)))
+    angles[kind, bends, _FLEXION] = part * largest[bends]
     return angles
+
+
+def _without_side(skeleton: Skeleton, joints: NDArray[np.int64]) -> tuple[list[str], NDArray[np.int64]]:
+    """Names of joints without their side, in the order in which they come, and which of them each joint is. Toes, which
+    nobody looks at one by one, are one."""
+    names = [_TOE.sub("toe", skeleton.names[j].removeprefix("left.").removeprefix("right.")) for j in joints]
+    known = list(dict.fromkeys(names))
+    return known, np.array([known.index(name) for name in names], dtype=np.int64)
 
 
 def _digit(name: str) -> str:

@@ -1,0 +1,208 @@
+"""Whether one covering is worse than another in any pose: volume, folds and roughness, measured on what it deforms."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from warpjld.covering.covering import Covering
+from warpjld.covering.dihedral import dihedral_angles, hinges
+from warpjld.covering.intersections import Crossings, crossing_faces, surface_parts
+from warpjld.covering.pose_losses import PoseLosses
+from warpjld.covering.quality import edge_stretch, unique_edges
+from warpjld.covering.tolerances import TOLERANCES, Tolerances
+from warpjld.covering.volume_form import ClosedSurface, any_of
+from warpjld.skeleton.kinematics import Poses
+
+__all__ = ["Guard", "PoseMeasures", "copy_of"]
+
+_SHARP = np.radians(70.0)  # growth of a dihedral angle without which skin does not cross itself, and
+_RINGS = 3  # of faces around such hinges, among which crossings are looked for
+_PLATES = 0.02  # of all faces: so many cross others at rest where a surface is made of plates
+_BLOCK = 16  # poses deformed at once
+_FACES_SEARCHED = 1_000_000  # for crossings, in all poses together
+
+
+@dataclass(frozen=True, eq=False)
+class PoseMeasures:
+    """Measures of F poses.
+
+    Attributes:
+        volume: Relative change of the volume of the flesh, shape (F,).
+        roughness: RMS growth of dihedral angles beyond rest [rad], shape (F,).
+        least, largest: Edge stretch of what amplitudes move, shape (F,).
+        folds: Faces that cross others of the same part or of one that it joins on to, and did not at rest, shape (F,).
+            They are looked for where the skin is sharply bent, in as many poses as are quickly searched.
+        contacts: Faces that cross those of another part, likewise.
+        folded: Vertices of the former in each pose.
+        sharper: Squared growth of the dihedral angles that amplitudes change [rad²], in each pose.
+    """
+
+    volume: NDArray[np.float64]
+    roughness: NDArray[np.float64]
+    least: NDArray[np.float64]
+    largest: NDArray[np.float64]
+    folds: NDArray[np.int64]
+    contacts: NDArray[np.int64]
+    folded: list[NDArray[np.int64]]
+    sharper: list[NDArray[np.float64]]
+
+    @staticmethod
+    def of_none(poses: int) -> PoseMeasures:
+        """Of poses that are not measured yet."""
+        volume, roughness, least, largest = np.zeros((4, poses))
+        folds, contacts = np.zeros((2, poses), dtype=np.int64)
+        folded, sharper = [np.zeros(0, dtype=np.int64)] * poses, [np.zeros(0)] * poses
+        return PoseMeasures(volume, roughness, least, largest, folds, contacts, folded, sharper)
+
+    def summary(self) -> dict[str, float | int]:
+        """Of all poses: volume error as a root of the mean square and the worst one [%], roughness as a root of the
+        mean square and the worst [degrees], stretch, and faces summed up."""
+        worst = int(np.abs(self.volume).argmax())
+        return {
+            "volume_rms": 100.0 * float(np.sqrt((self.volume**2).mean())),
+            "volume_worst": 100.0 * float(self.volume[worst]),
+            "roughness_rms": float(np.degrees(np.sqrt((self.roughness**2).mean()))),
+            "roughness_worst": float(np.degrees(self.roughness.max())),
+            "stretch_least": float(self.least.min()),
+            "stretch_largest": float(self.largest.max()),
+            "faces_folded": int(self.folds.sum()),
+            "faces_in_contact": int(self.contacts.sum()),
+        }
+
+
+class Guard:
+    """Measures coverings of one surface in the same poses, and compares them to the first.
+
+    Args:
+        covering: What others are compared to; they differ from it in amplitudes.
+        poses: F poses.
+        losses: Of these poses: what amplitudes move in each, nothing else is looked at.
+        tolerances: What counts as worse.
+    """
+
+    def __init__(
+        self,
+        covering: Covering,
+        poses: Poses,
+        losses: PoseLosses,
+        tolerances: Tolerances = TOLERANCES,
+        progress: Callable[[int, int], None] | None = None,
+    ) -> None:
+        surface, flesh = covering.surface, covering.flesh
+        self._poses, self._moved, self._tolerances = poses, losses.moved, tolerances
+        self._closed = ClosedSurface(flesh)
+        self._rest, self._faces = np.asarray(surface.vertices, dtype=np.float64), flesh.faces
+        self._edges, self.hinges = unique_edges(flesh.faces), hinges(flesh.faces)
+        self._dihedral = dihedral_angles(self._rest, self.hinges)
+        parts = surface_parts(covering)
+        # faces of the flesh are some of the surface's, in its order
+        soft = (covering.anchors.rigid[surface.faces] < 0).any(axis=1)
+        self._parts = parts.of_face[soft]
+        self._joined = _joined(parts.names, covering.skeleton.names, covering.skeleton.parents)
+        crossing = crossing_faces(self._rest, flesh.faces)
+        self._crossing = _keys(crossing, len(flesh.faces))
+        self._plates = len(crossing.faces) > _PLATES * len(flesh.faces)
+        self._relative = self._closed.volume / losses.regions
+        self._searched = np.cumsum([2 * len(points) for points in losses.moved]) <= _FACES_SEARCHED
+        self._still = losses.still
+        self.first = PoseMeasures.of_none(len(poses))
+        self.measure(covering, np.arange(len(poses)), self.first, progress)
+
+    def measure(
+        self,
+        covering: Covering,
+        which: NDArray[np.int64],
+        into: PoseMeasures,
+        progress: Callable[[int, int], None] | None = None,
+    ) -> None:
+        """Measure some poses of a covering."""
+        for done, f in enumerate(which.tolist()):
+            if done % _BLOCK == 0:
+                some = which[done : done + _BLOCK]
+                p = self._poses
+                block = covering.deform(Poses(p.positions[some], p.rotations[some], p.flexion[some]))
+            self._measure(block[done % _BLOCK].astype(np.float64), f, into)
+            if progress:
+                progress(done + 1, len(which))
+
+    def _measure(self, points: NDArray[np.float64], f: int, into: PoseMeasures) -> None:
+        inside = np.zeros(len(points), dtype=bool)
+        inside[self._moved[f]] = True
+        local = any_of(inside, self.hinges)
+        growth = self._growth(points, local)
+        into.sharper[f] = growth**2
+        into.volume[f] = self._closed.volume_of(points) / self._closed.volume - 1.0
+        into.roughness[f] = np.sqrt((self._still[f] + into.sharper[f].sum()) / max(len(self.hinges), 1))
+        edges = self._edges[any_of(inside, self._edges)]
+        stretch = edge_stretch(self._rest, points, edges) if len(edges) else np.ones(1)
+        into.least[f], into.largest[f] = stretch.min(), stretch.max()
+        into.folds[f], into.contacts[f], into.folded[f] = 0, 0, np.zeros(0, dtype=np.int64)
+        sharp = self.hinges[local][growth > _SHARP]
+        if self._searched[f] and (len(sharp) or self._plates):
+            self._search(points, self._near(inside, sharp), f, into)
+
+    def local_hinges(self, pose: int) -> NDArray[np.int64]:
+        """The hinges of ``PoseMeasures.sharper``, shape (H, 4)."""
+        inside = np.zeros(len(self._rest), dtype=bool)
+        inside[self._moved[pose]] = True
+        return self.hinges[any_of(inside, self.hinges)]
+
+    def _growth(self, points: NDArray[np.float64], which: NDArray[np.bool_]) -> NDArray[np.float64]:
+        return np.maximum(dihedral_angles(points, self.hinges[which]) - self._dihedral[which], 0.0)
+
+    def worse(self, measured: PoseMeasures) -> tuple[NDArray[np.bool_], NDArray[np.bool_], NDArray[np.bool_]]:
+        """Poses that have lost volume, that fold more and that are rougher than at first, shape (F,) each."""
+        t, first = self._tolerances, self.first
+        error, before = np.abs(measured.volume), np.abs(first.volume)
+        emptier = error > np.maximum(before + t.volume, t.volume_free)
+        emptier |= error * self._relative > np.maximum(before * self._relative + t.region, t.region_free)
+        folded = measured.folds > t.folds * first.folds + t.folds_more
+        rougher = measured.roughness > t.roughness * first.roughness + t.roughness_more
+        return emptier, folded, rougher
+
+    def _near(self, inside: NDArray[np.bool_], sharp: NDArray[np.int64]) -> NDArray[np.bool_]:
+        """Vertices near hinges that have become sharp. Of a doll of plates, which cross at rest, all that move: they
+        pass into each other without bending."""
+        if self._plates:
+            return inside
+        near = np.zeros(len(inside), dtype=bool)
+        near[sharp] = True
+        for _ in range(_RINGS):
+            near[self._faces[any_of(near, self._faces)]] = True
+        return near
+
+    def _search(self, points: NDArray[np.float64], near: NDArray[np.bool_], f: int, into: PoseMeasures) -> None:
+        """Count crossings of faces near some vertices."""
+        faces = np.flatnonzero(any_of(near, self._faces))
+        pairs = faces[crossing_faces(points, self._faces[faces]).pairs].reshape(-1, 2)
+        pairs = pairs[~np.isin(pairs[:, 0] * len(self._faces) + pairs[:, 1], self._crossing)]
+        a, b = self._parts[pairs].T
+        folds = self._joined[a, b]
+        folded = np.unique(pairs[folds])
+        into.folds[f], into.contacts[f] = len(folded), len(np.unique(pairs[~folds]))
+        into.folded[f] = np.unique(self._faces[folded])
+
+
+def copy_of(measures: PoseMeasures) -> PoseMeasures:
+    """Measures of other poses can be written into, one by one."""
+    return replace(measures, **{name: value.copy() for name, value in vars(measures).items()})
+
+
+def _keys(crossings: Crossings, faces: int) -> NDArray[np.int64]:
+    pairs = crossings.pairs.astype(np.int64)
+    return pairs[:, 0] * faces + pairs[:, 1]
+
+
+def _joined(parts: tuple[str, ...], names: tuple[str, ...], parents: NDArray[np.int32]) -> NDArray[np.bool_]:
+    """Whether two parts are the same one or limbs that join on to each other, shape (parts, parts)."""
+    number = [names.index(p) if p in names else -1 for p in parts]
+    out = np.eye(len(parts), dtype=bool)
+    for i, a in enumerate(number):
+        for j, b in enumerate(number):
+            if a >= 0 and b >= 0:
+                out[i, j] |= parents[a] == b or parents[b] == a
+    return out

@@ -1,0 +1,213 @@
+"""Sums of squares minimised under inequalities: Gauss–Newton steps that keep to the linearised constraints, damped as
+by Levenberg and Marquardt where they make things worse.
+
+Each step solves the quadratic program
+
+    min ½ s·H s + g·s,   c + C s ≤ 0,   low ≤ x + s ≤ high,   H = JᵀJ + pull
+
+as a least distance problem, which is one of non-negative least squares in the multipliers λ of the constraints, with
+s = −H⁻¹ (g + Cᵀ λ) (Lawson and Hanson, *Solving Least Squares Problems*, §23). Residuals and constraints come in parts
+that know a few parameters each.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+__all__ = ["Fit", "Linearised", "Part", "minimise"]
+
+_SETTLED = 1e-3  # relative gain of a step below which the next is not taken
+_VIOLATED = 1e-3  # by all constraints together, above which one more step is taken all the same
+_LEAST, _MOST, _DAMPED = 0.1, 1e3, 10.0
+"""Least and largest damping, of the diagonal of H, once a step has made things worse, and the factor between two."""
+
+_TOUCH = 1e-9  # by which a step may pass a constraint
+_IMPOSSIBLE = 1e-9  # residual of the least distance problem where nothing is within its constraints
+_SLACK = 0.02  # of one constraint, beyond which a step is not taken unless it lessens what is violated
+_MULTIPLIED = 2.0  # weight of violated constraints in what a step has to gain, of the largest multiplier
+
+
+@dataclass(frozen=True, eq=False)
+class Linearised:
+    """A part around some parameters: N residuals and M constraints by p parameters.
+
+    Attributes:
+        residuals: r, shape (N,): the sum of squares is made small.
+        jacobian: dr/dx, shape (N, p).
+        constraints: c, shape (M,): wanted ≤ 0.
+        slopes: dc/dx, shape (M, p).
+    """
+
+    residuals: NDArray[np.float64]
+    jacobian: NDArray[np.float64]
+    constraints: NDArray[np.float64]
+    slopes: NDArray[np.float64]
+
+
+class Part(Protocol):
+    """Residuals and constraints that some parameters determine."""
+
+    parameters: NDArray[np.int64]
+
+    def linearised(self, x: NDArray[np.float64]) -> Linearised:
+        """At all parameters x, shape (P,); derivatives by ``parameters``, (p,)."""
+
+
+@dataclass(frozen=True, eq=False)
+class Fit:
+    """What :func:`minimise` found.
+
+    Attributes:
+        x: Parameters, shape (P,).
+        iterations: Steps taken.
+        evaluations: Times all parts were linearised.
+        converged: Whether the last step gained next to nothing; else the evaluations ran out.
+    """
+
+    x: NDArray[np.float64]
+    iterations: int
+    evaluations: int
+    converged: bool
+
+
+@dataclass(frozen=True, eq=False)
+class _Sum:
+    """All parts together, by the parameters that any of them moves."""
+
+    loss: float
+    gradient: NDArray[np.float64]
+    square: NDArray[np.float64]
+    constraints: NDArray[np.float64]
+    slopes: NDArray[np.float64]
+
+    @property
+    def worst(self) -> float:
+        return float(self.constraints.max(initial=0.0))
+
+    @property
+    def violated(self) -> float:
+        return float(np.maximum(self.constraints, 0.0).sum())
+
+
+def minimise(
+    parts: Sequence[Part],
+    start: NDArray[np.float64],
+    bounds: tuple[NDArray[np.float64], NDArray[np.float64]],
+    pull: NDArray[np.float64],
+    *,
+    evaluations: int = 12,
+    progress: Callable[[int, int], None] | None = None,
+) -> Fit:
+    """Minimise ½ Σ |r(x)|² + ½ Σ pull (x − start)² under c(x) ≤ 0 and within bounds.
+
+    Args:
+        parts: Residuals and constraints; parameters that none of them moves stay as they are.
+        start: First x, shape (P,), where constraints and bounds hold.
+        bounds: Least and largest x, shape (P,) each.
+        pull: How much each parameter is held at its start, above 0, shape (P,).
+        evaluations: Most times that all parts are linearised.
+        progress: Called with evaluations done, and how many there may be.
+    """
+    moved = np.unique(np.concatenate([part.parameters for part in parts])) if parts else np.zeros(0, dtype=np.int64)
+    place = np.full(len(start), -1)
+    place[moved] = np.arange(len(moved))
+    low, high, held = bounds[0][moved], bounds[1][moved], pull[moved]
+
+    def summed(x: NDArray[np.float64]) -> _Sum:
+        change = (x - start)[moved]
+        loss = float((held * change**2).sum())
+        gradient, square = held * change, np.diag(held)
+        constraints, slopes = [], []
+        for part in parts:
+            local = part.linearised(x)
+            mine = place[part.parameters]
+            loss += float(local.residuals @ local.residuals)
+            gradient[mine] += local.jacobian.T @ local.residuals
+            square[np.ix_(mine, mine)] += local.jacobian.T @ local.jacobian
+            rows = np.zeros((len(local.constraints), len(moved)))
+            rows[:, mine] = local.slopes
+            constraints.append(local.constraints)
+            slopes.append(rows)
+        return _Sum(0.5 * loss, gradient, square, np.concatenate(constraints), np.concatenate(slopes))
+
+    x = start.copy()
+    if not moved.size:
+        return Fit(x, 0, 0, True)
+    here = summed(x)
+    done, taken, weight, damping = 1, 0, 0.0, 0.0
+    while done < evaluations:
+        step, largest = _step(here, damping, low - x[moved], high - x[moved])
+        weight = max(weight, _MULTIPLIED * largest)
+        merit = here.loss + weight * here.violated
+        if _predicted(here, step) + weight * here.violated < _SETTLED * merit and here.violated < _VIOLATED:
+            return Fit(x, taken, done, True)
+        candidate = x.copy()
+        candidate[moved] = np.clip(x[moved] + step, low, high)
+        there = summed(candidate)
+        done += 1
+        if progress:
+            progress(done, evaluations)
+        gain = merit - there.loss - weight * there.violated
+        if gain > 0.0 and there.worst <= max(here.worst, _SLACK):
+            x, here, taken = candidate, there, taken + 1
+            damping = damping / _DAMPED if damping > _LEAST else 0.0
+            if gain < _SETTLED * merit and here.violated < _VIOLATED:
+                return Fit(x, taken, done, True)
+        else:
+            damping = max(_DAMPED * damping, _LEAST)
+            if damping > _MOST:
+                return Fit(x, taken, done, True)
+    return Fit(x, taken, done, False)
+
+
+def _predicted(here: _Sum, step: NDArray[np.float64]) -> float:
+    """What a step gains if nothing curves."""
+    return -float(here.gradient @ step + 0.5 * step @ (here.square @ step))
+
+
+def _step(
+    here: _Sum, damping: float, low: NDArray[np.float64], high: NDArray[np.float64]
+) -> tuple[NDArray[np.float64], float]:
+    """The step of the quadratic program, and the largest multiplier of a constraint that is no bound.
+
+    Where no step satisfies what is violated, one that violates it no more.
+    """
+    unit = np.eye(len(low))
+    rows = np.concatenate([here.slopes, unit, -unit])
+    lower = np.linalg.cholesky(here.square + damping * np.diag(np.diag(here.square)))
+    for constraints in (here.constraints, np.minimum(here.constraints, 0.0)):
+        found = _least_distance(lower, here.gradient, rows, np.concatenate([-constraints, high, -low]))
+        if found is not None:
+            step, multipliers = found
+            return step, float(multipliers[: len(constraints)].max(initial=0.0))
+    return np.zeros(len(low)), 0.0
+
+
+def _least_distance(
+    lower: NDArray[np.floating], gradient: NDArray[np.float64], rows: NDArray[np.float64], room: NDArray[np.float64]
+) -> tuple[NDArray[np.float64], NDArray[np.float64]] | None:
+    """The s with rows · s ≤ room that makes ½ |Lᵀ s|² + g·s least, and the multipliers of the rows; None where there is
+    no such s."""
+    from scipy.optimize import nnls
+
+    # y = Lᵀ s − t is made short under G y ≥ h
+    target = np.linalg.solve(lower, -gradient)
+    step = np.linalg.solve(lower.T, target)
+    chosen = np.zeros(len(rows), dtype=bool)
+    multipliers = np.zeros(len(rows))
+    while (beyond := ~chosen & (rows @ step > room + _TOUCH)).any():
+        chosen |= beyond
+        whitened = np.linalg.solve(lower, rows[chosen].T)
+        short = whitened.T @ target - room[chosen]
+        wanted = np.append(np.zeros(len(gradient)), 1.0)
+        found, residual = nnls(np.vstack([-whitened, short]), wanted, maxiter=50 * len(rows))
+        if residual < _IMPOSSIBLE:
+            return None
+        multipliers[chosen] = found / (1.0 - short @ found)
+        step = np.linalg.solve(lower.T, target - whitened @ multipliers[chosen])
+    return step, multipliers
