@@ -28,6 +28,7 @@ class Parts:
     give: wp.array(dtype=float)
     give_of: wp.array(dtype=float)
     at_rest: wp.array(dtype=float)
+    area: wp.array(dtype=float)
     edge: wp.array(dtype=float)
 
 
@@ -125,6 +126,12 @@ def find_normals(
         normal_out[v] = total / 6.0
 
 
+@wp.func
+def smooth_skin(normal: wp.vec3, area: float) -> float:
+    """1 where a vertex has its faces side by side, 0 where they are folded: there is no inside and no outside."""
+    return wp.clamp(4.0 * wp.length(normal) / wp.max(area, 1.0e-30) - 0.6, 0.0, 1.0)
+
+
 @wp.kernel
 def find_samples(
     # frame
@@ -165,14 +172,22 @@ def find_samples(
                 c = mesh.indices[3 * found.face + 2]
                 w = 1.0 - found.u - found.v
                 foot = found.u * points[a] + found.v * points[b] + w * points[c]
-                n = found.u * wp.normalize(normals[a]) + found.v * wp.normalize(normals[b]) + w * wp.normalize(normals[c])
+                n = (
+                    found.u * wp.normalize(normals[a])
+                    + found.v * wp.normalize(normals[b])
+                    + w * wp.normalize(normals[c])
+                )
                 n = wp.normalize(n)
                 behind = -wp.dot(p - foot, n)
                 if behind > 0.0:
                     at = 3 * (parts.first_face[k] + found.face)
                     border = found.u * parts.border[at] + found.v * parts.border[at + 1] + w * parts.border[at + 2]
                     facing = wp.clamp(-2.0 * wp.dot(n, wp.normalize(normals[v])), 0.0, 1.0)
-                    depth = behind * facing * wp.min(2.0 * border, 1.0) - parts.at_rest[v]
+                    plain = smooth_skin(normals[v], parts.area[v])
+                    plain = wp.min(plain, smooth_skin(normals[a], parts.area[a]))
+                    plain = wp.min(plain, smooth_skin(normals[b], parts.area[b]))
+                    plain = wp.min(plain, smooth_skin(normals[c], parts.area[c]))
+                    depth = behind * plain * facing * wp.min(2.0 * border, 1.0) - parts.at_rest[v]
                     thick = found.u * parts.thickness[a] + found.v * parts.thickness[b] + w * parts.thickness[c]
                     if depth > 0.0 and behind < 1.5 * thick:
                         thick = wp.min(thick, parts.thickness[v])

@@ -160,7 +160,8 @@ class Crowd:
         """Surfaces of a role (n, V, 3) from the frame of that place on: what crosses is parted where TOUCH is on, and
         where contact was solved the skin is as it found it."""
         if role.contact is not None and len(vertices):
-            vertices = role.contact.skin(vertices, first=round(float(self.frames[start])))
+            poses = role.poses[start : start + len(vertices)]
+            vertices = role.contact.skin(vertices, poses, first=round(float(self.frames[start])))
         if self.pressed is None:
             return vertices
         out = vertices

@@ -95,9 +95,7 @@ class Creases:
         return cls._sorted(planes, entries)
 
     @classmethod
-    def _sorted(
-        cls, planes: list[tuple[int, int, NDArray[np.float64], float]], entries: list[_Entries]
-    ) -> Creases:
+    def _sorted(cls, planes: list[tuple[int, int, NDArray[np.float64], float]], entries: list[_Entries]) -> Creases:
         joined = _Entries.joined(entries)
         crease = np.repeat(np.arange(len(entries)), [len(e.rows) for e in entries])
         order = np.argsort(joined.rows, kind="stable")

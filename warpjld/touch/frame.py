@@ -16,7 +16,10 @@ __all__ = ["SHARE", "Bench", "Model", "Overlaps"]
 SHARE = 1.0 / 3.0
 """Of the local thickness: overlaps up to it skin can give way to, deeper ones are poses that nobody can take."""
 
-_FULL, _NONE = 1.5, 2.5  # shares: overlaps that deep at most are parted in full, those deeper than the second left alone
+_FULL, _NONE = (
+    1.5,
+    2.5,
+)  # shares: overlaps that deep at most are parted in full, those deeper than the second left alone
 _SWEEPS = 3
 _SOFT = 0.05  # shares over which an overlap comes to count
 _CLEARANCE = 0.05  # shares by which both sides are moved beyond their meeting
@@ -95,9 +98,14 @@ class Bench:
         parts.beside = self._numbers(beside)
         parts.thickness = self._floats(patches.thickness)
         parts.give = self._floats(patches.give)
-        mean = np.bincount(patches.part, patches.give, names) / np.maximum(np.bincount(patches.part, minlength=names), 1)
+        mean = np.bincount(patches.part, patches.give, names) / np.maximum(
+            np.bincount(patches.part, minlength=names), 1
+        )
         parts.give_of = self._floats(mean)
         parts.at_rest = self._floats(model.at_rest)
+        a, b, c = (np.asarray(vertices, dtype=np.float64)[patches.faces[:, k]] for k in range(3))
+        around = [np.bincount(patches.faces.ravel(), np.repeat(n, 3), count) for n in np.cross(b - a, c - a).T]
+        parts.area = self._floats(np.linalg.norm(around, axis=0) / 6.0)
         parts.edge = self._floats(model.edge)
         corner = patches.faces[:, [[1, 2], [2, 0], [0, 1]]].reshape(-1, 2)
         order = np.argsort(patches.faces.ravel(), kind="stable")
@@ -167,7 +175,8 @@ class Bench:
         if not len(wanted):
             return 0
         for k in wanted.tolist():
-            self._meshes[k].refit()
+            if (mesh := self._meshes[k]) is not None:
+                mesh.refit()
         launch(
             kernels.find_normals,
             count,
@@ -193,6 +202,11 @@ class Bench:
             a.numpy()[:count].copy() for a in (s.vertex, s.own, s.other, s.depth, s.ratio)
         )
         return Overlaps(vertex, own, other, depth.astype(np.float64), ratio.astype(np.float64))
+
+    def measure(self, points: NDArray[np.floating]) -> Overlaps:
+        """What overlaps in one frame (V, 3)."""
+        self.points.numpy()[...] = points
+        return self.overlaps(self.find())
 
     def part(self, points: NDArray[np.floating]) -> Overlaps:
         """Part one frame (V, 3) in place; what overlapped before."""

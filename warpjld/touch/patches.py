@@ -52,7 +52,7 @@ class Patches:
 
     @cached_property
     def joined(self) -> NDArray[np.bool_]:
-        """Which parts are the same, share an edge or meet at a joint, shape (P, P): there they meet, and nowhere else."""
+        """Which parts are the same, share an edge or meet at a joint, shape (P, P): they meet there alone."""
         out = np.eye(len(self.names), dtype=bool)
         for a, b in self.joints:
             out[a, b] = out[b, a] = True
@@ -102,9 +102,7 @@ def patches_of(covering: Covering) -> Patches:
     part = covering.domains.argmax(axis=1).astype(np.int32)
     skeleton = covering.skeleton
     ends = [(f, s.proximal, s.distal) for f, fan in enumerate(covering.fans) for s in fan.segments]
-    joints = {
-        (f, g) for f, a, b in ends for g, c, _ in ends if f != g and (c in (a, b) or skeleton.parents[c] == a)
-    }
+    joints = {(f, g) for f, a, b in ends for g, c, _ in ends if f != g and (c in (a, b) or skeleton.parents[c] == a)}
     return patches(
         covering.surface.faces,
         part,

@@ -23,9 +23,7 @@ def edge_lengths(vertices: NDArray[np.float64], faces: NDArray[np.int32]) -> NDA
     return np.asarray(np.bincount(row, length, len(vertices)) / np.maximum(degree, 1))
 
 
-def smoothing(
-    vertices: NDArray[np.float64], faces: NDArray[np.int32], reach: NDArray[np.float64]
-) -> csr_array:
+def smoothing(vertices: NDArray[np.float64], faces: NDArray[np.int32], reach: NDArray[np.float64]) -> csr_array:
     """Rows that average a field over about ``reach`` [m] of every vertex, each summing to one, shape (V, V).
 
     Each step mixes a share a of the neighbours' mean in: after n steps the spread is the edges' length times √(n a).

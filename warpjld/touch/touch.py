@@ -9,12 +9,15 @@ around, which is smooth over the surface. The volume that this takes is given ba
 from __future__ import annotations
 
 import threading
+from collections.abc import Callable
 from dataclasses import dataclass
+from functools import cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
+from warpjld.covering.intersections import crossing_faces
 from warpjld.errors import InputError
 from warpjld.skeleton.kinematics import Poses
 from warpjld.threads import in_threads, threads_for
@@ -96,9 +99,7 @@ class Touch:
 
     def overlaps(self, points: NDArray[np.floating]) -> Overlaps:
         """What overlaps in one frame (V, 3), but for what overlaps at rest."""
-        bench = self._bench()
-        bench.points.numpy()[...] = points
-        return bench.overlaps(bench.find())
+        return self._bench().measure(points)
 
     def apply(
         self, points: NDArray[np.floating], poses: Poses | None = None, *, first: int = 0, threads: int | None = None
@@ -122,6 +123,26 @@ class Touch:
         self, points: NDArray[np.floating], poses: Poses | None = None, *, threads: int | None = None
     ) -> tuple[NDArray[np.floating], list[Overlaps]]:
         """The same, with all that overlapped in every frame once joints' two sides were parted."""
+        moved, found = self._each(points, poses, threads, lambda bench, frame: bench.part(frame))
+        if points.dtype == np.float32:
+            return moved, found
+        same = (moved == points.astype(np.float32)).all(axis=2, keepdims=True)
+        return np.where(same, points, moved), found
+
+    def measured(
+        self, points: NDArray[np.floating], poses: Poses | None = None, *, threads: int | None = None
+    ) -> list[Overlaps]:
+        """What :meth:`apply` would part in every frame."""
+        return self._each(points, poses, threads, lambda bench, frame: bench.measure(frame))[1]
+
+    def _each(
+        self,
+        points: NDArray[np.floating],
+        poses: Poses | None,
+        threads: int | None,
+        work: Callable[[Bench, NDArray[np.float32]], Overlaps],
+    ) -> tuple[NDArray[np.float32], list[Overlaps]]:
+        """Work on every frame once joints' two sides were parted."""
         count = len(self.patches.part)
         if points.ndim != 3 or points.shape[1:] != (count, 3):
             raise InputError(f"touch: want points of shape (frames, {count}, 3), got {points.shape}")
@@ -133,21 +154,29 @@ class Touch:
         moved = np.array(points, dtype=np.float32)
         if self.creases is not None and poses is not None:
             self.creases.part(wp.array(moved, dtype=wp.vec3, device="cpu", copy=False), poses)
-        found: list[Overlaps] = [None] * len(points)  # type: ignore[list-item]
+        found: dict[int, Overlaps] = {}
 
         def span(begin: int, end: int) -> None:
             bench = self._bench()
             for k in range(begin, end):
-                found[k] = bench.part(moved[k])
+                found[k] = work(bench, moved[k])
 
         if threads is None:
             threads = threads_for(moved.shape[0] * count, _SPLIT_BELOW)
         self._bench()
         in_threads(span, len(points), threads, find_samples, wp.get_device("cpu"))
-        if points.dtype == np.float32:
-            return moved, found
-        same = (moved == points.astype(np.float32)).all(axis=2, keepdims=True)
-        return np.where(same, points, moved), found
+        return moved, [found[k] for k in range(len(points))]
+
+    def new_crossings(self, pairs: NDArray[np.integer]) -> NDArray[np.int64]:
+        """Of crossing pairs of faces (N, 2) those that do not cross at rest."""
+        count = len(self.patches.faces)
+        keys = pairs.astype(np.int64) @ [count, 1]
+        return pairs[~np.isin(keys, self._crossing_at_rest)].astype(np.int64)
+
+    @cached_property
+    def _crossing_at_rest(self) -> NDArray[np.int64]:
+        pairs = crossing_faces(self._vertices, self.patches.faces).pairs
+        return np.asarray(pairs.astype(np.int64) @ [len(self.patches.faces), 1])
 
     def _bench(self) -> Bench:
         """The calling thread's."""
