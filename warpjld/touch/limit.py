@@ -22,7 +22,10 @@ if TYPE_CHECKING:
 __all__ = ["Closed", "close_until_touch"]
 
 _ALLOWED = 0.5  # of what skin can give way to: what is left after parting then bulges little
-_STEPS = 9  # halvings: 1/512 of a digit's bend; what is left is interpolated where depth is measured
+_BESIDE = 0.4  # how much overlaps of two digits count: beside one another they overlap however far they open
+_SCAN = 10  # steps in which a digit is opened until it is free
+_STEPS = 7  # halvings of the last: 1/1280 of a digit's bend; what is left is interpolated where depth is measured
+_FASTEST = 2.0  # times as fast as the hand moves a digit may open or close beside its pose
 _BLOCK = 32  # frames searched at once
 _STILL = 1e-6  # rad: a digit that is bent less cannot be opened
 
@@ -68,22 +71,30 @@ def close_until_touch(covering: Covering, poses: Poses, touch: Touch, *, first: 
     told: list[Closed] = []
     if not digits:
         return poses, told
-    blocks = []
-    for start in range(0, len(poses), _BLOCK):
-        block, closed = _block(covering, poses[start : start + _BLOCK], touch, digits, first + start)
-        blocks.append(block)
-        told += closed
-    return _joined(blocks), told
+    searched = [_block(covering, poses[k : k + _BLOCK], touch, digits) for k in range(0, len(poses), _BLOCK)]
+    moved = _motion(covering, poses, digits)
+    limited = poses
+    for n, digit in enumerate(digits):
+        share, ratio, depth, other = (np.concatenate([block[n][k] for block in searched]) for k in range(4))
+        share = _steady(share, moved / np.maximum(_bend(covering, poses, digit.joints), _STILL))
+        limited = _bent(covering, limited, digit.joints, share)
+        for f in np.flatnonzero((share < 1.0) | (ratio > 1.0)).tolist():
+            flexion = float(np.degrees(limited.flexion[f, digit.joints].sum()))
+            name = covering.fans[int(other[f])].name if other[f] >= 0 else ""
+            told.append(Closed(digit.name, first + f, float(depth[f]), float(share[f]), flexion, name))
+    return limited, told
 
 
 @dataclass(frozen=True, eq=False)
 class _Digit:
-    """A digit, its joints and its parts; ``counts`` of parts that it is closed against, itself among them."""
+    """A digit, its joints and its parts; ``counts`` of parts that it is closed against, itself among them; ``fingers``
+    of the parts of any digit."""
 
     name: str
     joints: list[int]
     parts: NDArray[np.bool_]
     counts: NDArray[np.bool_]
+    fingers: NDArray[np.bool_]
 
 
 def _digits(covering: Covering) -> list[_Digit]:
@@ -97,43 +108,57 @@ def _digits(covering: Covering) -> list[_Digit]:
     order = ("index", "middle", "ring", "pinky", "thumb")
     found.sort(key=lambda one: order.index(one[0].rpartition(".")[2]))
     later = np.zeros(len(parts), dtype=bool)
+    fingers = np.logical_or.reduce([mine for _, _, mine in found]) if found else later
     out = []
     for name, joints, mine in reversed(found):
-        out.append(_Digit(name, joints, mine, ~later))
+        out.append(_Digit(name, joints, mine, ~later, fingers))
         later = later | mine
     return out[::-1]
 
 
-def _block(
-    covering: Covering, poses: Poses, touch: Touch, digits: list[_Digit], first: int
-) -> tuple[Poses, list[Closed]]:
-    original, share = poses, {digit.name: np.ones(len(poses)) for digit in digits}
-    depth = {digit.name: _depths(covering, touch, poses, digit) for digit in digits}
-    for digit in digits:
-        deepest = _depths(covering, touch, poses, digit)[0] if poses is not original else depth[digit.name][0]
+def _block(covering: Covering, poses: Poses, touch: Touch, digits: list[_Digit]) -> list[tuple[NDArray, ...]]:
+    """Of every digit the share of its bend that it keeps, and :func:`_depths` of the poses as they are."""
+    original, share = poses, [np.ones(len(poses)) for _ in digits]
+    depth = [_depths(covering, touch, poses, digit) for digit in digits]
+    for n, digit in enumerate(digits):
+        deepest = _depths(covering, touch, poses, digit)[0] if poses is not original else depth[n][0]
 
         def over(some: Poses, digit: _Digit = digit) -> NDArray[np.float64]:
             return _depths(covering, touch, some, digit)[0] - _ALLOWED
 
         left = _search(covering, poses, digit, deepest - _ALLOWED, over, interpolated=True)
-        share[digit.name] *= left
+        share[n] *= left
         poses = _bent(covering, poses, digit.joints, left)
-    for digit in digits:
+    for n, digit in enumerate(digits):
 
         def crosses(some: Poses, digit: _Digit = digit) -> NDArray[np.float64]:
             return np.where(_crossing(covering, touch, some, digit), 1.0, -1.0)
 
         left = _search(covering, poses, digit, crosses(poses), crosses, interpolated=False)
-        share[digit.name] *= left
+        share[n] *= left
         poses = _bent(covering, poses, digit.joints, left)
-    told = []
-    for digit in digits:
-        ratio, deep, other = depth[digit.name]
-        for f in np.flatnonzero((share[digit.name] < 1.0) | (ratio > 1.0)).tolist():
-            flexion = float(np.degrees(poses.flexion[f, digit.joints].sum()))
-            name = covering.fans[other[f]].name if other[f] >= 0 else ""
-            told.append(Closed(digit.name, first + f, float(deep[f]), float(share[digit.name][f]), flexion, name))
-    return poses, told
+    return [(kept, *of) for kept, of in zip(share, depth, strict=True)]
+
+
+def _motion(covering: Covering, poses: Poses, digits: list[_Digit]) -> NDArray[np.float64]:
+    """How far the joints of digits turn from the frame before, the largest of them [rad], shape (F,)."""
+    joints = [j for digit in digits for j in digit.joints]
+    parents = [max(int(covering.skeleton.parents[j]), 0) for j in joints]
+    local = multiply(conjugate(poses.rotations[:, parents]), poses.rotations[:, joints])
+    step = multiply(conjugate(local[:-1]), local[1:])
+    turned = Rotation.from_quat(step.reshape(-1, 4)).magnitude().reshape(step.shape[:2]) if len(step) else step[..., 0]
+    return np.concatenate([np.zeros(min(len(poses), 1)), turned.max(axis=1)])
+
+
+def _steady(share: NDArray[np.float64], moved: NDArray[np.float64]) -> NDArray[np.float64]:
+    """The largest shares, none above those given, that change no faster than the motion: whether single faces cross
+    may flicker from frame to frame, and digits must not."""
+    out = share.copy()
+    for f in range(1, len(out)):
+        out[f] = min(out[f], out[f - 1] + _FASTEST * moved[f])
+    for f in range(len(out) - 1, 0, -1):
+        out[f - 1] = min(out[f - 1], out[f] + _FASTEST * moved[f])
+    return out
 
 
 def _search(
@@ -156,12 +181,19 @@ def _search(
     frames = np.flatnonzero((over > 0.0) & (_bend(covering, poses, digit.joints) > _STILL))
     if not len(frames):
         return out
-    some = _picked(poses, frames)
-    low, high = np.zeros(len(frames)), np.ones(len(frames))
-    at_low, at_high = measure(_bent(covering, some, digit.joints, low)), over[frames]
+    # opened by and by: some cross at first what they are clear of later, and then again what lies behind them
+    low, high, at_low, at_high = np.ones(len(frames)), np.ones(len(frames)), over[frames], over[frames]
+    for share in np.linspace(1.0, 0.0, _SCAN + 1)[1:]:
+        rows = np.flatnonzero(at_low > 0.0)
+        if not len(rows):
+            break
+        high[rows], at_high[rows] = low[rows], at_low[rows]
+        low[rows] = share
+        at_low[rows] = measure(_bent(covering, _picked(poses, frames[rows]), digit.joints, low[rows]))
     opens = at_low <= 0.0
-    frames, some = frames[opens], _picked(some, np.flatnonzero(opens))
+    frames = frames[opens]
     low, high, at_low, at_high = low[opens], high[opens], at_low[opens], at_high[opens]
+    some = _picked(poses, frames)
     for _ in range(_STEPS if len(frames) else 0):
         middle = 0.5 * (low + high)
         at = measure(_bent(covering, some, digit.joints, middle))
@@ -191,7 +223,9 @@ def _depths(
         mine, its = digit.parts[found.part], digit.parts[found.other]
         rows = np.flatnonzero((mine | its) & digit.counts[found.part] & digit.counts[found.other])
         if len(rows):
-            ratio[f] = found.ratio[rows].max()
+            beside = ~(digit.parts[found.part[rows]] & digit.parts[found.other[rows]])
+            beside &= digit.fingers[found.part[rows]] & digit.fingers[found.other[rows]]
+            ratio[f] = (found.ratio[rows] * np.where(beside, _BESIDE, 1.0)).max()
             deepest = rows[found.depth[rows].argmax()]
             depth[f] = found.depth[deepest]
             other[f] = found.other[deepest] if digit.parts[found.part[deepest]] else found.part[deepest]
@@ -213,11 +247,6 @@ def _crossing(covering: Covering, touch: Touch, poses: Poses, digit: _Digit) -> 
 
 def _picked(poses: Poses, frames: NDArray[np.int64]) -> Poses:
     return Poses(poses.positions[frames], poses.rotations[frames], poses.flexion[frames])
-
-
-def _joined(blocks: list[Poses]) -> Poses:
-    arrays = ([getattr(p, name) for p in blocks] for name in ("positions", "rotations", "flexion"))
-    return Poses(*(np.concatenate(a) for a in arrays))
 
 
 def _bent(covering: Covering, poses: Poses, joints: list[int], share: NDArray[np.float64]) -> Poses:
