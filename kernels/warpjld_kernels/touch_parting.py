@@ -16,11 +16,13 @@ def fade_samples(
     none: float,
     # out
     shown_out: wp.array(dtype=float),
+    count_out: wp.array(dtype=wp.int32),
+    list_out: wp.array2d(dtype=wp.int32),
     lower_out: wp.array(dtype=wp.vec3),
     upper_out: wp.array(dtype=wp.vec3),
 ):
     """How much of an overlap is parted, by how deep two parts and those next to them lie in one another at most; and
-    the boxes in which the vertices of every part are within reach of a sample."""
+    of every part the samples that its vertices may heed, and the box in which they do."""
     i = wp.tid()
     own = samples.own[i]
     other = samples.other[i]
@@ -38,7 +40,11 @@ def fade_samples(
     for side in range(2):
         for k in range(width):
             a = parts.beside[wp.where(side == 0, own, other), k]
-            if a >= 0:
+            # what is beside both heeds it once
+            if a >= 0 and (side == 0 or parts.apart[own, a] != 2):
+                at = wp.atomic_add(count_out, a, 1)
+                if at < list_out.shape[1]:
+                    list_out[a, at] = i
                 wp.atomic_min(lower_out, a, samples.point[i] - reach)
                 wp.atomic_max(upper_out, a, samples.point[i] + reach)
 
@@ -49,8 +55,10 @@ def part_surfaces(
     points: wp.array(dtype=wp.vec3),
     normals: wp.array(dtype=wp.vec3),
     samples: Samples,
-    count: int,
     shown: wp.array(dtype=float),
+    # of every part
+    count: wp.array(dtype=wp.int32),
+    heeded: wp.array2d(dtype=wp.int32),
     lower: wp.array(dtype=wp.vec3),
     upper: wp.array(dtype=wp.vec3),
     # surface
@@ -77,7 +85,8 @@ def part_surfaces(
         facing = wp.normalize(normals[v])
         matrix = wp.mat33(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
         right = wp.vec3(0.0, 0.0, 0.0)
-        for i in range(count):
+        for k in range(wp.min(count[own], heeded.shape[1])):
+            i = heeded[own, k]
             r = p - samples.point[i]
             near = 1.0 - wp.length_sq(r) / (samples.radius[i] * samples.radius[i])
             if near > 0.0:
@@ -93,7 +102,8 @@ def part_surfaces(
                 n = side * samples.normal[i]
                 limit = samples.depth[i] / samples.ratio[i]
                 # what is much farther beyond the plane than that vertex was is not beside it
-                missing = wp.min(clearance * limit - wp.dot(r, n), clearance * limit + 1.5 * samples.depth[i])
+                gap = clearance * limit * samples.counts[i]
+                missing = wp.min(gap - wp.dot(r, n), gap + 1.5 * samples.depth[i])
                 looks = wp.clamp(1.0 - 2.0 * wp.dot(facing, n), 0.0, 1.0)
                 if side != 0.0 and missing > 0.0 and looks > 0.0:
                     weight = near * near * looks * samples.counts[i]
@@ -117,8 +127,11 @@ def move(
 
 
 @wp.kernel
-def no_boxes(lower_out: wp.array(dtype=wp.vec3), upper_out: wp.array(dtype=wp.vec3)):
-    """Boxes that hold nothing."""
+def heed_nothing(
+    count_out: wp.array(dtype=wp.int32), lower_out: wp.array(dtype=wp.vec3), upper_out: wp.array(dtype=wp.vec3)
+):
+    """No samples, and boxes that hold nothing."""
     k = wp.tid()
+    count_out[k] = 0
     lower_out[k] = wp.vec3(FAR, FAR, FAR)
     upper_out[k] = wp.vec3(-FAR, -FAR, -FAR)

@@ -14,6 +14,8 @@ class Parts:
     ``corner`` lists the vertices of every part's mesh from ``first_corner`` on, ``border`` is 0 at corners of its
     faces, three a face from ``first_face`` times three on, that lie on the mesh's border, else 1. ``apart`` is 1 for
     parts that may meet, 2 for parts that are the same or neighbours; ``beside`` lists the latter, filled up with -1.
+    ``bone`` holds joints at the ends of every part's segments from ``first_bone`` on, ``around`` how far its mesh is
+    from them at most.
     """
 
     part: wp.array(dtype=wp.int32)
@@ -29,6 +31,9 @@ class Parts:
     give_of: wp.array(dtype=float)
     at_rest: wp.array(dtype=float)
     area: wp.array(dtype=float)
+    first_bone: wp.array(dtype=wp.int32)
+    bone: wp.array(dtype=wp.vec2i)
+    around: wp.array(dtype=float)
     edge: wp.array(dtype=float)
 
 
@@ -78,6 +83,8 @@ def find_pairs(
     parts: Parts,
     lower: wp.array(dtype=wp.vec3),
     upper: wp.array(dtype=wp.vec3),
+    # overlaps found before in this frame, or anything above nought for all that may be
+    before: wp.array2d(dtype=float),
     # out; ``wanted_out`` of parts whose mesh is asked, ``active_out`` of those that take part at all
     count_out: wp.array(dtype=wp.int32),
     other_out: wp.array2d(dtype=wp.int32),
@@ -88,7 +95,7 @@ def find_pairs(
     k = wp.tid()
     count = int(0)
     for other in range(parts.mesh.shape[0]):
-        if parts.apart[k, other] == 1:
+        if parts.apart[k, other] == 1 and wp.max(before[k, other], before[other, k]) > 0.0:
             low = wp.max(lower[k], lower[other])
             high = wp.min(upper[k], upper[other])
             if low[0] < high[0] and low[1] < high[1] and low[2] < high[2]:
@@ -127,6 +134,26 @@ def find_normals(
 
 
 @wp.func
+def may_be_inside(joints: wp.array(dtype=wp.vec3), parts: Parts, k: int, p: wp.vec3, normal: wp.vec3) -> bool:
+    """Whether a point is as near to a part's bones as its mesh reaches, on skin that does not look away from all of
+    those; always where a part has none."""
+    first = parts.first_bone[k]
+    last = parts.first_bone[k + 1]
+    reach = parts.around[k] * parts.around[k]
+    near = first == last
+    for i in range(first, last):
+        if not near:
+            a = joints[parts.bone[i][0]]
+            along = joints[parts.bone[i][1]] - a
+            r = p - a
+            t = wp.clamp(wp.dot(r, along) / wp.max(wp.length_sq(along), 1.0e-30), 0.0, 1.0)
+            r = r - t * along
+            # written so that joints that are not known, not numbers, rule out nothing
+            near = not (wp.length_sq(r) >= reach or wp.dot(r, normal) > 0.6 * wp.length(r))
+    return near
+
+
+@wp.func
 def smooth_skin(normal: wp.vec3, area: float) -> float:
     """1 where a vertex has its faces side by side, 0 where they are folded: there is no inside and no outside."""
     return wp.clamp(4.0 * wp.length(normal) / wp.max(area, 1.0e-30) - 0.6, 0.0, 1.0)
@@ -141,6 +168,10 @@ def find_samples(
     upper: wp.array(dtype=wp.vec3),
     count: wp.array(dtype=wp.int32),
     others: wp.array2d(dtype=wp.int32),
+    joints: wp.array(dtype=wp.vec3),
+    # boxes outside which vertices of every part are not asked
+    within_lower: wp.array(dtype=wp.vec3),
+    within_upper: wp.array(dtype=wp.vec3),
     # surface
     parts: Parts,
     share: float,
@@ -157,14 +188,21 @@ def find_samples(
     v = wp.tid()
     p = points[v]
     own = parts.part[v]
-    for i in range(count[own]):
+    asked = count[own]
+    if asked > 0:
+        low = within_lower[own]
+        high = within_upper[own]
+        if p[0] < low[0] or p[1] < low[1] or p[2] < low[2] or p[0] > high[0] or p[1] > high[1] or p[2] > high[2]:
+            asked = 0
+    looks = wp.normalize(normals[v])
+    for i in range(asked):
         k = others[own, i]
         low = lower[k]
         high = upper[k]
         outside = p[0] < low[0] or p[1] < low[1] or p[2] < low[2] or p[0] > high[0] or p[1] > high[1] or p[2] > high[2]
-        if not outside:
+        if not outside and may_be_inside(joints, parts, k, p, looks):
             # nothing lies deeper in flesh than that with any meaning
-            found = wp.mesh_query_point_no_sign(parts.mesh[k], p, 2.0 * parts.thickness[v])
+            found = wp.mesh_query_point_no_sign(parts.mesh[k], p, 1.5 * parts.thickness[v])
             if found.result:
                 mesh = wp.mesh_get(parts.mesh[k])
                 a = mesh.indices[3 * found.face]
@@ -182,7 +220,7 @@ def find_samples(
                 if behind > 0.0:
                     at = 3 * (parts.first_face[k] + found.face)
                     border = found.u * parts.border[at] + found.v * parts.border[at + 1] + w * parts.border[at + 2]
-                    facing = wp.clamp(-2.0 * wp.dot(n, wp.normalize(normals[v])), 0.0, 1.0)
+                    facing = wp.clamp(-2.0 * wp.dot(n, looks), 0.0, 1.0)
                     plain = smooth_skin(normals[v], parts.area[v])
                     plain = wp.min(plain, smooth_skin(normals[a], parts.area[a]))
                     plain = wp.min(plain, smooth_skin(normals[b], parts.area[b]))

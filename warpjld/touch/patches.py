@@ -31,6 +31,7 @@ class Patches:
         thickness: Distance to the bone [m], shape (V,).
         give: Compliance of every vertex, a number without unit: of two that meet each gives way by its share.
         joints: Pairs of parts that meet at a joint, whether or not the surface joins them.
+        bones: Of every part the joints at the ends of its segments; none without a skeleton.
     """
 
     faces: NDArray[np.int32]
@@ -39,6 +40,7 @@ class Patches:
     thickness: NDArray[np.float64]
     give: NDArray[np.float64]
     joints: tuple[tuple[int, int], ...] = ()
+    bones: tuple[tuple[tuple[int, int], ...], ...] = ()
 
     @cached_property
     def linked(self) -> csr_array:
@@ -90,11 +92,12 @@ def patches(
     thickness: NDArray[np.float64],
     give: NDArray[np.float64] | None = None,
     joints: tuple[tuple[int, int], ...] = (),
+    bones: tuple[tuple[tuple[int, int], ...], ...] = (),
 ) -> Patches:
     """Patches of given parts."""
     usual = np.array([np.median(thickness[part == k]) if (part == k).any() else 0.0 for k in range(len(names))])
     thick = np.maximum(thickness, _THINNEST * usual[part])
-    return Patches(faces, part, names, thick, np.ones(len(part)) if give is None else give, joints)
+    return Patches(faces, part, names, thick, np.ones(len(part)) if give is None else give, joints, bones)
 
 
 def patches_of(covering: Covering) -> Patches:
@@ -109,6 +112,7 @@ def patches_of(covering: Covering) -> Patches:
         tuple(fan.name for fan in covering.fans),
         segment_distance(covering.surface.vertices, skeleton.rest, [(s.proximal, s.distal) for s in skeleton.segments]),
         joints=tuple(sorted(joints)),
+        bones=tuple(tuple((s.proximal, s.distal) for s in fan.segments) for fan in covering.fans),
     )
 
 

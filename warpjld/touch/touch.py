@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import threading
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import TYPE_CHECKING
 
@@ -23,7 +23,7 @@ from warpjld.skeleton.kinematics import Poses
 from warpjld.threads import in_threads, threads_for
 from warpjld.touch.creases import Creases
 from warpjld.touch.frame import SHARE, Bench, Model, Overlaps
-from warpjld.touch.patches import Patches, patches_of
+from warpjld.touch.patches import Patches, patches_of, segment_distance
 from warpjld.touch.smoothing import edge_lengths, smoothing
 
 if TYPE_CHECKING:
@@ -60,9 +60,17 @@ class Touch:
         patches: The surface's parts.
         vertices: Rest positions [m], shape (V, 3). What overlaps there already stays as it is, to that depth.
         creases: The joints whose two sides are parted; none without.
+        joints: Rest positions of the joints that the patches' bones name [m], shape (J, 3).
     """
 
-    def __init__(self, patches: Patches, vertices: NDArray[np.float64], *, creases: Creases | None = None) -> None:
+    def __init__(
+        self,
+        patches: Patches,
+        vertices: NDArray[np.float64],
+        *,
+        creases: Creases | None = None,
+        joints: NDArray[np.float64] | None = None,
+    ) -> None:
         if (patches.give < 0.0).any() or not np.isfinite(patches.give).all():
             raise InputError("touch: compliances must be finite numbers, 0 or above")
         self.patches = patches
@@ -73,14 +81,16 @@ class Touch:
         count = len(vertices)
         self.coarse = patches.coarse(edge)
         never = self.coarse[:, None] | self.coarse
-        self._model = Model(patches, smooth, np.zeros(count), never, edge)
+        around = np.zeros(len(patches.names)) if joints is None else _around(patches, vertices, joints)
+        bones = 0 if joints is None else len(joints)
+        self._model = Model(patches, smooth, np.zeros(count), never, edge, bones, around)
         self._benches: dict[int, Bench] = {}
-        found = self.overlaps(vertices)
+        found = self._bench().measure(vertices, joints)
         at_rest = np.zeros(count)
         # a little more than it is: in other positions single precision makes some of it anew
         noise = _NOISE * float(np.linalg.norm(np.ptp(vertices, axis=0)))
         np.maximum.at(at_rest, found.vertex, 1.001 * found.depth + noise)
-        self._model = Model(patches, smooth, at_rest, never | self._nested(found), edge)
+        self._model = replace(self._model, at_rest=at_rest, never=never | self._nested(found))
         self._benches = {}
 
     def _nested(self, found: Overlaps) -> NDArray[np.bool_]:
@@ -95,11 +105,8 @@ class Touch:
     def of(cls, covering: Covering) -> Touch:
         """Of a covering's own parts, all equally compliant."""
         patches = patches_of(covering)
-        return cls(patches, covering.surface.vertices, creases=Creases.of(covering, patches))
-
-    def overlaps(self, points: NDArray[np.floating]) -> Overlaps:
-        """What overlaps in one frame (V, 3), but for what overlaps at rest."""
-        return self._bench().measure(points)
+        vertices, joints = covering.surface.vertices, covering.skeleton.rest
+        return cls(patches, vertices, creases=Creases.of(covering, patches), joints=joints)
 
     def apply(
         self, points: NDArray[np.floating], poses: Poses | None = None, *, first: int = 0, threads: int | None = None
@@ -123,7 +130,7 @@ class Touch:
         self, points: NDArray[np.floating], poses: Poses | None = None, *, threads: int | None = None
     ) -> tuple[NDArray[np.floating], list[Overlaps]]:
         """The same, with all that overlapped in every frame once joints' two sides were parted."""
-        moved, found = self._each(points, poses, threads, lambda bench, frame: bench.part(frame))
+        moved, found = self._each(points, poses, threads, Bench.part)
         if points.dtype == np.float32:
             return moved, found
         same = (moved == points.astype(np.float32)).all(axis=2, keepdims=True)
@@ -133,14 +140,14 @@ class Touch:
         self, points: NDArray[np.floating], poses: Poses | None = None, *, threads: int | None = None
     ) -> list[Overlaps]:
         """What :meth:`apply` would part in every frame."""
-        return self._each(points, poses, threads, lambda bench, frame: bench.measure(frame))[1]
+        return self._each(points, poses, threads, Bench.measure)[1]
 
     def _each(
         self,
         points: NDArray[np.floating],
         poses: Poses | None,
         threads: int | None,
-        work: Callable[[Bench, NDArray[np.float32]], Overlaps],
+        work: Callable[[Bench, NDArray[np.float32], NDArray[np.float64] | None], Overlaps],
     ) -> tuple[NDArray[np.float32], list[Overlaps]]:
         """Work on every frame once joints' two sides were parted."""
         count = len(self.patches.part)
@@ -155,11 +162,12 @@ class Touch:
         if self.creases is not None and poses is not None:
             self.creases.part(wp.array(moved, dtype=wp.vec3, device="cpu", copy=False), poses)
         found: dict[int, Overlaps] = {}
+        places = [None] * len(points) if poses is None else poses.positions
 
         def span(begin: int, end: int) -> None:
             bench = self._bench()
             for k in range(begin, end):
-                found[k] = work(bench, moved[k])
+                found[k] = work(bench, moved[k], places[k])
 
         if threads is None:
             threads = threads_for(moved.shape[0] * count, _SPLIT_BELOW)
@@ -192,3 +200,13 @@ class Touch:
             part = self.patches.names[found.part[i]]
             told[part] = Touched(part, self.patches.names[found.other[i]], frame, float(found.depth[i]))
         return list(told.values())
+
+
+def _around(patches: Patches, vertices: NDArray[np.float64], joints: NDArray[np.float64]) -> NDArray[np.float64]:
+    """How far the mesh of every part is from its bones at most [m], shape (P,)."""
+    out = np.zeros(len(patches.names))
+    for k, bones in enumerate(patches.bones):
+        corners = np.unique(patches.mesh(k)[0])
+        if len(corners) and bones:
+            out[k] = segment_distance(vertices[corners], joints, list(bones)).max()
+    return out
