@@ -102,7 +102,7 @@ def part_surfaces(
                 n = side * samples.normal[i]
                 limit = samples.depth[i] / samples.ratio[i]
                 # what is much farther beyond the plane than that vertex was is not beside it
-                gap = clearance * limit * samples.counts[i]
+                gap = clearance * limit * wp.sqrt(samples.counts[i])
                 missing = wp.min(gap - wp.dot(r, n), gap + 1.5 * samples.depth[i])
                 looks = wp.clamp(1.0 - 2.0 * wp.dot(facing, n), 0.0, 1.0)
                 if side != 0.0 and missing > 0.0 and looks > 0.0:

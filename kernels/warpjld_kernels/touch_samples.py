@@ -202,7 +202,7 @@ def find_samples(
         outside = p[0] < low[0] or p[1] < low[1] or p[2] < low[2] or p[0] > high[0] or p[1] > high[1] or p[2] > high[2]
         if not outside and may_be_inside(joints, parts, k, p, looks):
             # nothing lies deeper in flesh than that with any meaning
-            found = wp.mesh_query_point_no_sign(parts.mesh[k], p, 1.5 * parts.thickness[v])
+            found = wp.mesh_query_point_no_sign(parts.mesh[k], p, 2.0 * parts.thickness[v])
             if found.result:
                 mesh = wp.mesh_get(parts.mesh[k])
                 a = mesh.indices[3 * found.face]
