@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from functools import cached_property
 from typing import TYPE_CHECKING
 
@@ -13,6 +14,8 @@ from warpjld.skeleton.kinematics import Poses
 
 if TYPE_CHECKING:
     from warpjld.covering.covering import Covering
+    from warpjld.grasp.distance import ObjectSet
+    from warpjld.grasp.objects import GraspObject, Places
     from warpjld.touch.limit import Closed
     from warpjld.touch.touch import Touch, Touched
 
@@ -33,6 +36,8 @@ class SkinContact:
         self._closed: dict[tuple[str, int], Closed] = {}
         self._deep: set[tuple[str, int]] = set()
         self._deepest: dict[str, tuple[Touched, Poses]] = {}
+        self._objects: dict[int, ObjectSet] = {}
+        self._in_objects: dict[tuple[str, str], Touched] = {}
 
     @cached_property
     def touch(self) -> Touch:
@@ -62,6 +67,23 @@ class SkinContact:
                 self._deepest[one.part] = one, poses[k : k + 1]
         return np.asarray(parted, dtype=np.float32)
 
+    def hold(
+        self, points: NDArray[np.float32], held: Sequence[tuple[GraspObject, Places]], *, first: int = 0
+    ) -> NDArray[np.float32]:
+        """Surfaces (F, V, 3) with skin that lies inside rigid objects flattened on them; F places of each."""
+        from warpjld.grasp.distance import ObjectSet
+        from warpjld.touch.held import flatten_on
+
+        for thing, places in held:
+            if id(thing) not in self._objects:
+                self._objects[id(thing)] = ObjectSet(thing)
+            points, deep = flatten_on(self.touch, points, self._objects[id(thing)], [places], first=first)
+            for one in deep:
+                worst = self._in_objects.setdefault((one.part, one.other), one)
+                if one.depth > worst.depth:
+                    self._in_objects[one.part, one.other] = one
+        return points
+
     def told(self) -> list[str]:
         """A line a digit that was closed less, and one a digit or part that lies too deep in another, each at its
         worst."""
@@ -80,7 +102,12 @@ class SkinContact:
                     f"{where} closed only until it touches, deepest at frame {worst.frame}: {inside}, "
                     f"touches at {worst.flexion:.0f}° of flexion in all"
                 )
-        return lines + self._too_deep()
+        lines += self._too_deep()
+        lines += [
+            f"{one.part}: {1e3 * one.depth:.1f} mm inside {one.other} at frame {one.frame}, more than skin can give"
+            for one in self._in_objects.values()
+        ]
+        return lines
 
     def _too_coarse(self) -> str:
         names = [n for n, coarse in zip(self.touch.patches.names, self.touch.coarse, strict=True) if coarse]

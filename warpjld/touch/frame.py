@@ -11,7 +11,7 @@ from scipy.sparse import csr_array
 
 from warpjld.touch.patches import Patches
 
-__all__ = ["SHARE", "Bench", "Model", "Overlaps"]
+__all__ = ["SHARE", "Bench", "Model", "Overlaps", "fade"]
 
 SHARE = 1.0 / 3.0
 """Of the local thickness: overlaps up to it skin can give way to, deeper ones are poses that nobody can take."""
@@ -26,6 +26,12 @@ _CLEARANCE = 0.05  # shares by which both sides are moved beyond their meeting
 _STIFFNESS = 0.1  # of the fit of planes: samples that weigh less than that in all move nothing in full
 _SWELLS = 1.3  # times as far from its bones as at rest flesh may come by bending
 _BULGE = 0.5  # shares that a bulge is high at most
+
+
+def fade(ratio: NDArray[np.float64]) -> NDArray[np.float64]:
+    """How much of an overlap is parted whose deepest place is so many shares deep: 1 to ``_FULL``, 0 from ``_NONE``."""
+    t = np.clip((_NONE - ratio) / (_NONE - _FULL), 0.0, 1.0)
+    return np.asarray(t * t * (3.0 - 2.0 * t))
 
 
 @dataclass(frozen=True, eq=False)

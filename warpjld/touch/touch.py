@@ -16,6 +16,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.sparse import csr_array
 
 from warpjld.covering.intersections import crossing_faces
 from warpjld.errors import InputError
@@ -77,7 +78,8 @@ class Touch:
         self.creases = creases
         self._vertices = vertices
         edge = edge_lengths(vertices, patches.faces)
-        smooth = smoothing(vertices, patches.faces, _REACH * patches.thickness)
+        # one ring of faces at least: what coarse faces give way by is given back on the next
+        smooth = smoothing(vertices, patches.faces, np.maximum(_REACH * patches.thickness, edge))
         count = len(vertices)
         self.coarse = patches.coarse(edge)
         never = self.coarse[:, None] | self.coarse
@@ -107,6 +109,11 @@ class Touch:
         patches = patches_of(covering)
         vertices, joints = covering.surface.vertices, covering.skeleton.rest
         return cls(patches, vertices, creases=Creases.of(covering, patches), joints=joints)
+
+    @property
+    def smooth(self) -> csr_array:
+        """Rows that smooth a field over the surface, on the scale of its thickness, shape (V, V)."""
+        return self._model.smooth
 
     def apply(
         self, points: NDArray[np.floating], poses: Poses | None = None, *, first: int = 0, threads: int | None = None
