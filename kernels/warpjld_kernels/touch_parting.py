@@ -64,6 +64,7 @@ def part_surfaces(
     # surface
     parts: Parts,
     clearance: float,
+    soft: float,
     stiffness: float,
     # out
     moved_out: wp.array(dtype=wp.vec3),
@@ -106,7 +107,9 @@ def part_surfaces(
                 missing = wp.min(gap - wp.dot(r, n), gap + 1.5 * samples.depth[i])
                 looks = wp.clamp(1.0 - 2.0 * wp.dot(facing, n), 0.0, 1.0)
                 if side != 0.0 and missing > 0.0 and looks > 0.0:
-                    weight = near * near * looks * samples.counts[i]
+                    # a plane that is just being passed counts for nothing yet: else all would jump
+                    passing = wp.min(missing / (soft * limit), 1.0)
+                    weight = near * near * looks * passing * samples.counts[i]
                     matrix += weight * wp.outer(n, n)
                     right += weight * shown[i] * missing * n
         matrix += stiffness * wp.identity(n=3, dtype=float)

@@ -192,7 +192,7 @@ class Bench:
             recorded(
                 touch_parting.part_surfaces,
                 count,
-                [points, normals, samples, shown, heeded, heed, *boxes, parts, _CLEARANCE, _STIFFNESS],
+                [points, normals, samples, shown, heeded, heed, *boxes, parts, _CLEARANCE, _SOFT, _STIFFNESS],
                 [self._moved],
             ),
             recorded(touch_parting.move, count, [self._moved], [points]),
