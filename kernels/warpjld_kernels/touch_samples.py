@@ -15,7 +15,7 @@ class Parts:
     faces, three a face from ``first_face`` times three on, that lie on the mesh's border, else 1. ``apart`` is 1 for
     parts that may meet, 2 for parts that are the same or neighbours; ``beside`` lists the latter, filled up with -1.
     ``bone`` holds joints at the ends of every part's segments from ``first_bone`` on, ``around`` how far its mesh is
-    from them at most.
+    from them at most. ``facing`` is 0, or 1 where overlaps count whichever way both surfaces face.
     """
 
     part: wp.array(dtype=wp.int32)
@@ -31,6 +31,7 @@ class Parts:
     give_of: wp.array(dtype=float)
     at_rest: wp.array(dtype=float)
     area: wp.array(dtype=float)
+    facing: float
     first_bone: wp.array(dtype=wp.int32)
     bone: wp.array(dtype=wp.vec2i)
     around: wp.array(dtype=float)
@@ -149,7 +150,7 @@ def may_be_inside(joints: wp.array(dtype=wp.vec3), parts: Parts, k: int, p: wp.v
             t = wp.clamp(wp.dot(r, along) / wp.max(wp.length_sq(along), 1.0e-30), 0.0, 1.0)
             r = r - t * along
             # written so that joints that are not known, not numbers, rule out nothing
-            near = not (wp.length_sq(r) >= reach or wp.dot(r, normal) > 0.6 * wp.length(r))
+            near = not (wp.length_sq(r) >= reach)
     return near
 
 
@@ -201,8 +202,7 @@ def find_samples(
         high = upper[k]
         outside = p[0] < low[0] or p[1] < low[1] or p[2] < low[2] or p[0] > high[0] or p[1] > high[1] or p[2] > high[2]
         if not outside and may_be_inside(joints, parts, k, p, looks):
-            # nothing lies deeper in flesh than that with any meaning
-            found = wp.mesh_query_point_no_sign(parts.mesh[k], p, 2.0 * parts.thickness[v])
+            found = wp.mesh_query_point_no_sign(parts.mesh[k], p, wp.max(2.0 * parts.thickness[v], parts.around[k]))
             if found.result:
                 mesh = wp.mesh_get(parts.mesh[k])
                 a = mesh.indices[3 * found.face]
@@ -220,16 +220,20 @@ def find_samples(
                 if behind > 0.0:
                     at = 3 * (parts.first_face[k] + found.face)
                     border = found.u * parts.border[at] + found.v * parts.border[at + 1] + w * parts.border[at + 2]
-                    facing = wp.clamp(-2.0 * wp.dot(n, looks), 0.0, 1.0)
+                    facing = wp.clamp(-2.0 * wp.dot(n, looks), parts.facing, 1.0)
                     plain = smooth_skin(normals[v], parts.area[v])
                     plain = wp.min(plain, smooth_skin(normals[a], parts.area[a]))
                     plain = wp.min(plain, smooth_skin(normals[b], parts.area[b]))
                     plain = wp.min(plain, smooth_skin(normals[c], parts.area[c]))
-                    depth = behind * plain * facing * wp.min(2.0 * border, 1.0) - parts.at_rest[v]
+                    inside = behind * plain * wp.min(2.0 * border, 1.0)
+                    depth = inside * facing - parts.at_rest[v]
                     thick = found.u * parts.thickness[a] + found.v * parts.thickness[b] + w * parts.thickness[c]
-                    if depth > 0.0 and behind < 1.5 * thick:
-                        thick = wp.min(thick, parts.thickness[v])
-                        limit = share * thick
+                    thick = wp.min(thick, parts.thickness[v])
+                    limit = share * thick
+                    # whichever way the surfaces face: that changes at a leap where the nearest point does, deep inside
+                    if inside > parts.at_rest[v]:
+                        wp.atomic_max(deepest_out, own, k, (inside - parts.at_rest[v]) / limit)
+                    if depth > 0.0:
                         yields = parts.give[v] / wp.max(parts.give[v] + parts.give_of[k], 1.0e-12)
                         at = wp.atomic_add(samples.count, 0, 1)
                         if at < samples.vertex.shape[0]:
@@ -242,4 +246,3 @@ def find_samples(
                             samples.counts[at] = wp.min(depth / (soft * limit), 1.0)
                             samples.radius[at] = wp.max(thick, 1.2 * parts.edge[v])
                             samples.ratio[at] = depth / limit
-                            wp.atomic_max(deepest_out, own, k, depth / limit)

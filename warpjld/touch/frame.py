@@ -16,10 +16,9 @@ __all__ = ["SHARE", "Bench", "Model", "Overlaps", "fade"]
 SHARE = 1.0 / 3.0
 """Of the local thickness: overlaps up to it skin can give way to, deeper ones are poses that nobody can take."""
 
-_FULL, _NONE = (
-    1.5,
-    2.5,
-)  # shares: overlaps that deep at most are parted in full, those deeper than the second left alone
+# shares: what lies that deep at most is parted in full, what lies deeper than the second is left alone: at three, the
+# middle of the flesh, the nearest way out leaps to the other side
+_FULL, _NONE = 2.0, 2.75
 _SWEEPS = 3
 _SOFT = 0.05  # shares over which an overlap comes to count
 _CLEARANCE = 0.05  # shares by which both sides are moved beyond their meeting
@@ -60,7 +59,8 @@ class Model:
     Attributes:
         patches: Its parts.
         smooth: Rows that smooth a field, shape (V, V).
-        at_rest: Depth of every vertex that is no overlap since it is one at rest [m], shape (V,).
+        at_rest: Depth of every vertex that is no overlap since it is one at rest [m], shape (V,); None while that is
+            being found: then overlaps count whichever way surfaces face.
         never: Parts that may lie in one another, shape (P, P).
         edge: Mean length of the edges at every vertex [m], shape (V,).
         joints: Number of joints of the skeleton, 0 where there is none.
@@ -69,7 +69,7 @@ class Model:
 
     patches: Patches
     smooth: csr_array
-    at_rest: NDArray[np.float64]
+    at_rest: NDArray[np.float64] | None
     never: NDArray[np.bool_]
     edge: NDArray[np.float64]
     joints: int
@@ -133,11 +133,12 @@ class Bench:
         parts.give = _floats(patches.give)
         members = np.bincount(patches.part, minlength=names)
         parts.give_of = _floats(np.bincount(patches.part, patches.give, names) / np.maximum(members, 1))
-        parts.at_rest = _floats(model.at_rest)
+        parts.at_rest = _floats(np.zeros(len(vertices)) if model.at_rest is None else model.at_rest)
         a, b, c = (np.asarray(vertices, dtype=np.float64)[patches.faces[:, k]] for k in range(3))
         turns = np.cross(b - a, c - a).T
         areas = [np.bincount(patches.faces.ravel(), np.repeat(n, 3), len(vertices)) for n in turns]
         parts.area = _floats(np.linalg.norm(areas, axis=0) / 6.0)
+        parts.facing = 1.0 if model.at_rest is None else 0.0
         parts.edge = _floats(model.edge)
         bones = patches.bones if model.joints else ((),) * names
         parts.first_bone = _starts([len(some) for some in bones])

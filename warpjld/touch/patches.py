@@ -11,12 +11,14 @@ from numpy.typing import NDArray
 from scipy.sparse import csr_array
 from scipy.sparse.csgraph import connected_components
 
+from warpjld.normals import vertex_normals
+
 if TYPE_CHECKING:
     from warpjld.covering.covering import Covering
 
-__all__ = ["Patches", "neighbours", "patches_of", "segment_distance"]
+__all__ = ["Patches", "half_width", "neighbours", "patches_of", "segment_distance"]
 
-_COARSEST = 1.4  # of a part's thickness that its edges may be long
+_COARSEST = 2.2  # of a part's thickness that its edges may be long
 _THINNEST = 0.5  # of a part's median thickness: bones that run along the skin must not make it count as thin
 
 
@@ -28,7 +30,7 @@ class Patches:
         faces: Triangles of the whole, shape (T, 3).
         part: Part of every vertex, shape (V,).
         names: Names of the parts.
-        thickness: Distance to the bone [m], shape (V,).
+        thickness: Depth of the flesh [m], shape (V,): to the bone, or to the middle where that is nearer.
         give: Compliance of every vertex, a number without unit: of two that meet each gives way by its share.
         joints: Pairs of parts that meet at a joint, whether or not the surface joins them.
         bones: Of every part the joints at the ends of its segments; none without a skeleton.
@@ -104,16 +106,40 @@ def patches_of(covering: Covering) -> Patches:
     """A covering's patches: every vertex belongs to the operator that holds most of it."""
     part = covering.domains.argmax(axis=1).astype(np.int32)
     skeleton = covering.skeleton
+    segments = [(s.proximal, s.distal) for s in skeleton.segments]
+    to_bone = segment_distance(covering.surface.vertices, skeleton.rest, segments)
     ends = [(f, s.proximal, s.distal) for f, fan in enumerate(covering.fans) for s in fan.segments]
     joints = {(f, g) for f, a, b in ends for g, c, _ in ends if f != g and (c in (a, b) or skeleton.parents[c] == a)}
     return patches(
         covering.surface.faces,
         part,
         tuple(fan.name for fan in covering.fans),
-        segment_distance(covering.surface.vertices, skeleton.rest, [(s.proximal, s.distal) for s in skeleton.segments]),
+        np.minimum(to_bone, half_width(covering.surface.vertices, covering.surface.faces)),
         joints=tuple(sorted(joints)),
         bones=tuple(tuple((s.proximal, s.distal) for s in fan.segments) for fan in covering.fans),
     )
+
+
+def half_width(vertices: NDArray[np.float64], faces: NDArray[np.int32]) -> NDArray[np.float64]:
+    """Half of how wide the flesh is under every vertex [m], shape (V,): beyond it the way out is on the other side.
+
+    Along the inward normal, and the least of a vertex and those next to it: rays of single vertices stray.
+    """
+    import warp as wp
+    from warpjld_kernels.touch_thickness import measure_width
+
+    wp.init()
+    points = wp.array(vertices.astype(np.float32), dtype=wp.vec3, device="cpu")
+    normals = wp.array(vertex_normals(vertices, faces), dtype=wp.vec3, device="cpu")
+    mesh = wp.Mesh(points, wp.array(faces.ravel(), dtype=wp.int32, device="cpu"))
+    skip = 1e-5 * float(np.linalg.norm(np.ptp(vertices, axis=0)))
+    width = wp.empty(len(vertices), dtype=float, device="cpu")
+    wp.launch(measure_width, len(vertices), inputs=[mesh.id, points, normals, skip], outputs=[width], device="cpu")
+    half = 0.5 * width.numpy().astype(np.float64)
+    least = half.copy()
+    for k in range(3):
+        np.minimum.at(least, faces[:, k], half[faces].min(axis=1))
+    return least
 
 
 def segment_distance(

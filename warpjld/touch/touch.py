@@ -85,7 +85,7 @@ class Touch:
         never = self.coarse[:, None] | self.coarse
         around = np.zeros(len(patches.names)) if joints is None else _around(patches, vertices, joints)
         bones = 0 if joints is None else len(joints)
-        self._model = Model(patches, smooth, np.zeros(count), never, edge, bones, around)
+        self._model = Model(patches, smooth, None, never, edge, bones, around)
         self._benches: dict[int, Bench] = {}
         found = self._bench().measure(vertices, joints)
         at_rest = np.zeros(count)
