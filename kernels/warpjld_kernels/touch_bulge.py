@@ -12,8 +12,7 @@ def measure_displaced(
     points: wp.array(dtype=wp.vec3),
     normals: wp.array(dtype=wp.vec3),
     part: wp.array(dtype=wp.int32),
-    lower: wp.array(dtype=wp.vec3),
-    upper: wp.array(dtype=wp.vec3),
+    heeded: wp.array(dtype=wp.int32),
     give: wp.array(dtype=float),
     # rows of a smoothing
     first: wp.array(dtype=wp.int32),
@@ -24,16 +23,13 @@ def measure_displaced(
     lost_out: wp.array(dtype=float),
     room_out: wp.array(dtype=float),
 ):
-    """Where a bulge goes: what the smoothed size of the displacement is beyond itself, so beside it; in the boxes of
-    what was displaced."""
+    """Where a bulge goes: what the smoothed size of the displacement is beyond itself, so beside it; in parts that
+    something was displaced in or next to."""
     v = wp.tid()
     k = part[v]
     ring_out[v] = 0.0
-    p = before[v]
-    low = lower[k]
-    high = upper[k]
-    if p[0] > low[0] and p[1] > low[1] and p[2] > low[2] and p[0] < high[0] and p[1] < high[1] and p[2] < high[2]:
-        shift = points[v] - p
+    if heeded[k] > 0:
+        shift = points[v] - before[v]
         around = float(0.0)
         for i in range(first[v], first[v + 1]):
             u = column[i]

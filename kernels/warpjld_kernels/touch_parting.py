@@ -97,9 +97,12 @@ def part_surfaces(
                     side = 1.0
                 elif parts.apart[own, samples.other[i]] == 2 and own != samples.own[i]:
                     side = -1.0
-                # a part next to both is on the side that it looks away from
+                # a part next to both is on the side that it looks away from, and on none where it looks along
+                sure = float(1.0)
                 if side == 1.0 and parts.apart[own, samples.other[i]] == 2 and own != samples.own[i]:
-                    side = wp.where(wp.dot(facing, samples.normal[i]) < 0.0, 1.0, -1.0)
+                    away = wp.dot(facing, samples.normal[i])
+                    side = wp.where(away < 0.0, 1.0, -1.0)
+                    sure = wp.min(4.0 * wp.abs(away), 1.0)
                 n = side * samples.normal[i]
                 limit = samples.depth[i] / samples.ratio[i]
                 # what is much farther beyond the plane than that vertex was is not beside it
@@ -109,7 +112,7 @@ def part_surfaces(
                 if side != 0.0 and missing > 0.0 and looks > 0.0:
                     # a plane that is just being passed counts for nothing yet: else all would jump
                     passing = wp.min(missing / (soft * limit), 1.0)
-                    weight = near * near * looks * passing * samples.counts[i]
+                    weight = near * near * sure * looks * passing * samples.counts[i]
                     matrix += weight * wp.outer(n, n)
                     right += weight * shown[i] * missing * n
         matrix += stiffness * wp.identity(n=3, dtype=float)

@@ -203,7 +203,7 @@ class Bench:
             recorded(
                 touch_bulge.measure_displaced,
                 count,
-                [self._start, points, normals, parts.part, *boxes, parts.give, *smooth],
+                [self._start, points, normals, parts.part, heeded, parts.give, *smooth],
                 displaced,
             ),
             recorded(

@@ -14,6 +14,7 @@ from warpjld.errors import InputError
 from warpjld.grasp.distance import ObjectSet
 from warpjld.grasp.objects import Places
 from warpjld.normals import vertex_normals
+from warpjld.rotations import unit
 from warpjld.touch.frame import SHARE, fade
 from warpjld.touch.touch import Touch, Touched
 
@@ -22,6 +23,7 @@ __all__ = ["flatten_on"]
 _CLEARANCE = 0.02  # of the thickness between skin and object: faces of a round object would else show through
 _SOFT = 0.05  # shares of depth over which it comes
 _HIGHEST = 0.5  # shares that a bulge is high at most
+_WIDE = 4  # smoothings: how far it reaches
 _OFTEN = 2  # the bulge is laid on the object in its turn
 
 
@@ -98,16 +100,23 @@ def _bulged(touch: Touch, before: NDArray[np.float32], after: NDArray[np.float32
     patches, smooth = touch.patches, touch.smooth
     shift = after.astype(np.float64) - before
     size = np.linalg.norm(shift, axis=1)
-    ring = np.clip(smooth @ size - size, 0.0, None) * (patches.give > 0.0)
+    around_it = size
+    for _ in range(_WIDE):
+        around_it = smooth @ around_it
+    ring = np.clip(around_it - size, 0.0, None) * (patches.give > 0.0)
     faces, names = patches.faces, len(patches.names)
     a, b, c = (before[faces[:, k]].astype(np.float64) for k in range(3))
     turns = np.cross(b - a, c - a) / 6.0
     around = np.stack([np.bincount(faces.ravel(), np.repeat(turns[:, k], 3), len(before)) for k in range(3)], axis=1)
+    # sideways: towards the object it would be laid back at once
+    away = unit(smooth @ shift)
+    normals = vertex_normals(before, faces).astype(np.float64)
+    aside = normals - (normals * away).sum(axis=1, keepdims=True) * away
     lost = -np.bincount(patches.part, (around * shift).sum(axis=1), names)
-    room = np.bincount(patches.part, np.linalg.norm(around, axis=1) * ring, names)
+    room = np.bincount(patches.part, np.maximum((around * aside).sum(axis=1), 0.0) * ring, names)
     height = np.where(room > 0.0, lost / np.where(room > 0.0, room, 1.0), 0.0)[patches.part] * ring
     height = np.clip(height, 0.0, _HIGHEST * SHARE * patches.thickness)
     out = after.copy()
     at = height > 0.0
-    out[at] += (height[:, None] * vertex_normals(before, faces))[at].astype(np.float32)
+    out[at] += (height[:, None] * aside)[at].astype(np.float32)
     return out

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -129,7 +129,9 @@ def _block(covering: Covering, poses: Poses, touch: Touch, digits: list[_Digit])
         left = _search(covering, poses, digit, deepest - _ALLOWED, over, interpolated=True)
         share[n] *= left
         poses = _bent(covering, poses, digit.joints, left)
-    for n, digit in enumerate(digits):
+    # once more against all: skin that is parted from what comes later may cross what came before
+    everything = [replace(digit, counts=np.ones_like(digit.counts)) for digit in digits]
+    for n, digit in [*enumerate(digits), *enumerate(everything)]:
 
         def crosses(some: Poses, digit: _Digit = digit) -> NDArray[np.float64]:
             return np.where(_crossing(covering, touch, some, digit), 1.0, -1.0)
