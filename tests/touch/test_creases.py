@@ -32,8 +32,8 @@ def height(points: NDArray[np.floating], poses: Poses) -> NDArray[np.float64]:
 
 def test_both_sides_stay_on_their_own() -> None:
     rest = COVERING.surface.vertices[:, 2] + 0.05
-    near = np.abs(rest) < 0.012
-    poses = bent(COVERING, 120.0)
+    near = np.abs(rest) < 0.02
+    poses = bent(COVERING, 160.0)
     before = COVERING.deform(poses)
     own = np.sign(-rest) * height(before[0], poses)
     crossed = near & (own < -1e-4)
@@ -41,15 +41,15 @@ def test_both_sides_stay_on_their_own() -> None:
     after = TOUCH.apply(before, poses)[0]
     own_after = np.sign(-rest) * height(after[0], poses)
     assert own_after[crossed].min() > own[crossed].min() / 2.0
-    assert (own_after < -1e-4).sum() < 0.5 * (own < -1e-4).sum()
+    assert (own_after < -1e-4).sum() < 0.6 * (own < -1e-4).sum()
 
 
 def test_a_straight_finger_and_what_is_far_from_the_joint_stay_bit_for_bit() -> None:
-    for degrees in (0.0, 20.0):
+    for degrees in (0.0, 20.0, 90.0):
         poses = bent(COVERING, degrees)
         before = COVERING.deform(poses)
         np.testing.assert_array_equal(TOUCH.apply(before, poses)[0], before)
-    poses = bent(COVERING, 120.0)
+    poses = bent(COVERING, 160.0)
     before = COVERING.deform(poses)
     far = np.abs(COVERING.surface.vertices[:, 2] + 0.05) > 0.025
     assert far.sum() > 50
@@ -57,7 +57,7 @@ def test_a_straight_finger_and_what_is_far_from_the_joint_stay_bit_for_bit() -> 
 
 
 def test_it_moves_with_the_finger() -> None:
-    poses = bent(COVERING, 110.0)
+    poses = bent(COVERING, 160.0)
     before = COVERING.deform(poses)
     parted = TOUCH.apply(before, poses)[0]
     away = np.array([0.3, -0.2, 0.1])
@@ -67,7 +67,7 @@ def test_it_moves_with_the_finger() -> None:
 
 
 def test_without_poses_joints_are_left_alone() -> None:
-    poses = bent(COVERING, 110.0)
+    poses = bent(COVERING, 160.0)
     before = COVERING.deform(poses)
     assert (TOUCH.apply(before, poses)[0] != before).any()
     np.testing.assert_array_equal(TOUCH.apply(before)[0], before)
