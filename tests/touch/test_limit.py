@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 
 import numpy as np
@@ -14,6 +15,7 @@ from warpjld.covering.pose_sets import curled
 from warpjld.io.rig_file import load_rig
 from warpjld.skeleton.kinematics import rest_poses
 from warpjld.touch import Touch, close_until_touch
+from warpjld.touch.contact import SkinContact
 
 HAND = Path(__file__).resolve().parents[3] / "shared/data/hand_webxr_generic/right.glb"
 
@@ -37,11 +39,57 @@ def test_a_closed_hand_has_no_crossing_face_and_says_what_it_did() -> None:
     assert len(crossing_faces(before[1], rig.surface.faces).faces) > 20
     limited, told = close_until_touch(covering, poses, touch, first=4)
     np.testing.assert_array_equal(limited.rotations[0], poses.rotations[0])
-    after = touch.apply(covering.deform(limited))[0]
-    np.testing.assert_array_equal(after[0], before[0])
+    after = touch.apply(covering.deform(limited), limited)[0]
     assert not len(crossing_faces(after[1], rig.surface.faces).faces)
     assert told
     for one in told:
         assert one.frame == 5
         assert 0.5 < one.share < 1.0
         assert one.flexion == pytest.approx(240.0 * one.share, abs=1.0)
+
+
+@pytest.mark.skipif(not HAND.exists(), reason="the data folder is not there")
+def test_steps_of_limited_digits_halve_with_the_steps_of_the_motion() -> None:
+    covering = bind_rig(load_rig(HAND))
+    touch = Touch.of(covering)
+
+    def largest(count: int) -> float:
+        """Largest step of a limited flexion, of a fist that closes and opens again."""
+        amounts = 0.92 - 0.08 * np.cos(np.linspace(0.0, 2.0 * np.pi, count))
+        limited, told = close_until_touch(covering, curled(covering.skeleton, amounts), touch)
+        assert told
+        return float(np.abs(np.diff(limited.flexion, axis=0)).max())
+
+    coarse, fine = largest(17), largest(33)
+    assert fine < 0.65 * coarse
+
+
+@pytest.mark.skipif(not HAND.exists(), reason="the data folder is not there")
+def test_a_held_pose_is_limited_alike_in_every_frame_and_alone() -> None:
+    covering = bind_rig(load_rig(HAND))
+    touch = Touch.of(covering)
+    together, told = close_until_touch(covering, curled(covering.skeleton, [1.0] * 3), touch, first=2)
+    alone = close_until_touch(covering, curled(covering.skeleton, [1.0]), touch)[0]
+    for k in range(3):
+        np.testing.assert_array_equal(together.rotations[k], alone.rotations[0])
+    assert {one.frame for one in told} == {2, 3, 4}
+
+
+@pytest.mark.skipif(not HAND.exists(), reason="the data folder is not there")
+def test_what_is_too_deep_is_told_with_the_flexion_at_which_it_touches() -> None:
+    covering = bind_rig(load_rig(HAND))
+    contact = SkinContact(covering, limits=False)
+    poses = curled(covering.skeleton, [0.3, 1.0])
+    contact.skin(covering.deform(poses), poses, first=6)
+    (line,) = [line for line in contact.told() if line.startswith("right.index:")]
+    found = re.match(
+        r"right\.index: ([\d.]+) mm inside right\.palm at frame 7 \(1 frame in all\), more than skin can give; "
+        r"it touches at (\d+)° of flexion in all",
+        line,
+    )
+    assert found, line
+    assert float(found[1]) > 3.0
+    assert 180.0 < float(found[2]) < 240.0
+    again = SkinContact(covering, limits=False)
+    again.skin(covering.deform(poses[:1]), poses[:1])
+    assert not again.told()

@@ -127,7 +127,8 @@ def deform_clip(
         if caches:
             report("binding", 0, len(poses))
             for start, block in how.covering.blocks(poses, frames=_BLOCK, device=how.device, threads=how.threads):
-                parted = block if contact is None else contact.skin(block, first=first + start)
+                some = poses[start : start + len(block)]
+                parted = block if contact is None else contact.skin(block, some, first=first + start)
                 for cache in caches:
                     cache.write(parted)
                 report("deforming", start + len(block), len(poses))

@@ -9,11 +9,12 @@ import numpy as np
 from warpjld.covering import Covering
 from warpjld.covering.segment_table import SegmentTable
 from warpjld.errors import InputError
-from warpjld.skeleton import DIGITS, Skeleton
+from warpjld.skeleton import Skeleton
+from warpjld.skeleton.digits import digit_joints
 
 __all__ = ["digit_chains", "pad_vertex"]
 
-_KNUCKLES = ("base", "knuckle2", "knuckle3")
+_KNUCKLES = 3  # joints of a digit that can close round an object
 
 
 def digit_chains(skeleton: Skeleton, digits: Sequence[str] = ()) -> dict[str, tuple[int, ...]]:
@@ -22,12 +23,7 @@ def digit_chains(skeleton: Skeleton, digits: Sequence[str] = ()) -> dict[str, tu
     Raises:
         InputError: There is no such digit, or none at all.
     """
-    found = {}
-    for side in ("left.", "right.", ""):
-        for digit in DIGITS:
-            names = [f"{side}{digit}.{k}" for k in _KNUCKLES]
-            if all(name in skeleton.names for name in names):
-                found[f"{side}{digit}"] = tuple(skeleton.names.index(name) for name in names)
+    found = {name: joints for name, joints in digit_joints(skeleton).items() if len(joints) == _KNUCKLES}
     if not found:
         raise InputError("this skeleton has no digits to close")
     if not digits:

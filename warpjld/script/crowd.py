@@ -157,10 +157,16 @@ class Crowd:
         )
 
     def worn(self, role: Role, vertices: NDArray[np.float32], start: int) -> NDArray[np.float32]:
-        """Surfaces of a role (n, V, 3) from the frame of that place on: what crosses is parted where TOUCH is on, and
-        where contact was solved the skin is as it found it."""
+        """Surfaces of a role (n, V, 3) from the frame of that place on: where TOUCH is on what crosses is parted and
+        what is inside rigid objects flattened on them; where contact was solved the skin is as it found it."""
         if role.contact is not None and len(vertices):
-            vertices = role.contact.skin(vertices, first=round(float(self.frames[start])))
+            poses = role.poses[start : start + len(vertices)]
+            first = round(float(self.frames[start]))
+            vertices = role.contact.skin(vertices, poses, first=first)
+            pairs = zip(self.props, self.places, strict=True)
+            here = slice(start, start + len(vertices))
+            held = [(prop.thing, places[here]) for prop, places in pairs if not prop.deforms]
+            vertices = role.contact.hold(vertices, held, first=first)
         if self.pressed is None:
             return vertices
         out = vertices

@@ -1,8 +1,9 @@
-"""Digits that close only until they touch: a bisection of how far each is bent, against the hand itself."""
+"""Digits that close only until they touch: how far each may bend, against the hand itself."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Callable
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -11,7 +12,7 @@ from scipy.spatial.transform import Rotation
 
 from warpjld.covering.intersections import crossing_faces
 from warpjld.rotations import conjugate, multiply, rotate
-from warpjld.skeleton.hand import DIGITS
+from warpjld.skeleton.digits import digit_joints
 from warpjld.skeleton.kinematics import Poses, vertical_flexion
 from warpjld.touch.touch import Touch
 
@@ -20,9 +21,13 @@ if TYPE_CHECKING:
 
 __all__ = ["Closed", "close_until_touch"]
 
-_STEPS = 8  # halvings: 1/256 of a digit's bend, a degree of a full fist
-_ALLOWED = 0.5  # of the depth that can be parted
-_BACK = 0.02  # of a bend, at first; twice as much each time
+_ALLOWED = 0.5  # of what skin can give way to: what is left after parting then bulges little
+_BESIDE = 0.4  # how much overlaps of two digits count: beside one another they overlap however far they open
+_SCAN = 10  # steps in which a digit is opened until it is free
+_STEPS = 7  # halvings of the last: 1/1280 of a digit's bend; what is left is interpolated where depth is measured
+_FASTEST = 2.0  # times as fast as the hand moves a digit may open or close beside its pose
+_BLOCK = 32  # frames searched at once
+_STILL = 1e-6  # rad: a digit that is bent less cannot be opened
 
 
 @dataclass(frozen=True)
@@ -35,6 +40,7 @@ class Closed:
         depth: How deep it would have been [m].
         share: Of its bend that is left, 0…1.
         flexion: Sum of its joints' flexion at which it touches [degrees].
+        other: What it would have been inside of; empty where its faces only crossed.
     """
 
     digit: str
@@ -42,15 +48,18 @@ class Closed:
     depth: float
     share: float
     flexion: float
+    other: str
 
 
 def close_until_touch(covering: Covering, poses: Poses, touch: Touch, *, first: int = 0) -> tuple[Poses, list[Closed]]:
     """Poses whose digits are bent only as far as they touch.
 
-    The joints of a digit turn back together, by one share of their rotation from rest, which a bisection finds per
-    frame: each digit's deepest overlap with anything else may be half of what TOUCH can part, and no face of it may
-    cross another once it was parted. Digits are searched at once; those that stay free keep their pose exactly, and so
-    does one that crosses something however far it opens (its ``share`` is 1).
+    The joints of a digit turn back together, by one share of their rotation from rest: as little as makes its deepest
+    overlap half of what skin can give way to, and leaves no face of it crossing another once that was parted. Digits
+    are taken one after another, from index to pinky and the thumb last, each against the palm, the body and the digits
+    before it as they were left: so each share is a root of its own, which moves as the motion does. A digit that
+    touches nothing keeps its pose exactly, and so does one that crosses something however far it opens (its ``share``
+    is 1).
 
     Args:
         covering: The hand or body.
@@ -59,115 +68,212 @@ def close_until_touch(covering: Covering, poses: Poses, touch: Touch, *, first: 
         first: Number of the first frame, for what is told.
     """
     digits = _digits(covering)
-    if not digits:
-        return poses, []
-    names = list(digits)
-    joints = [digits[name][0] for name in names]
-    parts = [digits[name][1] for name in names]
     told: list[Closed] = []
-    frames: list[Poses] = []
-    for f in range(len(poses)):
-        pose = poses[f : f + 1]
-        meets, depth = _meets(covering, touch, pose, parts)
-        meets &= np.array([_bend(covering, pose, some) > 1e-6 for some in joints])
-        if meets.any():
-            share = _search(covering, touch, pose, joints, parts, meets)
-            pose = _bent(covering, pose, joints, share)
-            for n in np.flatnonzero(meets).tolist():
-                flexion = float(np.degrees(pose.flexion[0, joints[n]].sum()))
-                told.append(Closed(names[n], first + f, float(depth[n]), float(share[n]), flexion))
-        frames.append(pose)
-    arrays = ([getattr(p, name) for p in frames] for name in ("positions", "rotations", "flexion"))
-    return Poses(*(np.concatenate(a) for a in arrays)), told
+    if not digits:
+        return poses, told
+    searched = [_block(covering, poses[k : k + _BLOCK], touch, digits) for k in range(0, len(poses), _BLOCK)]
+    moved = _motion(covering, poses, digits)
+    limited = poses
+    for n, digit in enumerate(digits):
+        share, ratio, depth, other = (np.concatenate([block[n][k] for block in searched]) for k in range(4))
+        share = _steady(share, moved / np.maximum(_bend(covering, poses, digit.joints), _STILL))
+        limited = _bent(covering, limited, digit.joints, share)
+        for f in np.flatnonzero((share < 1.0) | (ratio > 1.0)).tolist():
+            flexion = float(np.degrees(limited.flexion[f, digit.joints].sum()))
+            name = covering.fans[int(other[f])].name if other[f] >= 0 else ""
+            told.append(Closed(digit.name, first + f, float(depth[f]), float(share[f]), flexion, name))
+    return limited, told
+
+
+@dataclass(frozen=True, eq=False)
+class _Digit:
+    """A digit, its joints and its parts; ``counts`` of parts that it is closed against, itself among them; ``fingers``
+    of the parts of any digit."""
+
+    name: str
+    joints: list[int]
+    parts: NDArray[np.bool_]
+    counts: NDArray[np.bool_]
+    fingers: NDArray[np.bool_]
+
+
+def _digits(covering: Covering) -> list[_Digit]:
+    """In the order in which they are closed; metacarpals are the palm's."""
+    parts = [fan.name for fan in covering.fans]
+    found = []
+    for name, joints in digit_joints(covering.skeleton).items():
+        mine = np.array([part.startswith(f"{name}.") for part in parts])
+        if mine.any():
+            found.append((name, list(joints), mine))
+    order = ("index", "middle", "ring", "pinky", "thumb")
+    found.sort(key=lambda one: order.index(one[0].rpartition(".")[2]))
+    later = np.zeros(len(parts), dtype=bool)
+    fingers = np.logical_or.reduce([mine for _, _, mine in found]) if found else later
+    out = []
+    for name, joints, mine in reversed(found):
+        out.append(_Digit(name, joints, mine, ~later, fingers))
+        later = later | mine
+    return out[::-1]
+
+
+def _block(covering: Covering, poses: Poses, touch: Touch, digits: list[_Digit]) -> list[tuple[NDArray, ...]]:
+    """Of every digit the share of its bend that it keeps, and :func:`_depths` of the poses as they are."""
+    original, share = poses, [np.ones(len(poses)) for _ in digits]
+    depth = [_depths(covering, touch, poses, digit) for digit in digits]
+    for n, digit in enumerate(digits):
+        deepest = _depths(covering, touch, poses, digit)[0] if poses is not original else depth[n][0]
+
+        def over(some: Poses, digit: _Digit = digit) -> NDArray[np.float64]:
+            return _depths(covering, touch, some, digit)[0] - _ALLOWED
+
+        left = _search(covering, poses, digit, deepest - _ALLOWED, over, interpolated=True)
+        share[n] *= left
+        poses = _bent(covering, poses, digit.joints, left)
+    # once more against all: skin that is parted from what comes later may cross what came before
+    everything = [replace(digit, counts=np.ones_like(digit.counts)) for digit in digits]
+    for n, digit in [*enumerate(digits), *enumerate(everything)]:
+
+        def crosses(some: Poses, digit: _Digit = digit) -> NDArray[np.float64]:
+            return np.where(_crossing(covering, touch, some, digit), 1.0, -1.0)
+
+        left = _search(covering, poses, digit, crosses(poses), crosses, interpolated=False)
+        share[n] *= left
+        poses = _bent(covering, poses, digit.joints, left)
+    return [(kept, *of) for kept, of in zip(share, depth, strict=True)]
+
+
+def _motion(covering: Covering, poses: Poses, digits: list[_Digit]) -> NDArray[np.float64]:
+    """How far the joints of digits turn from the frame before, the largest of them [rad], shape (F,)."""
+    joints = [j for digit in digits for j in digit.joints]
+    parents = [max(int(covering.skeleton.parents[j]), 0) for j in joints]
+    local = multiply(conjugate(poses.rotations[:, parents]), poses.rotations[:, joints])
+    step = multiply(conjugate(local[:-1]), local[1:])
+    turned = Rotation.from_quat(step.reshape(-1, 4)).magnitude().reshape(step.shape[:2]) if len(step) else step[..., 0]
+    return np.concatenate([np.zeros(min(len(poses), 1)), turned.max(axis=1)])
+
+
+def _steady(share: NDArray[np.float64], moved: NDArray[np.float64]) -> NDArray[np.float64]:
+    """The largest shares, none above those given, that change no faster than the motion: whether single faces cross
+    may flicker from frame to frame, and digits must not."""
+    out = share.copy()
+    for f in range(1, len(out)):
+        out[f] = min(out[f], out[f - 1] + _FASTEST * moved[f])
+    for f in range(len(out) - 1, 0, -1):
+        out[f - 1] = min(out[f - 1], out[f] + _FASTEST * moved[f])
+    return out
 
 
 def _search(
     covering: Covering,
-    touch: Touch,
-    pose: Poses,
-    joints: list[list[int]],
-    parts: list[NDArray[np.bool_]],
-    bent: NDArray[np.bool_],
+    poses: Poses,
+    digit: _Digit,
+    over: NDArray[np.float64],
+    measure: Callable[[Poses], NDArray[np.float64]],
+    *,
+    interpolated: bool,
 ) -> NDArray[np.float64]:
-    """Share of its bend that each digit keeps; 1 for those that do not touch, or touch however far they open."""
+    """Share of its bend that a digit keeps in every frame, so that a measure is not above nought; 1 where it is not
+    anyhow, or is above it however far the digit opens.
 
-    def at(share: NDArray[np.float64]) -> NDArray[np.bool_]:
-        return _meets(covering, touch, _bent(covering, pose, joints, share), parts)[0]
-
-    bent = bent & ~at(np.where(bent, 0.0, 1.0))
-    low, high = np.where(bent, 0.0, 1.0), np.ones(len(joints))
-    for _ in range(_STEPS):
-        share = np.where(bent, 0.5 * (low + high), 1.0)
-        meets = at(share)
-        low, high = np.where(bent & ~meets, share, low), np.where(bent & meets, share, high)
-    # a digit was judged beside others on their way: what meets beside them at their ends opens a little more
-    for step in range(_STEPS):
-        meets = at(low) & bent
-        if not meets.any():
+    Args:
+        over: The measure of the poses as they are.
+        interpolated: Whether the measure is continuous: then the last interval is cut where it would be nought.
+    """
+    out = np.ones(len(poses))
+    frames = np.flatnonzero((over > 0.0) & (_bend(covering, poses, digit.joints) > _STILL))
+    if not len(frames):
+        return out
+    # opened by and by: some cross at first what they are clear of later, and then again what lies behind them
+    low, high, at_low, at_high = np.ones(len(frames)), np.ones(len(frames)), over[frames], over[frames]
+    for share in np.linspace(1.0, 0.0, _SCAN + 1)[1:]:
+        rows = np.flatnonzero(at_low > 0.0)
+        if not len(rows):
             break
-        low = np.where(meets, low - _BACK * 2.0**step, low).clip(0.0)
-    return low
+        high[rows], at_high[rows] = low[rows], at_low[rows]
+        low[rows] = share
+        at_low[rows] = measure(_bent(covering, _picked(poses, frames[rows]), digit.joints, low[rows]))
+    opens = at_low <= 0.0
+    frames = frames[opens]
+    low, high, at_low, at_high = low[opens], high[opens], at_low[opens], at_high[opens]
+    some = _picked(poses, frames)
+    for _ in range(_STEPS if len(frames) else 0):
+        middle = 0.5 * (low + high)
+        at = measure(_bent(covering, some, digit.joints, middle))
+        free = at <= 0.0
+        low, at_low = np.where(free, middle, low), np.where(free, at, at_low)
+        high, at_high = np.where(free, high, middle), np.where(free, at_high, at)
+    if interpolated:
+        low = low + (high - low) * -at_low / np.maximum(at_high - at_low, 1e-12)
+    out[frames] = low
+    return out
 
 
-def _bend(covering: Covering, pose: Poses, joints: list[int]) -> float:
-    """Largest rotation of a digit's joints from rest [rad]."""
+def _bend(covering: Covering, poses: Poses, joints: list[int]) -> NDArray[np.float64]:
+    """Largest rotation of a digit's joints from rest in every frame [rad]."""
     parents = [max(int(covering.skeleton.parents[j]), 0) for j in joints]
-    local = multiply(conjugate(pose.rotations[:, parents]), pose.rotations[:, joints])
-    return float(Rotation.from_quat(local.reshape(-1, 4)).magnitude().max())
+    local = multiply(conjugate(poses.rotations[:, parents]), poses.rotations[:, joints])
+    return np.asarray(Rotation.from_quat(local.reshape(-1, 4)).magnitude().reshape(local.shape[:2]).max(axis=1))
 
 
-def _digits(covering: Covering) -> dict[str, tuple[list[int], NDArray[np.bool_]]]:
-    """Joints and parts of every digit; metacarpals are the palm's."""
-    out: dict[str, tuple[list[int], NDArray[np.bool_]]] = {}
-    names = covering.skeleton.names
-    for j, name in enumerate(names):
-        stem, _, last = name.rpartition(".")
-        if stem.rpartition(".")[2] in DIGITS and last in ("base", "knuckle2", "knuckle3"):
-            out.setdefault(stem, ([], np.array([fan.name.startswith(stem + ".") for fan in covering.fans])))[0].append(
-                j
-            )
-    return {name: found for name, found in out.items() if found[1].any()}
+def _depths(
+    covering: Covering, touch: Touch, poses: Poses, digit: _Digit
+) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.int64]]:
+    """Deepest overlap of a digit with what counts for it in every frame: in shares of what skin can give way to, in
+    metres, and the other part, -1 for none."""
+    ratio, depth, other = np.zeros(len(poses)), np.zeros(len(poses)), np.full(len(poses), -1)
+    for f, found in enumerate(touch.measured(covering.deform(poses), poses)):
+        mine, its = digit.parts[found.part], digit.parts[found.other]
+        rows = np.flatnonzero((mine | its) & digit.counts[found.part] & digit.counts[found.other])
+        if len(rows):
+            beside = ~(digit.parts[found.part[rows]] & digit.parts[found.other[rows]])
+            beside &= digit.fingers[found.part[rows]] & digit.fingers[found.other[rows]]
+            ratio[f] = (found.ratio[rows] * np.where(beside, _BESIDE, 1.0)).max()
+            deepest = rows[found.depth[rows].argmax()]
+            depth[f] = found.depth[deepest]
+            other[f] = found.other[deepest] if digit.parts[found.part[deepest]] else found.part[deepest]
+    return ratio, depth, other
 
 
-def _meets(
-    covering: Covering, touch: Touch, pose: Poses, parts: list[NDArray[np.bool_]]
-) -> tuple[NDArray[np.bool_], NDArray[np.float64]]:
-    """Of every digit whether it overlaps more than can be parted well, or crosses anything after it was parted; and
-    its deepest overlap with what is not itself [m]."""
-    points = covering.deform(pose)
-    found = touch.depths(points[0])
-    part = touch.patches.part
-    pairs = crossing_faces(touch.apply(points)[0][0], touch.patches.faces).pairs
-    crossing = np.unique(part[touch.patches.faces[pairs]])
-    hit = found.other >= 0
-    meets, depth = np.zeros(len(parts), dtype=bool), np.zeros(len(parts))
-    for n, inside in enumerate(parts):
-        rows = hit & (inside[part] != inside[found.other])
-        ratio = found.depth[rows] / np.maximum(touch.limit[rows], 1e-9)
-        meets[n] = inside[crossing].any() or (ratio > _ALLOWED).any()
-        depth[n] = float(found.depth[rows].max(initial=0.0))
-    return meets, depth
+def _crossing(covering: Covering, touch: Touch, poses: Poses, digit: _Digit) -> NDArray[np.bool_]:
+    """Whether a face of a digit crosses another that counts for it once its skin was parted, in every frame."""
+    part, faces = touch.patches.part, touch.patches.faces
+    parted, _ = touch.parted(covering.deform(poses), poses)
+    out = np.zeros(len(poses), dtype=bool)
+    mine = np.asarray(digit.parts[part[faces]].any(axis=1))
+    counts = np.asarray(digit.counts[part[faces]].all(axis=1))
+    for f, points in enumerate(parted):
+        pairs = np.flatnonzero(counts)[crossing_faces(points, faces[counts]).pairs]
+        out[f] = bool(mine[touch.new_crossings(pairs)].any())
+    return out
 
 
-def _bent(covering: Covering, pose: Poses, joints: list[list[int]], share: NDArray[np.float64]) -> Poses:
-    """The pose with each digit's joints at a share of their rotation from rest; bones keep the pose's lengths."""
-    skeleton = covering.skeleton
-    part = np.ones(len(skeleton))
-    for some, s in zip(joints, share, strict=True):
-        part[some] = s
-    changed = part < 1.0
-    positions, rotations = pose.positions.copy(), pose.rotations.copy()
-    local = pose.rotations.copy()
+def _picked(poses: Poses, frames: NDArray[np.int64]) -> Poses:
+    return Poses(poses.positions[frames], poses.rotations[frames], poses.flexion[frames])
+
+
+def _bent(covering: Covering, poses: Poses, joints: list[int], share: NDArray[np.float64]) -> Poses:
+    """Poses with some joints at a share (F,) of their rotation from rest; bones keep the poses' lengths, and frames at
+    a share of 1 every bit."""
+    frames = np.flatnonzero(share < 1.0)
+    if not len(frames):
+        return poses
+    skeleton, some = covering.skeleton, _picked(poses, frames)
+    positions, rotations, local = some.positions.copy(), some.rotations.copy(), some.rotations.copy()
+    changed = np.isin(np.arange(len(skeleton)), joints)
     for j, parent in enumerate(skeleton.parents.tolist()):
         if parent < 0:
             continue
-        local[:, j] = multiply(conjugate(pose.rotations[:, parent]), pose.rotations[:, j])
-        if part[j] < 1.0:
-            local[:, j] = Rotation.from_rotvec(part[j] * Rotation.from_quat(local[:, j]).as_rotvec()).as_quat()
+        local[:, j] = multiply(conjugate(some.rotations[:, parent]), some.rotations[:, j])
+        if j in joints:
+            vector = share[frames, None] * Rotation.from_quat(local[:, j]).as_rotvec()
+            local[:, j] = Rotation.from_rotvec(vector).as_quat()
             local[:, j] *= np.where(local[:, j, 3:] < 0.0, -1.0, 1.0)
         if changed[j] or changed[parent]:
             changed[j] = True
             rotations[:, j] = multiply(rotations[:, parent], local[:, j])
-            offset = rotate(conjugate(pose.rotations[:, parent]), pose.positions[:, j] - pose.positions[:, parent])
+            offset = rotate(conjugate(some.rotations[:, parent]), some.positions[:, j] - some.positions[:, parent])
             positions[:, j] = positions[:, parent] + rotate(rotations[:, parent], offset)
-    return Poses(positions, rotations, vertical_flexion(skeleton, local))
+    out = Poses(poses.positions.copy(), poses.rotations.copy(), poses.flexion.copy())
+    out.positions[frames], out.rotations[frames] = positions, rotations
+    out.flexion[frames] = vertical_flexion(skeleton, local)
+    return out

@@ -8,28 +8,35 @@ from scipy.sparse import csr_array, diags_array, eye_array
 
 from warpjld.touch.patches import neighbours
 
-__all__ = ["smoothing"]
+__all__ = ["edge_lengths", "smoothing"]
 
-_MOST = 12  # Jacobi steps: beyond that a row reaches over hundreds of vertices
+_MOST = 8  # Jacobi steps: beyond that a row reaches over hundreds of vertices
 _LEAST = 0.05  # of a row's largest entry: what is less is dropped
 
 
-def smoothing(
-    vertices: NDArray[np.float64], faces: NDArray[np.int32], reach: float, *, steps: int | None = None
-) -> csr_array:
-    """Rows that average a field over about ``reach`` [m], each summing to one, shape (V, V).
-
-    Steps of half the mean of the neighbours, as many as diffuse that far on edges of mean length: after n steps the
-    spread is the edge's length times √(n / 2).
-    """
+def edge_lengths(vertices: NDArray[np.float64], faces: NDArray[np.int32]) -> NDArray[np.float64]:
+    """Mean length of the edges at every vertex [m], 0 where there are none, shape (V,)."""
     linked = neighbours(faces, len(vertices)).tocoo()
     row, column = linked.coords
-    edge = float(np.linalg.norm(vertices[row] - vertices[column], axis=1).mean()) if len(row) else 1.0
-    if steps is None:
-        steps = int(np.clip(round(2.0 * (reach / max(edge, 1e-12)) ** 2), 2, _MOST))
-    degree = np.bincount(row, minlength=len(vertices)).astype(float)
-    mean = csr_array(diags_array(1.0 / np.maximum(degree, 1.0)) @ linked.tocsr())
-    step = csr_array(diags_array(np.where(degree > 0, 0.5, 1.0)) @ eye_array(len(vertices)) + 0.5 * mean)
+    length = np.linalg.norm(vertices[row] - vertices[column], axis=1)
+    degree = np.bincount(row, minlength=len(vertices))
+    return np.asarray(np.bincount(row, length, len(vertices)) / np.maximum(degree, 1))
+
+
+def smoothing(vertices: NDArray[np.float64], faces: NDArray[np.int32], reach: NDArray[np.float64]) -> csr_array:
+    """Rows that average a field over about ``reach`` [m] of every vertex, each summing to one, shape (V, V).
+
+    Each step mixes a share a of the neighbours' mean in: after n steps the spread is the edges' length times √(n a).
+    The finest region says how many steps, up to a bound; elsewhere a is less than a half.
+    """
+    linked = neighbours(faces, len(vertices))
+    edge = edge_lengths(vertices, faces)
+    square = (reach / np.where(edge > 0.0, edge, np.inf)) ** 2
+    steps = int(np.clip(np.ceil(2.0 * square.max(initial=0.0)), 2, _MOST))
+    share = np.minimum(square / steps, 0.5)
+    degree = np.diff(linked.indptr)
+    mean = csr_array(diags_array(share / np.maximum(degree, 1.0)) @ linked)
+    step = csr_array(diags_array(np.where(degree > 0, 1.0 - share, 1.0)) @ eye_array(len(vertices)) + mean)
     out = step
     for _ in range(steps - 1):
         out = csr_array(out @ step)

@@ -1,41 +1,45 @@
 """Contact of the skin with itself, displayed: what crosses is parted, and what is displaced bulges beside it.
 
-No forces and no equilibrium: contact that is solved is PRESS (:mod:`warpjld.press`). Each sweep finds the vertices that
-lie inside another part, moves both sides out along the other's normals by shares as their compliances are, smooths
-that displacement over the surface on the scale of the flesh's thickness, and gives the volume back around it.
+No forces and no equilibrium: contact that is solved is PRESS (:mod:`warpjld.press`). First the two sides of every bent
+joint are parted at the plane that halves its angle. Then vertices that lie inside another part are found; each gives a
+plane in which it and that part are to meet, and both sides are moved to theirs by a least squares fit to the planes
+around, which is smooth over the surface. The volume that this takes is given back around it.
 """
 
 from __future__ import annotations
 
+import threading
+from collections.abc import Callable
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.sparse import csr_array
 
+from warpjld.covering.intersections import crossing_faces
 from warpjld.errors import InputError
-from warpjld.touch.depths import Depths, Finder
-from warpjld.touch.patches import Patches, patches_of
-from warpjld.touch.smoothing import smoothing
+from warpjld.skeleton.kinematics import Poses
+from warpjld.threads import in_threads, threads_for
+from warpjld.touch.creases import Creases
+from warpjld.touch.frame import SHARE, Bench, Model, Overlaps
+from warpjld.touch.patches import Patches, patches_of, segment_distance
+from warpjld.touch.smoothing import edge_lengths, smoothing
 
 if TYPE_CHECKING:
     from warpjld.covering.covering import Covering
 
 __all__ = ["SHARE", "Touch", "Touched"]
 
-SHARE = 1.0 / 3.0
-"""Of the local thickness: overlaps up to it are parted, deeper ones are poses that nobody can take."""
-
-_SWEEPS = 4
-_SOFT = 0.05  # of the depth that can be parted: over it a vertex comes to count as touching
-_CLEARANCE = 0.1  # likewise: how far both sides are moved beyond their meeting
 _NOISE = 1e-6  # of the surface's size
-_REACH = 0.25  # of the median thickness: how far a displacement is smoothed
+_REACH = 0.25  # of the thickness: how far from a displacement its volume is given back
+_SPLIT_BELOW = 8_000  # vertex-frames a thread must have before splitting pays
 
 
 @dataclass(frozen=True)
 class Touched:
-    """The deepest overlap of one part in one frame that is too deep to be parted.
+    """The deepest overlap of one part in one frame that is deeper than skin can give way to.
 
     Attributes:
         part: The part, e.g. ``left.index.knuckle2``.
@@ -56,118 +60,160 @@ class Touch:
     Args:
         patches: The surface's parts.
         vertices: Rest positions [m], shape (V, 3). What overlaps there already stays as it is, to that depth.
+        creases: The joints whose two sides are parted; none without.
+        joints: Rest positions of the joints that the patches' bones name [m], shape (J, 3).
     """
 
-    def __init__(self, patches: Patches, vertices: NDArray[np.float64]) -> None:
+    def __init__(
+        self,
+        patches: Patches,
+        vertices: NDArray[np.float64],
+        *,
+        creases: Creases | None = None,
+        joints: NDArray[np.float64] | None = None,
+    ) -> None:
         if (patches.give < 0.0).any() or not np.isfinite(patches.give).all():
             raise InputError("touch: compliances must be finite numbers, 0 or above")
         self.patches = patches
-        self.finder = Finder(patches, vertices)
-        reach = _REACH * float(np.median(patches.thickness))
-        self._smooth = smoothing(vertices, patches.faces, reach)
-        self.limit = SHARE * patches.thickness
-        self._rest = np.zeros(len(vertices))
-        at_rest = self.depths(vertices).depth
+        self.creases = creases
+        self._vertices = vertices
+        edge = edge_lengths(vertices, patches.faces)
+        # one ring of faces at least: what coarse faces give way by is given back on the next
+        smooth = smoothing(vertices, patches.faces, np.maximum(_REACH * patches.thickness, edge))
+        count = len(vertices)
+        self.coarse = patches.coarse(edge)
+        never = self.coarse[:, None] | self.coarse
+        around = np.zeros(len(patches.names)) if joints is None else _around(patches, vertices, joints)
+        bones = 0 if joints is None else len(joints)
+        self._model = Model(patches, smooth, None, never, edge, bones, around)
+        self._benches: dict[int, Bench] = {}
+        found = self._bench().measure(vertices, joints)
+        at_rest = np.zeros(count)
         # a little more than it is: in other positions single precision makes some of it anew
         noise = _NOISE * float(np.linalg.norm(np.ptp(vertices, axis=0)))
-        self._rest = np.where(at_rest > 0.0, 1.001 * at_rest + noise, 0.0)
-        self._mean_give = np.array(
-            [
-                patches.give[patches.part == k].mean() if (patches.part == k).any() else 1.0
-                for k in range(len(patches.names))
-            ]
-        )
+        np.maximum.at(at_rest, found.vertex, 1.001 * found.depth + noise)
+        self._model = replace(self._model, at_rest=at_rest, never=never | self._nested(found))
+        self._benches = {}
+
+    def _nested(self, found: Overlaps) -> NDArray[np.bool_]:
+        """Parts of different shells that lie in one another at rest, as pieces of a jointed figure do, shape (P, P)."""
+        out = np.zeros((len(self.patches.names),) * 2, dtype=bool)
+        shells = [set(self.patches.shell[self.patches.part == k].tolist()) for k in range(len(out))]
+        for a, b in {(int(p), int(o)) for p, o in zip(found.part, found.other, strict=True)}:
+            out[a, b] = out[b, a] = out[a, b] or not shells[a] & shells[b]
+        return out
 
     @classmethod
     def of(cls, covering: Covering) -> Touch:
         """Of a covering's own parts, all equally compliant."""
-        return cls(patches_of(covering), covering.surface.vertices)
+        patches = patches_of(covering)
+        vertices, joints = covering.surface.vertices, covering.skeleton.rest
+        return cls(patches, vertices, creases=Creases.of(covering, patches), joints=joints)
 
-    def depths(self, points: NDArray[np.floating]) -> Depths:
-        """Overlaps of one frame (V, 3), less what overlaps at rest."""
-        found = self.finder(points)
-        depth = np.maximum(found.depth - self._rest, 0.0)
-        return replace(found, depth=depth, other=np.where(depth > 0.0, found.other, -1))
+    @property
+    def smooth(self) -> csr_array:
+        """Rows that smooth a field over the surface, on the scale of its thickness, shape (V, V)."""
+        return self._model.smooth
 
-    def apply(self, points: NDArray[np.floating], *, first: int = 0) -> tuple[NDArray[np.floating], list[Touched]]:
+    def apply(
+        self, points: NDArray[np.floating], poses: Poses | None = None, *, first: int = 0, threads: int | None = None
+    ) -> tuple[NDArray[np.floating], list[Touched]]:
         """Part what crosses.
 
         Args:
             points: Deformed vertices [m], shape (F, V, 3).
+            poses: The poses they were deformed by; without, joints' two sides are not parted.
             first: Number of the first frame, for what is told.
+            threads: CPU threads to split the frames over; by default all cores where that pays.
 
         Returns:
             The vertices, of the same type, bit for bit the same where nothing is near an overlap; and the overlaps
-            too deep to be parted, the deepest of every part and frame.
+            deeper than skin can give way to, the deepest of every part and frame.
         """
-        if points.ndim != 3 or points.shape[1:] != (len(self.patches.part), 3):
-            raise InputError(f"touch: want points of shape (frames, {len(self.patches.part)}, 3), got {points.shape}")
-        out = points.copy()
-        told: list[Touched] = []
-        for k in range(len(points)):
-            told += self._frame(out[k], first + k)
-        return out, told
+        out, found = self.parted(points, poses, threads=threads)
+        return out, [one for k, some in enumerate(found) for one in self._deep(some, first + k)]
 
-    def _frame(self, points: NDArray[np.floating], frame: int) -> list[Touched]:
-        told: list[Touched] = []
-        moved = points.astype(np.float64)
-        before = moved.copy()
-        normals = None
-        for sweep in range(_SWEEPS):
-            found = self.depths(moved)
-            if not found.depth.any():
-                break
-            if sweep == 0:
-                told = self._deep(found, frame)
-                normals = found.normals
-            moved += self._parting(found)
-        if normals is None:
-            return told
-        shift = moved - before
-        shift += self._bulge(before, shift, normals)
-        at = np.abs(shift).max(axis=1) > 0.0
-        points[at] = (before + shift)[at]
-        return told
+    def parted(
+        self, points: NDArray[np.floating], poses: Poses | None = None, *, threads: int | None = None
+    ) -> tuple[NDArray[np.floating], list[Overlaps]]:
+        """The same, with all that overlapped in every frame once joints' two sides were parted."""
+        moved, found = self._each(points, poses, threads, Bench.part)
+        if points.dtype == np.float32:
+            return moved, found
+        same = (moved == points.astype(np.float32)).all(axis=2, keepdims=True)
+        return np.where(same, points, moved), found
 
-    def _parting(self, found: Depths) -> NDArray[np.float64]:
-        """Displacement of one sweep, shape (V, 3)."""
-        limit = self.limit
-        # beyond the limit it falls to nothing again: continuous, and a pose nobody can take is left as it is
-        depth = np.clip(np.minimum(found.depth, 2.0 * limit - found.depth), 0.0, None)
-        give = self.patches.give
-        other = np.where(found.other >= 0, self._mean_give[found.other], 1.0)
-        share = give / np.maximum(give + other, 1e-12)
-        hit = np.clip(depth / (_SOFT * limit), 0.0, 1.0)
-        # a little more than met: between vertices that are just out, edges still cross
-        wanted = (share * (depth + _CLEARANCE * limit * hit))[:, None] * found.way
-        weight = self._smooth @ hit
-        # where contact is, the mean is over contact; at its rim over what is free as well
-        over = hit * weight + (1.0 - hit) * np.maximum(weight, 0.5)
-        smooth = (self._smooth @ wanted) / np.maximum(over, 1e-9)[:, None]
-        free = (give > 0.0)[:, None]
-        return np.asarray(np.where(free, smooth, 0.0))
+    def measured(
+        self, points: NDArray[np.floating], poses: Poses | None = None, *, threads: int | None = None
+    ) -> list[Overlaps]:
+        """What :meth:`apply` would part in every frame."""
+        return self._each(points, poses, threads, Bench.measure)[1]
 
-    def _bulge(
-        self, points: NDArray[np.float64], shift: NDArray[np.float64], normals: NDArray[np.float64]
-    ) -> NDArray[np.float64]:
-        """What gives each part's displaced volume back, around where it was displaced, shape (V, 3)."""
-        size = np.linalg.norm(shift, axis=1)
-        ring = np.clip(self._smooth @ size - size, 0.0, None) * (self.patches.give > 0.0)
-        faces = self.patches.faces
-        a, b, c = (points[faces[:, k]] for k in range(3))
-        area = np.linalg.norm(np.cross(b - a, c - a), axis=1) / 6.0
-        area = sum(np.bincount(faces[:, k], area, minlength=len(points)) for k in range(3))
-        count = len(self.patches.names)
-        lost = -np.bincount(self.patches.part, area * (shift * normals).sum(axis=1), minlength=count)
-        room = np.bincount(self.patches.part, area * ring, minlength=count)
-        height = lost / np.where(room > 0.0, room, 1.0) * (room > 0.0)
-        height = np.clip(height[self.patches.part] * ring, -self.limit, self.limit)
-        return np.asarray(height[:, None] * normals)
+    def _each(
+        self,
+        points: NDArray[np.floating],
+        poses: Poses | None,
+        threads: int | None,
+        work: Callable[[Bench, NDArray[np.float32], NDArray[np.float64] | None], Overlaps],
+    ) -> tuple[NDArray[np.float32], list[Overlaps]]:
+        """Work on every frame once joints' two sides were parted."""
+        count = len(self.patches.part)
+        if points.ndim != 3 or points.shape[1:] != (count, 3):
+            raise InputError(f"touch: want points of shape (frames, {count}, 3), got {points.shape}")
+        if poses is not None and len(poses) != len(points):
+            raise InputError(f"touch: {len(points)} frames of points, but {len(poses)} poses")
+        import warp as wp
+        from warpjld_kernels.touch_samples import find_samples
 
-    def _deep(self, found: Depths, frame: int) -> list[Touched]:
-        deep = np.flatnonzero(found.depth > self.limit)
+        moved = np.array(points, dtype=np.float32)
+        if self.creases is not None and poses is not None:
+            self.creases.part(wp.array(moved, dtype=wp.vec3, device="cpu", copy=False), poses)
+        found: dict[int, Overlaps] = {}
+        places = [None] * len(points) if poses is None else poses.positions
+
+        def span(begin: int, end: int) -> None:
+            bench = self._bench()
+            for k in range(begin, end):
+                found[k] = work(bench, moved[k], places[k])
+
+        if threads is None:
+            threads = threads_for(moved.shape[0] * count, _SPLIT_BELOW)
+        self._bench()
+        in_threads(span, len(points), threads, find_samples, wp.get_device("cpu"))
+        return moved, [found[k] for k in range(len(points))]
+
+    def new_crossings(self, pairs: NDArray[np.integer]) -> NDArray[np.int64]:
+        """Of crossing pairs of faces (N, 2) those that do not cross at rest."""
+        count = len(self.patches.faces)
+        keys = pairs.astype(np.int64) @ [count, 1]
+        return pairs[~np.isin(keys, self._crossing_at_rest)].astype(np.int64)
+
+    @cached_property
+    def _crossing_at_rest(self) -> NDArray[np.int64]:
+        pairs = crossing_faces(self._vertices, self.patches.faces).pairs
+        return np.asarray(pairs.astype(np.int64) @ [len(self.patches.faces), 1])
+
+    def _bench(self) -> Bench:
+        """The calling thread's."""
+        mine = threading.get_ident()
+        if mine not in self._benches:
+            self._benches[mine] = Bench(self._model, self._vertices)
+        return self._benches[mine]
+
+    def _deep(self, found: Overlaps, frame: int) -> list[Touched]:
+        deep = np.flatnonzero(found.ratio > 1.0)
         told = {}
-        for v in deep[np.argsort(found.depth[deep])].tolist():  # the deepest last, which stays
-            part = self.patches.names[self.patches.part[v]]
-            told[part] = Touched(part, self.patches.names[found.other[v]], frame, float(found.depth[v]))
+        for i in deep[np.argsort(found.depth[deep])].tolist():  # the deepest last, which stays
+            part = self.patches.names[found.part[i]]
+            told[part] = Touched(part, self.patches.names[found.other[i]], frame, float(found.depth[i]))
         return list(told.values())
+
+
+def _around(patches: Patches, vertices: NDArray[np.float64], joints: NDArray[np.float64]) -> NDArray[np.float64]:
+    """How far the mesh of every part is from its bones at most [m], shape (P,)."""
+    out = np.zeros(len(patches.names))
+    for k, bones in enumerate(patches.bones):
+        corners = np.unique(patches.mesh(k)[0])
+        if len(corners) and bones:
+            out[k] = segment_distance(vertices[corners], joints, list(bones)).max()
+    return out

@@ -1,0 +1,60 @@
+"""Volume that a displacement took from a part, given back around where it was taken."""
+
+import warp as wp
+
+wp.set_module_options({"enable_backward": False})
+
+
+@wp.kernel
+def measure_displaced(
+    # frame: before and after, normals as long as a third of the area around
+    before: wp.array(dtype=wp.vec3),
+    points: wp.array(dtype=wp.vec3),
+    normals: wp.array(dtype=wp.vec3),
+    part: wp.array(dtype=wp.int32),
+    heeded: wp.array(dtype=wp.int32),
+    give: wp.array(dtype=float),
+    # rows of a smoothing
+    first: wp.array(dtype=wp.int32),
+    column: wp.array(dtype=wp.int32),
+    value: wp.array(dtype=float),
+    # out, by part: volume lost, and volume of a bulge of height ``ring``
+    ring_out: wp.array(dtype=float),
+    lost_out: wp.array(dtype=float),
+    room_out: wp.array(dtype=float),
+):
+    """Where a bulge goes: what the smoothed size of the displacement is beyond itself, so beside it; in parts that
+    something was displaced in or next to."""
+    v = wp.tid()
+    k = part[v]
+    ring_out[v] = 0.0
+    if heeded[k] > 0:
+        shift = points[v] - before[v]
+        around = float(0.0)
+        for i in range(first[v], first[v + 1]):
+            u = column[i]
+            around += value[i] * wp.length(points[u] - before[u])
+        ring = wp.max(around - wp.length(shift), 0.0)
+        if give[v] > 0.0 and ring > 0.0:
+            ring_out[v] = ring
+            wp.atomic_add(room_out, k, wp.length(normals[v]) * ring)
+        wp.atomic_add(lost_out, k, -wp.dot(normals[v], shift))
+
+
+@wp.kernel
+def bulge(
+    normals: wp.array(dtype=wp.vec3),
+    part: wp.array(dtype=wp.int32),
+    thickness: wp.array(dtype=float),
+    most: float,
+    ring: wp.array(dtype=float),
+    lost: wp.array(dtype=float),
+    room: wp.array(dtype=float),
+    # in and out
+    points: wp.array(dtype=wp.vec3),
+):
+    v = wp.tid()
+    k = part[v]
+    if ring[v] > 0.0 and room[k] > 0.0:
+        height = wp.clamp(lost[k] / room[k] * ring[v], 0.0, most * thickness[v])
+        points[v] = points[v] + height * wp.normalize(normals[v])

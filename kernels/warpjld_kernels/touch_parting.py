@@ -1,0 +1,143 @@
+"""Vertices moved to their own side of the surface in which two parts are to meet."""
+
+import warp as wp
+
+from warpjld_kernels.touch_samples import FAR, Parts, Samples
+
+wp.set_module_options({"enable_backward": False})
+
+
+@wp.kernel
+def fade_samples(
+    samples: Samples,
+    parts: Parts,
+    deepest: wp.array2d(dtype=float),
+    full: float,
+    none: float,
+    # out
+    shown_out: wp.array(dtype=float),
+    count_out: wp.array(dtype=wp.int32),
+    list_out: wp.array2d(dtype=wp.int32),
+    lower_out: wp.array(dtype=wp.vec3),
+    upper_out: wp.array(dtype=wp.vec3),
+):
+    """How much of an overlap is parted, by how deep two parts and those next to them lie in one another at most; and
+    of every part the samples that its vertices may heed, and the box in which they do."""
+    i = wp.tid()
+    own = samples.own[i]
+    other = samples.other[i]
+    most = float(0.0)
+    width = parts.beside.shape[1]
+    for i_own in range(width):
+        a = parts.beside[own, i_own]
+        for i_other in range(width):
+            b = parts.beside[other, i_other]
+            if a >= 0 and b >= 0:
+                most = wp.max(most, wp.max(deepest[a, b], deepest[b, a]))
+    t = wp.clamp((none - most) / (none - full), 0.0, 1.0)
+    shown_out[i] = t * t * (3.0 - 2.0 * t)
+    reach = wp.vec3(samples.radius[i], samples.radius[i], samples.radius[i])
+    for side in range(2):
+        for k in range(width):
+            a = parts.beside[wp.where(side == 0, own, other), k]
+            # what is beside both heeds it once
+            if a >= 0 and (side == 0 or parts.apart[own, a] != 2):
+                at = wp.atomic_add(count_out, a, 1)
+                if at < list_out.shape[1]:
+                    list_out[a, at] = i
+                wp.atomic_min(lower_out, a, samples.point[i] - reach)
+                wp.atomic_max(upper_out, a, samples.point[i] + reach)
+
+
+@wp.kernel
+def part_surfaces(
+    # frame
+    points: wp.array(dtype=wp.vec3),
+    normals: wp.array(dtype=wp.vec3),
+    samples: Samples,
+    shown: wp.array(dtype=float),
+    # of every part
+    count: wp.array(dtype=wp.int32),
+    heeded: wp.array2d(dtype=wp.int32),
+    lower: wp.array(dtype=wp.vec3),
+    upper: wp.array(dtype=wp.vec3),
+    # surface
+    parts: Parts,
+    clearance: float,
+    soft: float,
+    stiffness: float,
+    # out
+    moved_out: wp.array(dtype=wp.vec3),
+):
+    """Displacement d of a vertex x that least violates the planes of the samples around,
+
+        Σ w ((x − m + d) · n − c)² + ε d²  →  least, over samples whose plane x has passed,
+
+    n towards the side the vertex is on, m a sample's point, c a clearance, w its weight times a kernel of its radius.
+    """
+    v = wp.tid()
+    p = points[v]
+    own = parts.part[v]
+    low = lower[own]
+    high = upper[own]
+    d = wp.vec3(0.0, 0.0, 0.0)
+    outside = p[0] < low[0] or p[1] < low[1] or p[2] < low[2] or p[0] > high[0] or p[1] > high[1] or p[2] > high[2]
+    if not outside and parts.give[v] > 0.0:
+        facing = wp.normalize(normals[v])
+        matrix = wp.mat33(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+        right = wp.vec3(0.0, 0.0, 0.0)
+        for k in range(wp.min(count[own], heeded.shape[1])):
+            i = heeded[own, k]
+            r = p - samples.point[i]
+            near = 1.0 - wp.length_sq(r) / (samples.radius[i] * samples.radius[i])
+            if near > 0.0:
+                side = float(0.0)
+                # on the side of the vertex that was found, or of the part that it was found in
+                if parts.apart[own, samples.own[i]] == 2 and own != samples.other[i]:
+                    side = 1.0
+                elif parts.apart[own, samples.other[i]] == 2 and own != samples.own[i]:
+                    side = -1.0
+                # a part next to both is on the side that it looks away from, and on none where it looks along
+                sure = float(1.0)
+                if side == 1.0 and parts.apart[own, samples.other[i]] == 2 and own != samples.own[i]:
+                    away = wp.dot(facing, samples.normal[i])
+                    side = wp.where(away < 0.0, 1.0, -1.0)
+                    sure = wp.min(4.0 * wp.abs(away), 1.0)
+                n = side * samples.normal[i]
+                limit = samples.depth[i] / samples.ratio[i]
+                # what is much farther beyond the plane than that vertex was is not beside it
+                gap = clearance * limit * wp.sqrt(samples.counts[i])
+                missing = wp.min(gap - wp.dot(r, n), gap + 1.5 * samples.depth[i])
+                looks = wp.clamp(1.0 - 2.0 * wp.dot(facing, n), 0.0, 1.0)
+                if side != 0.0 and missing > 0.0 and looks > 0.0:
+                    # a plane that is just being passed counts for nothing yet: else all would jump
+                    passing = wp.min(missing / (soft * limit), 1.0)
+                    weight = near * near * sure * looks * passing * samples.counts[i]
+                    matrix += weight * wp.outer(n, n)
+                    right += weight * shown[i] * missing * n
+        matrix += stiffness * wp.identity(n=3, dtype=float)
+        d = wp.inverse(matrix) * right
+    moved_out[v] = d
+
+
+@wp.kernel
+def move(
+    moved: wp.array(dtype=wp.vec3),
+    # in and out
+    points: wp.array(dtype=wp.vec3),
+):
+    """Add displacements; what has none stays bit for bit."""
+    v = wp.tid()
+    if wp.length_sq(moved[v]) > 0.0:
+        points[v] = points[v] + moved[v]
+
+
+@wp.kernel
+def heed_nothing(
+    count_out: wp.array(dtype=wp.int32), lower_out: wp.array(dtype=wp.vec3), upper_out: wp.array(dtype=wp.vec3)
+):
+    """No samples, and boxes that hold nothing."""
+    k = wp.tid()
+    count_out[k] = 0
+    lower_out[k] = wp.vec3(FAR, FAR, FAR)
+    upper_out[k] = wp.vec3(-FAR, -FAR, -FAR)

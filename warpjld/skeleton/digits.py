@@ -1,0 +1,20 @@
+"""The digits of a skeleton, and the joints that bend them."""
+
+from __future__ import annotations
+
+from warpjld.skeleton.hand import DIGITS, FINGER_JOINTS
+from warpjld.skeleton.tree import Skeleton
+
+__all__ = ["digit_joints"]
+
+
+def digit_joints(skeleton: Skeleton) -> dict[str, tuple[int, ...]]:
+    """Flexion joints of every digit there is, base first, by its name (``index``, ``left.index``); sides one after
+    another, digits from pinky to thumb. Those of a hand drawn with less than three phalanges have fewer."""
+    found = {}
+    for side in ("left.", "right.", ""):
+        for digit in DIGITS:
+            names = [f"{side}{digit}.{joint}" for joint in FINGER_JOINTS[:-1]]
+            if joints := tuple(skeleton.names.index(name) for name in names if name in skeleton.names):
+                found[f"{side}{digit}"] = joints
+    return found

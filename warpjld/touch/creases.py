@@ -1,0 +1,209 @@
+"""Planes in which the two sides of a bent joint meet."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, fields
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial import cKDTree
+
+from warpjld.rotations import rotate, unit
+from warpjld.skeleton.kinematics import Poses
+from warpjld.touch.patches import Patches, segment_distance
+from warpjld.touch.smoothing import edge_lengths
+
+if TYPE_CHECKING:
+    from warpjld.covering.covering import Covering
+
+__all__ = ["Creases"]
+
+_KEPT = 0.25
+"""Of its rest distance from the plane that every vertex keeps. Without any, skin of both sides would lie in one plane
+and cross by rounding; at .1 more faces cross than at .25, and beyond that it moves what does not cross."""
+
+_REACH = 3.0  # thicknesses from the joint, over the last of which it fades
+_WIDE = (0.9, 1.4)  # thicknesses along the axis between which it fades: what is beside a knuckle is another's skin
+_LEAST = 0.02  # of a vertex that both segments must hold for it to count
+
+
+@dataclass(frozen=True, eq=False)
+class Creases:
+    """The planes that halve the angles of joints, and the vertices near them.
+
+    A joint between a segment along a and one along b has the plane through it normal to a + b at rest, which the
+    rotation halfway between its bones turns. The papers' inner surfaces meet on it (A §4).
+
+    Attributes:
+        joint: Joint of every crease, shape (C,).
+        parent: The joint its first segment begins at, likewise.
+        normal: Normal at rest, towards the second segment, shape (C, 3).
+        vertex: Vertices near any of them, shape (N,).
+        first: First entry of each, and their number, shape (N + 1,).
+        crease: Crease of every entry.
+        height: Rest distance from its plane [m], positive on the side of the second segment.
+        weight: How much it counts, 0…1.
+        opposite: Three vertices of the other side, where the plane mirrors this one to at rest, shape (entries, 3).
+        share: Their shares, likewise.
+        size: Thickness of the flesh at every crease [m], shape (C,).
+    """
+
+    joint: NDArray[np.int32]
+    parent: NDArray[np.int32]
+    normal: NDArray[np.float64]
+    vertex: NDArray[np.int32]
+    first: NDArray[np.int32]
+    crease: NDArray[np.int32]
+    height: NDArray[np.float32]
+    weight: NDArray[np.float32]
+    opposite: NDArray[np.int32]
+    share: NDArray[np.float32]
+    size: NDArray[np.float64]
+
+    @classmethod
+    def of(cls, covering: Covering, patches: Patches) -> Creases:
+        """Of every joint between segments of different operators."""
+        skeleton, vertices = covering.skeleton, covering.surface.vertices
+        thick = segment_distance(vertices, skeleton.rest, [(s.proximal, s.distal) for s in skeleton.segments])
+        shell = patches.shell
+        fine = ~patches.coarse(edge_lengths(vertices, patches.faces))[patches.part]
+        fan_of = {(s.proximal, s.distal): f for f, fan in enumerate(covering.fans) for s in fan.segments}
+        planes: list[tuple[int, int, NDArray[np.float64], float]] = []
+        entries: list[_Entries] = []
+        for (a, joint), near_fan in fan_of.items():
+            for (start, b), far_fan in fan_of.items():
+                if start != joint or near_fan == far_fan:
+                    continue
+                rest = skeleton.rest
+                normal = unit(unit(rest[joint] - rest[a]) + unit(rest[b] - rest[joint]))
+                offset = vertices - rest[joint]
+                distance = np.linalg.norm(offset, axis=1)
+                far = covering.domains[:, far_fan]
+                size = _size(thick, distance, far)
+                if not size > 0.0:
+                    continue
+                weight = np.clip(_REACH - distance / size, 0.0, 1.0)
+                weight *= np.clip(covering.domains[:, near_fan] + far, 0.0, 1.0)
+                along = np.abs(offset @ skeleton.axes[joint]) / size
+                weight *= np.clip((_WIDE[1] - along) / (_WIDE[1] - _WIDE[0]), 0.0, 1.0)
+                rows = np.flatnonzero((weight > _LEAST) & fine)
+                found = _Entries.of(rows, offset[rows], normal, weight[rows], size, shell[rows])
+                if found is not None:
+                    planes.append((joint, a, normal, size))
+                    entries.append(found)
+        return cls._sorted(planes, entries)
+
+    @classmethod
+    def _sorted(cls, planes: list[tuple[int, int, NDArray[np.float64], float]], entries: list[_Entries]) -> Creases:
+        joined = _Entries.joined(entries)
+        crease = np.repeat(np.arange(len(entries)), [len(e.rows) for e in entries])
+        order = np.argsort(joined.rows, kind="stable")
+        vertex, first = np.unique(joined.rows[order], return_index=True)
+        return cls(
+            np.array([p[0] for p in planes], dtype=np.int32),
+            np.array([p[1] for p in planes], dtype=np.int32),
+            np.array([p[2] for p in planes]).reshape(-1, 3),
+            vertex.astype(np.int32),
+            np.append(first, len(joined.rows)).astype(np.int32),
+            crease[order].astype(np.int32),
+            joined.height[order].astype(np.float32),
+            joined.weight[order].astype(np.float32),
+            joined.opposite[order].astype(np.int32),
+            joined.share[order].astype(np.float32),
+            np.array([p[3] for p in planes]),
+        )
+
+    def part(self, points: Any, poses: Poses) -> None:
+        """Part frames in place.
+
+        Args:
+            points: Warp array of deformed vertices on the CPU, shape (F, V).
+            poses: Their poses.
+        """
+        import warp as wp
+        from warpjld_kernels.touch_crease import part_creases
+
+        if not len(self.vertex):
+            return
+        first, second = poses.rotations[:, self.parent], poses.rotations[:, self.joint]
+        same = np.where((first * second).sum(axis=-1, keepdims=True) < 0.0, -1.0, 1.0)
+        normal = rotate(unit(first + same * second), self.normal)
+        turned = wp.array(np.ascontiguousarray(normal, dtype=np.float32), dtype=wp.vec3, device="cpu")
+        size = wp.array(self.size.astype(np.float32), dtype=float, device="cpu")
+        entries = [
+            wp.array(a, dtype=kind, device="cpu", copy=False)
+            for a, kind in (
+                (self.vertex, wp.int32),
+                (self.first, wp.int32),
+                (self.crease, wp.int32),
+                (self.height, float),
+                (self.weight, float),
+                (self.opposite, wp.vec3i),
+                (self.share, wp.vec3),
+            )
+        ]
+        wp.launch(
+            part_creases,
+            (len(poses), len(self.vertex)),
+            inputs=[*entries, size, turned, _KEPT, wp.clone(points)],
+            outputs=[points],
+            device="cpu",
+        )
+
+
+@dataclass(frozen=True, eq=False)
+class _Entries:
+    """Vertices near one plane; fields as in :class:`Creases`."""
+
+    rows: NDArray[np.int64]
+    height: NDArray[np.float64]
+    weight: NDArray[np.float64]
+    opposite: NDArray[np.int64]
+    share: NDArray[np.float64]
+
+    @classmethod
+    def of(
+        cls,
+        rows: NDArray[np.int64],
+        offset: NDArray[np.float64],
+        normal: NDArray[np.float64],
+        weight: NDArray[np.float64],
+        size: float,
+        shell: NDArray[np.int32],
+    ) -> _Entries | None:
+        """Of vertices at offsets (N, 3) from the joint; None where one side has fewer than three.
+
+        What is opposite is of the same shell (N,): pieces that lie in one another at a joint were made to.
+        """
+        height = offset @ normal
+        sides = [np.flatnonzero(height < 0.0), np.flatnonzero(height > 0.0)]
+        if min(map(len, sides)) < 3:
+            return None
+        mirrored = offset - 2.0 * height[:, None] * normal
+        offset, mirrored = (np.column_stack([a, 1e3 * size * shell]) for a in (offset, mirrored))
+        opposite = np.zeros((len(rows), 3), dtype=np.int64)
+        share = np.zeros((len(rows), 3))
+        gate = np.zeros(len(rows))
+        for mine, others in (sides, sides[::-1]):
+            distance, near = cKDTree(offset[others]).query(mirrored[mine], k=3)
+            inverse = 1.0 / (distance + 1e-3 * size)
+            opposite[mine], share[mine] = rows[others[near]], inverse / inverse.sum(axis=1, keepdims=True)
+            gate[mine] = np.clip(2.0 - 2.0 * distance[:, 0] / size, 0.0, 1.0)
+        kept = np.flatnonzero(weight * gate > _LEAST)
+        return cls(rows[kept], height[kept], (weight * gate)[kept], opposite[kept], share[kept])
+
+    @staticmethod
+    def joined(some: list[_Entries]) -> _Entries:
+        """All of them, one after another."""
+        none = _Entries(np.zeros(0, np.int64), np.zeros(0), np.zeros(0), np.zeros((0, 3), np.int64), np.zeros((0, 3)))
+        names = [field.name for field in fields(_Entries)]
+        return _Entries(*(np.concatenate([getattr(e, name) for e in (none, *some)]) for name in names))
+
+
+def _size(thick: NDArray[np.float64], distance: NDArray[np.float64], share: NDArray[np.float64]) -> float:
+    """Thickness of the second segment's flesh in the half of it next to the joint [m]; 0 where it has none."""
+    held = share > 0.5
+    if not held.any():
+        return 0.0
+    return float(np.median(thick[held & (distance <= np.median(distance[held]))]))

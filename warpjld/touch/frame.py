@@ -1,0 +1,313 @@
+"""One frame's surface parted: what lies where, and both sides moved out of one another."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from scipy.sparse import csr_array
+
+from warpjld.touch.patches import Patches
+
+__all__ = ["SHARE", "Bench", "Model", "Overlaps", "fade"]
+
+SHARE = 1.0 / 3.0
+"""Of the local thickness: overlaps up to it skin can give way to, deeper ones are poses that nobody can take."""
+
+# shares: what lies that deep at most is parted in full, what lies deeper than the second is left alone: at three, the
+# middle of the flesh, the nearest way out leaps to the other side
+_FULL, _NONE = 2.0, 2.75
+_SWEEPS = 3
+_SOFT = 0.05  # shares over which an overlap comes to count
+_CLEARANCE = 0.05  # shares by which both sides are moved beyond their meeting
+_STIFFNESS = 0.1  # of the fit of planes: samples that weigh less than that in all move nothing in full
+_SWELLS = 1.3  # times as far from its bones as at rest flesh may come by bending
+_BULGE = 0.5  # shares that a bulge is high at most
+
+
+def fade(ratio: NDArray[np.float64]) -> NDArray[np.float64]:
+    """How much of an overlap is parted whose deepest place is so many shares deep: 1 to ``_FULL``, 0 from ``_NONE``."""
+    t = np.clip((_NONE - ratio) / (_NONE - _FULL), 0.0, 1.0)
+    return np.asarray(t * t * (3.0 - 2.0 * t))
+
+
+@dataclass(frozen=True, eq=False)
+class Overlaps:
+    """Vertices of one frame that lie inside another part, N of them.
+
+    Attributes:
+        vertex: Their numbers.
+        part: Their parts.
+        other: What they are inside of.
+        depth: How deep [m], beyond what overlaps at rest.
+        ratio: The same in shares of what skin can give way to; above 1 nobody can take the pose.
+    """
+
+    vertex: NDArray[np.int32]
+    part: NDArray[np.int32]
+    other: NDArray[np.int32]
+    depth: NDArray[np.float64]
+    ratio: NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class Model:
+    """What parting needs of a surface in any frame.
+
+    Attributes:
+        patches: Its parts.
+        smooth: Rows that smooth a field, shape (V, V).
+        at_rest: Depth of every vertex that is no overlap since it is one at rest [m], shape (V,); None while that is
+            being found: then overlaps count whichever way surfaces face.
+        never: Parts that may lie in one another, shape (P, P).
+        edge: Mean length of the edges at every vertex [m], shape (V,).
+        joints: Number of joints of the skeleton, 0 where there is none.
+        around: How far the mesh of every part is from its bones at most [m], shape (P,).
+    """
+
+    patches: Patches
+    smooth: csr_array
+    at_rest: NDArray[np.float64] | None
+    never: NDArray[np.bool_]
+    edge: NDArray[np.float64]
+    joints: int
+    around: NDArray[np.float64]
+
+
+class Bench:
+    """Meshes of the parts and arrays of one frame: made once for a thread, refitted for every frame it takes.
+
+    Launches are recorded once: of a frame's time their arguments would take as much as the work.
+    """
+
+    def __init__(self, model: Model, vertices: NDArray[np.floating]) -> None:
+        import warp as wp
+
+        wp.init()
+        self._meshes: list[Any] = []
+        count, names = len(vertices), len(model.patches.names)
+        self.points = _vectors(vertices)
+        self.joints = _vectors(np.zeros((max(model.joints, 1), 3)))
+        self.parts = self._parts(model, vertices)
+        self.samples = _no_samples(2 * count)
+        faces = model.patches.faces
+        order = np.argsort(faces.ravel(), kind="stable")
+        around = faces[:, [[1, 2], [2, 0], [0, 1]]].reshape(-1, 2)[order]
+        star = [_starts(np.bincount(faces.ravel(), minlength=count)), wp.array(around, dtype=wp.vec2i, device="cpu")]
+        smooth = [_numbers(model.smooth.indptr), _numbers(model.smooth.indices), _floats(model.smooth.data)]
+        self._count = self.samples.count.numpy()
+        self._wanted = wp.zeros(names, dtype=wp.int32, device="cpu")
+        self._active = wp.zeros(names, dtype=wp.int32, device="cpu")
+        self._before = wp.zeros((names, names), dtype=float, device="cpu")
+        self._deepest = wp.zeros((names, names), dtype=float, device="cpu")
+        self._normals, self._moved, self._start = (wp.zeros(count, dtype=wp.vec3, device="cpu") for _ in range(3))
+        self._lost, self._room = (wp.zeros(names, dtype=float, device="cpu") for _ in range(2))
+        self._record(star, smooth)
+
+    def _parts(self, model: Model, vertices: NDArray[np.floating]) -> Any:
+        import warp as wp
+        from warpjld_kernels.touch_samples import Parts
+
+        patches, names = model.patches, len(model.patches.names)
+        meshes = [patches.mesh(k) for k in range(names)]
+        self._meshes = [wp.Mesh(self.points, _numbers(f.ravel())) if len(f) else None for f, _ in meshes]
+        corners = [np.unique(f) for f, _ in meshes]
+        joined = patches.joined
+        empty = np.array([not len(f) for f, _ in meshes], dtype=bool)
+        beside = np.full((names, int(joined.sum(axis=1).max())), -1)
+        for k, row in enumerate(joined):
+            some = np.flatnonzero(row)
+            beside[k, : len(some)] = some
+        parts = Parts()
+        parts.part = _numbers(patches.part)
+        parts.mesh = wp.array([m.id if m else 0 for m in self._meshes], dtype=wp.uint64, device="cpu")
+        parts.first_corner = _starts([len(c) for c in corners])
+        parts.corner = _numbers(np.concatenate(corners))
+        parts.first_face = _starts([len(f) for f, _ in meshes])
+        parts.border = _floats(np.concatenate([b.ravel() for _, b in meshes]))
+        parts.apart = _numbers(np.where(joined, 2, np.where(empty[:, None] | empty | model.never, 0, 1)))
+        parts.beside = _numbers(beside)
+        parts.thickness = _floats(patches.thickness)
+        parts.give = _floats(patches.give)
+        members = np.bincount(patches.part, minlength=names)
+        parts.give_of = _floats(np.bincount(patches.part, patches.give, names) / np.maximum(members, 1))
+        parts.at_rest = _floats(np.zeros(len(vertices)) if model.at_rest is None else model.at_rest)
+        a, b, c = (np.asarray(vertices, dtype=np.float64)[patches.faces[:, k]] for k in range(3))
+        turns = np.cross(b - a, c - a).T
+        areas = [np.bincount(patches.faces.ravel(), np.repeat(n, 3), len(vertices)) for n in turns]
+        parts.area = _floats(np.linalg.norm(areas, axis=0) / 6.0)
+        parts.facing = 1.0 if model.at_rest is None else 0.0
+        parts.edge = _floats(model.edge)
+        bones = patches.bones if model.joints else ((),) * names
+        parts.first_bone = _starts([len(some) for some in bones])
+        flat = np.array([pair for some in bones for pair in some], dtype=np.int32).reshape(-1, 2)
+        parts.bone = wp.array(flat, dtype=wp.vec2i, device="cpu")
+        parts.around = _floats(_SWELLS * model.around)
+        return parts
+
+    def _record(self, star: list[Any], smooth: list[Any]) -> None:
+        import warp as wp
+        from warpjld_kernels import touch_bulge, touch_parting, touch_samples
+
+        def recorded(kernel: Any, dim: int, inputs: list[Any], outputs: list[Any]) -> Any:
+            return wp.launch(kernel, dim, inputs=inputs, outputs=outputs, device="cpu", record_cmd=True)
+
+        count, names = len(self.points), len(self._meshes)
+        parts, points, normals, samples = self.parts, self.points, self._normals, self.samples
+        low, high, reach_low, reach_high = (wp.zeros(names, dtype=wp.vec3, device="cpu") for _ in range(4))
+        boxes = [reach_low, reach_high]
+        self._everywhere = reach_low.numpy(), reach_high.numpy()
+        pairs, heeded = (wp.zeros(names, dtype=wp.int32, device="cpu") for _ in range(2))
+        others = wp.zeros((names, names), dtype=wp.int32, device="cpu")
+        heed = wp.zeros((names, count), dtype=wp.int32, device="cpu")
+        shown = wp.zeros(2 * count, dtype=float, device="cpu")
+        ring = wp.zeros(count, dtype=float, device="cpu")
+        self._find_pairs = [
+            recorded(touch_samples.find_boxes, names, [points, parts], [low, high]),
+            recorded(
+                touch_samples.find_pairs,
+                names,
+                [parts, low, high, self._before],
+                [pairs, others, self._wanted, self._active],
+            ),
+        ]
+        self._find_samples = [
+            recorded(touch_samples.find_normals, count, [points, parts.part, self._active, *star], [normals]),
+            recorded(
+                touch_samples.find_samples,
+                count,
+                [points, normals, low, high, pairs, others, self.joints, *boxes, parts, SHARE, _SOFT],
+                [self._deepest, samples],
+            ),
+        ]
+        self._heed_nothing = recorded(touch_parting.heed_nothing, names, [], [heeded, *boxes])
+        self._fade = recorded(
+            touch_parting.fade_samples,
+            1,
+            [samples, parts, self._deepest, _FULL, _NONE],
+            [shown, heeded, heed, *boxes],
+        )
+        self._part = [
+            recorded(
+                touch_parting.part_surfaces,
+                count,
+                [points, normals, samples, shown, heeded, heed, *boxes, parts, _CLEARANCE, _SOFT, _STIFFNESS],
+                [self._moved],
+            ),
+            recorded(touch_parting.move, count, [self._moved], [points]),
+        ]
+        displaced = [ring, self._lost, self._room]
+        self._bulge = [
+            recorded(
+                touch_bulge.measure_displaced,
+                count,
+                [self._start, points, normals, parts.part, heeded, parts.give, *smooth],
+                displaced,
+            ),
+            recorded(
+                touch_bulge.bulge,
+                count,
+                [normals, parts.part, parts.thickness, _BULGE * SHARE, *displaced],
+                [points],
+            ),
+        ]
+
+    def measure(self, points: NDArray[np.floating], joints: NDArray[np.floating] | None) -> Overlaps:
+        """What overlaps in one frame (V, 3), whose joints are there (J, 3) where that is known."""
+        return self._overlaps(self._first(points, joints))
+
+    def part(self, points: NDArray[np.floating], joints: NDArray[np.floating] | None) -> Overlaps:
+        """Part one frame (V, 3) in place; what overlapped before."""
+        count = self._first(points, joints)
+        found = self._overlaps(count)
+        if not count:
+            return found
+        there = self.points.numpy()
+        before = there.copy()
+        self._start.numpy()[...] = there
+        for sweep in range(_SWEEPS):
+            if sweep:
+                self._before.numpy()[...] = self._deepest.numpy()
+                count = self._find()
+            if not count:
+                break
+            self._heed_nothing.launch()
+            self._fade.set_dim(count)
+            for command in (self._fade, *self._part):
+                command.launch()
+            if sweep == 0:
+                self._lost.numpy()[...] = 0.0
+                self._room.numpy()[...] = 0.0
+                for command in self._bulge:
+                    command.launch()
+        at = (there != before).any(axis=1)
+        points[at] = there[at]
+        return found
+
+    def _first(self, points: NDArray[np.floating], joints: NDArray[np.floating] | None) -> int:
+        self.points.numpy()[...] = points
+        self.joints.numpy()[...] = np.nan if joints is None else joints
+        self._before.numpy()[...] = 1.0
+        for box, end in zip(self._everywhere, (-np.inf, np.inf), strict=True):
+            box[...] = end
+        return self._find()
+
+    def _find(self) -> int:
+        """Fill ``samples`` from ``points``; how many there are."""
+        wanted, active, deepest = self._wanted.numpy(), self._active.numpy(), self._deepest.numpy()
+        wanted[...] = 0
+        active[...] = 0
+        deepest[...] = 0.0
+        self._count[...] = 0
+        for command in self._find_pairs:
+            command.launch()
+        asked = np.flatnonzero(wanted).tolist()
+        if not asked:
+            return 0
+        for k in asked:
+            if (mesh := self._meshes[k]) is not None:
+                mesh.refit()
+        for command in self._find_samples:
+            command.launch()
+        return min(int(self._count[0]), len(self.samples.vertex))
+
+    def _overlaps(self, count: int) -> Overlaps:
+        s = self.samples
+        vertex, own, other, depth, ratio = (
+            a.numpy()[:count].copy() for a in (s.vertex, s.own, s.other, s.depth, s.ratio)
+        )
+        return Overlaps(vertex, own, other, depth.astype(np.float64), ratio.astype(np.float64))
+
+
+def _no_samples(room: int) -> Any:
+    import warp as wp
+    from warpjld_kernels.touch_samples import Samples
+
+    samples = Samples()
+    for name, kind in Samples.vars.items():
+        setattr(samples, name, wp.zeros(1 if name == "count" else room, dtype=kind.type.dtype, device="cpu"))
+    return samples
+
+
+def _vectors(values: NDArray[np.floating]) -> Any:
+    import warp as wp
+
+    return wp.array(np.array(values, dtype=np.float32), dtype=wp.vec3, device="cpu")
+
+
+def _numbers(values: NDArray) -> Any:
+    import warp as wp
+
+    return wp.array(np.ascontiguousarray(values, dtype=np.int32), dtype=wp.int32, device="cpu")
+
+
+def _floats(values: NDArray) -> Any:
+    import warp as wp
+
+    return wp.array(np.ascontiguousarray(values, dtype=np.float32), dtype=float, device="cpu")
+
+
+def _starts(lengths: ArrayLike) -> Any:
+    return _numbers(np.concatenate([[0], np.cumsum(np.asarray(lengths, dtype=np.int64))]))

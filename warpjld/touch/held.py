@@ -1,0 +1,122 @@
+"""Skin that lies inside rigid objects, flattened on them: only the skin gives way.
+
+A display of contact, as all of TOUCH: no force is found, and an object is never moved. Contact that is solved is PRESS.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from warpjld.errors import InputError
+from warpjld.grasp.distance import ObjectSet
+from warpjld.grasp.objects import Places
+from warpjld.normals import vertex_normals
+from warpjld.rotations import unit
+from warpjld.touch.frame import SHARE, fade
+from warpjld.touch.touch import Touch, Touched
+
+__all__ = ["flatten_on"]
+
+_CLEARANCE = 0.02  # of the thickness between skin and object: faces of a round object would else show through
+_SOFT = 0.05  # shares of depth over which it comes
+_HIGHEST = 0.5  # shares that a bulge is high at most
+_WIDE = 4  # smoothings: how far it reaches
+_OFTEN = 2  # the bulge is laid on the object in its turn
+
+
+def flatten_on(
+    touch: Touch, points: NDArray[np.float32], objects: ObjectSet, places: Sequence[Places], *, first: int = 0
+) -> tuple[NDArray[np.float32], list[Touched]]:
+    """Lay skin that is inside objects on their surfaces.
+
+    Vertices move to the nearest point of the object and a little beyond; what that takes of the flesh's volume bulges
+    beside it. Overlaps deeper than skin can give way to fade out, part by part, as those of two parts do, and are told.
+
+    Args:
+        touch: Of the surface.
+        points: Deformed vertices [m], shape (F, V, 3).
+        objects: Rigid objects.
+        places: Of every object its F places.
+        first: Number of the first frame, for what is told.
+
+    Returns:
+        The vertices, bit for bit the same where nothing is near an object; and the deepest overlap of every part and
+        frame that is too deep.
+    """
+    frames, count = points.shape[:2]
+    if len(places) != len(objects) or any(len(one) != frames for one in places):
+        raise InputError(f"touch: want {frames} places for each of {len(objects)} objects")
+    if count != len(touch.patches.part):
+        raise InputError(f"touch: want {len(touch.patches.part)} vertices, got {count}")
+    out = np.array(points, dtype=np.float32)
+    told: list[Touched] = []
+    for number, one in enumerate(places):
+        for sweep in range(_OFTEN):
+            moved, deep = _laid(touch, out, objects, number, one, first)
+            if sweep == 0:
+                told += deep
+            changed = np.flatnonzero((moved != out).any(axis=(1, 2)))
+            if sweep + 1 < _OFTEN:
+                for f in changed.tolist():
+                    moved[f] = _bulged(touch, out[f], moved[f])
+            out = moved
+            if not len(changed):
+                break
+    return out, told
+
+
+def _laid(
+    touch: Touch, points: NDArray[np.float32], objects: ObjectSet, number: int, places: Places, first: int
+) -> tuple[NDArray[np.float32], list[Touched]]:
+    patches = touch.patches
+    farthest = 2.0 * float(patches.thickness.max())
+    found = objects.distances(points, which=number, places=places, limit=farthest, nearest=True)
+    assert found.point is not None
+    depth = np.where(found.face >= 0, np.maximum(-found.distance, 0.0), 0.0).astype(np.float64)
+    ratio = depth / (SHARE * patches.thickness)
+    names = len(patches.names)
+    out, told = points.copy(), []
+    for f in np.flatnonzero(depth.any(axis=1)).tolist():
+        deepest = np.zeros(names)
+        np.maximum.at(deepest, patches.part, ratio[f])
+        around = np.where(patches.joined, deepest, 0.0).max(axis=1)
+        shown = fade(around)[patches.part] * (patches.give > 0.0)
+        inside = np.flatnonzero((depth[f] > 0.0) & (shown > 0.0))
+        way = found.point[f, inside] - points[f, inside]
+        length = np.linalg.norm(way, axis=1)
+        beyond = _CLEARANCE * patches.thickness[inside] * np.minimum(ratio[f, inside] / _SOFT, 1.0)
+        out[f, inside] += (shown[inside] * (1.0 + beyond / np.maximum(length, 1e-12)))[:, None] * way
+        for part in np.flatnonzero(deepest > 1.0).tolist():
+            deep = float(depth[f, patches.part == part].max())
+            told.append(Touched(patches.names[part], objects.objects[number].name, first + f, deep))
+    return out, told
+
+
+def _bulged(touch: Touch, before: NDArray[np.float32], after: NDArray[np.float32]) -> NDArray[np.float32]:
+    """The volume that a displacement took from every part given back around where it was taken."""
+    patches, smooth = touch.patches, touch.smooth
+    shift = after.astype(np.float64) - before
+    size = np.linalg.norm(shift, axis=1)
+    around_it = size
+    for _ in range(_WIDE):
+        around_it = smooth @ around_it
+    ring = np.clip(around_it - size, 0.0, None) * (patches.give > 0.0)
+    faces, names = patches.faces, len(patches.names)
+    a, b, c = (before[faces[:, k]].astype(np.float64) for k in range(3))
+    turns = np.cross(b - a, c - a) / 6.0
+    around = np.stack([np.bincount(faces.ravel(), np.repeat(turns[:, k], 3), len(before)) for k in range(3)], axis=1)
+    # sideways: towards the object it would be laid back at once
+    away = unit(smooth @ shift)
+    normals = vertex_normals(before, faces).astype(np.float64)
+    aside = normals - (normals * away).sum(axis=1, keepdims=True) * away
+    lost = -np.bincount(patches.part, (around * shift).sum(axis=1), names)
+    room = np.bincount(patches.part, np.maximum((around * aside).sum(axis=1), 0.0) * ring, names)
+    height = np.where(room > 0.0, lost / np.where(room > 0.0, room, 1.0), 0.0)[patches.part] * ring
+    height = np.clip(height, 0.0, _HIGHEST * SHARE * patches.thickness)
+    out = after.copy()
+    at = height > 0.0
+    out[at] += (height[:, None] * aside)[at].astype(np.float32)
+    return out
