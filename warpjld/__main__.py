@@ -1,5 +1,41 @@
-"""``python -m warpjld``: the command line."""
+"""The program: ``warpjld``, or ``python -m warpjld``."""
+
+from __future__ import annotations
+
+import atexit
+import os
+import sys
+import threading
+from typing import NoReturn
 
 from warpjld.cli import main
 
-main()
+__all__ = ["run"]
+
+
+def run() -> NoReturn:
+    """The command line as a process of its own."""
+    try:
+        main()
+    except SystemExit as done:
+        _leave(done.code if isinstance(done.code, int) else int(done.code is not None))
+    _leave(0)
+
+
+def _leave(code: int) -> NoReturn:
+    """End the process as ``sys.exit`` does, but for taking apart all that was imported: .3 s of a clip's 1.5.
+
+    Threads are waited for, what was registered to run at the end runs, and what was printed is written.
+    """
+    threading._shutdown()  # type: ignore[attr-defined]
+    atexit._run_exitfuncs()
+    try:
+        sys.stdout.flush()
+        sys.stderr.flush()
+    except OSError:  # whoever read it is gone, or the disk is full
+        code = code or 120  # as Python itself has it
+    os._exit(code)
+
+
+if __name__ == "__main__":
+    run()

@@ -5,6 +5,8 @@ from __future__ import annotations
 import errno
 import json
 import math
+import subprocess
+import sys
 from pathlib import Path
 
 import click
@@ -85,3 +87,19 @@ def test_a_full_disk_is_one_line(monkeypatch: pytest.MonkeyPatch, capsys: pytest
     monkeypatch.setattr("warpjld.cli.study.command", full)
     assert run("study") == 1
     assert capsys.readouterr().err == "error: out/a.npz: No space left on device\n"
+
+
+def test_the_process_ends_with_all_that_was_printed_and_registered() -> None:
+    script = (
+        "import atexit, sys, threading, time\n"
+        "atexit.register(print, 'registered')\n"
+        "threading.Thread(target=lambda: (time.sleep(0.2), print('thread'))).start()\n"
+        "from warpjld.__main__ import run\n"
+        "sys.argv = ['warpjld', *sys.argv[1:]]\n"
+        "run()\n"
+    )
+    for arguments, code in ((["--version"], 0), (["deform"], 2), (["inspect", "no such file.glb"], 1)):
+        done = subprocess.run([sys.executable, "-c", script, *arguments], capture_output=True, text=True)
+        assert done.returncode == code, done.stderr
+        assert done.stdout.splitlines()[-2:] == ["thread", "registered"]
+        assert "Traceback" not in done.stderr
