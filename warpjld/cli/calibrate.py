@@ -58,7 +58,7 @@ _ROWS = {
     help="Motion file with the pose of every target, where the targets bring none.",
 )
 @click.option(
-    "--iterations", type=click.IntRange(min=1), default=10, show_default=True, help="Most steps of the minimiser."
+    "--iterations", type=click.IntRange(min=1), default=14, show_default=True, help="Most steps of the minimiser."
 )
 @options.json
 @options.quiet
@@ -84,7 +84,7 @@ def command(
     builtin:right. Scripts load the file written with PARAMETERS."""
     from warpjld.cli.progress import progress
     from warpjld.cli.rig_argument import open_rig, rig_files
-    from warpjld.covering import bind_rig
+    from warpjld.covering.kept import bind_kept
     from warpjld.covering.parameters import load_parameters, save_parameters
     from warpjld.errors import InputError
     from warpjld.io.identity import files_of
@@ -103,7 +103,7 @@ def command(
     opened = open_rig(rig, **how)
     begin = None if start is None else load_parameters(start, opened.skeleton)
     with progress(quiet) as report:
-        covering = bind_rig(opened, parameters=begin, domains=domains)
+        covering, _ = bind_kept(opened, parameters=begin, domains=domains)
         if targets is None:
             summary, told, found = _calibrated(covering, poses, iterations, report)
         else:
