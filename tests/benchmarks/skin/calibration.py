@@ -71,10 +71,10 @@ def main(rigs: str) -> None:
                 "; ".join(worse(a, b)),
             )
             print(f"| {name} | {pose_name} | {' | '.join(cells)} |", flush=True)
-        vertices = len(bench.covering.surface.vertices)
+        vertices, joints = len(bench.covering.surface.vertices), len(found.kept)
         print(
-            f"| {name} | {vertices} vertices, {found.poses} + {found.guards} poses: {found.seconds:.1f} s, {processor:.1f} s "
-            f"of processor; {found.evaluations} evaluations, {len(found.kept)} joints went back |"
+            f"| {name} | {vertices} vertices, {found.poses} + {found.guards} poses: {found.seconds:.1f} s, "
+            f"{processor:.1f} s of processor; {found.evaluations} evaluations, {joints} joints went back |"
         )
 
 
