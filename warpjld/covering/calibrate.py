@@ -78,7 +78,7 @@ def calibrate(
     poses: Poses | None = None,
     *,
     guards: Poses | None = None,
-    iterations: int = 10,
+    iterations: int = 14,
     weights: LossWeights | None = None,
     tolerances: Tolerances = TOLERANCES,
     progress: Callable[[str, int, int], None] | None = None,

@@ -45,7 +45,7 @@ class LossWeights:
             it: the bending energy of a discrete shell (Grinspun et al. 2003), of each joint that bends.
     """
 
-    volume: float = 100.0
+    volume: float = 200.0
     stretch: float = 1.0
     roughness: float = 0.01
 

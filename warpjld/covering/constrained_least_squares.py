@@ -23,8 +23,9 @@ __all__ = ["Fit", "Linearised", "Part", "minimise"]
 
 _SETTLED = 1e-3  # relative gain of a step below which the next is not taken
 _VIOLATED = 1e-3  # by all constraints together, above which one more step is taken all the same
+_SHORTER = 0.4  # of a step that made things worse, tried before it is damped
 _LEAST, _MOST, _DAMPED = 0.1, 1e3, 10.0
-"""Least and largest damping, of the diagonal of H, once a step has made things worse, and the factor between two."""
+"""Least and largest damping, of the diagonal of H, once a shorter step has not helped, and the factor between two."""
 
 _TOUCH = 1e-9  # by which a step may pass a constraint
 _IMPOSSIBLE = 1e-9  # residual of the least distance problem where nothing is within its constraints
@@ -139,7 +140,7 @@ def minimise(
     if not moved.size:
         return Fit(x, 0, 0, True)
     here = summed(x)
-    done, taken, weight, damping = 1, 0, 0.0, 0.0
+    done, taken, weight, damping, part = 1, 0, 0.0, 0.0, 1.0
     while done < evaluations:
         step, largest = _step(here, damping, low - x[moved], high - x[moved])
         weight = max(weight, _MULTIPLIED * largest)
@@ -147,19 +148,21 @@ def minimise(
         if _predicted(here, step) + weight * here.violated < _SETTLED * merit and here.violated < _VIOLATED:
             return Fit(x, taken, done, True)
         candidate = x.copy()
-        candidate[moved] = np.clip(x[moved] + step, low, high)
+        candidate[moved] = np.clip(x[moved] + part * step, low, high)
         there = summed(candidate)
         done += 1
         if progress:
             progress(done, evaluations)
         gain = merit - there.loss - weight * there.violated
         if gain > 0.0 and there.worst <= max(here.worst, _SLACK):
-            x, here, taken = candidate, there, taken + 1
+            x, here, taken, part = candidate, there, taken + 1, 1.0
             damping = damping / _DAMPED if damping > _LEAST else 0.0
             if gain < _SETTLED * merit and here.violated < _VIOLATED:
                 return Fit(x, taken, done, True)
+        elif part == 1.0:
+            part = _SHORTER
         else:
-            damping = max(_DAMPED * damping, _LEAST)
+            damping, part = max(_DAMPED * damping, _LEAST), 1.0
             if damping > _MOST:
                 return Fit(x, taken, done, True)
     return Fit(x, taken, done, False)

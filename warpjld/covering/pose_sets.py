@@ -22,6 +22,7 @@ _WIDEST = np.radians(120.0)  # shoulders, knees and elbows in full are contact o
 _UNKNOWN = np.radians(30.0)  # where limits are as wide one way as the other: nothing is known of the joint
 _TOE = re.compile(r"^toe\d")
 _CURLS = (0.3, 0.6, 0.9)
+_BETWEEN = (0.4, 0.5, 0.7, 0.8)
 _ONE_BY_ONE = (0.45, 0.9)
 
 
@@ -33,8 +34,8 @@ def curled(skeleton: Skeleton, amounts: NDArray[np.float64] | list[float] | tupl
 def calibration_poses(skeleton: Skeleton, count: int | None = None) -> Poses:
     """Poses to fit to, over the joint ranges of a skeleton, in the order in which they matter.
 
-    Curls of 0.3, 0.6 and 0.9, digits curled one by one, thumbs opposed and spread, every joint alone at its full and
-    half flexion: in each pose what is lost belongs to few joints, so none has to make up for others.
+    Curls of 0.3, 0.6 and 0.9 and between, digits curled one by one, thumbs opposed and spread, every joint alone at
+    its full and half flexion: in each pose what is lost belongs to few joints, so none has to make up for others.
 
     Args:
         skeleton: The rest skeleton.
@@ -48,6 +49,7 @@ def calibration_poses(skeleton: Skeleton, count: int | None = None) -> Poses:
     bends, largest = _range(skeleton)
     kinds = [
         _curls(skeleton, _CURLS),
+        _curls(skeleton, _BETWEEN),
         _digits(skeleton, bends, largest),
         _thumbs(skeleton, bends, largest),
         _alone(skeleton, bends, largest, 1.0),

@@ -4,8 +4,7 @@
         [--sheet DIR] [--summary FILE]
 
 Names may be cut short (``curl`` is all curls, ``shoulder_150`` all of them). Without options everything is run but the
-calibrated covering (--calibrated). What calibration makes worse than the defaults is said on stderr, by the tolerances
-of ``calibration.py``; none of these poses but the curls is among those it fits to.
+calibrated covering (--calibrated).
 """
 
 from __future__ import annotations
@@ -21,7 +20,6 @@ import click
 import numpy as np
 from numpy.typing import NDArray
 
-from tests.benchmarks.skin.calibration import worse
 from tests.benchmarks.skin.measures import Measured, Measuring
 from tests.benchmarks.skin.methods import METHODS, Deform
 from tests.benchmarks.skin.poses import POSES, pose
@@ -37,7 +35,7 @@ _COLUMNS = ("rig", "pose", "method", *(f.name for f in fields(Measured)), "ms")
 @click.option("--rigs", default="", help=f"Of {', '.join(RIGS)}.")
 @click.option("--poses", default="", help=f"Of {', '.join(POSES)}.")
 @click.option("--methods", default="", help=f"Of {', '.join(METHODS)}.")
-@click.option("--calibrated", is_flag=True, help="Calibrate too, and say which poses got worse.")
+@click.option("--calibrated", is_flag=True, help="Calibrate too (minutes a rig).")
 @click.option("--sheet", "sheets", type=click.Path(path_type=Path), help="Draw a sheet of every rig into this folder.")
 @click.option("--csv", "csv_file", type=click.Path(path_type=Path), help="Write the table there too.")
 @click.option("--summary", "short", type=click.Path(path_type=Path), help="Write a line a rig and method there.")
@@ -76,20 +74,15 @@ def main(
             posed = pose(pose_name, bench.rig.skeleton)
             if posed is None:
                 continue
-            measured: dict[str, Measured] = {}
             for method, deform in ready.items():
                 deform(posed.poses)  # the first one packs, factorises or compiles
                 start = time.perf_counter()
                 points = deform(posed.poses)[0]
                 took = 1e3 * (time.perf_counter() - start)
-                measured[method] = measuring.measure(points, posed)
-                kept.append((name, pose_name, method, measured[method], took))
-                rows.append((name, pose_name, method, *astuple(measured[method]), took))
+                kept.append((name, pose_name, method, measuring.measure(points, posed), took))
+                rows.append((name, pose_name, method, *astuple(kept[-1][3]), took))
                 _print_row(rows[-1])
                 drawn.setdefault(pose_name, []).append(points)
-            if "ours" in measured and "calibrated" in measured:
-                for text in worse(measured["ours"], measured["calibrated"]):
-                    print(f"{name}, {pose_name}: calibration made it worse: {text}", file=sys.stderr)
         if sheets is not None and drawn:
             draw_sheet(bench, list(ready), drawn, sheets)
     if csv_file is not None:
