@@ -9,9 +9,10 @@ import pytest
 from warpjld.errors import InputError
 from warpjld.grasp import ObjectSet, Status
 from warpjld.grasp.digits import pad_vertex
+from warpjld.normals import vertex_normals
 from warpjld.script.binding import cover
 from warpjld.script.grasping import placed_at, posture
-from warpjld.script.runner import run_scene
+from warpjld.script.runner import cast, run_scene
 from warpjld.script.staging import stage
 from warpjld.skeleton import poses_from_angles
 
@@ -55,6 +56,24 @@ def test_objects_as_printed_in_the_paper(run) -> None:
     np.testing.assert_allclose(places.position[3], places.position[4], atol=1e-12)
     run("OBJECTS apple JOINT left.wrist 10 12")
     assert len(prop.associations) == 2
+
+
+def test_skin_is_laid_on_what_is_held_where_touch_is_on(run) -> None:
+    scene = run("FRAMES 0 1")
+    covering = cover(scene.actor())
+    pad = pad_vertex(covering, "left.index")
+    outwards = vertex_normals(covering.surface.vertices, covering.surface.faces)[pad]
+    middle = covering.surface.vertices[pad] + 0.0185 * outwards
+    run(f"OBJECT marble BALL 0.04 AT {middle[0]:.5f} {middle[1]:.5f} {middle[2]:.5f}")
+
+    def inside() -> float:
+        surface = cast(scene, np.array([0.0])).surface(0)
+        marble = scene.props["MARBLE"].thing
+        return float(-ObjectSet(marble).distances(surface, limit=0.02).distance.min())
+
+    assert inside() > 1e-3
+    run("TOUCH ON")
+    assert inside() < 1e-5
 
 
 @pytest.mark.parametrize(

@@ -23,7 +23,7 @@ _SWEEPS = 3
 _SOFT = 0.05  # shares over which an overlap comes to count
 _CLEARANCE = 0.05  # shares by which both sides are moved beyond their meeting
 _STIFFNESS = 0.1  # of the fit of planes: samples that weigh less than that in all move nothing in full
-_SWELLS = 1.3  # times as far from its bones as at rest flesh may come by bending
+_SWELLS = 1.1  # times as far from its bones as at rest flesh may come by bending
 _BULGE = 0.5  # shares that a bulge is high at most
 
 

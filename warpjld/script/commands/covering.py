@@ -88,7 +88,7 @@ def domains(scene: Scene, arguments: Arguments) -> None:
     "TOUCH",
     syntax="TOUCH <ON/OFF/LIMIT>",
     help=(
-        "Skin of the current actor that crosses is parted, for display (PRESS solves contact); "
+        "Skin that crosses or lies in objects is parted, for display (PRESS solves contact); "
         "LIMIT: digits close until they touch."
     ),
     group="Covering",
