@@ -14,6 +14,7 @@ from warpjld.covering.intersections import crossing_faces
 from warpjld.rotations import conjugate, multiply, rotate
 from warpjld.skeleton.digits import digit_joints
 from warpjld.skeleton.kinematics import Poses, vertical_flexion
+from warpjld.touch.frame import Overlaps
 from warpjld.touch.touch import Touch
 
 if TYPE_CHECKING:
@@ -120,17 +121,19 @@ def _digits(covering: Covering) -> list[_Digit]:
 def _block(covering: Covering, poses: Poses, touch: Touch, digits: list[_Digit]) -> list[tuple[NDArray, ...]]:
     """Of every digit the share of its bend that it keeps, whether it crosses something all the same, and
     :func:`_depths` of the poses as they are."""
-    original, share = poses, [np.ones(len(poses)) for _ in digits]
-    depth = [_depths(covering, touch, poses, digit) for digit in digits]
+    share = [np.ones(len(poses)) for _ in digits]
+    found = touch.measured(covering.deform(poses), poses)
+    depth = [_depths(found, digit) for digit in digits]
     for n, digit in enumerate(digits):
-        deepest = _depths(covering, touch, poses, digit)[0] if poses is not original else depth[n][0]
 
         def over(some: Poses, digit: _Digit = digit) -> NDArray[np.float64]:
-            return _depths(covering, touch, some, digit)[0] - _ALLOWED
+            return _depths(touch.measured(covering.deform(some), some), digit)[0] - _ALLOWED
 
-        left = _search(covering, poses, digit, deepest - _ALLOWED, over, interpolated=True)
-        share[n] *= left
-        poses = _bent(covering, poses, digit.joints, left)
+        left = _search(covering, poses, digit, _depths(found, digit)[0] - _ALLOWED, over, interpolated=True)
+        if (left < 1.0).any():
+            share[n] *= left
+            poses = _bent(covering, poses, digit.joints, left)
+            found = touch.measured(covering.deform(poses), poses)
     # once more against all: skin that is parted from what comes later may cross what came before
     for tried in (digits, [replace(digit, counts=np.ones_like(digit.counts)) for digit in digits]):
         crossing = _crossing(covering, touch, poses, tried)
@@ -223,12 +226,13 @@ def _bend(covering: Covering, poses: Poses, joints: list[int]) -> NDArray[np.flo
 
 
 def _depths(
-    covering: Covering, touch: Touch, poses: Poses, digit: _Digit
+    overlaps: list[Overlaps], digit: _Digit
 ) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.int64]]:
     """Deepest overlap of a digit with what counts for it in every frame: in shares of what skin can give way to, in
     metres, and the other part, -1 for none."""
-    ratio, depth, other = np.zeros(len(poses)), np.zeros(len(poses)), np.full(len(poses), -1)
-    for f, found in enumerate(touch.measured(covering.deform(poses), poses)):
+    count = len(overlaps)
+    ratio, depth, other = np.zeros(count), np.zeros(count), np.full(count, -1)
+    for f, found in enumerate(overlaps):
         mine, its = digit.parts[found.part], digit.parts[found.other]
         rows = np.flatnonzero((mine | its) & digit.counts[found.part] & digit.counts[found.other])
         if len(rows):
@@ -249,9 +253,20 @@ def _crossing(covering: Covering, touch: Touch, poses: Poses, digits: list[_Digi
     counts = np.array([digit.counts[part].all(axis=1) for digit in digits])
     out = np.zeros((len(digits), len(poses)), dtype=bool)
     for f, points in enumerate(parted):
-        pairs = touch.new_crossings(crossing_faces(points, touch.patches.faces).pairs)
+        near = np.flatnonzero(_beside(points[touch.patches.faces], mine))
+        pairs = touch.new_crossings(near[crossing_faces(points, touch.patches.faces[near]).pairs])
         found = np.logical_and(mine[:, pairs].any(axis=2), counts[:, pairs].all(axis=2))
         out[:, f] = np.asarray(found).any(axis=1)
+    return out
+
+
+def _beside(corners: NDArray[np.floating], mine: NDArray[np.bool_]) -> NDArray[np.bool_]:
+    """Faces (T, 3, 3) in the box of any of some digits' faces (digits, T): no other can cross them, shape (T,)."""
+    lower, upper = corners.min(axis=1), corners.max(axis=1)
+    out = np.zeros(len(corners), dtype=bool)
+    for faces in mine:
+        low, high = lower[faces].min(axis=0), upper[faces].max(axis=0)
+        out |= (lower <= high).all(axis=1) & (upper >= low).all(axis=1)
     return out
 
 
