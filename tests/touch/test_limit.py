@@ -54,13 +54,13 @@ def test_steps_of_limited_digits_halve_with_the_steps_of_the_motion() -> None:
     touch = Touch.of(covering)
 
     def largest(count: int) -> float:
-        """Largest step of a limited flexion, of a fist that closes and opens again."""
-        amounts = 0.92 - 0.08 * np.cos(np.linspace(0.0, 2.0 * np.pi, count))
+        """Largest step of a limited flexion, of a closing fist."""
+        amounts = 0.92 - 0.08 * np.cos(np.linspace(0.0, np.pi, count))
         limited, told = close_until_touch(covering, curled(covering.skeleton, amounts), touch)
         assert told
         return float(np.abs(np.diff(limited.flexion, axis=0)).max())
 
-    coarse, fine = largest(17), largest(33)
+    coarse, fine = largest(7), largest(13)
     assert fine < 0.65 * coarse
 
 

@@ -87,20 +87,21 @@ class SkinContact:
     def told(self) -> list[str]:
         """A line a digit that was closed less, and one a digit or part that lies too deep in another, each at its
         worst."""
-        lines = [self._too_coarse()] if self.touch.coarse.any() else []
+        lines = self._too_coarse()
         for name in dict.fromkeys(digit for digit, _ in self._closed):
             mine = [one for (digit, _), one in self._closed.items() if digit == name]
-            worst = max(mine, key=lambda one: (one.share == 1.0, one.depth))
-            where = f"{name}: {_frames(len(mine))}"
-            if worst.share == 1.0:
-                lines.append(f"{where} cross something however far it opens, as at frame {worst.frame}: left as posed")
-            else:
-                inside = (
-                    f"{1e3 * worst.depth:.1f} mm inside {worst.other} as posed" if worst.other else "crossing itself"
-                )
+            stuck = [one.frame for one in mine if one.crosses]
+            if stuck:
                 lines.append(
-                    f"{where} closed only until it touches, deepest at frame {worst.frame}: {inside}, "
-                    f"touches at {worst.flexion:.0f}° of flexion in all"
+                    f"{name}: {_frames(len(stuck))} cross something however far it opens, as at frame {stuck[0]}"
+                )
+            closed = [one for one in mine if one.share < 1.0]
+            if closed:
+                worst = max(closed, key=lambda one: one.depth)
+                inside = f"{1e3 * worst.depth:.1f} mm inside {worst.other} as posed" if worst.other else "folded"
+                lines.append(
+                    f"{name}: {_frames(len(closed))} closed only until it touches, deepest at frame {worst.frame}: "
+                    f"{inside}, touches at {worst.flexion:.0f}° of flexion in all"
                 )
         lines += self._too_deep()
         lines += [
@@ -109,10 +110,15 @@ class SkinContact:
         ]
         return lines
 
-    def _too_coarse(self) -> str:
-        names = [n for n, coarse in zip(self.touch.patches.names, self.touch.coarse, strict=True) if coarse]
+    def _too_coarse(self) -> list[str]:
+        """Parts of digits that cannot be parted: what else is too coarse seldom touches anything."""
+        digits = digit_joints(self._covering.skeleton)
+        pairs = zip(self.touch.patches.names, self.touch.coarse, strict=True)
+        names = [name for name, coarse in pairs if coarse and name.rpartition(".")[0] in digits]
+        if not names:
+            return []
         more = f" and {len(names) - 3} more" if len(names) > 3 else ""
-        return f"touch: {', '.join(names[:3])}{more}: edges are longer than the flesh is thick; nothing is parted there"
+        return [f"touch: {', '.join(names[:3])}{more}: edges too long for such thin flesh; nothing is parted there"]
 
     def _too_deep(self) -> list[str]:
         """By digit, with the flexion at which it touches; parts of the body by themselves."""

@@ -14,6 +14,7 @@ from warpjld.covering.intersections import crossing_faces
 from warpjld.rotations import conjugate, multiply, rotate
 from warpjld.skeleton.digits import digit_joints
 from warpjld.skeleton.kinematics import Poses, vertical_flexion
+from warpjld.touch.frame import Overlaps
 from warpjld.touch.touch import Touch
 
 if TYPE_CHECKING:
@@ -41,6 +42,7 @@ class Closed:
         share: Of its bend that is left, 0…1.
         flexion: Sum of its joints' flexion at which it touches [degrees].
         other: What it would have been inside of; empty where its faces only crossed.
+        crosses: Whether it crosses something all the same, however far it opens.
     """
 
     digit: str
@@ -49,6 +51,7 @@ class Closed:
     share: float
     flexion: float
     other: str
+    crosses: bool
 
 
 def close_until_touch(covering: Covering, poses: Poses, touch: Touch, *, first: int = 0) -> tuple[Poses, list[Closed]]:
@@ -58,8 +61,7 @@ def close_until_touch(covering: Covering, poses: Poses, touch: Touch, *, first: 
     overlap half of what skin can give way to, and leaves no face of it crossing another once that was parted. Digits
     are taken one after another, from index to pinky and the thumb last, each against the palm, the body and the digits
     before it as they were left: so each share is a root of its own, which moves as the motion does. A digit that
-    touches nothing keeps its pose exactly, and so does one that crosses something however far it opens (its ``share``
-    is 1).
+    touches nothing keeps its pose exactly; one that crosses something however far it opens is not opened for that.
 
     Args:
         covering: The hand or body.
@@ -75,13 +77,13 @@ def close_until_touch(covering: Covering, poses: Poses, touch: Touch, *, first: 
     moved = _motion(covering, poses, digits)
     limited = poses
     for n, digit in enumerate(digits):
-        share, ratio, depth, other = (np.concatenate([block[n][k] for block in searched]) for k in range(4))
+        share, stuck, _, depth, other = (np.concatenate([block[n][k] for block in searched]) for k in range(5))
         share = _steady(share, moved / np.maximum(_bend(covering, poses, digit.joints), _STILL))
         limited = _bent(covering, limited, digit.joints, share)
-        for f in np.flatnonzero((share < 1.0) | (ratio > 1.0)).tolist():
+        for f in np.flatnonzero((share < 1.0) | stuck).tolist():
             flexion = float(np.degrees(limited.flexion[f, digit.joints].sum()))
             name = covering.fans[int(other[f])].name if other[f] >= 0 else ""
-            told.append(Closed(digit.name, first + f, float(depth[f]), float(share[f]), flexion, name))
+            told.append(Closed(digit.name, first + f, float(depth[f]), float(share[f]), flexion, name, bool(stuck[f])))
     return limited, told
 
 
@@ -117,29 +119,37 @@ def _digits(covering: Covering) -> list[_Digit]:
 
 
 def _block(covering: Covering, poses: Poses, touch: Touch, digits: list[_Digit]) -> list[tuple[NDArray, ...]]:
-    """Of every digit the share of its bend that it keeps, and :func:`_depths` of the poses as they are."""
-    original, share = poses, [np.ones(len(poses)) for _ in digits]
-    depth = [_depths(covering, touch, poses, digit) for digit in digits]
+    """Of every digit the share of its bend that it keeps, whether it crosses something all the same, and
+    :func:`_depths` of the poses as they are."""
+    share = [np.ones(len(poses)) for _ in digits]
+    found = touch.measured(covering.deform(poses), poses)
+    depth = [_depths(found, digit) for digit in digits]
     for n, digit in enumerate(digits):
-        deepest = _depths(covering, touch, poses, digit)[0] if poses is not original else depth[n][0]
 
         def over(some: Poses, digit: _Digit = digit) -> NDArray[np.float64]:
-            return _depths(covering, touch, some, digit)[0] - _ALLOWED
+            return _depths(touch.measured(covering.deform(some), some), digit)[0] - _ALLOWED
 
-        left = _search(covering, poses, digit, deepest - _ALLOWED, over, interpolated=True)
-        share[n] *= left
-        poses = _bent(covering, poses, digit.joints, left)
+        left = _search(covering, poses, digit, _depths(found, digit)[0] - _ALLOWED, over, interpolated=True)
+        if (left < 1.0).any():
+            share[n] *= left
+            poses = _bent(covering, poses, digit.joints, left)
+            found = touch.measured(covering.deform(poses), poses)
     # once more against all: skin that is parted from what comes later may cross what came before
-    everything = [replace(digit, counts=np.ones_like(digit.counts)) for digit in digits]
-    for n, digit in [*enumerate(digits), *enumerate(everything)]:
+    for tried in (digits, [replace(digit, counts=np.ones_like(digit.counts)) for digit in digits]):
+        crossing = _crossing(covering, touch, poses, tried)
+        for n, digit in enumerate(tried):
+            if not crossing[n].any():
+                continue
 
-        def crosses(some: Poses, digit: _Digit = digit) -> NDArray[np.float64]:
-            return np.where(_crossing(covering, touch, some, digit), 1.0, -1.0)
+            def crosses(some: Poses, digit: _Digit = digit) -> NDArray[np.float64]:
+                return np.where(_crossing(covering, touch, some, [digit])[0], 1.0, -1.0)
 
-        left = _search(covering, poses, digit, crosses(poses), crosses, interpolated=False)
-        share[n] *= left
-        poses = _bent(covering, poses, digit.joints, left)
-    return [(kept, *of) for kept, of in zip(share, depth, strict=True)]
+            left = _search(covering, poses, digit, np.where(crossing[n], 1.0, -1.0), crosses, interpolated=False)
+            if (left < 1.0).any():
+                share[n] *= left
+                poses = _bent(covering, poses, digit.joints, left)
+                crossing = _crossing(covering, touch, poses, tried)
+    return [(kept, stuck, *of) for kept, stuck, of in zip(share, crossing, depth, strict=True)]
 
 
 def _motion(covering: Covering, poses: Poses, digits: list[_Digit]) -> NDArray[np.float64]:
@@ -216,12 +226,13 @@ def _bend(covering: Covering, poses: Poses, joints: list[int]) -> NDArray[np.flo
 
 
 def _depths(
-    covering: Covering, touch: Touch, poses: Poses, digit: _Digit
+    overlaps: list[Overlaps], digit: _Digit
 ) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.int64]]:
     """Deepest overlap of a digit with what counts for it in every frame: in shares of what skin can give way to, in
     metres, and the other part, -1 for none."""
-    ratio, depth, other = np.zeros(len(poses)), np.zeros(len(poses)), np.full(len(poses), -1)
-    for f, found in enumerate(touch.measured(covering.deform(poses), poses)):
+    count = len(overlaps)
+    ratio, depth, other = np.zeros(count), np.zeros(count), np.full(count, -1)
+    for f, found in enumerate(overlaps):
         mine, its = digit.parts[found.part], digit.parts[found.other]
         rows = np.flatnonzero((mine | its) & digit.counts[found.part] & digit.counts[found.other])
         if len(rows):
@@ -234,16 +245,28 @@ def _depths(
     return ratio, depth, other
 
 
-def _crossing(covering: Covering, touch: Touch, poses: Poses, digit: _Digit) -> NDArray[np.bool_]:
-    """Whether a face of a digit crosses another that counts for it once its skin was parted, in every frame."""
-    part, faces = touch.patches.part, touch.patches.faces
+def _crossing(covering: Covering, touch: Touch, poses: Poses, digits: list[_Digit]) -> NDArray[np.bool_]:
+    """Whether a face of a digit crosses another that counts for it once skin was parted, shape (digits, F)."""
+    part = touch.patches.part[touch.patches.faces]
     parted, _ = touch.parted(covering.deform(poses), poses)
-    out = np.zeros(len(poses), dtype=bool)
-    mine = np.asarray(digit.parts[part[faces]].any(axis=1))
-    counts = np.asarray(digit.counts[part[faces]].all(axis=1))
+    mine = np.array([digit.parts[part].any(axis=1) for digit in digits])
+    counts = np.array([digit.counts[part].all(axis=1) for digit in digits])
+    out = np.zeros((len(digits), len(poses)), dtype=bool)
     for f, points in enumerate(parted):
-        pairs = np.flatnonzero(counts)[crossing_faces(points, faces[counts]).pairs]
-        out[f] = bool(mine[touch.new_crossings(pairs)].any())
+        near = np.flatnonzero(_beside(points[touch.patches.faces], mine))
+        pairs = touch.new_crossings(near[crossing_faces(points, touch.patches.faces[near]).pairs])
+        found = np.logical_and(mine[:, pairs].any(axis=2), counts[:, pairs].all(axis=2))
+        out[:, f] = np.asarray(found).any(axis=1)
+    return out
+
+
+def _beside(corners: NDArray[np.floating], mine: NDArray[np.bool_]) -> NDArray[np.bool_]:
+    """Faces (T, 3, 3) in the box of any of some digits' faces (digits, T): no other can cross them, shape (T,)."""
+    lower, upper = corners.min(axis=1), corners.max(axis=1)
+    out = np.zeros(len(corners), dtype=bool)
+    for faces in mine:
+        low, high = lower[faces].min(axis=0), upper[faces].max(axis=0)
+        out |= (lower <= high).all(axis=1) & (upper >= low).all(axis=1)
     return out
 
 

@@ -8,10 +8,10 @@ around, which is smooth over the surface. The volume that this takes is given ba
 
 from __future__ import annotations
 
-import threading
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import cached_property
+from queue import SimpleQueue
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -86,14 +86,13 @@ class Touch:
         around = np.zeros(len(patches.names)) if joints is None else _around(patches, vertices, joints)
         bones = 0 if joints is None else len(joints)
         self._model = Model(patches, smooth, None, never, edge, bones, around)
-        self._benches: dict[int, Bench] = {}
-        found = self._bench().measure(vertices, joints)
+        found = Bench(self._model, vertices).measure(vertices, joints)
         at_rest = np.zeros(count)
         # a little more than it is: in other positions single precision makes some of it anew
         noise = _NOISE * float(np.linalg.norm(np.ptp(vertices, axis=0)))
         np.maximum.at(at_rest, found.vertex, 1.001 * found.depth + noise)
         self._model = replace(self._model, at_rest=at_rest, never=never | self._nested(found))
-        self._benches = {}
+        self._benches: list[Bench] = []
 
     def _nested(self, found: Overlaps) -> NDArray[np.bool_]:
         """Parts of different shells that lie in one another at rest, as pieces of a jointed figure do, shape (P, P)."""
@@ -171,14 +170,17 @@ class Touch:
         found: dict[int, Overlaps] = {}
         places = [None] * len(points) if poses is None else poses.positions
 
+        if threads is None:
+            threads = threads_for(moved.shape[0] * count, _SPLIT_BELOW)
+        free: SimpleQueue[Bench] = SimpleQueue()
+        for bench in self._made(max(1, min(threads, len(points)))):
+            free.put(bench)
+
         def span(begin: int, end: int) -> None:
-            bench = self._bench()
+            bench = free.get()
             for k in range(begin, end):
                 found[k] = work(bench, moved[k], places[k])
 
-        if threads is None:
-            threads = threads_for(moved.shape[0] * count, _SPLIT_BELOW)
-        self._bench()
         in_threads(span, len(points), threads, find_samples, wp.get_device("cpu"))
         return moved, [found[k] for k in range(len(points))]
 
@@ -193,12 +195,11 @@ class Touch:
         pairs = crossing_faces(self._vertices, self.patches.faces).pairs
         return np.asarray(pairs.astype(np.int64) @ [len(self.patches.faces), 1])
 
-    def _bench(self) -> Bench:
-        """The calling thread's."""
-        mine = threading.get_ident()
-        if mine not in self._benches:
-            self._benches[mine] = Bench(self._model, self._vertices)
-        return self._benches[mine]
+    def _made(self, count: int) -> list[Bench]:
+        """Benches for so many threads; made here, since Warp's meshes may not be made in several threads at once."""
+        while len(self._benches) < count:
+            self._benches.append(Bench(self._model, self._vertices))
+        return self._benches[:count]
 
     def _deep(self, found: Overlaps, frame: int) -> list[Touched]:
         deep = np.flatnonzero(found.ratio > 1.0)
