@@ -37,7 +37,7 @@ def test_both_sides_stay_on_their_own() -> None:
     before = COVERING.deform(poses)
     own = np.sign(-rest) * height(before[0], poses)
     crossed = near & (own < -1e-4)
-    assert crossed.sum() > 5
+    assert crossed.sum() >= 4
     after = TOUCH.apply(before, poses)[0]
     own_after = np.sign(-rest) * height(after[0], poses)
     assert own_after[crossed].min() > own[crossed].min() / 2.0
