@@ -123,6 +123,8 @@ def _write(path: Path, key: str, covering: Covering) -> None:
 
 def _load(path: Path, key: str, rig: Rig, skeleton: Skeleton | None) -> Covering:
     try:
+        if path.is_file() and not zipfile.is_zipfile(path):
+            raise ValueError("no NPZ archive")
         with np.load(path, allow_pickle=False) as file:
             if str(file["format"]) != _FORMAT:
                 raise InputError("not a binding of this version", path=path)
