@@ -189,11 +189,10 @@ def _heat(vertices: np.ndarray, faces: np.ndarray, radius: np.ndarray) -> np.nda
     """Two steps of heat, dense."""
     count, tau = len(vertices), (BETA * radius) ** 2 / 2
     conducted, area = np.zeros((count, count)), np.zeros(count)
-    corners = _saddles(vertices, faces)
-    reach = 0.02 * np.linalg.norm(np.ptp(vertices, axis=0))
+    corners = _saddles(vertices, faces, radius)
     for face in faces:
         exponent = 0.0  # around a saddle corner of angle θ heat is conducted as r^((2π/θ)² − 1), and a little more so
-        for corner, turns in corners:
+        for corner, turns, reach in corners:
             distance = np.linalg.norm(vertices[face].mean(axis=0) - corner)
             if distance <= reach:
                 exponent += 1.3 * (turns**-2 - 1) * np.log(distance / reach)
@@ -210,15 +209,15 @@ def _heat(vertices: np.ndarray, faces: np.ndarray, radius: np.ndarray) -> np.nda
     return np.asarray(step @ step)
 
 
-def _saddles(vertices: np.ndarray, faces: np.ndarray) -> list[tuple[np.ndarray, float]]:
-    """Vertices whose angles sum to more than 1.03 of a full turn, and to how many turns."""
+def _saddles(vertices: np.ndarray, faces: np.ndarray, radius: np.ndarray) -> list[tuple[np.ndarray, float, float]]:
+    """Vertices whose angles sum to more than 1.03 of a full turn, to how many turns, and how far each reaches."""
     angle = np.zeros(len(vertices))
     for face in faces:
         for k in range(3):
             u, v = (vertices[face[(k + n) % 3]] - vertices[face[k]] for n in (1, 2))
             angle[face[k]] += np.arccos(u @ v / np.linalg.norm(u) / np.linalg.norm(v))
     turns = angle / (2 * np.pi)
-    return [(vertices[v], float(turns[v])) for v in np.flatnonzero(turns > 1.03)]
+    return [(vertices[v], float(turns[v]), 0.4 * radius[v]) for v in np.flatnonzero(turns > 1.03)]
 
 
 def _shrunk(row: np.ndarray) -> np.ndarray:

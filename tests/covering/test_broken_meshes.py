@@ -163,7 +163,7 @@ def test_conductivity_of_crowded_corners_is_finite() -> None:
     start = tube(rings=60, around=24)
     vertices, faces = crumpled(start.vertices, start.faces, np.random.default_rng(3))
     vertices[::3] = vertices[0]
-    conductivity = corner_conductivity(vertices, faces)
+    conductivity = corner_conductivity(vertices, faces, np.full(len(vertices), 0.01))
     assert np.isfinite(conductivity).all()
     assert conductivity.min() >= 1.0
 

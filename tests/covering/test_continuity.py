@@ -13,6 +13,7 @@ from warpjld.covering import bind
 from warpjld.covering.corners import corner_conductivity
 from warpjld.rig import Rig
 from warpjld.skeleton import poses_from_angles
+from warpjld.surface import weld_surface
 
 GROWTH = 1.05  # per halving of the edges: a discontinuity doubles the stretch, a corner's spike adds a tenth or more
 
@@ -69,16 +70,29 @@ def test_conductivity_is_raised_around_saddle_corners_only(height: float) -> Non
     rim = np.column_stack([level * np.cos(around), level * np.sin(around), height * (-1.0) ** np.arange(8)])
     far = [[1000.0, 0.0, 0.0], [1001.0, 0.0, 0.0], [1000.0, 1.0, 0.0]]
     faces = np.array([*((0, 1 + k, 1 + (k + 1) % 8) for k in range(8)), (9, 10, 11)], dtype=np.int32)
-    got = corner_conductivity(np.concatenate([np.zeros((1, 3)), rim, far]), faces)
+    thickness = np.full(12, 40.0)
+    got = corner_conductivity(np.concatenate([np.zeros((1, 3)), rim, far]), faces, thickness)
     turns = 8 * np.arccos(rim[0] @ rim[1]) / (2 * np.pi)
     assert got[8] == 1.0
     assert np.ptp(got[:8]) < 1e-12
     if height:
         assert turns > 1.1
         # conductivity falls with the distance r as r^β; heat then goes as r^ν with ν (ν + β) = (2π/θ)²
-        wider = corner_conductivity(np.concatenate([np.zeros((1, 3)), 2 * rim, far]), faces)
+        wider = corner_conductivity(np.concatenate([np.zeros((1, 3)), 2 * rim, far]), faces, thickness)
         beta = np.log2(wider[0] / got[0])
         nu = -beta / 2 + np.sqrt(beta**2 / 4 + turns**-2)
         assert 1.0 <= nu < 1.2, "the slope of r^ν stays finite"
     else:
         assert got[0] == 1.0
+
+
+def test_how_large_the_surface_is_elsewhere_does_not_matter(built: Rig) -> None:
+    """A hand on a body is bound as a hand alone: its webs once conducted heat as far as a share of all there is."""
+    surface, count = built.surface, len(built.surface.vertices)
+    far = surface.vertices.mean(axis=0) + np.array([[2.0, 0.0, 0.0], [2.0, 0.1, 0.0], [2.0, 0.0, 0.1]])
+    vertices = np.concatenate([surface.vertices, far])
+    faces = np.concatenate([surface.faces, [[count, count + 1, count + 2]]]).astype(np.int32)
+    alone, beside = (bind(built.skeleton, s) for s in (surface, weld_surface(vertices, faces)))
+    assert len(beside.surface.vertices) == count + 3
+    np.testing.assert_allclose(beside.domains[:count], alone.domains, atol=2e-3)
+    np.testing.assert_allclose(beside.spread.positions.toarray()[:count], alone.spread.positions.toarray(), atol=2e-3)

@@ -37,7 +37,7 @@ def test_solutions_are_those_of_a_dense_solver(count: int, columns: int, pieces:
 def test_several_steps_at_once_are_one_after_another() -> None:
     hand = build_hand("left", resolution=1500).surface
     conductivity = np.random.default_rng(0).uniform(0.5, 2.0, len(hand.vertices)) * 1e-5
-    laplacian, area = conducting_laplacian(hand.vertices, hand.faces, conductivity)
+    laplacian, area = conducting_laplacian(hand.vertices, hand.faces, np.full(len(hand.vertices), 0.01), conductivity)
     factor = Factor(sp.csr_array(sp.diags_array(area) + laplacian))
     right = np.random.default_rng(1).uniform(size=(len(area), 11))
     steps = right

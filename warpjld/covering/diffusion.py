@@ -73,7 +73,7 @@ class Diffusion:
     def _system(self) -> tuple[sp.csr_array, NDArray[np.float64], sp.csr_array]:
         """A + L of a single step, A, and the edges' lengths in lengths of decay."""
         tau = (BETA * self.radius) ** 2 / _STEPS
-        laplacian, area = conducting_laplacian(self.vertices, self.faces, tau)
+        laplacian, area = conducting_laplacian(self.vertices, self.faces, self.radius, tau)
         edges = sp.triu(uniform_laplacian(self.faces, len(self.vertices)), 1).tocoo()
         i, j = edges.coords
         length = np.linalg.norm(self.vertices[i] - self.vertices[j], axis=1)

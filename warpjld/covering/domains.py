@@ -33,7 +33,7 @@ _LARGEST = 10.0  # skeletons: what lies further out says nothing of how large a 
 _NOTHING = 1e-6  # painted weight below which a vertex counts as bare
 _THREAD = 2_000  # points that a thread must have to look from
 _TOGETHER = 4_096  # points whose distances from all segments are held at once
-_TIE = 1e-5  # of the surface's size: segments whose distances differ by less, as float32 does, are equally near
+_TIE = 1e-5  # of the skeleton's size: segments whose distances differ by less, as float32 does, are equally near
 
 
 def domains_from_geometry(
@@ -59,14 +59,14 @@ def domains_from_geometry(
     faces = _distinct(faces)
     size = min(float(np.linalg.norm(np.ptp(points, axis=0))), _LARGEST)
     lines, fan_of = _lines(skeleton, vertices, faces, groups)
-    owner, distance = _nearest_visible(points, faces, (lines - centre) / unit, fan_of, size)
+    owner, distance = _nearest_visible(points, faces, (lines - centre) / unit, fan_of, min(size, 1.0))
     size = max(size, 1e-3)
     # far from every segment heat is not let run further than over the whole surface
     demand = contrast / np.clip(distance, 1e-4 * size, size) ** 2
     source = np.zeros((len(vertices), len(groups)))
     source[np.arange(len(vertices)), owner] = 1.0
     present = np.flatnonzero(source.any(axis=0))
-    laplacian, area = cotangent_laplacian(points, faces)
+    laplacian, area = cotangent_laplacian(points, faces, np.minimum(distance, size))
     order = spatial_order(points)
     for conducting, cover in (
         (lambda: laplacian, area),
@@ -168,7 +168,10 @@ def _nearest_visible(
     fan_of: NDArray[np.int64],
     size: float,
 ) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
-    """Fan of the nearest line (L, 2, 3) that each point sees from inside, and its distance."""
+    """Fan of the nearest line (L, 2, 3) that each point sees from inside, and its distance.
+
+    ``size`` is what steps and ties are relative to: the skeleton's, for what else the surface has must not count.
+    """
     import warp as wp
     from warpjld_kernels.visibility import nearest_visible_segment
 

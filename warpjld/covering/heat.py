@@ -35,22 +35,26 @@ _PLAIN_STEPS = 5_000
 
 
 def cotangent_laplacian(
-    vertices: NDArray[np.float64], faces: NDArray[np.int32]
+    vertices: NDArray[np.float64], faces: NDArray[np.int32], thickness: NDArray[np.float64]
 ) -> tuple[sp.csr_array, NDArray[np.float64]]:
     """Positive semidefinite cotangent Laplacian and barycentric vertex areas.
 
     Cotangents are kept within (0, 1e3): a weight of the wrong sign would let heat run uphill. Around saddle corners
-    heat is conducted better, so that weights have no spike there.
+    heat is conducted better, so that weights have no spike there, as far as a share of the ``thickness`` of what they
+    are on, shape (V,).
     """
-    conductivity = corner_conductivity(vertices, faces)
+    conductivity = corner_conductivity(vertices, faces, thickness)
     return _cotangents(vertices, faces, lambda i, j: conductivity)
 
 
 def conducting_laplacian(
-    vertices: NDArray[np.float64], faces: NDArray[np.int32], conductivity: NDArray[np.float64]
+    vertices: NDArray[np.float64],
+    faces: NDArray[np.int32],
+    thickness: NDArray[np.float64],
+    conductivity: NDArray[np.float64],
 ) -> tuple[sp.csr_array, NDArray[np.float64]]:
     """The same where heat is conducted as well as each vertex says, shape (V,): an edge by the mean of its ends."""
-    corner = corner_conductivity(vertices, faces)
+    corner = corner_conductivity(vertices, faces, thickness)
     return _cotangents(vertices, faces, lambda i, j: corner * (conductivity[i] + conductivity[j]) / 2.0)
 
 
