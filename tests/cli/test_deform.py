@@ -134,8 +134,8 @@ def test_a_polite_kill_leaves_nothing_behind(data: Path, tmp_path: Path) -> None
         cwd=tmp_path,
         env=os.environ | {"PYTHONPATH": os.pathsep.join(map(str, (root, root / "kernels")))},
     )
-    while process.poll() is None and not list(tmp_path.glob("*.part")):
-        pass
+    while process.poll() is None and not list(tmp_path.glob(".curl.part*")):
+        time.sleep(0.01)
     process.send_signal(signal.SIGTERM)
     assert process.wait(60) == 130
     assert [path.name for path in tmp_path.iterdir()] == ["curl.csv"]
