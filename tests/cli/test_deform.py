@@ -134,7 +134,7 @@ def test_a_polite_kill_leaves_nothing_behind(data: Path, tmp_path: Path) -> None
         cwd=tmp_path,
         env=os.environ | {"PYTHONPATH": os.pathsep.join(map(str, (root, root / "kernels")))},
     )
-    while process.poll() is None and not list(tmp_path.glob(".curl.part*")):
+    while process.poll() is None and not list(tmp_path.glob("*.part")):
         time.sleep(0.01)
     process.send_signal(signal.SIGTERM)
     assert process.wait(60) == 130
