@@ -151,13 +151,20 @@ def _bend_in_turn(hands: ClosingHands, joints: NDArray[np.int64], rounds: int) -
         How the joints' searches ended, shape (G, D, 3).
     """
     status = np.full((len(hands), *joints.shape), int(Status.NO_CONTACT), dtype=np.int32)
+    going = np.ones(len(hands), dtype=bool)
     for again in range(rounds):
+        before = hands.angles.copy()
         for k in range(1 if again else 0, 3):
             # a joint with a touch at or beyond its segment finds it at once and stays
             ended = hands.bend(joints[:, k:], np.array([1.0, 0.0, 0.0])[: 3 - k])
             # skin left inside by less than twice the tolerance is a touch
             ended = np.where(ended == int(Status.INSIDE), int(Status.CONVERGED), ended) if again else ended
-            status[..., k] = ended
-        if rounds == 1 or not hands.settle(joints[:, 0].tolist()):
+            status[going, :, k] = ended[going]
+        # what has settled stays, or a hand would end otherwise beside others than alone
+        hands.angles[~going] = before[~going]
+        if rounds == 1:
+            break
+        going &= hands.settle(joints[:, 0].tolist())
+        if not going.any():
             break
     return status

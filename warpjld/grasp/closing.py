@@ -135,8 +135,8 @@ class ClosingHands:
                 self.angles[:, joint, _FLEXION] = np.maximum(now, np.clip(far, low, high))
         return ended
 
-    def settle(self, bases: list[int]) -> bool:
-        """Open base joints where skin that swelled has entered the object; whether any had to.
+    def settle(self, bases: list[int]) -> NDArray[np.bool_]:
+        """Open base joints where skin that swelled has entered the object; which hands had to, shape (G,).
 
         What was inside before the hand closed does not count.
         """
@@ -146,7 +146,7 @@ class ClosingHands:
             self._floor = np.minimum(-2.0 * self._tolerance, self._distances(vertices, self._open) - 1e-6)
         some = (now < self._floor).any(axis=0)
         if not some.any():
-            return False
+            return np.zeros(len(self), dtype=bool)
         vertices, now, allowed = vertices[some], now[:, some], self._floor[:, some]
         deep = now < allowed
         widest = np.full(len(self), _WIDEST)
@@ -160,7 +160,7 @@ class ClosingHands:
                 floor = np.where(own, np.minimum(allowed, at_widest[d] - 1e-7), -np.inf)[:, some]
                 enough = self._least_opening(base, vertices[some], floor)
                 self.angles = self._opened(base, np.where(own.any(axis=1), enough, 0.0))
-        return True
+        return np.asarray(deep.any(axis=1))
 
     def _least_opening(self, base: int, vertices: NDArray[np.int32], floor: NDArray[np.float64]) -> NDArray[np.float64]:
         """Least opening of a base joint [rad] that brings vertices to their least distances (G, n), shape (G,)."""
