@@ -38,11 +38,8 @@ else:
 
 __all__ = ["volume_keeping"]
 
-_PARTS = (
-    0.33,
-    0.67,
-    1.0,
-)  # of the largest flexion: what is lost grows faster than the flexion ratio, what swells as it does
+# of the largest flexion: what is lost grows faster than the flexion ratio, what swells as it does
+_PARTS = (0.33, 0.67, 1.0)
 _WIDEST = np.radians(110.0)  # of what is measured: beyond, limbs lie on one another
 _MOST = 0.8  # amplitude at which it ends
 _STEPS = 4
