@@ -15,7 +15,7 @@ from warpjld.covering.parameters import Parameters
 from warpjld.covering.segment_table import SegmentTable
 from warpjld.skeleton.tree import Skeleton
 
-__all__ = ["FLOOR", "OPERATORS", "SIDE_BAND", "STATIONS", "Anchors", "anchor"]
+__all__ = ["FLOOR", "OPERATORS", "SIDE_BAND", "STATIONS", "Anchors", "anchor", "smoothstep"]
 
 OPERATORS = 4
 """Segment operators a vertex may hold (the paper has one; the rest make borders soft)."""
@@ -173,7 +173,7 @@ def _side(offset: NDArray[np.float64], normals: NDArray[np.float64], place: NDAr
     """
     length = np.maximum(np.linalg.norm(offset, axis=2), 1e-12)
     height = np.einsum("vok,voek->voe", offset, normals)
-    sides = _smoothstep((height / length[..., None] + SIDE_BAND) / (2.0 * SIDE_BAND))
+    sides = smoothstep((height / length[..., None] + SIDE_BAND) / (2.0 * SIDE_BAND))
     share = np.stack([1.0 - place, place], axis=2)
     return np.asarray((share * sides).sum(axis=2))
 
@@ -247,6 +247,7 @@ def _strongest_pairs(between: NDArray[np.float64]) -> tuple[NDArray[np.int32], N
     return order.astype(np.int32), np.maximum(kept - third[:, None], 0.0)
 
 
-def _smoothstep(x: NDArray[np.float64]) -> NDArray[np.float64]:
+def smoothstep(x: NDArray[np.float64]) -> NDArray[np.float64]:
+    """0 below 0, 1 above 1, x² (3 − 2 x) between: without an edge at either."""
     x = np.clip(x, 0.0, 1.0)
-    return x * x * (3.0 - 2.0 * x)
+    return np.asarray(x * x * (3.0 - 2.0 * x))

@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from warpjld.covering.binding import STATIONS, Anchors
+from warpjld.covering.binding import STATIONS, Anchors, smoothstep
 from warpjld.covering.device import array_on, checked_device
 from warpjld.covering.parameters import Parameters
 from warpjld.lazily import lazy_module
@@ -175,11 +175,7 @@ def _swellings(anchors: Anchors) -> list[tuple[NDArray, NDArray]]:
     t = np.clip(anchors.ratio, 0.0, 1.0)
     amount = anchors.weight * anchors.side * ~anchors.stiff[anchors.segment]
     ends = (anchors.ends[anchors.segment, k] for k in (0, 1))
-    return [(end, amount * _smooth(near)) for end, near in zip(ends, (1.0 - t, t), strict=True)]
-
-
-def _smooth(x: NDArray[np.float64]) -> NDArray[np.float64]:
-    return np.asarray(x * x * (3.0 - 2.0 * x))
+    return [(end, amount * smoothstep(near)) for end, near in zip(ends, (1.0 - t, t), strict=True)]
 
 
 def _sparse(entries: list[tuple[NDArray, NDArray]], rows: int, width: int) -> sp.csr_array:

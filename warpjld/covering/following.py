@@ -13,10 +13,8 @@ from warpjld.lazily import lazy_module
 
 if TYPE_CHECKING:
     import scipy.sparse as sp
-    from scipy.sparse import csgraph
 else:
     sp = lazy_module("scipy.sparse")
-    csgraph = lazy_module("scipy.sparse.csgraph")
 
 __all__ = ["Following", "following"]
 
@@ -61,20 +59,12 @@ def following(
     vertices: NDArray[np.float64], faces: NDArray[np.int32], lines: NDArray[np.float64], rigid: NDArray[np.int32]
 ) -> Following | None:
     """What shells of a surface follow; None where its flesh is a single shell. Arguments as of ``shells``."""
-    if not _several(faces, rigid):
-        return None
-    from warpjld.covering.shells import shells
+    from warpjld.covering.shells import components, shells
 
+    used = np.zeros(len(rigid), dtype=bool)
+    used[faces.ravel()] = True
+    if len(np.unique(components(faces, len(rigid))[used & (rigid < 0)])) <= 1:
+        return None
     found = shells(vertices, faces, lines, rigid)
     bends = ~found.whole[found.label] | (rigid >= 0)
     return Following(found.follow, sp.csr_array(sp.diags_array(bends.astype(np.float64)) @ found.follow))
-
-
-def _several(faces: NDArray[np.int32], rigid: NDArray[np.int32]) -> bool:
-    """Whether flesh lies in more than one connected shell."""
-    links = np.concatenate([faces[:, :2], faces[:, 1:]])
-    graph = sp.coo_array((np.ones(len(links)), (links[:, 0], links[:, 1])), shape=(len(rigid), len(rigid)))
-    label = csgraph.connected_components(graph, directed=False)[1]
-    used = np.zeros(len(rigid), dtype=bool)
-    used[faces.ravel()] = True
-    return len(np.unique(label[used & (rigid < 0)])) > 1

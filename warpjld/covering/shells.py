@@ -18,7 +18,7 @@ from scipy.spatial import cKDTree
 from warpjld.normals import vertex_normals
 from warpjld.rotations import unit
 
-__all__ = ["Shells", "shells"]
+__all__ = ["Shells", "components", "shells"]
 
 _SAMPLES = 16  # places on a segment, and
 _RAYS = 8  # rays from each of them around it, that ask which shell its flesh is
@@ -77,7 +77,7 @@ def shells(
     used = np.zeros(count, dtype=bool)
     used[faces.ravel()] = True
     seams = _seams(vertices, faces, flesh)
-    label = _components(faces, seams, count)
+    label = components(faces, count, seams)
     number = int(label.max()) + 1
     soft = np.bincount(label, flesh & used, number) > 0
     host, lies = soft, np.zeros(number, dtype=bool)
@@ -96,9 +96,9 @@ def shells(
     return Shells(label, host, lies, whole, follow, distance)
 
 
-def _components(faces: NDArray[np.int32], seams: NDArray[np.int64], count: int) -> NDArray[np.int32]:
-    """Number of the connected shell of every vertex, shape (V,)."""
-    links = np.concatenate([faces[:, :2], faces[:, 1:], seams])
+def components(faces: NDArray[np.int32], count: int, seams: NDArray[np.int64] | None = None) -> NDArray[np.int32]:
+    """Number of the connected shell of every vertex, shape (V,); ``seams`` join pairs of vertices, shape (n, 2)."""
+    links = np.concatenate([faces[:, :2], faces[:, 1:], *([] if seams is None else [seams])])
     graph = sp.coo_array((np.ones(len(links)), (links[:, 0], links[:, 1])), shape=(count, count))
     label: NDArray[np.int32] = connected_components(graph, directed=False)[1]
     return label

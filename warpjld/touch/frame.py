@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.sparse import csr_array
 
+from warpjld.covering.binding import smoothstep
 from warpjld.touch.patches import Patches
 
 __all__ = ["SHARE", "Bench", "Model", "Overlaps", "fade"]
@@ -29,8 +30,7 @@ _BULGE = 0.5  # shares that a bulge is high at most
 
 def fade(ratio: NDArray[np.float64]) -> NDArray[np.float64]:
     """How much of an overlap is parted whose deepest place is so many shares deep: 1 to ``_FULL``, 0 from ``_NONE``."""
-    t = np.clip((_NONE - ratio) / (_NONE - _FULL), 0.0, 1.0)
-    return np.asarray(t * t * (3.0 - 2.0 * t))
+    return smoothstep((_NONE - ratio) / (_NONE - _FULL))
 
 
 @dataclass(frozen=True, eq=False)
