@@ -16,6 +16,7 @@ from warpjld.fem.contact.solids import Plane
 from warpjld.fem.embedding import embed
 from warpjld.press.clear import Shown, clear
 from warpjld.press.outside import outside, outside_of_nodes
+from warpjld.press.overlap import SurfacePart
 
 RADIUS = 0.01
 
@@ -38,7 +39,7 @@ def test_two_spheres_are_flattened_the_softer_one_more(moduli: tuple[float, floa
     found = clear({"one": one, "other": other}, {}, 0.0)
     at, there = found.vertices["one"], found.vertices["other"]
     assert depth(one, at, other, there) < 2e-6
-    assert found.left["one", "other"] < 2e-6
+    assert found.left[SurfacePart("one"), SurfacePart("other")] < 2e-6
     assert found.moved["one"] == pytest.approx(share * 4e-4, rel=0.15)
     assert found.moved["other"] == pytest.approx((1.0 - share) * 4e-4, rel=0.15)
     far = one.vertices[:, 0] < 0.9 * RADIUS
@@ -49,14 +50,14 @@ def test_what_no_element_explains_stays_and_is_said() -> None:
     one, other = sphere(0.0, 1e5, 2e-4), sphere(2.0 * RADIUS - 2e-3, 1e5, 2e-4)
     found = clear({"one": one, "other": other}, {}, 0.0)
     assert max(found.moved.values()) <= 2e-4 * (1.0 + 1e-9)
-    assert found.left["one", "other"] == pytest.approx(2e-3 - 2 * 2e-4, rel=0.1)
+    assert found.left[SurfacePart("one"), SurfacePart("other")] == pytest.approx(2e-3 - 2 * 2e-4, rel=0.1)
 
 
 def test_obstacles_do_not_give_way() -> None:
     plate = Plane((0.0, 0.0, -RADIUS), (0, 0, 1), motion=lambda time: ((0, 0, time), (0, 0, 0, 1)))
     found = clear({"one": sphere(0.0, 1e5)}, {"plate": plate}, 3e-4)
     assert found.vertices["one"][:, 2].min() == pytest.approx(3e-4 - RADIUS, abs=1e-12)
-    assert found.left == {("one", "plate"): 0.0}
+    assert found.left == {(SurfacePart("one"), SurfacePart("plate")): 0.0}
 
 
 def test_nothing_that_is_apart_moves() -> None:

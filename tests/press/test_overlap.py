@@ -10,7 +10,7 @@ from warpjld.covering import bind
 from warpjld.fem.contact.facets import Facets
 from warpjld.fem.hand.flesh_hand import build_flesh_hand
 from warpjld.press.clear import Shown, clear
-from warpjld.press.overlap import within_itself
+from warpjld.press.overlap import SurfacePart, within_itself
 from warpjld.press.skin_parts import SkinParts, skin_parts
 from warpjld.rig import Rig
 from warpjld.skeleton import poses_from_angles
@@ -45,7 +45,7 @@ def test_both_move_half_the_way() -> None:
     half = len(vertices) // 2
     assert moved[:half].max() == pytest.approx(0.5 * OVERLAP, rel=0.1)
     assert moved[half:].max() == pytest.approx(0.5 * OVERLAP, rel=0.1)
-    assert cleared.left.get(("hand index", "hand thumb"), 0.0) < 1e-9
+    assert cleared.left.get((SurfacePart("hand", "index"), SurfacePart("hand", "thumb")), 0.0) < 1e-9
     pieces = [Facets(at[:half], parts.faces[: len(BALL.faces)]), Facets(at[half:], parts.faces[: len(BALL.faces)])]
     assert pieces[0].project(at[half:]).distance.min() > -1e-6
     assert pieces[1].project(at[:half]).distance.min() > -1e-6
@@ -56,7 +56,7 @@ def test_what_contact_does_not_know_of_stays_and_is_said() -> None:
     nobody = np.zeros(len(vertices), dtype=bool)
     cleared = clear({"hand": Shown(vertices, parts.faces, 8e4, 1e-3, parts, nobody)}, {}, 0.0)
     np.testing.assert_array_equal(cleared.vertices["hand"], vertices)
-    assert cleared.left["hand index", "hand thumb"] == pytest.approx(OVERLAP, rel=0.05)
+    assert cleared.left[SurfacePart("hand", "index"), SurfacePart("hand", "thumb")] == pytest.approx(OVERLAP, rel=0.05)
 
 
 def test_neighbours_never_meet() -> None:

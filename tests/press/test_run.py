@@ -106,7 +106,7 @@ def test_a_finished_state_is_gone_on_from(pressed: tuple[Path, dict], rig, tmp_p
     scene = Scene(say=lambda text: None)
     scene.add("left", rig)
     Interpreter(scene).run_text(PLATE + "PRESS 0 7 EVERY 2 STATE 'state.npz'")
-    with pytest.raises(InputError, match=r"state.npz: this state belongs to another scene"):
+    with pytest.raises(InputError, match=r"state.npz: this state belongs to another scene: frames"):
         run_press(scene, tmp_path)
 
 

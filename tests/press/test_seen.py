@@ -9,12 +9,14 @@ from types import SimpleNamespace
 import numpy as np
 
 from warpjld.fem import Status
-from warpjld.press.overlap import Over
+from warpjld.press.overlap import Over, SurfacePart
 from warpjld.press.run import Solved
 from warpjld.press.seen import missed
 from warpjld.press.verdict import verdict_of
 from warpjld.script import Scene
 from warpjld.script.pressing import run_press
+
+A, B = SurfacePart("A"), SurfacePart("B")
 
 
 def deep(depth: float) -> Over:
@@ -27,7 +29,7 @@ def test_overlap_that_contact_left_is_a_status_of_its_own() -> None:
     pressed = SimpleNamespace(
         bodies=SimpleNamespace(hands=()),
         solved=SimpleNamespace(frames=[SimpleNamespace(frame=frame) for frame in depths]),
-        cleared=lambda frame: SimpleNamespace(inside={("A", "B"): deep(depths[frame]), ("B", "A"): deep(1e-4)}),
+        cleared=lambda frame: SimpleNamespace(inside={(A, B): deep(depths[frame]), (B, A): deep(1e-4)}),
         most=lambda name: 2e-3,
     )
     (found,) = missed(pressed)  # type: ignore[arg-type]

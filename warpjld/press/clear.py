@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from warpjld.fem.contact import Obstacle
 from warpjld.fem.contact.facets import Facets
-from warpjld.press.overlap import Over, over, within_itself
+from warpjld.press.overlap import Over, SurfacePart, over, within_itself
 from warpjld.press.skin_parts import SkinParts
 
 __all__ = ["Cleared", "Shown", "clear"]
@@ -52,17 +52,17 @@ class Cleared:
         vertices: Of every surface [m], shape (V, 3).
         moved: Farthest move of each [m].
         inside: Vertices that stay inside something, too deep to be a matter of elements, by the surface's name and that
-            of what they are in. Parts of one surface are called by its name and theirs.
+            of what they are in; parts of one surface by its name and theirs.
     """
 
     vertices: dict[str, NDArray[np.float64]]
     moved: dict[str, float]
-    inside: dict[tuple[str, str], Over] = field(default_factory=dict)
+    inside: dict[tuple[SurfacePart, SurfacePart], Over] = field(default_factory=dict)
 
     @property
-    def left(self) -> dict[tuple[str, str], float]:
+    def left(self) -> dict[tuple[SurfacePart, SurfacePart], float]:
         """Overlap that stays of each two [m]."""
-        out: dict[tuple[str, str], float] = {}
+        out: dict[tuple[SurfacePart, SurfacePart], float] = {}
         for (one, other), found in self.inside.items():
             two = (other, one) if (other, one) in out else (one, other)
             out[two] = max(found.depth, out.get(two, 0.0))
@@ -96,14 +96,15 @@ def clear(surfaces: Mapping[str, Shown], obstacles: Mapping[str, Obstacle], time
     for body in bodies.values():
         for obstacle in obstacles.values():
             body.put(body.sunk(obstacle, time), 1.0)
-    inside: dict[tuple[str, str], Over] = {}
+    inside: dict[tuple[SurfacePart, SurfacePart], Over] = {}
     for one, other in pairs:
-        inside[one, other] = bodies[other].over(bodies[one])
-        inside[other, one] = bodies[one].over(bodies[other])
+        inside[SurfacePart(one), SurfacePart(other)] = bodies[other].over(bodies[one])
+        inside[SurfacePart(other), SurfacePart(one)] = bodies[one].over(bodies[other])
     for name, body in bodies.items():
         parts = sorted(body.itself().items(), key=lambda item: item[0])
-        inside |= {(f"{name} {part}", f"{name} {other}"): found for (part, other), found in parts}
-        inside |= {(name, solid): body.sunk(obstacle, time) for solid, obstacle in obstacles.items()}
+        inside |= {(SurfacePart(name, part), SurfacePart(name, other)): found for (part, other), found in parts}
+        for solid, obstacle in obstacles.items():
+            inside[SurfacePart(name), SurfacePart(solid)] = body.sunk(obstacle, time)
     return Cleared(
         {name: body.at for name, body in bodies.items()},
         {name: body.moved for name, body in bodies.items()},

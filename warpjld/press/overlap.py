@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,10 +13,22 @@ from warpjld.fem.contact.facets import Facets
 from warpjld.fem.contact.obstacles import Touching
 from warpjld.press.skin_parts import SkinParts
 
-__all__ = ["Over", "over", "within_itself"]
+__all__ = ["Over", "SurfacePart", "over", "within_itself"]
 
 _FACING = 0.3
 """Surfaces that meet look at each other: cosine between their normals, at most."""
+
+
+class SurfacePart(NamedTuple):
+    """A surface by its name; or a part of it, as a digit of a hand's skin."""
+
+    surface: str
+    part: str = ""
+
+    @property
+    def text(self) -> str:
+        """``BALL``, ``LEFT index``."""
+        return f"{self.surface} {self.part}" if self.part else self.surface
 
 
 @dataclass(frozen=True, eq=False)

@@ -16,10 +16,14 @@ from warpjld.press.brushes import Brush, brushes_between
 from warpjld.press.checks import why_not
 from warpjld.press.detour import TOLERANCE
 from warpjld.press.frames import SolvedFrame, solved_frame
+from warpjld.press.identity import differences
 from warpjld.press.passing import Passing
 from warpjld.press.state import State, load_state, save_state
 
 __all__ = ["Solved", "solve_frames"]
+
+_NAMED = 6
+"""Parts that are named of what differs."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -54,6 +58,7 @@ def solve_frames(
     mend: Callable[[ContactSolution, ContactSolution], ContactSolution] | None = None,
     pauses: Mapping[float, Callable[[ContactSolution], None]] | None = None,
     state: Path | None = None,
+    identity: Mapping[str, str] | None = None,
     progress: Callable[[str, int, int], None] = lambda what, done, total: None,
 ) -> Solved:
     """Solve contact at frames.
@@ -67,6 +72,7 @@ def solve_frames(
         mend: Given the equilibrium before and that of a frame; answers with the one to go on from (R120).
         pauses: Called with the equilibrium of a frame before it is gone on from: they may change what comes.
         state: File that holds what was solved so far; an earlier run's is gone on from.
+        identity: What the state belongs to.
         progress: Told what is being done, how much of it is done, and how much there is.
 
     Raises:
@@ -81,11 +87,15 @@ def solve_frames(
     after: ContactSolution | None = None
     passing = Passing(bodies)
     brushes: list[Brush] = []
-    mark = f"{bodies.body.mesh.nodes.sum():.17g} {len(bodies.pairs)} {start:g} {[float(f) for f in frames]}"
+    mine = dict(identity or {})
     if state is not None and state.is_file():
         found = load_state(state)
-        if found.mark != mark:
-            raise InputError("this state belongs to another scene; remove it, or name another after STATE", path=state)
+        if other := differences(found.identity, mine):
+            raise InputError(
+                f"this state belongs to another scene: {', '.join(other[:_NAMED])}{' and more' * (len(other) > _NAMED)} "
+                "differ; remove it, or name another after STATE",
+                path=state,
+            )
         done, after = list(found.frames), found.solution
         for one in done:
             bodies.note(one.frame - start, one.displacement, one.reactions, one.nodal)
@@ -126,7 +136,7 @@ def solve_frames(
         bodies.note(frame - start, solved.displacement, solved.reactions, solved.nodal)
         done.append(solved)
         if state is not None:
-            save_state(state, State(mark, tuple(done), solution))
+            save_state(state, State(mine, tuple(done), solution))
         reason = watch(solved) if watch else None
         if reason:
             return ended(Status.STOPPED, reason)

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from warpjld.press.hand_body import WORN, HandBody
-from warpjld.press.overlap import Over
+from warpjld.press.overlap import Over, SurfacePart
 from warpjld.press.pressed import Pressed
 
 __all__ = ["Missed", "missed", "seen"]
@@ -28,8 +28,8 @@ class Missed:
         first, last: Frames.
     """
 
-    one: str
-    other: str
+    one: SurfacePart
+    other: SurfacePart
     depth: float
     first: float
     last: float
@@ -38,15 +38,15 @@ class Missed:
     def text(self) -> str:
         """``LEFT index and BALL overlap by 4.2 mm at frames 12 to 20``."""
         when = f"frame {self.first:g}" if self.first == self.last else f"frames {self.first:g} to {self.last:g}"
-        return f"{self.one} and {self.other} overlap by {1e3 * self.depth:.1f} mm at {when}"
+        return f"{self.one.text} and {self.other.text} overlap by {1e3 * self.depth:.1f} mm at {when}"
 
 
 def missed(pressed: Pressed) -> list[Missed]:
     """What contact was to keep apart and did not, deepest first: forces there are wrong."""
-    found: dict[tuple[str, str], Missed] = {}
+    found: dict[tuple[SurfacePart, SurfacePart], Missed] = {}
     for frame in (solved.frame for solved in pressed.solved.frames):
         for one, other, over in _known(pressed, frame):
-            if over.depth > pressed.most(one.split(" ")[0]):
+            if over.depth > pressed.most(one.surface):
                 two = (other, one) if (other, one) in found else (one, other)
                 was = found.get(two, Missed(*two, 0.0, frame, frame))
                 found[two] = Missed(*two, max(was.depth, over.depth), was.first, frame)
@@ -60,7 +60,7 @@ def seen(pressed: Pressed, frame: float) -> list[str]:
     out = []
     for two, depth in cleared.left.items():
         if depth > _SEEN:
-            text = f"{two[0]} and {two[1]} are seen to overlap by {1e3 * depth:.1f} mm at frame {frame:g}"
+            text = f"{two[0].text} and {two[1].text} are seen to overlap by {1e3 * depth:.1f} mm at frame {frame:g}"
             out.append(f"{text}: {_why(pressed, *two)}")
     for hand in pressed.bodies.hands:
         bare = hand.part.blend < WORN
@@ -77,19 +77,19 @@ def seen(pressed: Pressed, frame: float) -> list[str]:
     return out
 
 
-def _known(pressed: Pressed, frame: float) -> Iterator[tuple[str, str, Over]]:
+def _known(pressed: Pressed, frame: float) -> Iterator[tuple[SurfacePart, SurfacePart, Over]]:
     """Overlap that is contact's concern, of parts of hands by their names."""
     hands = {hand.name: hand for hand in pressed.bodies.hands}
     for (one, other), over in pressed.cleared(frame).inside.items():
-        hand = hands.get(one) or hands.get(one.rpartition(" ")[0])
+        hand = hands.get(one.surface)
         if hand is None:
             yield one, other, over
             continue
         fleshed = over.of(hand.part.blend > WORN)
-        if one == hand.name:
+        if not one.part:
             for part in hand.parts.name_of(fleshed.vertices):
-                yield f"{one} {part}", other, fleshed.of(_mask(hand, part))
-        elif hand.itself and hand.worn(other.rpartition(" ")[2]):
+                yield SurfacePart(one.surface, part), other, fleshed.of(_mask(hand, part))
+        elif hand.itself and hand.worn(other.part):
             yield one, other, fleshed
 
 
@@ -97,11 +97,11 @@ def _mask(hand: HandBody, part: str) -> NDArray[np.bool_]:
     return np.asarray(hand.parts.part_of[hand.parts.labels] == hand.parts.names.index(part))
 
 
-def _why(pressed: Pressed, one: str, other: str) -> str:
+def _why(pressed: Pressed, one: SurfacePart, other: SurfacePart) -> str:
     """What leaves two overlapping, and what to do."""
     for hand in pressed.bodies.hands:
-        parts = [name.removeprefix(f"{hand.name} ") for name in (one, other)]
-        if all(part in hand.parts.names for part in parts):
+        parts = [one.part, other.part]
+        if one.surface == hand.name and all(parts):
             bare = [part for part in parts if not hand.worn(part)]
             if bare:
                 return f"FLESH {hand.name} … {' '.join(bare).upper()} makes them press on each other"

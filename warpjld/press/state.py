@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import zipfile
 from dataclasses import dataclass, fields
 from pathlib import Path
@@ -25,12 +26,12 @@ class State:
     """Frames so far, and the solution to go on from.
 
     Attributes:
-        mark: What it belongs to.
+        identity: What it belongs to: hashes by name (see ``identity_of``).
         frames: In order.
         solution: Of the last of them.
     """
 
-    mark: str
+    identity: dict[str, str]
     frames: tuple[SolvedFrame, ...]
     solution: ContactSolution
 
@@ -41,7 +42,11 @@ def save_state(path: Path, state: State) -> None:
     Raises:
         InputError: It cannot be written.
     """
-    arrays: dict[str, Any] = {"mark": state.mark, "count": len(state.frames), "time": state.solution.last.time}
+    arrays: dict[str, Any] = {
+        "identity": json.dumps(state.identity),
+        "count": len(state.frames),
+        "time": state.solution.last.time,
+    }
     for k, frame in enumerate(state.frames):
         for one in fields(SolvedFrame):
             if one.name != "imprint":
@@ -69,6 +74,8 @@ def load_state(path: Path) -> State:
     """
     try:
         with np.load(path, allow_pickle=False) as file:
+            if "identity" not in file:
+                raise ValueError("it does not say what it belongs to")
             frames = []
             for k in range(int(file["count"])):
                 imprint = Imprint(*(file[f"frame{k}.imprint.{f.name}"] for f in fields(Imprint)))
@@ -79,10 +86,12 @@ def load_state(path: Path) -> State:
             memory = tuple(
                 Memory(*(file[f"memory{k}.{f.name}"] for f in fields(Memory))) for k in range(int(file["memories"]))
             )
-            mark, time = str(file["mark"]), float(file["time"])
+            identity, time = json.loads(str(file["identity"])), float(file["time"])
             course = file.get("course")
     except (OSError, KeyError, ValueError, zipfile.BadZipFile) as error:
         raise InputError(f"no state of a contact solve: {error}", path=path) from error
     last = frames[-1]
     instant = ContactInstant(time, last.displacement, last.reactions, (), last.solves, 0, 0.0)
-    return State(mark, tuple(frames), ContactSolution(Status.CONVERGED, (instant,), "", memory, (), Loads(), course))
+    return State(
+        identity, tuple(frames), ContactSolution(Status.CONVERGED, (instant,), "", memory, (), Loads(), course)
+    )

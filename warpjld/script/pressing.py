@@ -88,6 +88,7 @@ def run_press(scene: Scene, folder: Path, progress: Report = lambda what, done, 
 def _run(scene: Scene, pressing: Pressing, folder: Path, progress: Report) -> PressReport:
     from warpjld.press.bodies import assemble
     from warpjld.press.checks import refuse_hopeless
+    from warpjld.press.identity import identity_of
     from warpjld.press.mend import Mending
     from warpjld.press.pressed import Pressed
     from warpjld.press.run import solve_frames
@@ -110,16 +111,18 @@ def _run(scene: Scene, pressing: Pressing, folder: Path, progress: Report) -> Pr
     table = PressRows(scene, bodies)
     grips: list[FoundGrip] = []
     mending = Mending(bodies, wishes.strength, lambda *change: corrected_keys(scene, start, *change))
+    frames = _frames(pressing, wishes, start)
     solved = solve_frames(
         bodies,
         start,
-        _frames(pressing, wishes, start),
+        frames,
         method=pressing.method,
         aitken=pressing.aitken,
         watch=table.take if pressing.stop else table.note,
         mend=mending if pressing.correct else None,
         pauses=_pauses(scene, bodies, grips),
         state=None if pressing.state is None else folder / pressing.state,
+        identity=None if pressing.state is None else identity_of(bodies, wishes, frames),
         progress=progress,
     )
     notes += table.notes()
