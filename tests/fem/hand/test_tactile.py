@@ -116,7 +116,7 @@ def test_files(hand: FleshHand, tmp_path: Path) -> None:
     described = json.loads((tmp_path / "tactile.columns.json").read_text(encoding="utf-8"))
     assert [c["name"] for c in described] == [c.name for c in TACTILE_COLUMNS]
 
-    from warpjld.study.table import read_table
+    from warpjld.tables.files import read_table
 
     pytest.importorskip("pyarrow")
     write_tactile(tmp_path / "tactile.parquet", found)

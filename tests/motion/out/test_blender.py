@@ -12,8 +12,8 @@ import pytest
 
 from warpjld.hand import build_hand
 from warpjld.io import load_rig
-from warpjld.io.motion_out import source_motion, write_motion
 from warpjld.motion import open_motion
+from warpjld.motion.out import source_motion, write_motion
 
 SHARED = Path(__file__).resolve().parents[4] / "shared" / "data"
 TOLERANCE = 1e-4  # [m], asked for

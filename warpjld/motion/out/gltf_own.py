@@ -9,10 +9,10 @@ from urllib.parse import unquote
 import numpy as np
 
 from warpjld.errors import InputError
-from warpjld.io.motion_out.glb_file import GlbFile, read_gltf_json
-from warpjld.io.motion_out.local_motion import rest_scales
-from warpjld.io.motion_out.node_tree import NodeTree
-from warpjld.io.motion_out.source_motion import SourceMotion
+from warpjld.motion.out.glb_file import GlbFile, read_gltf_json
+from warpjld.motion.out.local_motion import rest_scales
+from warpjld.motion.out.node_tree import NodeTree
+from warpjld.motion.out.source_motion import SourceMotion
 from warpjld.rig import Rig
 
 if TYPE_CHECKING:

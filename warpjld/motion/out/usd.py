@@ -21,12 +21,12 @@ from scipy.spatial.transform import Rotation
 
 from warpjld.errors import MissingExtraError
 from warpjld.io.caches.usd import write_texture_coordinates
-from warpjld.io.motion_out.baked_skin import BakedSkin
-from warpjld.io.motion_out.local_motion import local_motion, rest_scales
-from warpjld.io.motion_out.skin_weights import joint_weights
-from warpjld.io.motion_out.source_motion import SourceMotion, source_motion
-from warpjld.io.motion_out.write import Timing, WrittenMotion
 from warpjld.io.usd.skeletons import concatenated
+from warpjld.motion.out.baked_skin import BakedSkin
+from warpjld.motion.out.local_motion import local_motion, rest_scales
+from warpjld.motion.out.skin_weights import joint_weights
+from warpjld.motion.out.source_motion import SourceMotion, source_motion
+from warpjld.motion.out.write import Timing, WrittenMotion
 from warpjld.rig import Rig
 from warpjld.rotations import upright
 from warpjld.skeleton import Poses
@@ -38,7 +38,7 @@ _SAME = 1e-9
 
 
 def write_usd(path: Path, rig: Rig, poses: Poses, timing: Timing, baked: BakedSkin | None = None) -> WrittenMotion:
-    """Write a motion of a rig's own joints as USD; a :class:`~warpjld.io.motion_out.write.Writer`.
+    """Write a motion of a rig's own joints as USD; a :class:`~warpjld.motion.out.write.Writer`.
 
     Args:
         path: The file.

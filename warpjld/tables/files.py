@@ -1,25 +1,18 @@
-"""The results table (Parquet or CSV) and the arrays beside it (npz), from the trials kept on disk.
-
-All three hold results only, in the order of the trials: a study gives the same bytes however it was run.
-"""
+"""Tables as Parquet or CSV files, their columns described: results only, so that the same rows give the same bytes."""
 
 from __future__ import annotations
 
 import csv
 import json
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-from numpy.typing import NDArray
-
-from warpjld.errors import MissingExtraError, WarpjldError
-from warpjld.study.columns import Column
-from warpjld.study.shards import Shard
+from warpjld.errors import MissingExtraError
+from warpjld.tables.columns import Column
 from warpjld.whole_file import whole_file
 
-__all__ = ["gathered", "read_table", "require_parquet", "write_arrays", "write_csv", "write_parquet"]
+__all__ = ["read_table", "require_parquet", "write_csv", "write_parquet"]
 
 _PURPOSE = "a Parquet table"
 
@@ -30,31 +23,6 @@ def require_parquet() -> None:
         import pyarrow  # noqa: F401
     except ImportError as error:
         raise MissingExtraError(_PURPOSE, "study") from error
-
-
-def gathered(shards: Iterable[Shard]) -> tuple[list[dict[str, Any]], dict[str, NDArray[Any]]]:
-    """Rows in trial order, and per array name the trials that have it stacked, with their numbers as ``NAME.trials``.
-
-    Raises:
-        WarpjldError: One name with two shapes.
-    """
-    rows: list[dict[str, Any]] = []
-    stacks: dict[str, list[NDArray[Any]]] = {}
-    owners: dict[str, list[int]] = {}
-    for shard in shards:
-        rows.append(shard.row)
-        for name, array in shard.arrays.items():
-            stack = stacks.setdefault(name, [])
-            if stack and (stack[0].shape != array.shape or stack[0].dtype != array.dtype):
-                shapes = f"{array.shape} in trial {shard.trial}, {stack[0].shape} before"
-                raise WarpjldError(f"array '{name}' has two shapes or types: {shapes}")
-            stack.append(array)
-            owners.setdefault(name, []).append(shard.trial)
-    arrays: dict[str, NDArray[Any]] = {}
-    for name in sorted(stacks):
-        arrays[name] = np.stack(stacks[name])
-        arrays[f"{name}.trials"] = np.array(owners[name], dtype=np.int64)
-    return rows, arrays
 
 
 def write_parquet(path: Path, rows: Sequence[dict[str, Any]], columns: Sequence[Column]) -> None:
@@ -85,13 +53,6 @@ def write_csv(
             writer.writerow([_cell(row[c.name]) for c in columns])
     about = [{"name": c.name, "type": c.kind, "unit": c.unit, "description": c.about} for c in columns]
     path.with_name(described).write_text(json.dumps(about, indent=1, ensure_ascii=False) + "\n", "utf-8")
-
-
-def write_arrays(path: Path, arrays: dict[str, NDArray[Any]]) -> None:
-    """Write a NumPy archive (npz)."""
-    with whole_file(path) as part, part.open("wb") as file:
-        # numpy dates the archive's members 1980, so bytes do not depend on the clock
-        np.savez_compressed(file, allow_pickle=False, **arrays)
 
 
 def read_table(path: Path) -> list[dict[str, Any]]:

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
-from warpjld.io.motion_out.local_motion import LocalMotion, local_motion, rest_scales
+from warpjld.motion.out.local_motion import LocalMotion, local_motion, rest_scales
 
 PARENTS = np.array([2, 0, -1, 2, 3])  # in no order
 ALL = np.ones(5, dtype=bool)

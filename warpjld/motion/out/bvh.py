@@ -16,10 +16,10 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
-from warpjld.io.motion_out.euler import ContinuousEuler
-from warpjld.io.motion_out.source_motion import SourceMotion, source_motion
-from warpjld.io.motion_out.write import Timing, WrittenMotion
 from warpjld.listed import first_few
+from warpjld.motion.out.euler import ContinuousEuler
+from warpjld.motion.out.source_motion import SourceMotion, source_motion
+from warpjld.motion.out.write import Timing, WrittenMotion
 from warpjld.rig import Rig
 from warpjld.rotations import conjugate, multiply, rotate
 from warpjld.skeleton import Poses
@@ -45,7 +45,7 @@ class _Joint:
 
 
 def write_bvh(path: Path, rig: Rig, poses: Poses, timing: Timing) -> WrittenMotion:
-    """Write a motion of a rig's own joints as BVH; a :class:`~warpjld.io.motion_out.write.Writer`.
+    """Write a motion of a rig's own joints as BVH; a :class:`~warpjld.motion.out.write.Writer`.
 
     BVH holds one hierarchy, so several roots get one above them, at the origin.
     """

@@ -9,12 +9,12 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from warpjld import __version__
-from warpjld.io.motion_out.baked_skin import BakedSkin
-from warpjld.io.motion_out.glb_file import ARRAY_BUFFER, ELEMENT_ARRAY_BUFFER, GlbFile
-from warpjld.io.motion_out.local_motion import nearest_rotations
-from warpjld.io.motion_out.node_tree import NodeTree
-from warpjld.io.motion_out.skin_weights import joint_weights
-from warpjld.io.motion_out.source_motion import SourceMotion
+from warpjld.motion.out.baked_skin import BakedSkin
+from warpjld.motion.out.glb_file import ARRAY_BUFFER, ELEMENT_ARRAY_BUFFER, GlbFile
+from warpjld.motion.out.local_motion import nearest_rotations
+from warpjld.motion.out.node_tree import NodeTree
+from warpjld.motion.out.skin_weights import joint_weights
+from warpjld.motion.out.source_motion import SourceMotion
 from warpjld.normals import vertex_normals
 from warpjld.rig import Rig
 

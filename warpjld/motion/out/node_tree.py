@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
-from warpjld.io.motion_out.local_motion import nearest_rotations
+from warpjld.motion.out.local_motion import nearest_rotations
 
 __all__ = ["NodeTree"]
 

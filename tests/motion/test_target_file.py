@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from warpjld.errors import InputError
-from warpjld.io.target_file import read_targets
+from warpjld.motion.target_file import read_targets
 from warpjld.rig import Rig
 from warpjld.skeleton import CHANNELS, poses_from_angles
 

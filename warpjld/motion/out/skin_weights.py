@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from warpjld.io.motion_out.source_motion import SourceMotion
+from warpjld.motion.out.source_motion import SourceMotion
 from warpjld.rig import Rig, Skin
 from warpjld.skeleton import Skeleton
 

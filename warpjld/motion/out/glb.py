@@ -14,14 +14,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from warpjld.io.motion_out.baked_skin import BakedSkin
-from warpjld.io.motion_out.glb_file import GlbFile
-from warpjld.io.motion_out.gltf_new import new_document
-from warpjld.io.motion_out.gltf_own import own_document
-from warpjld.io.motion_out.local_motion import local_motion
-from warpjld.io.motion_out.node_tree import NodeTree
-from warpjld.io.motion_out.source_motion import SourceMotion, source_motion
-from warpjld.io.motion_out.write import Timing, WrittenMotion
+from warpjld.motion.out.baked_skin import BakedSkin
+from warpjld.motion.out.glb_file import GlbFile
+from warpjld.motion.out.gltf_new import new_document
+from warpjld.motion.out.gltf_own import own_document
+from warpjld.motion.out.local_motion import local_motion
+from warpjld.motion.out.node_tree import NodeTree
+from warpjld.motion.out.source_motion import SourceMotion, source_motion
+from warpjld.motion.out.write import Timing, WrittenMotion
 from warpjld.rig import Rig
 from warpjld.skeleton import Poses
 
@@ -32,7 +32,7 @@ _SHEARED = 1e-3  # of a joint's scale
 
 
 def write_glb(path: Path, rig: Rig, poses: Poses, timing: Timing) -> WrittenMotion:
-    """Write a motion of a rig's own joints as binary glTF; a :class:`~warpjld.io.motion_out.write.Writer`."""
+    """Write a motion of a rig's own joints as binary glTF; a :class:`~warpjld.motion.out.write.Writer`."""
     motion = source_motion(rig, poses)
     notes = list(motion.notes)
     warnings: list[str] = []

@@ -10,9 +10,9 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from warpjld.errors import InputError
-from warpjld.io.motion_out.write import Timing, WrittenMotion
 from warpjld.motion.hand_motion import IDENTITY
 from warpjld.motion.mano_rest import MANO_DIGITS, MANO_JOINTS, mano_rest
+from warpjld.motion.out.write import Timing, WrittenMotion
 from warpjld.rig import Rig
 from warpjld.rotations import conjugate, multiply
 from warpjld.skeleton import Poses, Skeleton
@@ -21,7 +21,7 @@ __all__ = ["hand_parameters", "write_mano"]
 
 
 def write_mano(path: Path, rig: Rig, poses: Poses, timing: Timing) -> WrittenMotion:
-    """Write a hand's motion as MANO-family parameters; a :class:`~warpjld.io.motion_out.write.Writer`.
+    """Write a hand's motion as MANO-family parameters; a :class:`~warpjld.motion.out.write.Writer`.
 
     Fields: ``global_orient`` (F, 3) and ``hand_pose`` (F, 45), axis-angle [rad]; ``transl`` (F, 3), where the wrist is
     [m]; ``joint_order`` (15 names), ``side``, ``fps``, ``flat_hand_mean`` (true: no rotation is the flat hand) and

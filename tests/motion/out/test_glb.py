@@ -13,12 +13,12 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from tests.io.motion_out.gltf_reader import chunks, evaluate, skinned
+from tests.motion.out.gltf_reader import chunks, evaluate, skinned
 from warpjld.errors import InputError
 from warpjld.io import load_rig
-from warpjld.io.motion_out import source_motion, write_motion
 from warpjld.io.skeleton_file import write_skeleton_file
 from warpjld.motion import open_motion
+from warpjld.motion.out import source_motion, write_motion
 from warpjld.rig import Rig, Skin
 from warpjld.skeleton import Poses, poses_from_rotations, poses_from_world
 
@@ -105,7 +105,7 @@ def test_only_joints_that_stray_are_translated(
 def test_turns_are_interpolated_the_short_way(
     write_glb: Callable[..., Path], hand_glb: Callable[..., Any], tmp_path: Path
 ) -> None:
-    from tests.io.motion_out.gltf_reader import array
+    from tests.motion.out.gltf_reader import array
 
     rig = load_rig(write_glb(hand_glb(), tmp_path / "rig.glb"))
     poses = turning(rig, 40)

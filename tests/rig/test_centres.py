@@ -9,8 +9,8 @@ from scipy.spatial.transform import Rotation
 from warpjld.motion.joint_animation import JointAnimation
 from warpjld.motion.own_joints import own_poses
 from warpjld.rig import Rig
+from warpjld.rig.centres import joint_centres, with_centred_joints
 from warpjld.skeleton import Skeleton, default_limits
-from warpjld.skeleton.centres import joint_centres, with_centred_joints
 from warpjld.skeleton.recognise.tree import SourceTree
 from warpjld.surface import weld_surface
 

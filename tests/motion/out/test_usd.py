@@ -14,9 +14,9 @@ from scipy.spatial.transform import Rotation
 
 from warpjld.errors import InputError, MissingExtraError
 from warpjld.io import load_rig
-from warpjld.io.motion_out import source_motion, write_motion
-from warpjld.io.motion_out.skin_weights import joint_weights
 from warpjld.motion import load_motion
+from warpjld.motion.out import source_motion, write_motion
+from warpjld.motion.out.skin_weights import joint_weights
 from warpjld.rig import Rig
 from warpjld.skeleton import Poses, poses_from_rotations
 
@@ -180,7 +180,7 @@ def test_rotations_take_the_short_way(hands: dict[str, Rig], tmp_path: Path) -> 
 
 
 def test_nothing_is_left_of_a_failure(hands: dict[str, Rig], tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("warpjld.io.motion_out.usd.joint_weights", lambda *_: 1 / 0)
+    monkeypatch.setattr("warpjld.motion.out.usd.joint_weights", lambda *_: 1 / 0)
     with pytest.raises(ZeroDivisionError):
         write_motion(tmp_path / "a.usdc", hands["left"], moving(hands["left"]), rate=RATE)
     assert list(tmp_path.iterdir()) == []

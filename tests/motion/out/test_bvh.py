@@ -12,11 +12,11 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation, Slerp
 
-from tests.io.motion_out.bvh_reader import evaluate
+from tests.motion.out.bvh_reader import evaluate
 from warpjld.io import load_rig
-from warpjld.io.motion_out import write_motion
-from warpjld.io.motion_out.euler import ContinuousEuler
 from warpjld.motion.bvh import read_bvh
+from warpjld.motion.out import write_motion
+from warpjld.motion.out.euler import ContinuousEuler
 from warpjld.rig import Rig
 from warpjld.skeleton import Poses, poses_from_rotations, poses_from_world, rest_poses
 

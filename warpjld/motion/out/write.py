@@ -117,7 +117,7 @@ def write_motion(
     check_motion_out(path)
     timing = Timing(rate, start_frame, path.stem if name is None else name)
     module, function = _WRITERS[path.suffix.lower()]
-    write: Writer = getattr(import_module(f"warpjld.io.motion_out.{module}"), function)
+    write: Writer = getattr(import_module(f"warpjld.motion.out.{module}"), function)
     make_folder(path.parent)
     try:
         with whole_file(path) as part:
