@@ -17,7 +17,3 @@ def unique_names(names: Sequence[str]) -> list[str]:
             chosen = f"{name}#{number}"
         out.append(chosen)
     return out
-
-
-_GLTF = ("warpjld.motion.gltf_animation", "gltf_animation_names")
-_USD = ("warpjld.motion.usd_animation", "usd_animation_names")

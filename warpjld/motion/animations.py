@@ -48,6 +48,8 @@ def choose_animation(wanted: str | None, names: tuple[str, ...], path: Path) -> 
     raise InputError(f"no animation '{wanted}' in this file{one_of(wanted, names)}", path=path)
 
 
+_GLTF = ("warpjld.motion.gltf_animation", "gltf_animation_names")
+_USD = ("warpjld.motion.usd_animation", "usd_animation_names")
 _LISTERS = {
     ".glb": _GLTF,
     ".gltf": _GLTF,
