@@ -52,7 +52,7 @@ def press(
         times: Rising times above 0 (above ``after``'s) to find equilibria at.
         after: Contact and displacement to go on from.
         method: ``augmented`` (Lagrangian, on bodies and contact together), or ``paper``: objects repelled by the skin
-            and released, in turns (R113; ``warpjld.fem.contact.paper.loop`` says when it settles). The slave is repelled.
+            and released, in turns (R113; ``contact.paper.loop`` says when it settles). The slave is repelled.
         aitken: Relax the paper's loop.
         tolerance: Residual over the forces that balance.
         penetration: Overlap left, as a share of an edge.
