@@ -8,8 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from warpjld.fem.contact.facets import Facets
-from warpjld.fem.contact.obstacles import Touching
+from warpjld.fem.contact.obstacles.facets import Facets
+from warpjld.fem.contact.obstacles.obstacle import Touching
 from warpjld.press.skin_parts import SkinParts
 
 __all__ = ["Over", "over", "within_itself"]

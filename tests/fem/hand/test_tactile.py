@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from warpjld.errors import InputError
 from warpjld.fem.contact import Pair
-from warpjld.fem.contact.imprint import Imprint, skin_around
+from warpjld.fem.contact.results.nodal_contact import Imprint, skin_around
 from warpjld.fem.hand import FleshHand
 from warpjld.fem.hand.tactile import tactile_of
 from warpjld.fem.hand.tactile_files import TACTILE_COLUMNS, draw_tactile, write_tactile
