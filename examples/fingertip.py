@@ -21,10 +21,10 @@ import numpy as np
 
 from warpjld.fem import Body, prescribe
 from warpjld.fem.contact import Pair, press
-from warpjld.fem.contact.solids import Plane
+from warpjld.fem.contact.obstacles.solids import Plane
 from warpjld.fem.hand import hand_laws
 from warpjld.fem.hand.fingertip import Fingertip, build_fingertip
-from warpjld.fem.vtk import grid_of
+from warpjld.fem.output.vtk import grid_of
 from warpjld.hand import build_hand
 
 ENOUGH = 5.0  # N

@@ -13,9 +13,9 @@ import numpy as np
 
 from warpjld.cli.rig_argument import open_rig
 from warpjld.fem import Body, LinearElastic, Loads, solve
-from warpjld.fem.flesh import flesh_of
-from warpjld.fem.pictures import draw
-from warpjld.fem.vtk import write_vtu
+from warpjld.fem.mesh.flesh import flesh_of
+from warpjld.fem.output.pictures import draw
+from warpjld.fem.output.vtk import write_vtu
 
 
 def main(rig_name: str, folder: Path, spacing: float) -> float:

@@ -55,7 +55,7 @@ def draw(path: Path, holding: Holding, grip: float, title: str) -> None:
     from matplotlib.collections import PolyCollection
     from matplotlib.figure import Figure
 
-    from warpjld.fem.vtk import grid_of
+    from warpjld.fem.output.vtk import grid_of
 
     instants = holding.found[grip].instants
     figure = Figure(figsize=(10.0, 5.0), dpi=120, layout="constrained")

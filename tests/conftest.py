@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 
 import pytest
 
+from tests.glb_files import hand_glb, write_glb  # noqa: F401
 from warpjld.rig import Rig
 
 if TYPE_CHECKING:

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from warpjld.cli import main
-from warpjld.fem.contact.facets import Facets
+from warpjld.fem.contact.obstacles.facets import Facets
 from warpjld.script import Interpreter, Scene, all_commands
 from warpjld.script.outputs import Picture
 from warpjld.script.plugin import load_commands

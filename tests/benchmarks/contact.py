@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 
 from warpjld.fem import Body, HexMesh, LinearElastic, Prescribed, ball, prescribe
 from warpjld.fem.contact import Pair, press
-from warpjld.fem.contact.solids import Plane
+from warpjld.fem.contact.obstacles.solids import Plane
 from warpjld.quiet import silence_warp
 
 TRAVEL, POISSON = 0.2, 0.3

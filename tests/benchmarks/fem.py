@@ -21,8 +21,8 @@ from typing import Any
 import numpy as np
 
 from warpjld.fem import Body, HexMesh, LinearElastic, box, finger, prescribe
-from warpjld.fem.linear import LinearSolver
-from warpjld.fem.prescribed import rigid_modes
+from warpjld.fem.load.prescribed import rigid_modes
+from warpjld.fem.solver.linear import LinearSolver
 from warpjld.quiet import silence_warp
 
 CASES: dict[str, tuple[Callable[[], HexMesh], float, str]] = {

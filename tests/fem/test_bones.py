@@ -10,13 +10,13 @@ import trimesh
 from numpy.typing import NDArray
 
 from warpjld.fem import Body, Fung, HexMesh, box, prescribe
-from warpjld.fem.bones import Bone, claimed, fitted
 from warpjld.fem.contact import Pair, press
-from warpjld.fem.contact.solids import Plane
-from warpjld.fem.envelope import Envelope
-from warpjld.fem.fit import fit_mesh
-from warpjld.fem.hexmesh import elements_of
-from warpjld.fem.loads import volumes
+from warpjld.fem.contact.obstacles.solids import Plane
+from warpjld.fem.load.loads import volumes
+from warpjld.fem.mesh.bones import Bone, claimed, fitted
+from warpjld.fem.mesh.envelope import Envelope
+from warpjld.fem.mesh.fit import fit_mesh
+from warpjld.fem.mesh.hexmesh import elements_of
 
 RADIUS, LENGTH = 7e-3, 0.04
 """Of a cylinder of flesh along z [m]."""

@@ -10,7 +10,7 @@ import pytest
 
 from warpjld.errors import InputError
 from warpjld.fem import Body, LinearElastic, Loads, solve
-from warpjld.fem.flesh import flesh_of
+from warpjld.fem.mesh.flesh import flesh_of
 from warpjld.io import load_rig
 from warpjld.skeleton import poses_from_angles
 
@@ -74,6 +74,6 @@ def test_coarse_elements_fill_every_finger(spacing: float) -> None:
 
 
 def _volume(mesh):  # type: ignore[no-untyped-def]
-    from warpjld.fem.loads import volumes
+    from warpjld.fem.load.loads import volumes
 
     return volumes(mesh).sum(axis=1)

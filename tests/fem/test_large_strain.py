@@ -21,8 +21,8 @@ from warpjld.fem import (
     prescribe,
     solve,
 )
-from warpjld.fem.loads import external_forces, subtract_pressure_stiffness
-from warpjld.fem.stress import cauchy
+from warpjld.fem.load.loads import external_forces, subtract_pressure_stiffness
+from warpjld.fem.output.stress import cauchy
 
 pytestmark = pytest.mark.filterwarnings("ignore::warpjld.fem.MaterialWarning")
 

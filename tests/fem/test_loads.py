@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from warpjld.fem import Body, Centrifugal, LinearElastic, Loads, NeoHooke, ball, box, prescribe, solve
-from warpjld.fem.loads import external_forces
-from warpjld.fem.stress import cauchy, mises
+from warpjld.fem.load.loads import external_forces
+from warpjld.fem.output.stress import cauchy, mises
 
 
 def test_column_under_its_own_weight() -> None:

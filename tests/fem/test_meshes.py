@@ -11,10 +11,10 @@ import trimesh
 
 from warpjld.errors import InputError
 from warpjld.fem import Body, HexMesh, LinearElastic, Loads, ball, box, cylinder, finger, merge, prescribe, solve
-from warpjld.fem.embedding import embed
-from warpjld.fem.envelope import Envelope
-from warpjld.fem.fit import fit_mesh
-from warpjld.fem.voxels import make_manifold
+from warpjld.fem.mesh.embedding import embed
+from warpjld.fem.mesh.envelope import Envelope
+from warpjld.fem.mesh.fit import fit_mesh
+from warpjld.fem.mesh.voxels import make_manifold
 
 
 def volume(mesh: HexMesh) -> float:
@@ -133,7 +133,7 @@ def test_manifold_cells() -> None:
     cells[2:-2, 2:-2, 2:-2] = rng.random((10, 10, 10)) < 0.6
     kept = make_manifold(cells)
     assert not (kept & ~cells).any()
-    from warpjld.fem.hexmesh import elements_of
+    from warpjld.fem.mesh.hexmesh import elements_of
 
     grid = elements_of(np.arange(15**3, dtype=np.int32).reshape(15, 15, 15))[kept.ravel()]
     used, corners = np.unique(grid, return_inverse=True)
@@ -165,7 +165,7 @@ def test_embedded_points_follow_a_linear_field_exactly() -> None:
 @pytest.mark.parametrize("suffix", [".vtu", ".inp", ".msh"])
 def test_exchange(tmp_path: Path, suffix: str) -> None:
     pytest.importorskip("meshio")
-    from warpjld.fem.exchange import read_mesh, write_mesh
+    from warpjld.fem.mesh.exchange import read_mesh, write_mesh
 
     mesh = ball(1.0, n=2)
     write_mesh(tmp_path / f"ball{suffix}", mesh)
@@ -176,7 +176,7 @@ def test_exchange(tmp_path: Path, suffix: str) -> None:
 
 def test_tetrahedra_are_read_as_degenerate_hexahedra(data: Path) -> None:
     pytest.importorskip("meshio")
-    from warpjld.fem.exchange import read_mesh
+    from warpjld.fem.mesh.exchange import read_mesh
 
     path = next((data / "bell_pepper").glob("*.vtk"))
     mesh = read_mesh(path)

@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 
 from warpjld.fem import Body, HexMesh, LinearElastic, ball, box, finger, prescribe
-from warpjld.fem.galerkin import coarse_matrix
-from warpjld.fem.hierarchy import hierarchy_of
-from warpjld.fem.linear import LinearSolver
-from warpjld.fem.multigrid import Multigrid
+from warpjld.fem.solver.galerkin import coarse_matrix
+from warpjld.fem.solver.hierarchy import hierarchy_of
+from warpjld.fem.solver.linear import LinearSolver
+from warpjld.fem.solver.multigrid import Multigrid
 
 
 def iterations(mesh: HexMesh, poisson: float, fixed: str, precision: str = "float64") -> int:

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from warpjld.fem import Body, HexMesh, LinearElastic, Loads, ball, box, cylinder, prescribe, solve
-from warpjld.fem.prescribed import Prescribed
+from warpjld.fem.load.prescribed import Prescribed
 
 pytestmark = pytest.mark.filterwarnings("ignore::warpjld.fem.MaterialWarning")
 
@@ -118,7 +118,7 @@ def test_locking_without_mean_dilatation() -> None:
 
 def test_convergence_rates() -> None:
     """Manufactured solution on a distorted box: error in u falls as h² (L2), in its gradient as h (H1)."""
-    from warpjld.fem.shape import POINTS, shape_at, slope_at
+    from warpjld.fem.mesh.shape import POINTS, shape_at, slope_at
 
     young, poisson = 1.0, 0.3
     shear = young / (2 * (1 + poisson))

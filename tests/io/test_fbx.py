@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from tests.io.conftest import Glb
+from tests.glb_files import Glb
 from tests.io.fbx_text import Fbx, Mesh
 from warpjld.errors import InputError, MissingExtraError
 from warpjld.io import load_rig

@@ -252,7 +252,7 @@ def test_alembic_has_seams_by_corner(cube: Surface, tmp_path: Path) -> None:
 def test_a_textured_tubes_seam_survives_a_skinned_export(tmp_path: Path) -> None:
     """A rig from OBJ and skeleton file → a USD with a skeleton, read again: vertices and seams as they were."""
     pytest.importorskip("pxr", reason="the extra 'usd' is not installed")
-    from warpjld.io.motion_out.write import write_motion
+    from warpjld.motion.out.write import write_motion
     from warpjld.skeleton import rest_poses
 
     rig = load_rig(seamed_tube(tmp_path), skeleton=tmp_path / "tube.json", unit="m")

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from tests.io.conftest import Glb
+from tests.glb_files import Glb
 from tests.io.vrm_files import BONES, CANONICAL, HAIR, animation, avatar, with_humanoid
 from warpjld.errors import InputError
 from warpjld.io import load_rig

@@ -8,7 +8,7 @@ import numpy as np
 import pygltflib as gl
 from scipy.spatial.transform import Rotation
 
-from tests.io.conftest import Glb
+from tests.glb_files import Glb
 
 _HALF = {  # the left half: bone → its parent and where it is [m]
     "Shoulder": ("upperChest", (0.05, 1.45, 0.0)),

@@ -14,9 +14,9 @@ from tests.motion.hand_files import POSTURES, postures, save
 from tests.motion.skeletons import hand, rig, with_forearm
 from warpjld.errors import InputError
 from warpjld.io import load_rig
-from warpjld.io.motion_out import write_motion
 from warpjld.motion import open_motion
 from warpjld.motion.hand_file import read_hands
+from warpjld.motion.out import write_motion
 from warpjld.skeleton import Poses, Skeleton, default_limits, hand_joint_names, rest_poses
 from warpjld.skeleton.hand import HAND_PARENTS
 

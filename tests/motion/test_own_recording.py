@@ -14,10 +14,10 @@ from tests.motion.skeletons import rig as rigged
 from tests.motion.skinned_files import animal, write
 from tests.motion.test_own_animation import FBX, TURNED, gait
 from warpjld.io import load_rig
-from warpjld.io.motion_out import write_motion
 from warpjld.motion import open_motion
 from warpjld.motion.bvh import read_bvh
 from warpjld.motion.clip import Clip
+from warpjld.motion.out import write_motion
 from warpjld.motion.own_joints import own_poses
 from warpjld.motion.own_recording import own_recording, with_own_joints
 from warpjld.rig import Rig

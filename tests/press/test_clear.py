@@ -11,9 +11,9 @@ import trimesh
 from tests.fem.contact.bodies import lid
 from warpjld.fem import Body, LinearElastic, ball, prescribe
 from warpjld.fem.contact import Pair, press
-from warpjld.fem.contact.facets import Facets
-from warpjld.fem.contact.solids import Plane
-from warpjld.fem.embedding import embed
+from warpjld.fem.contact.obstacles.facets import Facets
+from warpjld.fem.contact.obstacles.solids import Plane
+from warpjld.fem.mesh.embedding import embed
 from warpjld.press.clear import Shown, clear
 from warpjld.press.outside import outside, outside_of_nodes
 from warpjld.press.overlap import SurfacePart

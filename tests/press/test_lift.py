@@ -13,10 +13,10 @@ from numpy.typing import NDArray
 
 from warpjld.fem import Body, LinearElastic, Prescribed, box, merge, prescribe
 from warpjld.fem.contact import ContactSolution, Pair, press
-from warpjld.fem.contact.solids import Plane
+from warpjld.fem.contact.obstacles.solids import Plane
 from warpjld.fem.hand.grip import GripStatus, Outcome, gentlest_grip
-from warpjld.fem.hexmesh import HexMesh
-from warpjld.fem.loads import Loads
+from warpjld.fem.load.loads import Loads
+from warpjld.fem.mesh.hexmesh import HexMesh
 from warpjld.press.bodies import Bodies, PairOf
 from warpjld.press.lift import Lift
 from warpjld.press.wishes import GripWish

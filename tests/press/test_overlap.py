@@ -7,7 +7,7 @@ import pytest
 import trimesh
 
 from warpjld.covering import bind
-from warpjld.fem.contact.facets import Facets
+from warpjld.fem.contact.obstacles.facets import Facets
 from warpjld.fem.hand.flesh_hand import build_flesh_hand
 from warpjld.press.clear import Shown, clear
 from warpjld.press.overlap import SurfacePart, within_itself

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from warpjld.errors import InputError
-from warpjld.fem.contact.solids import Box, Plane, Sphere
+from warpjld.fem.contact.obstacles.solids import Box, Plane, Sphere
 from warpjld.press.passing import half_thickness, way_past
 from warpjld.script import Scene
 from warpjld.script.pressing import run_press

@@ -9,8 +9,8 @@ import pytest
 import trimesh
 
 from warpjld.fem import HexMesh, ball, merge
-from warpjld.fem.contact.imprint import skin_around
-from warpjld.fem.embedding import Embedding, embed
+from warpjld.fem.contact.results.nodal_contact import skin_around
+from warpjld.fem.mesh.embedding import Embedding, embed
 from warpjld.press.finer import finer
 from warpjld.press.pressure_map import pressure_map
 

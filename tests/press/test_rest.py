@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from warpjld.covering import Covering, bind
-from warpjld.fem.contact.facets import Facets
+from warpjld.fem.contact.obstacles.facets import Facets
 from warpjld.fem.hand.flesh_hand import FleshHand, build_flesh_hand
 from warpjld.io import load_rig
 from warpjld.press.rest import part_of, posed

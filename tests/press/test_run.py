@@ -198,7 +198,7 @@ def test_frames_solved_but_not_made_are_noted(run: Callable[[str], Scene], tmp_p
 
 
 def test_a_free_ball_settles_between_what_closes_on_it() -> None:
-    from warpjld.fem.contact.solids import Plane
+    from warpjld.fem.contact.obstacles.solids import Plane
     from warpjld.grasp.shapes import ball
 
     thing = ball(0.02)

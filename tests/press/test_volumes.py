@@ -8,7 +8,7 @@ import trimesh
 
 from warpjld.errors import InputError
 from warpjld.fem import Body, Loads, Prescribed, solve
-from warpjld.fem.loads import volumes
+from warpjld.fem.load.loads import volumes
 from warpjld.grasp import GraspObject, Places, make_object
 from warpjld.grasp.shapes import ball, box, cylinder, glass
 from warpjld.press.matter import Physical

@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 
 from warpjld.errors import InputError
-from warpjld.fem.contact.barr import Barr
-from warpjld.fem.contact.meshes import Keyframed
-from warpjld.fem.contact.solids import Box, Sphere
+from warpjld.fem.contact.obstacles.barr import Barr
+from warpjld.fem.contact.obstacles.meshes import Keyframed
+from warpjld.fem.contact.obstacles.solids import Box, Sphere
 from warpjld.press.grips import FoundGrip
 from warpjld.press.state_variables import Points
 from warpjld.script.press_bodies import prop_obstacle

@@ -7,9 +7,9 @@ import json
 import numpy as np
 import pytest
 
-from tests.io.motion_out.bvh_reader import evaluate
+from tests.motion.out.bvh_reader import evaluate
 from warpjld.errors import InputError
-from warpjld.io.motion_out import write
+from warpjld.motion.out import write
 from warpjld.script.runner import run_scene
 from warpjld.script.staging import frame_numbers, stage
 

@@ -16,7 +16,7 @@ import pytest
 from tests.study.dice import Dice
 from warpjld.errors import InputError, MissingExtraError
 from warpjld.study import rerun_trial, run_study
-from warpjld.study.table import read_table
+from warpjld.tables.files import read_table
 
 _ROOT = Path(__file__).resolve().parents[2]
 _RESULTS = ("table.parquet", "table.csv", "poses.npz")

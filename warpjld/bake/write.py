@@ -13,9 +13,9 @@ from numpy.typing import NDArray
 from warpjld.bake.baked import Baked
 from warpjld.errors import InputError
 from warpjld.folders import make_folder
-from warpjld.io.motion_out.baked_skin import BakedSkin
-from warpjld.io.motion_out.source_motion import source_motion
-from warpjld.io.motion_out.write import Timing, WrittenMotion, check_motion_out
+from warpjld.motion.out.baked_skin import BakedSkin
+from warpjld.motion.out.source_motion import source_motion
+from warpjld.motion.out.write import Timing, WrittenMotion, check_motion_out
 from warpjld.skeleton.kinematics import Poses, rest_poses
 from warpjld.whole_file import whole_file
 
@@ -82,11 +82,11 @@ def write_baked(path: Path, baked: Baked, clip: Poses | None = None, *, rate: fl
                 part.write_text(json.dumps(_drivers(baked, targets), indent=1), "utf-8")
         with whole_file(path) as part:
             if path.suffix.lower() != ".glb":
-                from warpjld.io.motion_out.usd import write_usd
+                from warpjld.motion.out.usd import write_usd
 
                 return write_usd(part, baked.rig, poses, timing, skin)
-            from warpjld.io.motion_out.glb import animate
-            from warpjld.io.motion_out.gltf_new import new_document
+            from warpjld.motion.out.glb import animate
+            from warpjld.motion.out.gltf_new import new_document
 
             notes, warnings = list(motion.notes), list[str]()
             file, nodes = new_document(baked.rig, motion, notes, skin)

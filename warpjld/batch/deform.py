@@ -107,7 +107,7 @@ def deform_clip(
     from contextlib import ExitStack
 
     from warpjld.io.caches import open_cache
-    from warpjld.io.motion_out import write_motion
+    from warpjld.motion.out import write_motion
 
     rig = how.rig
     moved = open_motion(motion, rig, animation=animation, **how.reading)

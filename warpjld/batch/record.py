@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from warpjld.io.identity import content_hash
-from warpjld.study.manifest import file_hash, write_json
+from warpjld.manifest import file_hash, write_json
 
 __all__ = ["FOLDER", "ClipRecord", "read_record", "still_there", "write_record"]
 

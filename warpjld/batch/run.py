@@ -16,8 +16,8 @@ from warpjld.batch.work import BatchWork
 from warpjld.errors import InputError
 from warpjld.folder_lock import locked_folder
 from warpjld.folders import make_folder
+from warpjld.manifest import fingerprint, write_json
 from warpjld.processes import run_jobs
-from warpjld.study.manifest import fingerprint, write_json
 from warpjld.threads import cores
 
 __all__ = ["BatchResult", "run_batch"]

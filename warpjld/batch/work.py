@@ -11,7 +11,7 @@ from warpjld.batch.deform import Deforming, deform_clip
 from warpjld.batch.record import ClipRecord, read_record, write_record
 from warpjld.errors import WarpjldError
 from warpjld.io.identity import content_hash
-from warpjld.study.manifest import file_hash
+from warpjld.manifest import file_hash
 
 __all__ = ["BatchWork"]
 

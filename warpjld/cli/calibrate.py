@@ -160,7 +160,7 @@ def _fitted(
 ) -> tuple[dict[str, Any], list[str], Parameters]:
     from warpjld.cli.warn import warn
     from warpjld.covering.fit_targets import fit_targets
-    from warpjld.io.target_file import read_targets
+    from warpjld.motion.target_file import read_targets
 
     wanted = read_targets(targets, rig, motion=motion)
     warn(wanted.warnings)

@@ -14,7 +14,7 @@ from warpjld.cli.deform_wanted import Wanted, count, deforming, tell_rig
 from warpjld.cli.warn import warn
 from warpjld.errors import InputError
 from warpjld.io.caches import FORMATS
-from warpjld.io.motion_out import MOTION_OUT
+from warpjld.motion.out import MOTION_OUT
 from warpjld.overwriting import check_outputs
 
 if TYPE_CHECKING:
@@ -134,7 +134,7 @@ def _single(wanted: Wanted, job: ClipJob) -> None:
     from warpjld.batch import deform_clip
     from warpjld.cli.progress import progress
     from warpjld.io.caches import check_cache
-    from warpjld.io.motion_out import check_motion_out
+    from warpjld.motion.out import check_motion_out
 
     began = time.perf_counter()
     surfaces = () if wanted.out is None else (wanted.out,)

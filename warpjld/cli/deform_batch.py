@@ -21,7 +21,7 @@ def make_batch(wanted: Wanted, jobs: list[ClipJob]) -> None:
     from warpjld.batch import run_batch
     from warpjld.cli.progress import progress
     from warpjld.io.caches import check_cache
-    from warpjld.io.motion_out import check_motion_out
+    from warpjld.motion.out import check_motion_out
 
     assert wanted.out is not None
     for suffix in wanted.formats:

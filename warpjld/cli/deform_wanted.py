@@ -75,7 +75,7 @@ class Wanted:
     def settings(self) -> dict[str, Any]:
         """All that determines a batch's files besides the motions."""
         from warpjld.io.identity import content_hash
-        from warpjld.study.manifest import versions
+        from warpjld.manifest import versions
 
         files = {"rig": Path(self.rig), "parameters": self.parameters} | {
             name: value for name, value in self.how.items() if isinstance(value, Path)

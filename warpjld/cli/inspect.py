@@ -72,7 +72,7 @@ def command(
 
 def _report(rig: Rig) -> dict[str, Any]:
     from warpjld.motion.animations import animation_names
-    from warpjld.skeleton.centres import joint_centres
+    from warpjld.rig.centres import joint_centres
     from warpjld.skeleton.recognise.placing import check_placing
 
     skeleton, surface = rig.skeleton, rig.surface

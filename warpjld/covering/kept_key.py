@@ -29,7 +29,7 @@ _MODULES = (
     "lazily.py",
     "listed.py",
     "normals.py",
-    "rig.py",
+    "rig/*.py",
     "rotations.py",
     "scales.py",
     "spread.py",

@@ -1,15 +1,15 @@
 """Finite elements: hexahedral meshes, materials, loads, and solvers that say how they ended (B §3, R91–R107)."""
 
-from warpjld.fem.ball import ball, cylinder, finger
 from warpjld.fem.body import Body
-from warpjld.fem.box import box
-from warpjld.fem.conjugate import Status
-from warpjld.fem.hexmesh import HexMesh, merge
-from warpjld.fem.loads import Centrifugal, Loads
-from warpjld.fem.materials import Fung, LinearElastic, Material, MaterialWarning, MooneyRivlin, NeoHooke
-from warpjld.fem.prescribed import FreeBodyError, Prescribed, prescribe
-from warpjld.fem.solution import Instant, Solution, SolveError
-from warpjld.fem.static import solve
+from warpjld.fem.load.loads import Centrifugal, Loads
+from warpjld.fem.load.prescribed import FreeBodyError, Prescribed, prescribe
+from warpjld.fem.material.materials import Fung, LinearElastic, Material, MaterialWarning, MooneyRivlin, NeoHooke
+from warpjld.fem.mesh.ball import ball, cylinder, finger
+from warpjld.fem.mesh.box import box
+from warpjld.fem.mesh.hexmesh import HexMesh, merge
+from warpjld.fem.solver.conjugate import Status
+from warpjld.fem.solver.solution import Instant, Solution, SolveError
+from warpjld.fem.solver.static import solve
 
 __all__ = [
     "Body",

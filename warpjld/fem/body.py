@@ -9,11 +9,11 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from warpjld.errors import InputError
-from warpjld.fem.blockmatrix import BlockMatrix
-from warpjld.fem.hexmesh import HexMesh
-from warpjld.fem.materials import NEO_HOOKE, Material, laws_of
-from warpjld.fem.pattern import Pattern, batches_of, pattern_of
-from warpjld.fem.rows import grouped, on_rows, threads_of
+from warpjld.fem.launch import grouped, on_rows, threads_of
+from warpjld.fem.material.materials import NEO_HOOKE, Material, laws_of
+from warpjld.fem.mesh.hexmesh import HexMesh
+from warpjld.fem.solver.block_matrix import BlockMatrix
+from warpjld.fem.solver.pattern import Pattern, batches_of, pattern_of
 
 __all__ = ["Body", "Tangent"]
 

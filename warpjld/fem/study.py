@@ -9,11 +9,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from warpjld.fem.body import Body
-from warpjld.fem.hexmesh import HexMesh
-from warpjld.fem.loads import Loads
-from warpjld.fem.prescribed import Prescribed, prescribe
-from warpjld.fem.solution import Instant, Solution
-from warpjld.fem.static import solve
+from warpjld.fem.load.loads import Loads
+from warpjld.fem.load.prescribed import Prescribed, prescribe
+from warpjld.fem.mesh.hexmesh import HexMesh
+from warpjld.fem.solver.solution import Instant, Solution
+from warpjld.fem.solver.static import solve
 
 __all__ = ["Reached", "Step", "Study", "Support"]
 

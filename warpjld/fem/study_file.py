@@ -10,14 +10,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from warpjld.errors import InputError
-from warpjld.fem.ball import ball, cylinder, finger
 from warpjld.fem.body import Body
-from warpjld.fem.box import box
-from warpjld.fem.hexmesh import HexMesh
-from warpjld.fem.linear import METHODS, PRECISIONS
-from warpjld.fem.loads import Centrifugal, Loads, external_forces
-from warpjld.fem.materials import Fung, LinearElastic, Material, MooneyRivlin, NeoHooke
-from warpjld.fem.static import FREE
+from warpjld.fem.load.loads import Centrifugal, Loads, external_forces
+from warpjld.fem.material.materials import Fung, LinearElastic, Material, MooneyRivlin, NeoHooke
+from warpjld.fem.mesh.ball import ball, cylinder, finger
+from warpjld.fem.mesh.box import box
+from warpjld.fem.mesh.hexmesh import HexMesh
+from warpjld.fem.solver.linear import METHODS, PRECISIONS
+from warpjld.fem.solver.static import FREE
 from warpjld.fem.study import Step, Study, Support
 from warpjld.toml_table import TomlTable, read_toml
 
@@ -81,11 +81,11 @@ def _mesh(table: TomlTable) -> tuple[HexMesh, tuple[str, ...]]:
     file = table.folder / (table.text("path") or "")
     scale = table.number("scale", 1.0, above=0.0) or 1.0
     if kind == "file":
-        from warpjld.fem.exchange import read_mesh
+        from warpjld.fem.mesh.exchange import read_mesh
 
         table.finish()
         return read_mesh(file, scale=scale), ()
-    from warpjld.fem.fit import mesh_surface_file
+    from warpjld.fem.mesh.fit import mesh_surface_file
 
     table.needed("spacing")
     spacing = table.number("spacing", above=0.0)

@@ -41,7 +41,7 @@ def load_rig(
         joint_map: Joints stated by hand, which win over what is recognised: a JSON file (see
             :mod:`warpjld.io.joint_map_file`), or what it holds: ``{"left.knee": "LeftShin", "ignore": ["Socket"]}``.
         centre_joints: Whether joints that lie clearly off the middle of a finger's or limb's flesh are moved there (see
-            :mod:`warpjld.skeleton.centres`); the file's own joints stay where they are.
+            :mod:`warpjld.rig.centres`); the file's own joints stay where they are.
 
     Returns:
         Skeleton in canonical names, metres; each hand has its 25 joints, those the file lacks added.
@@ -67,7 +67,7 @@ def load_rig(
     rig = assemble_rig(_read(Path(path), skeleton), side=side, unit=unit, scale=scale, up=up, joint_map=joint_map)
     if not centre_joints:
         return rig
-    from warpjld.skeleton.centres import with_centred_joints
+    from warpjld.rig.centres import with_centred_joints
 
     return with_centred_joints(rig)
 

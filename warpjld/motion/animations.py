@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from pathlib import Path
 
 from warpjld.errors import InputError
 from warpjld.lazily import imported
 from warpjld.suggest import one_of
 
-__all__ = ["animation_names", "choose_animation", "unique_names"]
+__all__ = ["animation_names", "choose_animation"]
 
 
 def animation_names(path: str | Path) -> tuple[str, ...]:
@@ -47,18 +46,6 @@ def choose_animation(wanted: str | None, names: tuple[str, ...], path: Path) -> 
     if alike:
         raise InputError(f"animation '{wanted}' may be {' or '.join(alike)}", path=path)
     raise InputError(f"no animation '{wanted}' in this file{one_of(wanted, names)}", path=path)
-
-
-def unique_names(names: Sequence[str]) -> list[str]:
-    """Names of which the second of a kind is called ``name#2``."""
-    out: list[str] = []
-    for name in names:
-        chosen, number = name, 1
-        while chosen in out:
-            number += 1
-            chosen = f"{name}#{number}"
-        out.append(chosen)
-    return out
 
 
 _GLTF = ("warpjld.motion.gltf_animation", "gltf_animation_names")

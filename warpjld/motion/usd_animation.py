@@ -14,7 +14,8 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from warpjld.errors import InputError
-from warpjld.motion.animations import choose_animation, unique_names
+from warpjld.io.unique_names import unique_names
+from warpjld.motion.animations import choose_animation
 from warpjld.motion.frame_times import frame_times
 from warpjld.motion.joint_animation import JointAnimation
 

@@ -9,8 +9,8 @@ from numpy.typing import NDArray
 
 from warpjld.errors import InputError
 from warpjld.fem import HexMesh
-from warpjld.fem.contact.facets import Facets
-from warpjld.fem.contact.surface import surface_of
+from warpjld.fem.contact.interface.surface import surface_of
+from warpjld.fem.contact.obstacles.facets import Facets
 from warpjld.press.bodies import Bodies
 from warpjld.press.hand_body import HandBody
 from warpjld.press.where import placed

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from warpjld.fem.contact import Obstacle
-from warpjld.fem.contact.facets import Facets
+from warpjld.fem.contact.obstacles.facets import Facets
 from warpjld.press.overlap import Over, SurfacePart, over, within_itself
 from warpjld.press.skin_parts import SkinParts
 

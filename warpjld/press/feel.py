@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from warpjld.fem.contact.imprint import Imprint
+from warpjld.fem.contact.results.nodal_contact import Imprint
 from warpjld.fem.hand.tactile import Tactile, tactile_of
 from warpjld.press.bodies import Bodies
 from warpjld.press.frames import SolvedFrame

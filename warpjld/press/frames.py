@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from warpjld.fem.contact import ContactInstant
-from warpjld.fem.contact.imprint import Imprint, skin_around, stacked
+from warpjld.fem.contact.results.nodal_contact import Imprint, skin_around, stacked
 from warpjld.press.bodies import Bodies
 
 __all__ = ["SolvedFrame", "solved_frame"]

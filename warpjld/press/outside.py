@@ -13,8 +13,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from warpjld.fem.contact.facets import Facets
-from warpjld.fem.hexmesh import HexMesh
+from warpjld.fem.contact.obstacles.facets import Facets
+from warpjld.fem.mesh.hexmesh import HexMesh
 
 __all__ = ["outer_triangles", "outside", "outside_of_nodes"]
 

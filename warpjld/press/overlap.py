@@ -9,8 +9,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from warpjld.fem.contact.facets import Facets
-from warpjld.fem.contact.obstacles import Touching
+from warpjld.fem.contact.obstacles.facets import Facets
+from warpjld.fem.contact.obstacles.obstacle import Touching
 from warpjld.press.skin_parts import SkinParts
 
 __all__ = ["Over", "SurfacePart", "over", "within_itself"]

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from warpjld.fem.contact import Obstacle
-from warpjld.fem.contact.surface import surface_of
+from warpjld.fem.contact.interface.surface import surface_of
 from warpjld.press.bodies import Bodies
 from warpjld.press.hand_body import HandBody
 from warpjld.press.object_body import ObjectBody

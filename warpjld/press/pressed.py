@@ -9,7 +9,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from warpjld.fem.hexmesh import HexMesh
+from warpjld.fem.mesh.hexmesh import HexMesh
 from warpjld.grasp import Places
 from warpjld.press.bodies import Bodies
 from warpjld.press.clear import Cleared, Shown, clear

@@ -7,10 +7,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from warpjld.fem.contact.facets import Facets
-from warpjld.fem.contact.imprint import skin_around
-from warpjld.fem.embedding import Embedding, embed_between
-from warpjld.fem.hexmesh import HexMesh
+from warpjld.fem.contact.obstacles.facets import Facets
+from warpjld.fem.contact.results.nodal_contact import skin_around
+from warpjld.fem.mesh.embedding import Embedding, embed_between
+from warpjld.fem.mesh.hexmesh import HexMesh
 from warpjld.press.finer import Finer, finer
 
 __all__ = ["PressureMap", "pressure_map"]

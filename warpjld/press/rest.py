@@ -14,11 +14,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from warpjld.errors import InputError
-from warpjld.fem.contact.facets import Facets
+from warpjld.fem.contact.obstacles.facets import Facets
 from warpjld.fem.hand.blend import Moves
 from warpjld.fem.hand.flesh_hand import FleshHand
-from warpjld.fem.hexmesh import HexMesh
-from warpjld.fem.untangle import as_far, improve
+from warpjld.fem.mesh.hexmesh import HexMesh
+from warpjld.fem.mesh.untangle import as_far, improve
 from warpjld.skeleton import Poses
 
 __all__ = ["Part", "part_of", "posed"]

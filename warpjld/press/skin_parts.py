@@ -8,7 +8,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from warpjld.fem.contact.facets import Facets
+from warpjld.fem.contact.obstacles.facets import Facets
 from warpjld.fem.hand.flesh_hand import FleshHand
 from warpjld.skeleton import DIGITS
 

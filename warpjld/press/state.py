@@ -13,8 +13,8 @@ import numpy as np
 from warpjld.errors import InputError
 from warpjld.fem import Loads, Status
 from warpjld.fem.contact import ContactInstant, ContactSolution
-from warpjld.fem.contact.imprint import Imprint
-from warpjld.fem.contact.law import Memory
+from warpjld.fem.contact.law.law import Memory
+from warpjld.fem.contact.results.nodal_contact import Imprint
 from warpjld.press.frames import SolvedFrame
 from warpjld.whole_file import whole_file
 

@@ -13,7 +13,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from warpjld.fem.prescribed import Prescribed
+from warpjld.fem.load.prescribed import Prescribed
 
 __all__ = ["Support"]
 

@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 
 from warpjld.fem import Instant
-from warpjld.fem.vtk import Series
+from warpjld.fem.output.vtk import Series
 from warpjld.press.pressed import Pressed
 
 __all__ = ["write_volumes"]

@@ -9,10 +9,10 @@ from numpy.typing import NDArray
 
 from warpjld.errors import InputError
 from warpjld.fem import Body, HexMesh, LinearElastic, Loads, Prescribed, ball, box, cylinder, solve
-from warpjld.fem.embedding import Embedding, embed
-from warpjld.fem.envelope import Envelope
-from warpjld.fem.fit import fit_mesh
-from warpjld.fem.stress import cauchy
+from warpjld.fem.mesh.embedding import Embedding, embed
+from warpjld.fem.mesh.envelope import Envelope
+from warpjld.fem.mesh.fit import fit_mesh
+from warpjld.fem.output.stress import cauchy
 from warpjld.grasp.objects import GraspObject, Places
 from warpjld.press.matter import Physical
 from warpjld.rotations import unit

@@ -17,7 +17,7 @@ from warpjld.script.staging import stage
 
 if TYPE_CHECKING:
     from warpjld.fem.contact import Obstacle
-    from warpjld.fem.contact.facets import Facets
+    from warpjld.fem.contact.obstacles.facets import Facets
     from warpjld.grasp import Places
     from warpjld.script.scene import Actor, Scene
 
@@ -103,7 +103,7 @@ def approach(scene: Scene, pressing: Pressing) -> Approach:
 
 def _moments(scene: Scene, frame: int, moved: dict[str, tuple[list[float], list[Places]]]) -> list[float]:
     """Moments after the frame before and up to this one, so close that skin passes nothing from one to the next."""
-    from warpjld.fem.contact.meshes import RigidMesh
+    from warpjld.fem.contact.obstacles.meshes import RigidMesh
     from warpjld.press.passing import half_thickness, way_past
 
     times = [0.0, 0.5, 1.0]
@@ -138,7 +138,7 @@ def _held(
     scene: Scene, frame: float, free: list[str], moved: dict[str, tuple[list[float], list[Places]]]
 ) -> tuple[bool, dict[str, Places]]:
     """Whether anything is held at a frame, and where free objects are that are pushed."""
-    from warpjld.fem.contact.facets import Facets
+    from warpjld.fem.contact.obstacles.facets import Facets
     from warpjld.press.settle import settle
 
     moment = np.array([frame])

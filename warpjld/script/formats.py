@@ -8,7 +8,7 @@ from pathlib import PurePosixPath
 
 from warpjld.errors import MissingExtraError
 from warpjld.io.caches import FORMATS
-from warpjld.io.motion_out import MOTION_OUT
+from warpjld.motion.out import MOTION_OUT
 from warpjld.render.camera import VIEWS as _VIEWS
 
 __all__ = [

@@ -25,7 +25,7 @@ def write_motions(
     scene: Scene, crowd: Crowd, frames: NDArray[np.float64], outputs: Sequence[Output], out: OutputFolder
 ) -> list[str]:
     """Write what was asked for, at these frames (F,); returns notes, and warns through the scene."""
-    from warpjld.io.motion_out import write_motion
+    from warpjld.motion.out import write_motion
 
     notes: list[str] = []
     for output in outputs:

@@ -136,7 +136,7 @@ def object_body(scene: Scene, prop: Prop, start: float, place: Places | None = N
 def _lifted(scene: Scene, wish: GripWish, volume: ObjectVolume) -> tuple[ObjectVolume, Support]:
     """The object with its weight, and what it stands on."""
     from warpjld.fem.hand.weighed import handle_of
-    from warpjld.fem.loads import volumes
+    from warpjld.fem.load.loads import volumes
     from warpjld.press.support import Support
 
     pull = np.array(scene.contact.pull)
@@ -154,8 +154,8 @@ def _foot(axis: int, pull: tuple[float, float, float]) -> Points:
 
 def prop_obstacle(scene: Scene, prop: Prop, start: float) -> Obstacle:
     """An object as an obstacle; its time is in frames from ``start``. Built-in shapes are exact, with edges rounded."""
-    from warpjld.fem.contact.meshes import Keyframed, RigidMesh
-    from warpjld.fem.contact.solids import Box, Cylinder, Sphere
+    from warpjld.fem.contact.obstacles.meshes import Keyframed, RigidMesh
+    from warpjld.fem.contact.obstacles.solids import Box, Cylinder, Sphere
 
     places = _places(scene, prop, start)
 

@@ -14,8 +14,8 @@ from warpjld.script.placement import Placement
 from warpjld.script.staging import stage
 
 if TYPE_CHECKING:
-    from warpjld.fem.contact.barr import Barr
-    from warpjld.fem.contact.obstacles import Motion
+    from warpjld.fem.contact.obstacles.barr import Barr
+    from warpjld.fem.contact.obstacles.obstacle import Motion
     from warpjld.grasp.keyframes import KeyframedShape
     from warpjld.press.state_variables import Barred
     from warpjld.script.scene import Scene
@@ -66,7 +66,7 @@ class Prop:
 
     def barr(self, start: float = 0.0, motion: Motion | None = None) -> Barr:
         """Its deformed shape, in its own frame unless it has a motion; time is in frames from ``start``."""
-        from warpjld.fem.contact.barr import Barr
+        from warpjld.fem.contact.obstacles.barr import Barr
 
         barred = self.barred
         assert barred is not None

@@ -3,10 +3,10 @@
 `run_study` repeats any `Experiment`; `warpjld.study.grasping` has the one that closes hands on objects.
 """
 
-from warpjld.study.columns import Column
 from warpjld.study.experiment import Experiment, Outcome
 from warpjld.study.rerun import Rerun, rerun_trial
 from warpjld.study.run import StudyResult, run_study
 from warpjld.study.wilson import wilson_interval
+from warpjld.tables.columns import Column
 
 __all__ = ["Column", "Experiment", "Outcome", "Rerun", "StudyResult", "rerun_trial", "run_study", "wilson_interval"]

@@ -1,37 +1,10 @@
-"""The documented schema of a results table."""
+"""What the table of every study begins with."""
 
 from __future__ import annotations
 
-import math
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
-from typing import Any, Literal
+from warpjld.tables.columns import Column
 
-from warpjld.errors import WarpjldError
-
-__all__ = ["COMMON_COLUMNS", "Column", "checked_values"]
-
-Kind = Literal["integer", "number", "truth", "text"]
-
-_PYTHON: dict[Kind, tuple[type, ...]] = {"integer": (int,), "number": (float, int), "truth": (bool,), "text": (str,)}
-
-
-@dataclass(frozen=True)
-class Column:
-    """One column of a table.
-
-    Attributes:
-        name: As in the file, lower case with underscores.
-        kind: "integer" (int64), "number" (float64), "truth" (bool) or "text" (string). Any value may be missing.
-        unit: SI unit, "" for pure numbers and words.
-        about: What it is, with its frame where it has one.
-    """
-
-    name: str
-    kind: Kind
-    unit: str
-    about: str
-
+__all__ = ["COMMON_COLUMNS"]
 
 COMMON_COLUMNS = (
     Column("trial", "integer", "", "Number of the trial, from 0: the row to give to --rerun."),
@@ -40,27 +13,3 @@ COMMON_COLUMNS = (
     Column("message", "text", "", "What went wrong, or is worth knowing; empty otherwise."),
 )
 """What every study's table begins with."""
-
-
-def checked_values(values: Mapping[str, Any], columns: Sequence[Column]) -> dict[str, Any]:
-    """Values in the columns' order and Python types, missing ones and NaN as None.
-
-    Raises:
-        WarpjldError: A value without a column, or of another type: the experiment contradicts its own schema.
-    """
-    stray = set(values) - {column.name for column in columns}
-    if stray:
-        raise WarpjldError(f"trial: no column for {', '.join(sorted(stray))}")
-    return {column.name: _checked(values.get(column.name), column) for column in columns}
-
-
-def _checked(value: Any, column: Column) -> Any:
-    if value is None:
-        return None
-    plain: Any = value.item() if hasattr(value, "item") else value
-    if type(plain) not in _PYTHON[column.kind]:
-        raise WarpjldError(f"trial: column '{column.name}' holds {column.kind}, got {plain!r}")
-    if column.kind == "number":
-        number = float(plain)
-        return None if math.isnan(number) else number
-    return plain

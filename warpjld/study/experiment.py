@@ -10,7 +10,7 @@ from typing import Any, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from warpjld.study.columns import Column
+from warpjld.tables.columns import Column
 
 __all__ = ["Experiment", "Outcome", "generator"]
 

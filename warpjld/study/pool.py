@@ -10,9 +10,10 @@ from pathlib import Path
 
 from warpjld.errors import WarpjldError
 from warpjld.processes import run_jobs
-from warpjld.study.columns import COMMON_COLUMNS, checked_values
+from warpjld.study.columns import COMMON_COLUMNS
 from warpjld.study.experiment import Experiment, Outcome, generator
 from warpjld.study.shards import Shard, Shards
+from warpjld.tables.columns import checked_values
 
 __all__ = ["TrialWork", "perform", "run_trials"]
 

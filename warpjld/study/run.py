@@ -14,14 +14,16 @@ from typing import Any, Literal
 
 from warpjld.errors import InputError
 from warpjld.folders import make_folder
-from warpjld.study.columns import COMMON_COLUMNS, Column
+from warpjld.manifest import file_hash, fingerprint, versions, write_json
+from warpjld.study.arrays import gathered, write_arrays
+from warpjld.study.columns import COMMON_COLUMNS
 from warpjld.study.experiment import Experiment
-from warpjld.study.manifest import file_hash, fingerprint, versions, write_json
 from warpjld.study.pool import run_trials
 from warpjld.study.rates import Rate, success_rates
 from warpjld.study.shards import Shards
 from warpjld.study.summary import write_summary
-from warpjld.study.table import gathered, require_parquet, write_arrays, write_csv, write_parquet
+from warpjld.tables.columns import Column
+from warpjld.tables.files import require_parquet, write_csv, write_parquet
 from warpjld.threads import cores
 
 __all__ = ["StudyResult", "TableFormat", "opened", "run_study", "table_columns"]

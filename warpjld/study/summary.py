@@ -10,8 +10,8 @@ from typing import Any
 
 import numpy as np
 
-from warpjld.study.columns import Column
 from warpjld.study.rates import Rate
+from warpjld.tables.columns import Column
 from warpjld.whole_file import whole_file
 
 __all__ = ["write_summary"]

@@ -9,7 +9,7 @@ from numpy.typing import ArrayLike
 
 from warpjld.fem import Body, HexMesh, Material, Prescribed, merge, prescribe
 from warpjld.fem.contact import ContactInstant
-from warpjld.fem.contact.solids import Plane
+from warpjld.fem.contact.obstacles.solids import Plane
 
 FREE = Prescribed(np.empty(0, np.int64), np.empty(0))
 

@@ -8,7 +8,7 @@ import pytest
 from tests.fem.contact.bodies import FREE
 from warpjld.fem import Body, LinearElastic, Loads, Status, box
 from warpjld.fem.contact import Pair, press
-from warpjld.fem.contact.solids import Plane
+from warpjld.fem.contact.obstacles.solids import Plane
 
 SLOPE = np.radians(20.0)
 GRAVITY = 9.81 * np.array([np.sin(SLOPE), 0.0, -np.cos(SLOPE)])

@@ -8,8 +8,8 @@ import pytest
 from tests.fem.contact.bodies import named
 from warpjld.fem import Body, LinearElastic, Loads, ball, box, merge, prescribe
 from warpjld.fem.contact import ContactInstant, Pair, press
-from warpjld.fem.contact.imprint import skin_around, stacked
-from warpjld.fem.contact.solids import Plane
+from warpjld.fem.contact.obstacles.solids import Plane
+from warpjld.fem.contact.results.nodal_contact import skin_around, stacked
 from warpjld.fem.hand.tactile import tactile_of_pairs
 
 STEP, FRICTION, DEPTH = 2e-4, 0.3, 1e-4

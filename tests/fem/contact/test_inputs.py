@@ -8,12 +8,12 @@ import pytest
 from tests.fem.contact.bodies import FREE, lid, named, symmetric, together
 from warpjld.errors import InputError
 from warpjld.fem import Body, LinearElastic, Loads, NeoHooke, Status, ball, box, cylinder, prescribe
-from warpjld.fem.blockmatrix import BlockMatrix
 from warpjld.fem.contact import Bond, ContactError, Exclusion, Pair, press
-from warpjld.fem.contact.damping import Damping
-from warpjld.fem.contact.solids import Plane, Sphere
-from warpjld.fem.contact.step_solver import StepSolver
-from warpjld.fem.indefinite import IndefiniteError
+from warpjld.fem.contact.obstacles.solids import Plane, Sphere
+from warpjld.fem.contact.solver.damping import Damping
+from warpjld.fem.contact.solver.step_solver import StepSolver
+from warpjld.fem.solver.block_matrix import BlockMatrix
+from warpjld.fem.solver.indefinite import IndefiniteError
 
 
 @pytest.fixture(scope="module")

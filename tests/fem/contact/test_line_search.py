@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 
 from warpjld.fem import Body, Loads, NeoHooke, Prescribed, box
-from warpjld.fem.contact.elastic import Elastic
-from warpjld.fem.contact.line_search import LineSearch
-from warpjld.fem.contact.step import Step
+from warpjld.fem.contact.solver.elastic import Elastic
+from warpjld.fem.contact.solver.line_search import LineSearch
+from warpjld.fem.contact.solver.load_step import Step
 
 
 @pytest.mark.parametrize(

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from warpjld.fem import Body, HexMesh, LinearElastic, Prescribed, box, prescribe
 from warpjld.fem.contact import Pair, Touch, press
-from warpjld.fem.contact.solids import Plane
+from warpjld.fem.contact.obstacles.solids import Plane
 
 YOUNG, POISSON, FRICTION = 1.0, 0.49, 0.3
 SHEAR, MODULUS = YOUNG / (2.0 * (1.0 + POISSON)), YOUNG / (1.0 - POISSON**2)

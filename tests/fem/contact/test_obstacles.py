@@ -9,10 +9,10 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from warpjld.errors import InputError
-from warpjld.fem.contact.barr import Barr
-from warpjld.fem.contact.meshes import Keyframed, RigidMesh
-from warpjld.fem.contact.obstacles import Obstacle, standing
-from warpjld.fem.contact.solids import Box, Cylinder, Plane, Sphere
+from warpjld.fem.contact.obstacles.barr import Barr
+from warpjld.fem.contact.obstacles.meshes import Keyframed, RigidMesh
+from warpjld.fem.contact.obstacles.obstacle import Obstacle, standing
+from warpjld.fem.contact.obstacles.solids import Box, Cylinder, Plane, Sphere
 from warpjld.grasp.shapes import glass
 
 TOLERANCE = 1e-6  # of the size, as the contact solver asks for

@@ -9,7 +9,7 @@ from tests.fem.contact.bodies import lid, named, together
 from warpjld.errors import InputError
 from warpjld.fem import Body, LinearElastic, box, prescribe
 from warpjld.fem.contact import Pair, press
-from warpjld.fem.hexmesh import HexMesh
+from warpjld.fem.mesh.hexmesh import HexMesh
 
 SKIN = 0.03
 

@@ -20,7 +20,7 @@ from warpjld.fem import (
     prescribe,
 )
 from warpjld.fem.contact import ContactError, ContactSolution, Exclusion, Pair, press
-from warpjld.fem.contact.solids import Plane
+from warpjld.fem.contact.obstacles.solids import Plane
 
 
 def _named(mesh: HexMesh, name: str, shift: tuple[float, float, float]) -> HexMesh:

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from warpjld.fem import HexMesh, box, merge
 from warpjld.fem.contact import Exclusion, Pair
-from warpjld.fem.contact.points import ContactPoints, Interface
+from warpjld.fem.contact.interface.contact_points import ContactPoints, Interface
 
 SIDE, THICK = 0.02, 0.006
 

@@ -8,7 +8,7 @@ import pytest
 from tests.fem.contact.bodies import named, together
 from warpjld.fem import Body, LinearElastic, Loads, Material, NeoHooke, Prescribed, box, prescribe
 from warpjld.fem.contact import Pair, press
-from warpjld.fem.stress import cauchy
+from warpjld.fem.output.stress import cauchy
 
 YOUNG = 1.0
 

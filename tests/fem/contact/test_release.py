@@ -7,7 +7,7 @@ import numpy as np
 from tests.fem.contact.bodies import lid, mean_gaps, named, symmetric, together
 from warpjld.fem import Body, LinearElastic, NeoHooke, Prescribed, ball, box, prescribe
 from warpjld.fem.contact import Pair, press
-from warpjld.fem.contact.solids import Plane
+from warpjld.fem.contact.obstacles.solids import Plane
 
 
 def squeezed() -> tuple[Body, Prescribed, Plane]:

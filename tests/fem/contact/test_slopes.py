@@ -11,9 +11,9 @@ from numpy.typing import NDArray
 from tests.fem.contact.bodies import named
 from warpjld.fem import box, merge
 from warpjld.fem.contact import Pair
-from warpjld.fem.contact.law import Memory, Response, respond, start_memory
-from warpjld.fem.contact.points import ContactPoints, Interface
-from warpjld.fem.contact.slopes import Slopes, slopes_of
+from warpjld.fem.contact.interface.contact_points import ContactPoints, Interface
+from warpjld.fem.contact.law.law import Memory, Response, respond, start_memory
+from warpjld.fem.contact.solver.tangent import Slopes, slopes_of
 
 EXACT = 1e-5
 """Differences of one in a million of an edge, of polygons with corners that come and go."""

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from warpjld.fem import Body, Prescribed, prescribe
 from warpjld.fem.contact import Pair, press
-from warpjld.fem.contact.solids import Plane
+from warpjld.fem.contact.obstacles.solids import Plane
 from warpjld.fem.hand import hand_laws
 from warpjld.fem.hand.blend import Moves, moves_of
 from warpjld.fem.hand.bone_loads import BoneLoads

@@ -11,7 +11,7 @@ import pytest
 from warpjld.errors import InputError
 from warpjld.fem import Body, prescribe
 from warpjld.fem.contact import Pair, press
-from warpjld.fem.contact.solids import Plane
+from warpjld.fem.contact.obstacles.solids import Plane
 from warpjld.fem.hand import hand_laws
 from warpjld.fem.hand.fingertip import Fingertip, build_fingertip
 from warpjld.hand import build_hand

@@ -11,7 +11,7 @@ from warpjld.covering import bind
 from warpjld.fem import Body, NeoHooke, Status, merge, prescribe
 from warpjld.fem import ball as ball_mesh
 from warpjld.fem.contact import ContactInstant, Pair, press
-from warpjld.fem.contact.solids import Sphere
+from warpjld.fem.contact.obstacles.solids import Sphere
 from warpjld.fem.hand import FleshHand, HandMotion, build_flesh_hand, hand_laws, motion_of
 from warpjld.fem.hand.alone import FleshAlone
 from warpjld.fem.hand.bone_loads import BoneLoads, loads_from_contact, loads_from_reactions

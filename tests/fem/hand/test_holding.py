@@ -10,7 +10,7 @@ import pytest
 
 from warpjld.errors import InputError
 from warpjld.fem.contact import Pair
-from warpjld.fem.contact.solids import Plane
+from warpjld.fem.contact.obstacles.solids import Plane
 from warpjld.fem.hand.grip import GripStatus, Outcome, gentlest_grip
 from warpjld.fem.hand.holding import Holding
 from warpjld.fem.hand.tactile import tactile_of_pairs

@@ -15,7 +15,7 @@ from warpjld.fem.hand.correct import Correction, correct_angles
 from warpjld.fem.hand.limits import FORCE_LIMITS, force_limits
 from warpjld.fem.hand.muscles import effort_of
 from warpjld.fem.hand.suggestions import suggestions
-from warpjld.fem.loads import Loads
+from warpjld.fem.load.loads import Loads
 from warpjld.hand import build_hand
 from warpjld.skeleton import Skeleton, rest_poses
 

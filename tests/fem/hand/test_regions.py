@@ -7,11 +7,11 @@ import pytest
 import trimesh
 
 from warpjld.fem import box
-from warpjld.fem.envelope import Envelope
 from warpjld.fem.hand import FleshHand, build_flesh_hand, hand_laws
 from warpjld.fem.hand.cushion import coarse_note, cushions
 from warpjld.fem.hand.regions import shares_of_skin
-from warpjld.fem.loads import volumes
+from warpjld.fem.load.loads import volumes
+from warpjld.fem.mesh.envelope import Envelope
 
 
 @pytest.mark.parametrize("count", [6, 8, 12])

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from warpjld.errors import InputError
 from warpjld.fem.contact import Pair
-from warpjld.fem.contact.imprint import Imprint, skin_around
+from warpjld.fem.contact.results.nodal_contact import Imprint, skin_around
 from warpjld.fem.hand import FleshHand
 from warpjld.fem.hand.tactile import tactile_of
 from warpjld.fem.hand.tactile_files import TACTILE_COLUMNS, draw_tactile, write_tactile
@@ -116,7 +116,7 @@ def test_files(hand: FleshHand, tmp_path: Path) -> None:
     described = json.loads((tmp_path / "tactile.columns.json").read_text(encoding="utf-8"))
     assert [c["name"] for c in described] == [c.name for c in TACTILE_COLUMNS]
 
-    from warpjld.study.table import read_table
+    from warpjld.tables.files import read_table
 
     pytest.importorskip("pyarrow")
     write_tactile(tmp_path / "tactile.parquet", found)

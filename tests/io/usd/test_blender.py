@@ -13,8 +13,8 @@ from scipy.spatial import cKDTree
 from scipy.spatial.transform import Rotation
 
 from warpjld.io import load_rig
-from warpjld.io.motion_out import source_motion, write_motion
 from warpjld.motion import load_motion, open_motion
+from warpjld.motion.out import source_motion, write_motion
 
 pytest.importorskip("pxr")
 

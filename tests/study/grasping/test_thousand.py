@@ -11,7 +11,7 @@ from pathlib import Path
 
 import pytest
 
-from warpjld.study.table import read_table
+from warpjld.tables.files import read_table
 
 _ROOT = Path(__file__).resolve().parents[3]
 _TRIALS = 1000

@@ -17,11 +17,11 @@ import pytest
 from warpjld.cli import main
 from warpjld.errors import InputError
 from warpjld.grasp.segments import SEGMENTS
-from warpjld.study.columns import checked_values
 from warpjld.study.experiment import generator
 from warpjld.study.grasping import GraspExperiment, load_plan
 from warpjld.study.pool import perform
-from warpjld.study.table import read_table
+from warpjld.tables.columns import checked_values
+from warpjld.tables.files import read_table
 
 _ROOT = Path(__file__).resolve().parents[3]
 

@@ -8,12 +8,12 @@ import numpy as np
 
 from warpjld.errors import InputError
 from warpjld.fem.body import Body
-from warpjld.fem.conjugate import Status
-from warpjld.fem.contact.load_steps import Guess, LoadSteps
-from warpjld.fem.contact.pairs import Pair
-from warpjld.fem.contact.solution import ContactError, ContactInstant, ContactSolution
-from warpjld.fem.loads import Loads
-from warpjld.fem.prescribed import Prescribed
+from warpjld.fem.contact.interface.pairs import Pair
+from warpjld.fem.contact.results.solution import ContactError, ContactInstant, ContactSolution
+from warpjld.fem.contact.solver.load_steps import Guess, LoadSteps
+from warpjld.fem.load.loads import Loads
+from warpjld.fem.load.prescribed import Prescribed
+from warpjld.fem.solver.conjugate import Status
 
 __all__ = ["press"]
 
@@ -52,7 +52,7 @@ def press(
         times: Rising times above 0 (above ``after``'s) to find equilibria at.
         after: Contact and displacement to go on from.
         method: ``augmented`` (Lagrangian, on bodies and contact together), or ``paper``: objects repelled by the skin
-            and released, in turns (R113; see ``warpjld.fem.contact.paper`` for when it settles). The slave is repelled.
+            and released, in turns (R113; ``contact.paper.loop`` says when it settles). The slave is repelled.
         aitken: Relax the paper's loop.
         tolerance: Residual over the forces that balance.
         penetration: Overlap left, as a share of an edge.
@@ -107,7 +107,7 @@ def _by_turns(
     watch: Callable[[ContactInstant], str | None] | None,
     progress: Callable[[str], None] | None,
 ) -> ContactSolution:
-    from warpjld.fem.contact.paper import by_turns
+    from warpjld.fem.contact.paper.loop import by_turns
 
     if any(pair.exclusion is not None for pair in pairs):
         raise InputError("pairs: the paper's loop does not know a surface that meets itself; use method='augmented'")

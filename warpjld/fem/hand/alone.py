@@ -18,17 +18,17 @@ from numpy.typing import NDArray
 
 from warpjld.errors import InputError
 from warpjld.fem.body import Body, Tangent
-from warpjld.fem.conjugate import Status
-from warpjld.fem.contact.damping import Damping
-from warpjld.fem.contact.elastic import Elastic
-from warpjld.fem.contact.step_solver import StepSolver
-from warpjld.fem.dots import norm
+from warpjld.fem.contact.solver.damping import Damping
+from warpjld.fem.contact.solver.elastic import Elastic
+from warpjld.fem.contact.solver.step_solver import StepSolver
 from warpjld.fem.hand.blend import Moves
 from warpjld.fem.hand.flesh_hand import FleshHand
 from warpjld.fem.hand.motion import halfway
-from warpjld.fem.indefinite import IndefiniteError
-from warpjld.fem.loads import Loads
-from warpjld.fem.prescribed import Prescribed
+from warpjld.fem.load.loads import Loads
+from warpjld.fem.load.prescribed import Prescribed
+from warpjld.fem.solver.conjugate import Status
+from warpjld.fem.solver.dots import norm
+from warpjld.fem.solver.indefinite import IndefiniteError
 from warpjld.skeleton.kinematics import Poses
 
 __all__ = ["FleshAlone", "Untouched"]

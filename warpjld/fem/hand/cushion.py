@@ -8,9 +8,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from warpjld.fem.envelope import Envelope
 from warpjld.fem.hand.flesh_hand import FleshHand
-from warpjld.fem.hexmesh import EDGES
+from warpjld.fem.mesh.envelope import Envelope
+from warpjld.fem.mesh.hexmesh import EDGES
 from warpjld.skeleton.hand import DIGITS
 
 __all__ = ["Cushion", "coarse_note", "cushions"]

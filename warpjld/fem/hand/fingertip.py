@@ -8,9 +8,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from warpjld.errors import InputError
-from warpjld.fem.envelope import Envelope
-from warpjld.fem.fit import Fit, fit_mesh
-from warpjld.fem.hexmesh import HexMesh
+from warpjld.fem.mesh.envelope import Envelope
+from warpjld.fem.mesh.fit import Fit, fit_mesh
+from warpjld.fem.mesh.hexmesh import HexMesh
 from warpjld.rig import Rig
 
 __all__ = ["Fingertip", "build_fingertip"]

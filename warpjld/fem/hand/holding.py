@@ -18,8 +18,8 @@ from warpjld.fem.contact import ContactInstant, ContactSolution, Pair, press
 from warpjld.fem.hand.descent import Descent, descend
 from warpjld.fem.hand.grip import Outcome, Trial
 from warpjld.fem.hand.weighed import Weighed
-from warpjld.fem.loads import Loads
-from warpjld.fem.prescribed import Prescribed
+from warpjld.fem.load.loads import Loads
+from warpjld.fem.load.prescribed import Prescribed
 
 __all__ = ["Holding"]
 

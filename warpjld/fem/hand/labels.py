@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from warpjld.fem.hexmesh import HexMesh
+from warpjld.fem.mesh.hexmesh import HexMesh
 from warpjld.skeleton.hand import DIGITS
 
 __all__ = ["WEB", "excluded_pairs", "fringes", "joined_pairs", "segment_name", "skin_labels"]

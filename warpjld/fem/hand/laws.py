@@ -6,7 +6,7 @@ from dataclasses import replace
 from fractions import Fraction
 
 from warpjld.errors import InputError
-from warpjld.fem.materials import Fung, Material, NeoHooke
+from warpjld.fem.material.materials import Fung, Material, NeoHooke
 
 __all__ = ["hand_laws"]
 

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from warpjld.errors import InputError
 from warpjld.fem.hand.blend import Moves
 from warpjld.fem.hand.flesh_hand import FleshHand
-from warpjld.fem.prescribed import Prescribed
+from warpjld.fem.load.prescribed import Prescribed
 from warpjld.skeleton.kinematics import Poses
 
 __all__ = ["HandMotion", "halfway", "motion_of"]

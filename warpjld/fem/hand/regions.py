@@ -7,9 +7,9 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from warpjld.fem.envelope import Envelope
 from warpjld.fem.hand.labels import segment_name
-from warpjld.fem.hexmesh import HexMesh
+from warpjld.fem.mesh.envelope import Envelope
+from warpjld.fem.mesh.hexmesh import HexMesh
 from warpjld.skeleton.hand import DIGITS
 from warpjld.surface import Surface
 

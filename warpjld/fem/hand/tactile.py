@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from warpjld.errors import InputError
 from warpjld.fem.contact import ContactInstant
-from warpjld.fem.contact.imprint import Imprint, skin_around
+from warpjld.fem.contact.results.nodal_contact import Imprint, skin_around
 from warpjld.fem.hand.flesh_hand import FleshHand
 from warpjld.fem.hand.labels import WEB
 

@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Any
 
 from warpjld.fem.hand.tactile import Tactile
-from warpjld.study.columns import Column, checked_values
+from warpjld.tables.columns import Column, checked_values
 from warpjld.whole_file import whole_file
 
 __all__ = ["TACTILE_COLUMNS", "draw_tactile", "tactile_rows", "write_tactile"]
@@ -58,7 +58,7 @@ def write_tactile(path: Path, tactile: Tactile) -> None:
     Raises:
         MissingExtraError: Parquet without pyarrow.
     """
-    from warpjld.study.table import write_csv, write_parquet
+    from warpjld.tables.files import write_csv, write_parquet
 
     if path.suffix == ".parquet":
         write_parquet(path, tactile_rows(tactile), TACTILE_COLUMNS)

@@ -14,9 +14,9 @@ from numpy.typing import NDArray
 from warpjld.errors import InputError
 from warpjld.fem.body import Body
 from warpjld.fem.contact import ContactInstant, Pair
-from warpjld.fem.contact.solution import Touch
-from warpjld.fem.loads import volumes
-from warpjld.fem.prescribed import Prescribed
+from warpjld.fem.contact.results.solution import Touch
+from warpjld.fem.load.loads import volumes
+from warpjld.fem.load.prescribed import Prescribed
 
 __all__ = ["Weighed", "handle_of"]
 

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from warpjld.fem.hexmesh import EDGES, HexMesh
+from warpjld.fem.mesh.hexmesh import EDGES, HexMesh
 
 __all__ = ["bone_weights"]
 

@@ -174,7 +174,7 @@ def stacks(scene: Any, number: dict[int, int]) -> list[dict[str, Any]]:
             begin, end = min(times), max(times)
         found = {"moved": sorted(moved), "curved": sorted(curved), "shapes": shapes}
         name, count = stack.name, 1
-        while name in [other["name"] for other in out]:  # as warpjld.motion.animations.unique_names
+        while name in [other["name"] for other in out]:  # as warpjld.io.unique_names
             count += 1
             name = f"{stack.name}#{count}"
         out.append({"name": name, "begin": begin, "end": end, **found})

@@ -6,7 +6,7 @@ import re
 from typing import Any
 
 from warpjld.io.gltf.document import Document
-from warpjld.motion.animations import unique_names
+from warpjld.io.unique_names import unique_names
 
 __all__ = ["list_animations"]
 

@@ -5,7 +5,7 @@ The object does not move: its frame, Y up and its bounding box centred on the or
 
 from __future__ import annotations
 
-from warpjld.study.columns import Column
+from warpjld.tables.columns import Column
 
 __all__ = ["GRASP_COLUMNS"]
 

@@ -6,10 +6,10 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any, Literal
 
+from warpjld.manifest import versions
 from warpjld.skeleton import CHANNELS, DIGITS
 from warpjld.skeleton.hand import HAND_PARENTS
 from warpjld.study.grasping.choices import HandChoice, ObjectChoice, read_hand, read_object
-from warpjld.study.manifest import versions
 from warpjld.toml_table import TomlTable, read_toml
 
 __all__ = ["GraspPlan", "Measuring", "WristRange", "load_plan"]

@@ -18,7 +18,6 @@ from warpjld.grasp.postures import posture_for
 from warpjld.grasp.quality import Patches
 from warpjld.grasp.segments import SEGMENTS
 from warpjld.skeleton import poses_from_angles
-from warpjld.study.columns import Column
 from warpjld.study.experiment import Outcome
 from warpjld.study.grasping.choices import HandChoice, ObjectChoice
 from warpjld.study.grasping.columns import GRASP_COLUMNS
@@ -26,6 +25,7 @@ from warpjld.study.grasping.load import Hand, Thing, hand_of, opened_hand, thing
 from warpjld.study.grasping.measure import measure_grasp
 from warpjld.study.grasping.plan import GraspPlan
 from warpjld.study.grasping.wrist import Approach, draw_approach, place_palm, touch_along
+from warpjld.tables.columns import Column
 
 __all__ = ["GraspExperiment"]
 

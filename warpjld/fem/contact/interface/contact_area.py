@@ -1,0 +1,162 @@
+"""Areas of contact, finer than the mesh: inside borders that run between its nodes (see ``border``)."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from warpjld.fem.contact.interface.contact_border import beyond, held_beyond
+from warpjld.fem.contact.interface.contact_points import Interface
+
+__all__ = ["Inside"]
+
+
+class Inside:
+    """A slave surface at an instant.
+
+    Args:
+        interface: The pair.
+        near: Slave nodes with something before them, as indices into the surface's, shape (n,).
+        area: What of their surroundings has something opposite [m²], shape (n,).
+        x: Positions of the body's nodes [m], shape (N, 3).
+    """
+
+    def __init__(
+        self, interface: Interface, near: NDArray[np.int64], area: NDArray[np.float64], x: NDArray[np.float64]
+    ) -> None:
+        surface = interface.slave
+        self._interface, self._near, self._x = interface, near, x
+        self._count = len(surface.nodes)
+        whole = surface.at_nodes(np.linalg.norm(surface.area_vectors(x), axis=1))
+        self._covered = np.zeros(self._count)
+        self._covered[near] = np.minimum(area / np.maximum(whole[near], 1e-300), 1.0)
+
+    def areas(
+        self,
+        pressure: NDArray[np.float64],
+        gap: NDArray[np.float64],
+        modulus: NDArray[np.float64],
+        spare: NDArray[np.float64],
+    ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Area under pressure around nodes, and the part of it that friction holds [m²], shape (n,) each: each face's
+        share inside the border goes to its pressed corners, as far as their surroundings have something opposite.
+
+        Args:
+            pressure: [Pa], shape (n,).
+            gap: At the nodes, or averaged around them where the interface averages [m], shape (n,).
+            modulus: E* of all slave nodes [Pa], shape (m,).
+            spare: What is left of Coulomb's limit where nodes stick [Pa], shape (n,); 0 where they slide.
+        """
+        near, count = self._near, self._count
+        load, distance, left = np.zeros(count), np.full(count, np.inf), np.zeros(count)
+        load[near], distance[near], left[near] = pressure, gap, spare
+        pressed = load > 0.0
+        corners = self._interface.slave.corners
+        around = np.zeros(count, dtype=bool)
+        around[corners[pressed[corners].any(axis=1)]] = True
+        some = np.flatnonzero(around[corners].any(axis=1))
+        faces = _Faces(corners[some], self._x[self._interface.slave.quads[some]], count)
+        i, j, length = faces.across(pressed)
+        f = beyond(load[i], distance[j], length, modulus[i], averaged=self._interface.averages)
+        depth = faces.depth(pressed, i, j, f)
+        whole = self._at_nodes(faces, depth, pressed)
+        stuck = (left > 0.0) & pressed
+        if not stuck.any():
+            return whole, np.zeros(len(near))
+        i, j, _ = faces.across(stuck)
+        still = pressed[j]  # where pressure ends, what sticks ends with it
+        i, j = i[still], j[still]
+        held = faces.depth(stuck, i, j, held_beyond(left[i], faces.inwards(left, stuck, i, j)))
+        held = np.where(pressed, np.minimum(depth, held), depth)
+        return whole, np.minimum(self._at_nodes(faces, held, pressed), whole)
+
+    def _at_nodes(self, faces: _Faces, depth: NDArray[np.float64], pressed: NDArray[np.bool_]) -> NDArray[np.float64]:
+        corners = faces.corners
+        area = _positive_area(faces.at, depth[corners])
+        mask = (pressed | (depth > 0.0))[corners]
+        share = (area / np.maximum(mask.sum(axis=1), 1))[:, None] * mask * self._covered[corners]
+        return np.asarray(np.bincount(corners.ravel(), share.ravel(), minlength=self._count)[self._near])
+
+
+class _Faces:
+    """Faces whose corners are nodes (F, 4) of m in all, at positions (F, 4, 3), and their edges, both ways."""
+
+    def __init__(self, corners: NDArray[np.int32], at: NDArray[np.float64], count: int) -> None:
+        self.corners, self.at, self._count = corners, at, count
+        start, end = corners.ravel(), np.roll(corners, -1, axis=1).ravel()
+        way = (np.roll(at, -1, axis=1) - at).reshape(-1, 3)
+        self._start, self._end = np.concatenate([start, end]), np.concatenate([end, start])
+        self._way = np.concatenate([way, -way])
+
+    def across(self, inside: NDArray[np.bool_]) -> tuple[NDArray[np.int32], NDArray[np.int32], NDArray[np.float64]]:
+        """Edges that leave a set of nodes: where from, where to, and their lengths [m]."""
+        chosen = inside[self._start] & ~inside[self._end]
+        length = np.linalg.norm(self._way[chosen], axis=1)
+        return self._start[chosen], self._end[chosen], np.maximum(length, 1e-300)
+
+    def inwards(
+        self, values: NDArray[np.float64], inside: NDArray[np.bool_], i: NDArray[np.int32], j: NDArray[np.int32]
+    ) -> NDArray[np.float64]:
+        """Values at the inner nodes that best go on backwards from edges j → i; 0 where none lies that way."""
+        place = np.zeros((self._count, 3))
+        place[self.corners.ravel()] = self.at.reshape(-1, 3)
+        kept = inside[self._start] & inside[self._end]
+        start, end = self._start[kept], self._end[kept]
+        order = np.argsort(start, kind="stable")
+        start, end = start[order], end[order]
+        first, last = np.searchsorted(start, i), np.searchsorted(start, i, side="right")
+        out, best = np.zeros(len(i)), np.full(len(i), 0.5)
+        for k in range(int((last - first).max(initial=0))):
+            some = np.flatnonzero(first + k < last)
+            inner = end[first[some] + k]
+            back, on = place[i[some]] - place[inner], place[j[some]] - place[i[some]]
+            size = np.linalg.norm(back, axis=1) * np.linalg.norm(on, axis=1)
+            straight = np.einsum("ni,ni->n", back, on) / np.maximum(size, 1e-300)
+            better = straight > best[some]
+            best[some[better]], out[some[better]] = straight[better], values[inner[better]]
+        return out
+
+    def depth(
+        self,
+        inside: NDArray[np.bool_],
+        i: NDArray[np.int32],
+        j: NDArray[np.int32],
+        f: NDArray[np.float64],
+    ) -> NDArray[np.float64]:
+        """How many edges nodes lie inside a border that edges i → j cross f edges beyond i, negative outside, (m,)."""
+        count, start, end = self._count, self._start, self._end
+        out = np.where(inside, 1.0, -1.0)
+        alone = np.ones(count, dtype=bool)
+        alone[start[inside[start] & inside[end]]] = False
+        f = np.where(alone[i], np.maximum(f, 0.0), f)  # something presses there
+        for nodes, values in ((i, f), (j, f - 1.0)):
+            total, number = np.bincount(nodes, values, count), np.bincount(nodes, minlength=count)
+            out = np.where(number > 0, total / np.maximum(number, 1), out)
+        rim, edge = np.zeros(count, dtype=bool), np.zeros(count, dtype=bool)
+        rim[i], edge[j] = True, True
+        inner = inside[start] & ~rim[start] & rim[end]
+        least = np.full(count, np.inf)
+        np.minimum.at(least, start[inner], out[end[inner]] + 1.0)
+        out = np.where(np.isfinite(least), least, out)
+        outer = ~inside[start] & ~edge[start] & edge[end]
+        most = np.full(count, -np.inf)
+        np.maximum.at(most, start[outer], out[end[outer]] - 1.0)
+        return np.where(np.isfinite(most), np.minimum(most, 0.0), out)
+
+
+def _positive_area(at: NDArray[np.float64], values: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Area of the part of quadrilaterals (F, 4, 3) where what their corners say (F, 4) is positive, shape (F,)."""
+    polygon = np.zeros((len(at), 8, 3))
+    used = np.zeros((len(at), 8), dtype=bool)
+    for k in range(4):
+        here, there = values[:, k], values[:, (k + 1) % 4]
+        used[:, 2 * k] = here > 0.0
+        used[:, 2 * k + 1] = (here > 0.0) != (there > 0.0)
+        way = here / np.where(used[:, 2 * k + 1], here - there, 1.0)
+        polygon[:, 2 * k] = at[:, k]
+        polygon[:, 2 * k + 1] = at[:, k] + way[:, None] * (at[:, (k + 1) % 4] - at[:, k])
+    for k in range(16):  # what is not part of the polygon lies on the part before it
+        polygon[:, k % 8] = np.where(used[:, k % 8, None], polygon[:, k % 8], polygon[:, (k - 1) % 8])
+    from_first = polygon - polygon[:, :1]
+    vector = 0.5 * np.cross(from_first, np.roll(from_first, -1, axis=1)).sum(axis=1)
+    return np.where(used.any(axis=1), np.linalg.norm(vector, axis=1), 0.0)

@@ -1,0 +1,166 @@
+"""Mortar points between two surfaces that both deform."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from warpjld.errors import InputError
+from warpjld.fem.contact.interface.pair_filter import counted
+from warpjld.fem.contact.interface.pairs import Pair
+from warpjld.fem.contact.interface.surface import ContactSurface
+from warpjld.fem.launch import on_rows, shared
+
+if TYPE_CHECKING:
+    from warpjld.fem.contact.interface.contact_points import ContactPoints
+
+__all__ = ["Mortar"]
+
+_FACING = -0.2
+"""Facets may touch where the cosine of the angle between their normals is below this."""
+_TURN = 0.4
+"""They do so fully where it is less than that by this."""
+_LEAST = 1e-4
+"""Share of a node's surface below which a point is left out."""
+_SLIVER, _OFF = 0.1, 0.25
+"""Share of a node's surface below which its average hangs on a sliver, and by how many edges the least of slivers seem
+farther off than they are: what presses beside them is to hold them, not a pressure without bound on hardly any area."""
+
+
+class Mortar:
+    """Two surfaces of a body, and the integrals over what they have in common.
+
+    Args:
+        slave: Where pressures live.
+        master: The other side; may be the same.
+        pair: Exclusions.
+        count: Nodes of the body, N.
+        threads: Threads.
+
+    Attributes:
+        slave, master, threads: As given.
+        offset: How far what is seen lies outside the nodes [m], shape (N,), where it does.
+        labels: Of the slave's and the master's facets, shapes (F,) and (G,).
+        joined, fringe: See ``Exclusion``.
+    """
+
+    def __init__(self, slave: ContactSurface, master: ContactSurface, pair: Pair, count: int, threads: int) -> None:
+        self.slave, self.master = slave, master
+        self.offset = pair.offset
+        self._count, self.threads = count, threads
+        exclusion = pair.exclusion
+        if exclusion is None:
+            mine, other = np.zeros(len(slave.quads), np.int32), np.zeros(len(master.quads), np.int32)
+            never = joined = np.zeros((1, 1), np.uint8)
+        else:
+            mine, other = (np.asarray(a, dtype=np.int32) for a in (exclusion.slave, exclusion.master))
+            never = np.array(exclusion.never, dtype=np.uint8)
+            joined = never.copy() if exclusion.joined is None else np.array(exclusion.joined, dtype=np.uint8)
+            if mine.shape != (len(slave.quads),) or other.shape != (len(master.quads),):
+                raise InputError(
+                    f"{pair.title}: want one label for each of {len(slave.quads)} slave and {len(master.quads)} "
+                    f"master faces, got {mine.shape} and {other.shape}"
+                )
+            if never.ndim != 2 or never.shape[0] != never.shape[1]:
+                raise InputError(f"{pair.title}: never: want a square table of labels, got shape {never.shape}")
+            if max(mine.max(), other.max()) >= len(never) or min(mine.min(), other.min()) < 0:
+                raise InputError(f"{pair.title}: labels must lie in 0…{len(never) - 1}")
+        same = slave.quads.shape == master.quads.shape and bool((slave.quads == master.quads).all())
+        if same:
+            if exclusion is None:
+                raise InputError(f"{pair.title}: a surface against itself wants an exclusion, to know its parts")
+            never |= np.tril(np.ones_like(never))
+        self.labels = np.ascontiguousarray(mine), np.ascontiguousarray(other)
+        self.joined = joined
+        self.fringe = None if exclusion is None else exclusion.fringe
+        self._never = never
+
+    def points(self, x: NDArray[np.float64], reach: float, normals: NDArray[np.float64]) -> ContactPoints:
+        """Points at positions x (N, 3) with slave normals (m, 3).
+
+        Of facets face to face, no farther apart than ``reach``, nor deeper.
+        """
+        from scipy.sparse import coo_array, csr_array
+
+        from warpjld.fem.contact.interface.contact_points import ContactPoints
+
+        slave, master = self.slave, self.master
+        pairs = self._neighbours(x, reach)
+        found = self.integrals(pairs, slave.quads, master.quads, x, reach)
+        some = found[:, 32] > 0.0
+        pairs, found = pairs[some], found[some]
+        share = counted(self, pairs, found, normals, x, reach)
+        some = share > 0.0
+        pairs, share = pairs[some], share[some]
+        found = share[:, None] * found[some]
+        corner = slave.corners[pairs[:, 0]]
+        rows = np.repeat(corner, 4, axis=1)
+        own = np.tile(slave.quads[pairs[:, 0]], 4)
+        far = np.tile(master.quads[pairs[:, 1]], 4)
+        entries = np.concatenate([found[:, :16].ravel(), -found[:, 16:32].ravel()])
+        places = (np.concatenate([rows.ravel(), rows.ravel()]), np.concatenate([own.ravel(), far.ravel()]))
+        table = csr_array(coo_array((entries, places), shape=(len(slave.nodes), self._count)))
+        area = np.asarray(np.bincount(rows.ravel(), found[:, :16].ravel(), minlength=len(slave.nodes)), np.float64)
+        nodes: NDArray[np.int64] = np.flatnonzero(area > _LEAST * slave.edge**2)
+        table = table[nodes]
+        table.data /= np.repeat(area[nodes], np.diff(table.indptr))
+        table.sort_indices()
+        normal = normals[nodes]
+        gap = np.asarray(-np.einsum("mi,mi->m", normal, table @ x), np.float64)
+        gap += self.aside(nodes, area[nodes])[0]
+        return ContactPoints(nodes, table, normal, area[nodes], gap, np.zeros((len(nodes), 3)), pairs, share)
+
+    def aside(
+        self, sites: NDArray[np.int64], area: NDArray[np.float64]
+    ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """What slivers seem farther off [m], and its derivative by their area [1/m], shape (m,) each."""
+        edge = self.slave.edge[sites]
+        t = np.minimum(area / (_SLIVER * edge**2), 1.0)
+        return _OFF * edge * (1.0 - t) ** 2, -2.0 * _OFF * (1.0 - t) / (_SLIVER * edge)
+
+    def _neighbours(self, x: NDArray[np.float64], reach: float) -> NDArray[np.int32]:
+        """Slave and master facets whose boxes are within ``reach``, shape (P, 2); none is left out."""
+        import warp as wp
+        from warpjld_kernels import contact_mortar
+
+        origin = x[self.slave.nodes].mean(axis=0)
+        boxes = []
+        for surface, margin in ((self.slave, reach), (self.master, 0.0)):
+            corners = x[surface.quads] - origin
+            boxes.append((corners.min(axis=1) - margin, corners.max(axis=1) + margin))
+        low, high = (np.ascontiguousarray(b, dtype=np.float32) for b in boxes[1])
+        bvh = wp.Bvh(*(wp.array(b, dtype=wp.vec3, device="cpu") for b in (low, high)))
+        count = len(self.slave.quads)
+        lower, upper = (wp.array(b.astype(np.float32), dtype=wp.vec3, device="cpu") for b in boxes[0])
+        mine, other, never = (shared(a) for a in (*self.labels, self._never))
+        starts, counts = np.zeros(count + 1, np.int32), np.zeros(count, np.int32)
+        inputs: list[Any] = [bvh.id, lower, upper, mine, other, never]
+        out = np.empty(1, np.int32)
+        for fill in (False, True):
+            if fill:
+                np.cumsum(counts, out=starts[1:])
+                out = np.empty(max(int(starts[-1]), 1), np.int32)
+            arguments = [*inputs, shared(starts), fill, shared(counts), shared(out)]
+            wp.launch(contact_mortar.facet_pairs, dim=count, inputs=arguments, device="cpu")
+        facet = np.repeat(np.arange(count, dtype=np.int32), counts)
+        return np.stack([facet, out[: len(facet)]], axis=1)
+
+    def integrals(
+        self,
+        pairs: NDArray[np.int32],
+        slave: NDArray[np.int32],
+        master: NDArray[np.int32],
+        x: NDArray[np.float64],
+        reach: float,
+    ) -> NDArray[np.float64]:
+        """Of pairs (P, 2) of quadrilaterals with corners at x (n, 3), see the kernel, shape (P, 33)."""
+        from warpjld_kernels import contact_mortar
+
+        out = np.zeros((len(pairs), 33))
+        if len(pairs):
+            tables = [np.ascontiguousarray(a).reshape(-1) for a in (pairs, slave, master, x)]
+            arguments = [*(shared(t) for t in tables), _FACING, _TURN, reach, shared(out.reshape(-1))]
+            on_rows(contact_mortar.integrate, len(pairs), arguments, threads=self.threads, least=200)
+        return out

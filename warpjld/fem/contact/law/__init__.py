@@ -1,0 +1,1 @@
+"""Contact laws: pressure, Coulomb friction, bonds."""

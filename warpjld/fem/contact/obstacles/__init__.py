@@ -1,0 +1,1 @@
+"""Obstacles: rigid and prescribed surfaces, and the closest points of them."""

@@ -1,0 +1,185 @@
+"""Mathematically deformed obstacles: taper, twist and bend of a shape (R94).
+
+A. H. Barr, "Global and local deformations of solid primitives", SIGGRAPH '84: the three maps, their inverses, and
+normals by the inverse transpose of their Jacobian.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Literal
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from warpjld.errors import InputError
+from warpjld.fem.contact.obstacles.facets import Facets
+from warpjld.fem.contact.obstacles.obstacle import Motion, Obstacle, Points, Rigid, Touching, checked_points, placement
+
+__all__ = ["Barr"]
+
+Amount = Callable[[float], float] | float
+"""A constant, or a function of time."""
+
+
+class Barr(Obstacle):
+    """A shape that is tapered, then twisted, then bent along one of its axes, and moved as a whole.
+
+    The amounts are those between the two ends of the shape along the axis. The next axis in the order x, y, z is where
+    a bend leads to: a rod along y bends towards z, with its middle fixed.
+
+    Args:
+        shape: A solid, or vertices [m] (v, 3) and triangles (t, 3). Flat sides want enough vertices to bend.
+        axis: ``x``, ``y`` or ``z`` of the shape's frame.
+        taper: Share by which the far end is narrower than the near end, below 1; negative makes it wider.
+        twist: Angle between the ends [rad].
+        bend: Angle between the ends [rad].
+        motion: See `Motion`; of the deformed shape.
+
+    Raises:
+        InputError: An unknown axis, or a shape without extent along it.
+    """
+
+    def __init__(
+        self,
+        shape: Rigid | tuple[ArrayLike, ArrayLike],
+        *,
+        axis: Literal["x", "y", "z"] = "y",
+        taper: Amount = 0.0,
+        twist: Amount = 0.0,
+        bend: Amount = 0.0,
+        motion: Motion | None = None,
+    ) -> None:
+        if axis not in ("x", "y", "z"):
+            raise InputError(f"Barr axis: want x, y or z, got '{axis}'")
+        vertices, faces = shape.mesh(0.0) if isinstance(shape, Rigid) else shape
+        self._rest = Facets(vertices, faces)
+        if isinstance(shape, Rigid):
+            # of the shape itself, each seen from within its facet, where edges are no question
+            x = self._rest.vertices[self._rest.faces]
+            corners = 0.999 * x + 0.001 * x.mean(axis=1, keepdims=True)
+            exact = shape.project(corners.reshape(-1, 3), 0.0).normal.reshape(corners.shape)
+            self._rest.move(self._rest.vertices, exact)
+        self._shape = Facets(vertices, faces)
+        along = "xyz".index(axis)
+        # columns u, w, v: the axis is the second, bends lead to the third
+        self._order = [(along + 2) % 3, along, (along + 1) % 3]
+        reach = self._rest.vertices[:, along]
+        self._low, self._high = float(reach.min()), float(reach.max())
+        if not self._high > self._low:
+            raise InputError(f"Barr: the shape has no extent along {axis}")
+        across = self._rest.vertices[:, [k for k in range(3) if k != along]]
+        self._middle = 0.5 * (across.min(axis=0) + across.max(axis=0))
+        self._centre = np.zeros(3)
+        self._centre[[k for k in range(3) if k != along]] = self._middle
+        self._amounts = (taper, twist, bend)
+        self._motion = motion
+        self._now: tuple[float, ...] | None = (0.0, 0.0, 0.0)
+
+    def project(self, points: Points, time: float) -> Touching:
+        """See `Obstacle.project`: to the facets of the deformed shape, with Barr's normals."""
+        turn, shift = placement(self._motion, time)
+        found = self._at(time).project((checked_points(points) - shift) @ turn)
+        return Touching(found.distance, found.closest @ turn.T + shift, found.normal @ turn.T)
+
+    def carried(self, points: Points, time_from: float, time_to: float) -> Points:
+        """See `Obstacle.carried`: back through the maps of one time, and forth through those of the other."""
+        turn, shift = placement(self._motion, time_from)
+        then, there = placement(self._motion, time_to)
+        material = self._undeformed((checked_points(points) - shift) @ turn, self._values(time_from))
+        return np.asarray(self._deformed(material, self._values(time_to)) @ then.T + there)
+
+    def mesh(self, time: float) -> tuple[Points, NDArray[np.int32]]:
+        """See `Obstacle.mesh`."""
+        turn, shift = placement(self._motion, time)
+        return self._deformed(self._rest.vertices, self._values(time)) @ turn.T + shift, self._rest.faces
+
+    def _at(self, time: float) -> Facets:
+        values = self._values(time)
+        if values != self._now:
+            self._shape.move(self._deformed(self._rest.vertices, values), self._normals(values))
+            self._now = values
+        return self._shape
+
+    def _values(self, time: float) -> tuple[float, float, float]:
+        taper, twist, bend = (float(a(time)) if callable(a) else float(a) for a in self._amounts)
+        if not np.isfinite([taper, twist, bend]).all() or taper >= 1.0:
+            raise InputError(
+                f"Barr at time {time:g}: want finite amounts and a taper below 1, got taper {taper:g}, "
+                f"twist {twist:g}, bend {bend:g}"
+            )
+        return taper, twist, bend
+
+    def _normals(self, values: tuple[float, float, float]) -> NDArray[np.float64]:
+        """Normals of the corners, shape (t, 3, 3): det J · J⁻ᵀ of those at rest, J by central differences."""
+        step = 1e-5 * self._rest.size
+        inner = self._rest.vertices.copy()
+        along = inner[:, self._order[1]]
+        along.clip(self._low + step, self._high - step, out=along)  # beyond its ends the shape goes on differently
+        columns = [self._deformed(inner + h, values) - self._deformed(inner - h, values) for h in step * np.eye(3)]
+        a, b, c = columns
+        cofactor = np.stack([np.cross(b, c), np.cross(c, a), np.cross(a, b)], axis=2) / step**2
+        return np.asarray(np.einsum("tkij,tkj->tki", cofactor[self._rest.faces], self._rest.corner_normals))
+
+    def _deformed(self, points: Points, values: tuple[float, float, float]) -> Points:
+        taper, twist, bend = values
+        u, w, v = ((points - self._centre)[:, k] for k in self._order)
+        share = np.clip((w - self._low) / (self._high - self._low), 0.0, 1.0)
+        narrow = 1.0 - taper * share
+        u, v = narrow * u, narrow * v
+        angle = twist * (share - 0.5)
+        cos, sin = np.cos(angle), np.sin(angle)
+        u, v = u * cos + v * sin, v * cos - u * sin
+        w, v = _bent(w, v, bend, self._low, self._high)
+        return self._back(u, w, v)
+
+    def _undeformed(self, points: Points, values: tuple[float, float, float]) -> Points:
+        taper, twist, bend = values
+        u, w, v = ((points - self._centre)[:, k] for k in self._order)
+        w, v = _straight(w, v, bend, self._low, self._high)
+        share = np.clip((w - self._low) / (self._high - self._low), 0.0, 1.0)
+        angle = twist * (share - 0.5)
+        cos, sin = np.cos(angle), np.sin(angle)
+        u, v = u * cos - v * sin, v * cos + u * sin
+        narrow = 1.0 - taper * share
+        return self._back(u / narrow, w, v / narrow)
+
+    def _back(self, u: NDArray[np.float64], w: NDArray[np.float64], v: NDArray[np.float64]) -> Points:
+        out = np.empty((len(u), 3))
+        for column, part in zip(self._order, (u, w, v), strict=True):
+            out[:, column] = part
+        return out + self._centre
+
+
+def _bent(
+    w: NDArray[np.float64], v: NDArray[np.float64], bend: float, low: float, high: float
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Barr's bend with its centre half-way: lengths along the axis become angles."""
+    middle, rate = 0.5 * (low + high), bend / (high - low)
+    held = np.clip(w, low, high)
+    angle = rate * (held - middle)
+    cos, sin = np.cos(angle), np.sin(angle)
+    along, up = _arc(held - middle, angle)
+    beyond = w - held
+    return middle + along - v * sin + beyond * cos, up + v * cos + beyond * sin
+
+
+def _straight(
+    w: NDArray[np.float64], v: NDArray[np.float64], bend: float, low: float, high: float
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """The inverse of `_bent`, for points nearer than the centre of the bend."""
+    middle, rate = 0.5 * (low + high), bend / (high - low)
+    away = w - middle
+    angle = np.arctan2(rate * away, 1.0 - rate * v)
+    held = np.clip(middle + (angle / rate if abs(rate) > 1e-9 / (high - low) else away), low, high)
+    angle = rate * (held - middle)
+    cos, sin = np.cos(angle), np.sin(angle)
+    along, up = _arc(held - middle, angle)
+    off, rise = away - along, v - up
+    return held + off * cos + rise * sin, rise * cos - off * sin
+
+
+def _arc(length: NDArray[np.float64], angle: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Where an arc of this length that turns by this angle ends: along its first direction, and across."""
+    half = np.sinc(angle / (2.0 * np.pi))
+    return length * np.sinc(angle / np.pi), 0.5 * length * angle * half**2

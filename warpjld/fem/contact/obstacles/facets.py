@@ -1,0 +1,283 @@
+"""Closest points of a triangulated surface in double precision, with normals that are smooth across its facets."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from warpjld.errors import InputError
+from warpjld.fem.contact.obstacles.obstacle import Points, Touching
+from warpjld.threads import in_threads, threads_for
+
+__all__ = ["CREASE", "Facets", "Place"]
+
+CREASE = np.radians(40.0)
+"""Edges with a larger dihedral angle are edges of the body; smaller ones come from its being made of facets."""
+
+_SURE = 1e-5
+"""Share of the size from which on the winding number, which is in single precision, knows inside from outside."""
+
+_THREAD = 5_000
+"""Points a thread must have before splitting pays."""
+
+
+@dataclass(frozen=True, eq=False)
+class Place:
+    """Where on the surface points are nearest.
+
+    Attributes:
+        face: Triangle of each point, shape (n,).
+        weights: Barycentric coordinates there, shape (n, 3).
+    """
+
+    face: NDArray[np.int32]
+    weights: NDArray[np.float64]
+
+
+class Facets:
+    """A surface whose vertices may move while its triangles stay.
+
+    Distances are to the facets themselves: Warp's bounding volume hierarchy names the triangle in single precision, the
+    rest is done in double precision. Normals are interpolated from the corners, where they are weighted by angle and
+    split at creases; on a crease they point from the surface to the point.
+
+    Args:
+        vertices: [m], shape (v, 3).
+        faces: Triangles, anticlockwise seen from outside, shape (t, 3). Where they enclose a negative volume they are
+            turned.
+
+    Raises:
+        InputError: Not finite, wrong shapes, indices out of range, or only triangles without area.
+    """
+
+    def __init__(self, vertices: ArrayLike, faces: ArrayLike) -> None:
+        points, triangles = _checked(vertices, faces)
+        corners = points[triangles]
+        if np.einsum("ti,ti->", corners[:, 0], np.cross(corners[:, 1], corners[:, 2])) < 0.0:
+            triangles = np.ascontiguousarray(triangles[:, ::-1])
+        area = np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1)
+        triangles = triangles[area > 1e-14 * area.max()]
+        if not len(triangles):
+            raise InputError("surface: no triangle has an area")
+        self.faces = triangles
+        self._neighbours = _neighbours(triangles)
+        self._mesh: Any = None
+        self.move(points)
+
+    def move(self, vertices: NDArray[np.float64], normals: NDArray[np.float64] | None = None) -> None:
+        """Put the vertices elsewhere [m], shape (v, 3); with normals of the triangles' corners, of any length, shape
+        (t, 3, 3), where they are known better than from the facets."""
+        import warp as wp
+
+        self.vertices = vertices
+        self.size = float(np.linalg.norm(np.ptp(vertices, axis=0)))
+        self._origin = vertices.mean(axis=0)
+        self._features(normals)
+        local = wp.array(self._local(vertices), dtype=wp.vec3, device="cpu")
+        # a new tree: refitting an old one after large deformation makes slow queries
+        self._mesh = wp.Mesh(
+            points=local,
+            indices=wp.array(self.faces.ravel(), dtype=wp.int32, device="cpu"),
+            support_winding_number=True,
+        )
+
+    def project(self, points: Points) -> Touching:
+        """Distances, nearest points and normals of points (n, 3) [m]."""
+        return self.locate(points)[0]
+
+    def locate(self, points: Points) -> tuple[Touching, Place]:
+        """As `project`, and which triangles the nearest points lie in."""
+        face, inside = self._nearest(points)
+        weights = _closest_weights(self.vertices[self.faces[face]], points)
+        place = Place(face, weights)
+        closest = self.at(place, self.vertices)
+        away = points - closest
+        reach = np.linalg.norm(away, axis=1)
+        normal, feature = self._normals(place)
+        # near the surface the side of the facet, edge or corner decides; elsewhere the winding number, which also sees
+        # other parts of the same surface
+        beyond = np.einsum("ni,ni->n", away, feature) >= 0.0
+        outside = np.where(reach < _SURE * self.size, beyond, ~inside)
+        distance = np.where(outside, reach, -reach)
+        sharp = self._on_crease(place) & (reach > 1e-9 * self.size)
+        normal[sharp] = away[sharp] / distance[sharp, None]
+        return Touching(distance, closest, normal), place
+
+    def at(self, place: Place, vertices: NDArray[np.float64]) -> Points:
+        """Places of the surface when its vertices lie there [m], shape (n, 3)."""
+        out: Points = np.einsum("nk,nki->ni", place.weights, vertices[self.faces[place.face]])
+        return out
+
+    def frames(self, place: Place, vertices: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Orthonormal frames of the triangles of places when the vertices lie there; rows are the first edge, the
+        normal and their cross product, shape (n, 3, 3)."""
+        a, b, c = np.moveaxis(vertices[self.faces[place.face]], 1, 0)
+        x = (b - a) / np.linalg.norm(b - a, axis=1, keepdims=True)
+        y = np.cross(b - a, c - a)
+        y /= np.linalg.norm(y, axis=1, keepdims=True)
+        return np.stack([x, y, np.cross(x, y)], axis=1)
+
+    def _local(self, points: Points) -> NDArray[np.float32]:
+        return np.ascontiguousarray((points - self._origin) / self.size, dtype=np.float32)
+
+    def _nearest(self, points: Points) -> tuple[NDArray[np.int32], NDArray[np.bool_]]:
+        """Nearest triangle, and inside or not, in single precision."""
+        import warp as wp
+        from warpjld_kernels import fem_inside
+
+        count = len(points)
+        local = self._local(points)
+        distance, closest = np.empty(count, np.float32), np.empty((count, 3), np.float32)
+        face = np.empty(count, np.int32)
+        reach = 10.0 + 2.0 * float(np.abs(local).max(initial=0.0))
+
+        def span(begin: int, end: int) -> None:
+            piece = slice(begin, end)
+            inputs = [self._mesh.id, reach, wp.array(local[piece], dtype=wp.vec3, device="cpu", copy=False)]
+            outputs = [
+                wp.array(distance[piece], dtype=float, device="cpu", copy=False),
+                wp.array(closest[piece], dtype=wp.vec3, device="cpu", copy=False),
+                wp.array(face[piece], dtype=wp.int32, device="cpu", copy=False),
+            ]
+            wp.launch(fem_inside.signed_distance, dim=end - begin, inputs=[*inputs, *outputs], device="cpu")
+
+        in_threads(span, count, threads_for(count, _THREAD), fem_inside.signed_distance, "cpu")
+        return np.maximum(face, 0), distance < 0.0
+
+    def _features(self, normals: NDArray[np.float64] | None) -> None:
+        """Normals of triangles, edges and corners, and creases."""
+        x = self.vertices[self.faces]
+        flat = np.cross(x[:, 1] - x[:, 0], x[:, 2] - x[:, 0])
+        flat /= np.maximum(np.linalg.norm(flat, axis=1, keepdims=True), 1e-300)
+        other = np.where(self._neighbours >= 0, self._neighbours, np.arange(len(flat))[:, None])
+        soft = (np.einsum("ti,tki->tk", flat, flat[other]) > np.cos(CREASE)) & (self._neighbours >= 0)
+        self._sharp_edge = ~soft
+        sharp = np.zeros(len(self.vertices), dtype=bool)
+        for k in range(3):  # edge k lies opposite corner k
+            for end in ((k + 1) % 3, (k + 2) % 3):
+                sharp[self.faces[~soft[:, k], end]] = True
+        self._sharp_corner = sharp[self.faces]
+        angles = _angles(x)
+        around = _summed(self.faces.T.ravel(), angles.T[:, :, None] * flat, len(self.vertices))
+        # only their side of the surface matters, not their length
+        self._feature = np.concatenate([flat[:, None], flat[:, None] + flat[other], around[self.faces]], axis=1)
+        if normals is None:
+            label = _smooth_corners(self.faces, soft, self._neighbours)
+            normals = _summed(label.T.ravel(), angles.T[:, :, None] * flat, int(label.max()) + 1)[label]
+        length = np.linalg.norm(normals, axis=2, keepdims=True)
+        self.corner_normals = np.where(length > 1e-12, normals / np.maximum(length, 1e-12), flat[:, None])
+
+    def _normals(self, place: Place) -> tuple[Points, Points]:
+        """Smooth normals, unit length, and those of the feature a place lies on, which tell inside from outside."""
+        smooth = np.einsum("nk,nki->ni", place.weights, self.corner_normals[place.face])
+        length = np.linalg.norm(smooth, axis=1, keepdims=True)
+        flat = self._feature[place.face, 0]
+        smooth = np.where(length > 1e-6, smooth / np.maximum(length, 1e-6), flat)
+        zero = place.weights <= 0.0
+        count = zero.sum(axis=1)
+        which = np.where(count == 1, 1 + zero.argmax(axis=1), np.where(count == 2, 4 + (~zero).argmax(axis=1), 0))
+        return smooth, self._feature[place.face, which]
+
+    def _on_crease(self, place: Place) -> NDArray[np.bool_]:
+        zero = place.weights <= 0.0
+        count = zero.sum(axis=1)
+        edge = self._sharp_edge[place.face, zero.argmax(axis=1)]
+        corner = self._sharp_corner[place.face, (~zero).argmax(axis=1)]
+        return np.asarray(((count == 1) & edge) | ((count == 2) & corner))
+
+
+def _checked(vertices: ArrayLike, faces: ArrayLike) -> tuple[NDArray[np.float64], NDArray[np.int32]]:
+    points = np.ascontiguousarray(vertices, dtype=np.float64)
+    triangles = np.ascontiguousarray(faces, dtype=np.int32)
+    if points.ndim != 2 or points.shape[1] != 3 or not np.isfinite(points).all():
+        raise InputError(f"surface: want finite vertices of shape (n, 3), got {points.shape}")
+    if triangles.ndim != 2 or triangles.shape[1] != 3 or len(triangles) == 0:
+        raise InputError(f"surface: want triangles of shape (n, 3) with n > 0, got {triangles.shape}")
+    if triangles.min() < 0 or triangles.max() >= len(points):
+        raise InputError(f"surface: triangle indices must lie in 0…{len(points) - 1}")
+    return points, triangles
+
+
+def _neighbours(faces: NDArray[np.int32]) -> NDArray[np.int64]:
+    """Triangle across the edge opposite each corner, −1 where there is none or several, shape (t, 3)."""
+    edges = np.sort(faces[:, [[1, 2], [2, 0], [0, 1]]].reshape(-1, 2), axis=1)
+    _, label, uses = np.unique(edges, axis=0, return_inverse=True, return_counts=True)
+    label = label.ravel()
+    order = np.argsort(label, kind="stable")
+    out = np.full(len(label), -1, dtype=np.int64)
+    first = np.concatenate([[0], np.cumsum(uses)[:-1]])[uses == 2]
+    one, two = order[first], order[first + 1]
+    out[one], out[two] = two // 3, one // 3
+    return out.reshape(-1, 3)
+
+
+def _smooth_corners(
+    faces: NDArray[np.int32], soft: NDArray[np.bool_], neighbours: NDArray[np.int64]
+) -> NDArray[np.int64]:
+    """A number for each corner of each triangle, shape (t, 3): the same where triangles around a vertex are reached
+    from one another without crossing a crease."""
+    from scipy.sparse import coo_array
+    from scipy.sparse.csgraph import connected_components
+
+    links = []
+    for k in range(3):
+        mine = np.flatnonzero(soft[:, k])
+        other = neighbours[mine, k]
+        for end in ((k + 1) % 3, (k + 2) % 3):
+            place = (faces[other] == faces[mine, end][:, None]).argmax(axis=1)
+            links.append(np.stack([3 * mine + end, 3 * other + place]))
+    one, two = np.concatenate(links, axis=1)
+    graph = coo_array((np.ones(len(one)), (one, two)), shape=(faces.size, faces.size))
+    return np.asarray(connected_components(graph, directed=False)[1], dtype=np.int64).reshape(-1, 3)
+
+
+def _angles(x: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Angles at the corners of triangles (t, 3, 3) [rad], shape (t, 3)."""
+    ahead, back = np.roll(x, -1, axis=1) - x, np.roll(x, 1, axis=1) - x
+    return np.asarray(np.arctan2(np.linalg.norm(np.cross(ahead, back), axis=2), (ahead * back).sum(axis=2)))
+
+
+def _summed(label: NDArray[np.integer], vectors: NDArray[np.float64], count: int) -> NDArray[np.float64]:
+    """Sums of vectors with the same label, shape (count, 3)."""
+    flat = vectors.reshape(-1, 3)
+    return np.stack([np.bincount(label, flat[:, axis], minlength=count) for axis in range(3)], axis=1)
+
+
+def _closest_weights(triangles: NDArray[np.float64], points: Points) -> NDArray[np.float64]:
+    """Barycentric coordinates of the closest points of triangles (n, 3, 3), exactly zero on edges and corners
+    (Ericson, Real-Time Collision Detection, §5.1.5)."""
+    a, b, c = np.moveaxis(triangles, 1, 0)
+    ab, ac = b - a, c - a
+    d1, d2 = _dot(ab, points - a), _dot(ac, points - a)
+    d3, d4 = _dot(ab, points - b), _dot(ac, points - b)
+    d5, d6 = _dot(ab, points - c), _dot(ac, points - c)
+    va, vb, vc = d3 * d6 - d5 * d4, d5 * d2 - d1 * d6, d1 * d4 - d3 * d2
+    out = np.zeros((len(points), 3))
+    with np.errstate(divide="ignore", invalid="ignore"):
+        total = va + vb + vc
+        v, w = vb / total, vc / total
+        inner = np.stack([1.0 - v - w, v, w], axis=1)
+        on_ab, on_ac, on_bc = d1 / (d1 - d3), d2 / (d2 - d6), (d4 - d3) / ((d4 - d3) + (d5 - d6))
+    zero = np.zeros(len(points))
+    cases = [
+        ((d1 <= 0) & (d2 <= 0), (1.0 + zero, zero, zero)),
+        ((d3 >= 0) & (d4 <= d3), (zero, 1.0 + zero, zero)),
+        ((d6 >= 0) & (d5 <= d6), (zero, zero, 1.0 + zero)),
+        ((vc <= 0) & (d1 >= 0) & (d3 <= 0), (1.0 - on_ab, on_ab, zero)),
+        ((vb <= 0) & (d2 >= 0) & (d6 <= 0), (1.0 - on_ac, zero, on_ac)),
+        ((va <= 0) & (d4 >= d3) & (d5 >= d6), (zero, 1.0 - on_bc, on_bc)),
+    ]
+    todo = np.ones(len(points), dtype=bool)
+    for where, weights in cases:
+        chosen = todo & where
+        out[chosen] = np.stack([w[chosen] for w in weights], axis=1)
+        todo &= ~chosen
+    out[todo] = inner[todo]
+    return out
+
+
+def _dot(a: Points, b: Points) -> NDArray[np.float64]:
+    return np.asarray((a * b).sum(axis=1))

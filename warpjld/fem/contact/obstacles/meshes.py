@@ -1,0 +1,102 @@
+"""Obstacles made of facets: rigid ones, and ones deformed by key frames (R94)."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from warpjld.errors import InputError
+from warpjld.fem.contact.obstacles.facets import Facets
+from warpjld.fem.contact.obstacles.obstacle import Motion, Obstacle, Points, Rigid, Touching, checked_points, placement
+
+__all__ = ["Keyframed", "RigidMesh"]
+
+
+class RigidMesh(Rigid):
+    """A triangulated surface that keeps its shape.
+
+    Args:
+        vertices: [m], shape (v, 3).
+        faces: Triangles, shape (t, 3).
+        motion: See `Motion`.
+
+    Raises:
+        InputError: See `Facets`.
+    """
+
+    def __init__(self, vertices: ArrayLike, faces: ArrayLike, motion: Motion | None = None) -> None:
+        self._facets = Facets(vertices, faces)
+        self.motion = motion
+
+    def _project(self, points: Points) -> Touching:
+        return self._facets.project(points)
+
+    def _mesh(self) -> tuple[Points, NDArray[np.int32]]:
+        return self._facets.vertices, self._facets.faces
+
+
+class Keyframed(Obstacle):
+    """A surface whose vertices are given at times; between them they go straight, outside they stay.
+
+    Args:
+        faces: Triangles, shape (t, 3).
+        times: Increasing, shape (T,).
+        vertices: [m], shape (T, v, 3).
+        motion: See `Motion`; of the deformed shape.
+
+    Raises:
+        InputError: Times that do not increase, wrong shapes, or see `Facets`.
+    """
+
+    def __init__(self, faces: ArrayLike, times: ArrayLike, vertices: ArrayLike, motion: Motion | None = None) -> None:
+        self._motion = motion
+        self._times = np.asarray(times, dtype=np.float64)
+        self._vertices = np.asarray(vertices, dtype=np.float64)
+        if self._times.ndim != 1 or len(self._times) == 0 or not (np.diff(self._times) > 0.0).all():
+            raise InputError("keyframed obstacle: want increasing times, at least one")
+        shape = self._vertices.shape
+        if len(shape) != 3 or shape[0] != len(self._times) or shape[2] != 3 or not np.isfinite(self._vertices).all():
+            raise InputError(
+                f"keyframed obstacle: want finite vertices of shape ({len(self._times)}, n, 3), got {shape}"
+            )
+        self._facets = Facets(self._vertices[0], faces)
+        self._now = float(self._times[0])
+
+    def project(self, points: Points, time: float) -> Touching:
+        """See `Obstacle.project`."""
+        turn, shift = placement(self._motion, time)
+        found = self._at(time).project((checked_points(points) - shift) @ turn)
+        return Touching(found.distance, found.closest @ turn.T + shift, found.normal @ turn.T)
+
+    def carried(self, points: Points, time_from: float, time_to: float) -> Points:
+        """See `Obstacle.carried`: the offset from the nearest facet turns with it."""
+        turn, shift = placement(self._motion, time_from)
+        then, there = placement(self._motion, time_to)
+        points = (checked_points(points) - shift) @ turn
+        facets = self._at(time_from)
+        found, place = facets.locate(points)
+        before, after = facets.vertices, self._shape(time_to)
+        offset = np.einsum("nij,nj->ni", facets.frames(place, before), points - found.closest)
+        turned = np.einsum("nij,ni->nj", facets.frames(place, after), offset)
+        return np.asarray((facets.at(place, after) + turned) @ then.T + there)
+
+    def mesh(self, time: float) -> tuple[Points, NDArray[np.int32]]:
+        """See `Obstacle.mesh`."""
+        turn, shift = placement(self._motion, time)
+        return self._shape(time) @ turn.T + shift, self._facets.faces
+
+    def _at(self, time: float) -> Facets:
+        moment = float(np.clip(time, self._times[0], self._times[-1]))
+        if moment != self._now:
+            self._facets.move(self._shape(moment))
+            self._now = moment
+        return self._facets
+
+    def _shape(self, time: float) -> Points:
+        after = int(np.searchsorted(self._times, time))
+        if after == 0:
+            return np.asarray(self._vertices[0])
+        if after == len(self._times):
+            return np.asarray(self._vertices[-1])
+        part = (time - self._times[after - 1]) / (self._times[after] - self._times[after - 1])
+        return np.asarray((1.0 - part) * self._vertices[after - 1] + part * self._vertices[after])

@@ -1,0 +1,258 @@
+"""Plane, sphere, box and cylinder, by formula: exact distances and normals."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from warpjld.errors import InputError
+from warpjld.fem.contact.obstacles.obstacle import Motion, Points, Rigid, Touching, checked_vector
+
+__all__ = ["Box", "Cylinder", "Plane", "Sphere"]
+
+
+@dataclass(frozen=True, eq=False)
+class Plane(Rigid):
+    """The half-space behind a plane.
+
+    Attributes:
+        point: On the plane [m].
+        normal: Out of the obstacle, any length but zero.
+        motion: See `Motion`.
+        extent: Side of the square it is drawn as [m].
+
+    Raises:
+        InputError: A normal without direction.
+    """
+
+    point: ArrayLike = (0.0, 0.0, 0.0)
+    normal: ArrayLike = (0.0, 1.0, 0.0)
+    motion: Motion | None = None
+    extent: float = 0.3
+    _middle: Points = field(init=False, repr=False)
+    _out: Points = field(init=False, repr=False)
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "_middle", checked_vector("plane point", self.point))
+        object.__setattr__(self, "_out", _direction("plane normal", self.normal))
+
+    def _project(self, points: Points) -> Touching:
+        distance = (points - self._middle) @ self._out
+        return Touching(distance, points - distance[:, None] * self._out, np.tile(self._out, (len(points), 1)))
+
+    def _mesh(self) -> tuple[Points, NDArray[np.int32]]:
+        along, across = _square(self._out)
+        corners = [(-1, -1), (1, -1), (1, 1), (-1, 1)]
+        vertices = [self._middle + 0.5 * self.extent * (a * along + b * across) for a, b in corners]
+        return np.array(vertices), np.array([[0, 1, 2], [0, 2, 3]], dtype=np.int32)
+
+
+@dataclass(frozen=True, eq=False)
+class Sphere(Rigid):
+    """A ball.
+
+    Attributes:
+        centre: [m].
+        radius: [m].
+        motion: See `Motion`.
+
+    Raises:
+        InputError: A radius that is not above 0.
+    """
+
+    centre: ArrayLike
+    radius: float
+    motion: Motion | None = None
+    _middle: Points = field(init=False, repr=False)
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "_middle", checked_vector("sphere centre", self.centre))
+        _length("sphere radius", self.radius)
+
+    def _project(self, points: Points) -> Touching:
+        away = points - self._middle
+        reach = np.linalg.norm(away, axis=1)
+        normal = np.divide(away, reach[:, None], out=np.tile([0.0, 1.0, 0.0], (len(away), 1)), where=reach[:, None] > 0)
+        return Touching(reach - self.radius, self._middle + self.radius * normal, normal)
+
+    def _mesh(self) -> tuple[Points, NDArray[np.int32]]:
+        import trimesh
+
+        ball = trimesh.creation.icosphere(subdivisions=4, radius=self.radius)
+        return np.asarray(ball.vertices) + self._middle, np.asarray(ball.faces, dtype=np.int32)
+
+
+@dataclass(frozen=True, eq=False)
+class Box(Rigid):
+    """A box along the axes of its frame.
+
+    Attributes:
+        size: Extents along x, y and z [m].
+        centre: [m].
+        edge: Radius its edges and corners are rounded to [m].
+        motion: See `Motion`.
+
+    Raises:
+        InputError: A size that is not above 0, or edges rounder than the box is thick.
+    """
+
+    size: ArrayLike
+    centre: ArrayLike = (0.0, 0.0, 0.0)
+    edge: float = 0.0
+    motion: Motion | None = None
+    _middle: Points = field(init=False, repr=False)
+    _half: NDArray[np.float64] = field(init=False, repr=False)
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "_middle", checked_vector("box centre", self.centre))
+        object.__setattr__(self, "_half", 0.5 * checked_vector("box size", self.size, above=0.0))
+        _rounding("box", self.edge, float(self._half.min()))
+
+    def _project(self, points: Points) -> Touching:
+        found = _round_box(points - self._middle, self._half, self.edge)
+        return Touching(found.distance, found.closest + self._middle, found.normal)
+
+    def _mesh(self) -> tuple[Points, NDArray[np.int32]]:
+        rim = self.edge * (1.0 - np.tan(np.linspace(0.0, 0.25 * np.pi, 6 if self.edge else 1)))
+        vertices, faces = _box_surface([np.concatenate([rim - h, h - rim, [-h, h]]) for h in self._half])
+        return _round_box(vertices, self._half, self.edge).closest + self._middle, faces
+
+
+@dataclass(frozen=True, eq=False)
+class Cylinder(Rigid):
+    """A cylinder with flat ends.
+
+    Attributes:
+        radius: [m].
+        length: From end to end [m].
+        centre: [m].
+        axis: Any length but zero.
+        edge: Radius its two rims are rounded to [m].
+        motion: See `Motion`.
+
+    Raises:
+        InputError: A measure that is not above 0, an axis without direction, or rims rounder than it is thick.
+    """
+
+    radius: float
+    length: float
+    centre: ArrayLike = (0.0, 0.0, 0.0)
+    axis: ArrayLike = (0.0, 1.0, 0.0)
+    edge: float = 0.0
+    motion: Motion | None = None
+    _middle: Points = field(init=False, repr=False)
+    _along: Points = field(init=False, repr=False)
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "_middle", checked_vector("cylinder centre", self.centre))
+        object.__setattr__(self, "_along", _direction("cylinder axis", self.axis))
+        _length("cylinder radius", self.radius)
+        _length("cylinder length", self.length)
+        _rounding("cylinder", self.edge, min(self.radius, 0.5 * self.length))
+
+    def _project(self, points: Points) -> Touching:
+        # in the half-plane of the axis and the point it is a rectangle
+        axis = self._along
+        away = points - self._middle
+        along = away @ axis
+        across = away - along[:, None] * axis
+        reach = np.linalg.norm(across, axis=1)
+        any_way = np.tile(_square(axis)[0], (len(points), 1))
+        outwards = np.divide(across, reach[:, None], out=any_way, where=reach[:, None] > 0)
+        flat = _round_box(np.stack([reach, along], axis=1), np.array([self.radius, 0.5 * self.length]), self.edge)
+        closest, normal = (f[:, :1] * outwards + f[:, 1:] * axis for f in (flat.closest, flat.normal))
+        return Touching(flat.distance, closest + self._middle, normal)
+
+    def _mesh(self) -> tuple[Points, NDArray[np.int32]]:
+        around = 96
+        rim = np.linspace(0.0, 0.5 * np.pi, 7 if self.edge else 1)
+        r = self.radius - self.edge * (1.0 - np.sin(rim))
+        h = 0.5 * self.length - self.edge * (1.0 - np.cos(rim))
+        # a ring more on the flat ends keeps the triangles there from being too slender
+        r, h = np.concatenate([[0.5 * r[0]], r]), np.concatenate([[h[0]], h])
+        steps = max(1, int(np.ceil((2.0 * h[-1]) / (2.0 * np.pi * self.radius / around))))
+        side = np.linspace(h[-1], -h[-1], min(steps, 200) + 1)[1:-1]
+        rings_r = np.concatenate([r, np.full(len(side), self.radius), r[::-1]])
+        rings_h = np.concatenate([h, side, -h[::-1]])
+        u, v = _square(self._along)
+        angle = 2.0 * np.pi * np.arange(around) / around
+        circle = np.cos(angle)[:, None] * u + np.sin(angle)[:, None] * v
+        rings = rings_r[:, None, None] * circle + rings_h[:, None, None] * self._along
+        poles = 0.5 * self.length * np.array([self._along, -self._along])
+        number = np.arange(len(rings) * around).reshape(len(rings), around)
+        after = np.roll(number, -1, axis=1)
+        a, b, c, d = (part.ravel() for part in (number[:-1], number[1:], after[1:], after[:-1]))
+        top = np.full(around, number.size)
+        faces = [np.stack(t, axis=1) for t in ((a, b, c), (a, c, d), (top, number[0], after[0]))]
+        faces.append(np.stack([top + 1, after[-1], number[-1]], axis=1))
+        vertices = np.concatenate([rings.reshape(-1, 3), poles]) + self._middle
+        return vertices, np.concatenate(faces).astype(np.int32)
+
+
+def _round_box(points: NDArray[np.float64], half: NDArray[np.float64], edge: float) -> Touching:
+    """Distances to a box |x| ≤ half with rounded edges, in two or three dimensions: a smaller box, made fatter."""
+    core = half - edge
+    inner = np.clip(points, -core, core)
+    away = points - inner
+    reach = np.linalg.norm(away, axis=1)
+    deep = reach == 0.0
+    normal = np.divide(away, reach[:, None], out=np.zeros_like(away), where=~deep[:, None])
+    distance = reach - edge
+    closest = inner + edge * normal
+    beyond = np.abs(points[deep]) - core
+    axis = beyond.argmax(axis=1)
+    rows = np.arange(len(axis))
+    flat = np.zeros_like(beyond)
+    flat[rows, axis] = np.where(points[deep][rows, axis] < 0.0, -1.0, 1.0)
+    onto = points[deep].copy()
+    onto[rows, axis] = (flat * half)[rows, axis]
+    normal[deep], closest[deep] = flat, onto
+    distance[deep] = beyond[rows, axis] - edge
+    return Touching(distance, closest, normal)
+
+
+def _box_surface(lines: list[NDArray[np.float64]]) -> tuple[Points, NDArray[np.int32]]:
+    """The surface of a box, each side a grid over these coordinates; corners welded."""
+    lines = [np.unique(line) for line in lines]
+    points, faces, start = [], [], 0
+    for axis in range(3):
+        u, v = (axis + 1) % 3, (axis + 2) % 3
+        for end in (0, -1):
+            grid = np.stack(np.meshgrid(lines[u], lines[v], indexing="ij"), axis=-1)
+            side = np.full((*grid.shape[:2], 3), lines[axis][end])
+            side[..., u], side[..., v] = grid[..., 0], grid[..., 1]
+            number = np.arange(grid.shape[0] * grid.shape[1]).reshape(grid.shape[:2]) + start
+            a, b, c, d = number[:-1, :-1], number[1:, :-1], number[1:, 1:], number[:-1, 1:]
+            quads = np.stack([a, b, c, d] if end else [a, d, c, b], axis=-1).reshape(-1, 4)
+            faces += [quads[:, [0, 1, 2]], quads[:, [0, 2, 3]]]
+            points.append(side.reshape(-1, 3))
+            start += len(points[-1])
+    kept, weld = np.unique(np.concatenate(points), axis=0, return_inverse=True)
+    return kept, np.asarray(weld.ravel()[np.concatenate(faces)], dtype=np.int32)
+
+
+def _square(axis: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Two unit vectors that make a right-handed frame with a third: u × v = axis."""
+    u = np.cross(axis, np.eye(3)[np.abs(axis).argmin()])
+    u /= np.linalg.norm(u)
+    return u, np.cross(axis, u)
+
+
+def _direction(name: str, value: ArrayLike) -> NDArray[np.float64]:
+    vector = checked_vector(name, value)
+    length = float(np.linalg.norm(vector))
+    if not length > 1e-12:
+        raise InputError(f"{name}: has no direction")
+    return vector / length
+
+
+def _length(name: str, value: float) -> None:
+    if not (np.isfinite(value) and value > 0.0):
+        raise InputError(f"{name}: want metres above 0, got {value}")
+
+
+def _rounding(name: str, edge: float, most: float) -> None:
+    if not 0.0 <= edge <= most:
+        raise InputError(f"{name} edge: want a radius of 0 to {most:g} m, got {edge}")

@@ -1,0 +1,1 @@
+"""The paper's loop of repelling and releasing (B Fig. 9)."""

@@ -1,0 +1,121 @@
+"""A pair in the paper's loop: which nodes overlap, where they are repelled to, and with what force (B Fig. 9, R113)."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from warpjld.fem.body import Body
+from warpjld.fem.contact.interface.pairs import Pair
+from warpjld.fem.contact.interface.surface import ContactSurface, surface_of
+from warpjld.fem.contact.law.law import Memory, start_memory
+from warpjld.fem.contact.obstacles.facets import Facets, Place
+from warpjld.fem.contact.obstacles.obstacle import Obstacle
+from warpjld.fem.contact.results.nodal_contact import imprint_of
+from warpjld.fem.contact.results.solution import Touch
+
+__all__ = ["Meeting", "Side"]
+
+_DEEPEST = 5.0
+"""Overlap, over an edge, beyond which a node is taken to have another side of the master behind it."""
+
+
+@dataclass(frozen=True, eq=False)
+class Meeting:
+    """Where a pair's slave nodes are repelled to."""
+
+    rows: NDArray[np.int64]
+    target: NDArray[np.float64]
+    normal: NDArray[np.float64]
+    place: Place | None
+    distance: NDArray[np.float64]
+
+
+class Side:
+    """A pair, its surfaces, and which slave nodes are pushed."""
+
+    def __init__(self, body: Body, pair: Pair) -> None:
+        self.pair = pair
+        self.slave: ContactSurface = surface_of(body.mesh, pair.slave, f"{pair.title}: slave")
+        self.touching = np.zeros(len(self.slave.nodes), dtype=bool)
+        self.obstacle = pair.master if isinstance(pair.master, Obstacle) else None
+        self.nodes = np.empty(0, np.int32)
+        if not isinstance(pair.master, Obstacle):
+            master = surface_of(body.mesh, pair.master, f"{pair.title}: master")
+            self.nodes = master.nodes
+            corners = master.corners
+            self._facets = Facets(body.mesh.nodes[self.nodes], np.concatenate([corners[:, :3], corners[:, [0, 2, 3]]]))
+            self.triangles = self._facets.faces
+
+    def memory(self) -> Memory:
+        """Who was pushed, for a later run: nodes with a pressure."""
+        return replace(start_memory(len(self.slave.nodes), self.pair), pressure=self.touching.astype(np.float64))
+
+    def meet(self, x: NDArray[np.float64], skin: NDArray[np.float64], time: float) -> Meeting:
+        """Nodes that overlap or were pushed, at positions x (N, 3), and the polygons of ``skin`` (N, 3) under them."""
+        place = None
+        points = x[self.slave.nodes]
+        if self.obstacle is not None:
+            found = self.obstacle.project(points, time)
+        else:
+            self._facets.move(skin[self.nodes])
+            found, place = self._facets.locate(points)
+        # by the side of the nearest polygon: a master need not be closed
+        depth = np.einsum("mi,mi->m", found.closest - points, found.normal)
+        overlapping = (depth > 0.0) & (depth < _DEEPEST * self.slave.edge)
+        rows = np.flatnonzero(overlapping | self.touching)
+        if place is not None:
+            place = Place(place.face[rows], place.weights[rows])
+        return Meeting(rows, found.closest[rows], found.normal[rows], place, -depth[rows])
+
+    def share(self, meeting: Meeting, reactions: NDArray[np.float64], out: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Add forces on slave nodes (m, 3), and their opposites on the facets' nodes, to ``out`` (N, 3); what pulls is
+        let go. The forces that stay, shape (m, 3).
+        """
+        pushes = np.einsum("mi,mi->m", reactions, meeting.normal) > 0.0
+        forces = reactions * pushes[:, None]
+        self.touching[:] = False
+        self.touching[meeting.rows[pushes]] = True
+        np.add.at(out, self.slave.nodes[meeting.rows], forces)
+        if meeting.place is not None:
+            corners = self.nodes[self.triangles[meeting.place.face]]
+            np.add.at(out, corners, -meeting.place.weights[:, :, None] * forces[:, None, :])
+        return forces
+
+    def touch(self, meeting: Meeting, forces: NDArray[np.float64], x: NDArray[np.float64]) -> Touch:
+        """What a pair says of forces on its slave nodes (m, 3) at positions x (N, 3)."""
+        from scipy.sparse import csr_array
+
+        surface = self.slave
+        nodes = surface.nodes[meeting.rows]
+        area = surface.at_nodes(np.linalg.norm(surface.area_vectors(x), axis=1))[meeting.rows]
+        traction = forces / area[:, None]
+        pressure = np.einsum("mi,mi->m", traction, meeting.normal)
+        nodal = np.zeros_like(x)
+        nodal[nodes] = forces
+        there = csr_array((len(nodes), len(x)))
+        if meeting.place is not None:
+            corners = self.nodes[self.triangles[meeting.place.face]]
+            np.add.at(nodal, corners, -meeting.place.weights[:, :, None] * forces[:, None, :])
+            rows = 3 * np.arange(len(nodes) + 1)
+            there = csr_array((meeting.place.weights.ravel(), corners.ravel(), rows), shape=there.shape)
+        pressed, still = np.where(pressure > 0.0, area, 0.0), np.zeros((len(nodes), 3))
+        return Touch(
+            self.pair.label,
+            nodes,
+            x[nodes],
+            -meeting.normal,
+            pressure,
+            traction,
+            meeting.distance,
+            area,
+            pressed,
+            pressed,
+            still,
+            pressure > 0.0,
+            np.zeros(len(nodes), dtype=bool),
+            nodal,
+            imprint_of(nodes, pressed * pressure, pressed, pressed, still, there, len(x)),
+        )

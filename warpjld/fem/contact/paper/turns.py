@@ -1,0 +1,177 @@
+"""The turns of the paper's loop at one time: slave nodes are repelled, then bodies released (B Fig. 9, R113)."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from warpjld.fem.body import Body
+from warpjld.fem.contact.paper.sides import Meeting, Side
+from warpjld.fem.contact.results.solution import ContactInstant, Touch
+from warpjld.fem.load.loads import Loads
+from warpjld.fem.load.prescribed import Prescribed
+from warpjld.fem.solver.conjugate import Status
+from warpjld.fem.solver.solution import Solution
+from warpjld.fem.solver.static import solve
+
+__all__ = ["Turns"]
+
+_TURNS = 60
+_LEAST, _MOST = 0.1, 2.0
+"""Factors by which relaxation may change in a turn."""
+_RUNAWAY = 1e3
+"""Growth of the move from its least that is called divergence."""
+
+
+class Turns:
+    """Repelling and releasing at one time, in turns.
+
+    Attributes:
+        last: The last equilibrium of released bodies.
+        forces: Contact forces on all nodes under which it is one [N], shape (N, 3).
+        omega: Share of the forces found that bodies are released under, over those of the turn before; plainly all.
+        solves: Static solves, two a turn.
+        moves: Farthest move or overlap of any point in each turn [m].
+        report: How it ended, in words.
+        diverged: Whether turns did not settle, though each found its equilibria.
+    """
+
+    def __init__(
+        self,
+        body: Body,
+        known: Prescribed,
+        sides: list[Side],
+        loads: Loads,
+        time: float,
+        forces: NDArray[np.float64],
+        omega: float | None,
+        threshold: float,
+    ) -> None:
+        self._body, self._known, self._sides, self._loads, self._time = body, known, sides, loads, time
+        self._aitken, self._threshold = omega is not None, threshold
+        self._touches: list[Touch] = []
+        self._iterations = 0
+        self.forces, self.omega = forces, 1.0 if omega is None else omega
+        self.solves = 0
+        self.moves: list[float] = []
+        self.report = ""
+        self.diverged = False
+
+    def through(self, last: Solution, first: NDArray[np.float64] | None, deepest: float) -> Status:
+        """Turn until no point moves any more. Overlap beyond ``deepest`` [m] at the start is left to shorter steps."""
+        rest, surface = self._body.mesh.nodes, _surface(self._sides)
+        self.last = self._solve(self._known, self._loaded(self.forces), last, first)
+        if not self.last.converged:
+            return self._ended(self.last.status, f"the bodies do not follow what is prescribed: {self.last.message}")
+        before = np.zeros(0)
+        for turn in range(_TURNS):
+            u = self.last.displacement
+            meetings = [side.meet(rest + u, rest + u, self._time) for side in self._sides]
+            overlap = max(float(np.maximum(-m.distance, 0.0).max(initial=0.0)) for m in meetings)
+            if turn == 0 and overlap > deepest:
+                return self._ended(Status.STAGNATED, f"bodies overlap by {1e3 * overlap:.3g} mm at once")
+            fixed, found = self._repelled(surface, meetings)
+            if not fixed.converged:
+                return self._ended(fixed.status, f"repelled bodies found no equilibrium: {fixed.message}")
+            off = (found - self.forces).ravel()
+            if self._aitken and len(before) and (off != before).any():
+                change = off - before
+                wanted = -self.omega * float(before @ change) / float(change @ change)
+                self.omega = float(np.clip(wanted, _LEAST * self.omega, min(_MOST * self.omega, 1.0)))
+            before = off
+            forces = self.forces + self.omega * off.reshape(-1, 3)
+            # from where they were repelled to, if under nearly those forces: that is in equilibrium already
+            start = fixed if self.omega > 0.5 else self.last
+            freed = self._solve(self._known, self._loaded(forces), start)
+            if not freed.converged:
+                return self._ended(freed.status, f"released bodies give way under the forces found: {freed.message}")
+            self.last, self.forces = freed, forces
+            self.solves += 2
+            moved = float(np.abs(freed.displacement - u).max())
+            # what is relaxed moves less than it has yet to go
+            self.moves.append(max(moved, self._way(fixed, u)))
+            if self.moves[-1] < self._threshold:
+                return self._ended(Status.CONVERGED, f"{turn + 1} turns")
+            if self.moves[-1] > _RUNAWAY * min(self.moves):
+                break
+        self.diverged = True
+        grows = self.growth
+        how = f"each turn moves {grows:.2f} times as far as the one before"
+        status = Status.STAGNATED if grows >= 1.0 else Status.MAX_ITERATIONS
+        return self._ended(status, f"repelling and releasing did not settle in {len(self.moves)} turns: {how}")
+
+    def _way(self, fixed: Solution, u: NDArray[np.float64]) -> float:
+        """How far nodes that stay pushed were repelled [m]."""
+        pushed = np.concatenate([side.slave.nodes[side.touching] for side in self._sides])
+        return float(np.abs(fixed.displacement[pushed] - u[pushed]).max(initial=0.0))
+
+    def _loaded(self, forces: NDArray[np.float64]) -> Loads:
+        nodal = forces if self._loads.nodal is None else self._loads.nodal + forces
+        return replace(self._loads, nodal=nodal)
+
+    @property
+    def growth(self) -> float:
+        """Of the moves from turn to turn, as their geometric mean over the last ten; below 1 it settles."""
+        moves = self.moves[-11:]
+        return float((moves[-1] / moves[0]) ** (1.0 / (len(moves) - 1))) if len(moves) > 1 else np.nan
+
+    def instant(self) -> ContactInstant:
+        """What was reached."""
+        found = self.last.last
+        touches = tuple(self._touches)
+        return ContactInstant(
+            self._time, found.displacement, found.reactions, touches, self.solves, self._iterations, found.residual
+        )
+
+    def _repelled(self, surface: NDArray[np.int64], meetings: list[Meeting]) -> tuple[Solution, NDArray[np.float64]]:
+        """Steps 2 to 4: bodies with the skin held and slave nodes on it, and the forces of that on all nodes [N]."""
+        rest, u = self._body.mesh.nodes, self.last.displacement
+        repelled = _without(_onto_skin(rest, surface, u[surface], self._sides, meetings), self._known)
+        fixed = self._solve(self._known + repelled, self._loads, self.last)
+        forces = np.zeros_like(rest)
+        self._touches = []
+        for side, meeting in zip(self._sides, meetings, strict=True):
+            own = side.share(meeting, fixed.reactions[side.slave.nodes[meeting.rows]], forces)
+            self._touches.append(side.touch(meeting, own, rest + fixed.displacement))
+        return fixed, forces
+
+    def _solve(
+        self, known: Prescribed, loads: Loads, after: Solution, guess: NDArray[np.float64] | None = None
+    ) -> Solution:
+        found = solve(self._body, known, loads, after=after, guess=guess, free="hold", check=False)
+        self._iterations += found.last.iterations
+        return found
+
+    def _ended(self, status: Status, report: str) -> Status:
+        self.report = report
+        return status
+
+
+def _surface(sides: list[Side]) -> NDArray[np.int64]:
+    """Nodes of all masters."""
+    return np.unique(np.concatenate([side.nodes for side in sides])).astype(np.int64)
+
+
+def _onto_skin(
+    rest: NDArray[np.float64],
+    surface: NDArray[np.int64],
+    skin: NDArray[np.float64],
+    sides: list[Side],
+    meetings: list[Meeting],
+) -> Prescribed:
+    """The skin where it is, and slave nodes on its polygons; a node that is both is skin."""
+    nodes = [surface]
+    places = [skin]
+    for side, meeting in zip(sides, meetings, strict=True):
+        nodes.append(side.slave.nodes[meeting.rows].astype(np.int64))
+        places.append(meeting.target - rest[nodes[-1]])
+    found, first = np.unique(np.concatenate(nodes), return_index=True)
+    values = np.concatenate(places)[first]
+    return Prescribed((3 * found[:, None] + np.arange(3)).ravel(), values.ravel())
+
+
+def _without(given: Prescribed, known: Prescribed) -> Prescribed:
+    keep = ~np.isin(given.degrees, known.degrees)
+    return Prescribed(given.degrees[keep], given.values[keep])

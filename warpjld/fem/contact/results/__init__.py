@@ -1,0 +1,1 @@
+"""What a contact solve gives back."""

@@ -1,0 +1,68 @@
+"""The bodies without their contact: forces, stiffness and loads at a displacement."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from warpjld.fem.body import Body, Tangent
+from warpjld.fem.load.loads import Loads, external_forces, subtract_pressure_stiffness
+
+__all__ = ["Elastic"]
+
+
+class Elastic:
+    """Bodies whose stiffness at small strain is found once, and otherwise anew, in the same memory.
+
+    Args:
+        body: All bodies, merged.
+    """
+
+    def __init__(self, body: Body) -> None:
+        self.body = body
+        self.linear = not body.large_strain
+        self._rest = body.at()
+        self._last: Tangent | None = None
+        self._there: tuple[NDArray[np.float64], Tangent] | None = None
+        assert self._rest.stiffness is not None
+        self.stiffness: NDArray[np.float64] = np.einsum("nii->n", self._rest.stiffness.diagonal()) / 3.0
+        """Of each node at rest [N/m], shape (N,)."""
+        if not self.linear:
+            self._last = self._rest
+
+    def at(self, u: NDArray[np.float64], pressures: NDArray[np.float64] | None, loads: Loads) -> Tangent:
+        """Stiffness, that of following pressure taken off, and internal forces at displacement u (3N,).
+
+        ``pressures`` (E,) are those that K takes for its own. The matrix is good until the next call.
+        """
+        if self.linear:
+            return self.forces(u)
+        self._last = self.body.at(u, pressures=pressures, reuse=self._last)
+        assert self._last.stiffness is not None
+        subtract_pressure_stiffness(self._last.stiffness, self.body, loads, u)
+        return self._last
+
+    def forces(self, u: NDArray[np.float64]) -> Tangent:
+        """Internal forces alone; line searches ask for the same place in turn, so the last is kept."""
+        if not self.linear:
+            if self._there is None or not np.array_equal(u, self._there[0]):
+                self._there = u.copy(), self.body.at(u, stiffness=False)
+            return self._there[1]
+        assert self._rest.stiffness is not None
+        own = self._rest.stiffness.product(u, threads=self.body.threads)
+        return replace(self._rest, forces=self._rest.forces + own)
+
+    def external(self, loads: Loads, u: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Nodal forces of loads [N], shape (3N,); as the displaced body meets them at large strain."""
+        return external_forces(self.body, loads, None if self.linear else u)
+
+    def pressures(self, u: NDArray[np.float64], move: NDArray[np.float64] | None = None) -> NDArray[np.float64] | None:
+        """Pressure of each element [Pa], shape (E,), as foreseen after a move (3N,); None at small strain."""
+        return None if self.linear else self.body.at(u, stiffness=False, increment=move).pressures
+
+    def upright(self, u: NDArray[np.float64], least: NDArray[np.float64] | float = 0.0) -> bool:
+        """Whether the elements' Jacobian determinants are above ``least`` (E,) at displacement u (3N,); at small strain
+        they are."""
+        return self.linear or bool((self.forces(u).lowest > least).all())

@@ -1,0 +1,239 @@
+"""How contact between two surfaces that both deform changes as they move: what a symmetric stiffness leaves out.
+
+The points' weights and normals change too. With pressure as high as the flesh is stiff that is no small matter: pads of
+fingers roll and slide on each other, each facet then presses on other nodes, and Newton's method without these
+derivatives goes to and fro. Those of the weights are differences, one facet pair at a time (Puso & Laursen 2004 give
+them in closed form); those of the normals are exact.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from warpjld.fem.contact.interface.surface import ContactSurface
+
+if TYPE_CHECKING:
+    from warpjld.fem.contact.interface.contact_points import ContactPoints
+    from warpjld.fem.contact.interface.mortar import Mortar
+    from warpjld.fem.contact.law.law import Memory, Response
+
+__all__ = ["Slopes", "coupling", "slopes_of"]
+
+_STEP = 1e-6
+"""Of the differences, over an edge."""
+_NEAR, _DEEP = 0.5, 0.05
+"""Edges within which a gap may close in an iteration; and of overlap from which on how gaps change says little of where
+to go: its facets will not meet."""
+
+
+@dataclass(frozen=True, eq=False)
+class Slopes:
+    """Derivatives of m points by the displacement (3N,), beyond those with weights and normals that stay.
+
+    Attributes:
+        gap: Of the gaps of points that touch, ``csr_array`` (m, 3N).
+        forces: Of the nodal forces, less sign: what is to be added to the stiffness [N/m], ``csr_array`` (3N, 3N).
+    """
+
+    gap: Any
+    forces: Any
+
+
+def slopes_of(
+    mortar: Mortar,
+    points: ContactPoints,
+    response: Response,
+    memory: Memory,
+    penalty: NDArray[np.float64],
+    x: NDArray[np.float64],
+    reach: float,
+) -> Slopes | None:
+    """Derivatives at positions x (N, 3), at which the points were found with the normals there; None where nothing
+    touches.
+
+    Tractions turn with the multipliers, not with what the penalty adds to them: overlaps of a first guess are no
+    pressure. How the friction of a point depends on its normal, and on what its slip is measured at, is left out.
+
+    Args:
+        mortar: The surfaces.
+        points: The points.
+        response: Their tractions.
+        memory: Multipliers.
+        penalty: ε [Pa/m], shape (m,).
+        x: [m]
+        reach: How far the points look ahead [m].
+    """
+    from scipy.sparse import csr_array, diags_array
+
+    if not response.active.any():
+        return None
+    edge = mortar.slave.edge[points.sites]
+    rows = np.flatnonzero(response.active | (points.gap < _NEAR * edge))
+    pairs = _Pairs(mortar, points, rows, x, reach)
+    turning = _turning(mortar.slave, x, points.sites, rows)
+    pressure = np.where(response.active, np.maximum(memory.pressure[points.sites], 0.0), 0.0)
+    carried = np.where(response.active[:, None], memory.friction[points.sites], 0.0)
+    of_weights = pairs.forces(carried - pressure[:, None] * points.normal)
+    tractions = -diags_array(np.repeat(pressure, 3)) @ turning
+    of_gap = csr_array((len(edge), x.size))
+    if not (response.error > _DEEP * edge).any():
+        apart = np.zeros_like(points.normal)
+        apart[pairs.rows] = (points.weights @ x)[pairs.rows]
+        of_gap = csr_array(pairs.gaps() - _inner(apart) @ turning)
+        stiff = np.where(response.active, penalty, 0.0)
+        tractions = tractions + _inner(points.normal).T @ (diags_array(stiff) @ of_gap)
+    spreading = _blocks(points.weights.T @ diags_array(points.area))
+    return Slopes(of_gap, csr_array(-(spreading @ tractions + of_weights)))
+
+
+def coupling(points: ContactPoints, response: Response, friction: float, penalty: NDArray[np.float64]) -> Any:
+    """How the friction of points that slide follows their pressure, to be added to the stiffness [N/m], ``csr_array``
+    (3N, 3N); None where none slides.
+
+    Where all points slide, what they press and what they rub is decided together: an object that is about to slip out
+    of a hand moves a long way for a small force, and taking pressure and friction in turns creeps there.
+
+    Args:
+        points: The points, with their ``steep`` if it is known.
+        response: Their tractions, friction bounded by these pressures.
+        friction: Coulomb's μ.
+        penalty: ε [Pa/m], shape (m,).
+    """
+    from scipy.sparse import csr_array, diags_array
+
+    size = np.linalg.norm(response.friction, axis=1)
+    slides = response.active & ~response.sticking & (size > 0.0)
+    if not slides.any():
+        return None
+    along = np.where(slides[:, None], response.friction / np.maximum(size, 1e-300)[:, None], 0.0)
+    weights = _blocks(points.weights)
+    of_gap = -_inner(points.normal) @ weights
+    if points.steep is not None:
+        of_gap = of_gap + points.steep
+    rubs = weights.T @ _inner(points.area[:, None] * along).T
+    return csr_array(rubs @ (diags_array(friction * penalty) @ of_gap))
+
+
+class _Pairs:
+    """Facet pairs of some points, and how their integrals change.
+
+    Attributes:
+        rows: The points, among m.
+        corner: Point of each corner of the slave facets, -1 for none of these, shape (P, 4).
+        column: Degrees of freedom of the corners, slave's first, shape (P, 24).
+        own: Derivatives of ∫ N_a N_b by them, shape (P, 24, 4, 4).
+        far: Of ∫ N_a M_b.
+    """
+
+    def __init__(
+        self, mortar: Mortar, points: ContactPoints, rows: NDArray[np.int64], x: NDArray[np.float64], reach: float
+    ) -> None:
+        assert points.facets is not None
+        assert points.share is not None
+        slave = mortar.slave
+        number = np.full(len(slave.nodes), -1)
+        number[points.sites[rows]] = rows
+        some = (number[slave.corners[points.facets[:, 0]]] >= 0).any(axis=1)
+        facets, share = points.facets[some], points.share[some]
+        nodes = np.concatenate([slave.quads[facets[:, 0]], mortar.master.quads[facets[:, 1]]], axis=1)
+        self.rows = rows
+        self.corner = number[slave.corners[facets[:, 0]]]
+        self.column = (3 * nodes[:, :, None] + np.arange(3)).reshape(-1, 24)
+        self._mortar, self._points, self._at, self._size = mortar, points, x[nodes], x.size
+        change = _differences(mortar, self._at, reach, _STEP * float(np.median(slave.edge)))
+        change *= share[:, None, None]
+        self.own, self.far = (change[:, :, k : k + 16].reshape(-1, 24, 4, 4) for k in (0, 16))
+
+    def gaps(self) -> Any:
+        """How the points' gaps change with their weights, ``csr_array`` (m, 3N)."""
+        from scipy.sparse import coo_array, csr_array
+
+        points, corner, at = self._points, self.corner, self._at
+        spread = np.einsum("pkab,pbi->pkai", self.own, at[:, :4]) - np.einsum("pkab,pbi->pkai", self.far, at[:, 4:])
+        off, per_area = self._mortar.aside(points.sites, points.area)
+        wider = self.own.sum(axis=3)
+        mean = np.einsum("pkai,pai->pka", spread, points.normal[corner]) + (points.gap - off)[corner][:, None] * wider
+        if self._mortar.offset is not None:
+            offset = self._mortar.offset[self.column[:, ::3] // 3]
+            mean += np.einsum("pkab,pb->pka", self.own, offset[:, :4])
+            mean += np.einsum("pkab,pb->pka", self.far, offset[:, 4:])
+        gap = per_area[corner][:, None] * wider - mean / points.area[corner][:, None]
+        where = np.broadcast_to(corner[:, None] >= 0, gap.shape)
+        row = np.broadcast_to(corner[:, None], gap.shape)[where]
+        column = np.broadcast_to(self.column[:, :, None], gap.shape)[where]
+        return csr_array(coo_array((gap[where], (row, column)), shape=(len(points.sites), self._size)))
+
+    def forces(self, traction: NDArray[np.float64]) -> Any:
+        """How nodal forces of tractions (m, 3) change with the points' weights [N/m], ``csr_array`` (3N, 3N)."""
+        from scipy.sparse import coo_array, csr_array
+
+        known = np.where(self.corner[:, :, None] >= 0, traction[self.corner], 0.0)
+        pushed = [np.einsum("pkab,pai->pkbi", part, known) for part in (self.own, -self.far)]
+        block = np.concatenate(pushed, axis=2).reshape(-1, 24, 24)  # by what moves, then by what is pushed
+        row = np.broadcast_to(self.column[:, None, :], block.shape)
+        column = np.broadcast_to(self.column[:, :, None], block.shape)
+        shape = (self._size, self._size)
+        return csr_array(coo_array((block.ravel(), (row.ravel(), column.ravel())), shape=shape))
+
+
+def _differences(mortar: Mortar, at: NDArray[np.float64], reach: float, step: float) -> NDArray[np.float64]:
+    """Derivatives of each facet pair's integrals by the coordinates of its corners at (P, 8, 3), shape (P, 24, 33)."""
+    count = len(at)
+    moved = np.tile(at[:, None], (1, 25, 1, 1)).reshape(count, 25, 24)
+    k = np.arange(24)
+    moved[:, 1 + k, k] += step
+    corners = np.arange(count * 25 * 8, dtype=np.int32).reshape(-1, 2, 4)
+    pairs = np.repeat(np.arange(count * 25, dtype=np.int32)[:, None], 2, axis=1)
+    found = mortar.integrals(pairs, corners[:, 0], corners[:, 1], moved, reach)
+    found = found.reshape(count, 25, 33)
+    return np.asarray((found[:, 1:] - found[:, :1]) / step)
+
+
+def _turning(surface: ContactSurface, x: NDArray[np.float64], sites: NDArray[np.int64], rows: NDArray[np.int64]) -> Any:
+    """Derivatives of the nodes' normals, ``csr_array`` (3m, 3N), zero but at ``rows``."""
+    from scipy.sparse import coo_array, csr_array
+
+    number = np.full(len(surface.nodes), -1)
+    number[sites[rows]] = rows
+    some = np.flatnonzero((number[surface.corners] >= 0).any(axis=1))
+    quads, corner = surface.quads[some], number[surface.corners[some]]
+    length = np.linalg.norm(surface.at_nodes(surface.area_vectors(x)), axis=1)[surface.corners[some]]
+    length = np.where(length > 0.0, length, 1.0)
+    a, b, c, d = (x[quads[:, k]] for k in range(4))
+    # of (c − a) × (d − b) / 8: to each corner a quarter of the face's area vector
+    along, across = _cross(c - a), _cross(d - b)
+    each = 0.125 * np.stack([across, -along, -across, along], axis=1)  # face, node, 3, 3
+    n = surface.normals(x)[surface.corners[some]]
+    plane = np.eye(3) - n[:, :, :, None] * n[:, :, None, :]
+    block = np.einsum("faij,fbjk->fabik", plane, each) / length[:, :, None, None, None]
+    known = np.broadcast_to((corner >= 0)[:, :, None, None, None], block.shape)
+    row = np.broadcast_to((3 * corner[:, :, None] + np.arange(3))[:, :, None, :, None], block.shape)
+    column = np.broadcast_to((3 * quads[:, :, None] + np.arange(3))[:, None, :, None, :], block.shape)
+    shape = (3 * len(sites), x.size)
+    return csr_array(coo_array((block[known], (row[known], column[known])), shape=shape))
+
+
+def _cross(v: NDArray[np.float64]) -> NDArray[np.float64]:
+    """[v]× of vectors (n, 3), shape (n, 3, 3)."""
+    out = np.zeros((len(v), 3, 3))
+    out[:, 0, 1], out[:, 0, 2], out[:, 1, 2] = -v[:, 2], v[:, 1], -v[:, 0]
+    return out - out.transpose(0, 2, 1)
+
+
+def _inner(vectors: NDArray[np.float64]) -> Any:
+    """Rows that take the inner product of each point's vector (m, 3) with three values of it, (m, 3m)."""
+    from scipy.sparse import csr_array
+
+    count = len(vectors)
+    return csr_array((vectors.ravel(), np.arange(3 * count), 3 * np.arange(count + 1)), shape=(count, 3 * count))
+
+
+def _blocks(weights: Any) -> Any:
+    """A table of scalars (n, m) as one of 3 × 3 diagonal blocks."""
+    from scipy.sparse import csr_array, eye_array, kron
+
+    return csr_array(kron(weights, eye_array(3), format="csr"))

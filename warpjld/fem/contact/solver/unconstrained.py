@@ -1,0 +1,88 @@
+"""Bodies that nothing but contact holds."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from warpjld.fem.body import Body
+from warpjld.fem.contact.interface.contact_points import Interface
+from warpjld.fem.contact.solver.contact_system import Contact
+from warpjld.fem.load.prescribed import Prescribed, free_motions
+from warpjld.fem.solver.block_matrix import BlockMatrix
+from warpjld.fem.solver.conjugate import Status
+
+__all__ = ["Loose"]
+
+_HELD = (3e-2, 0.4, 1e-4)
+"""Stiffness given to bodies that only contact holds, over their own: it slows them down, and leaves no force. At first,
+so that contact is found before they fly off; by which factor it then falls with each iteration; and the least.
+"""
+
+
+class Loose:
+    """The bodies that prescribed displacements do not hold.
+
+    Args:
+        body: All bodies, merged.
+        prescribed: Known displacements.
+        stiffness: Stiffness of each node [N/m], shape (N,).
+    """
+
+    def __init__(self, body: Body, prescribed: Prescribed, stiffness: NDArray[np.float64]) -> None:
+        self._mesh = body.mesh
+        self._stiff = stiffness
+        self._bodies = [nodes for nodes, _ in free_motions(body, prescribed)]
+        points = np.unique(prescribed.degrees // 3)
+        self._held = [int(np.isin(points, nodes).sum()) for nodes in self._bodies]
+
+    def __bool__(self) -> bool:
+        return bool(self._bodies)
+
+    def falling(self, contact: Contact) -> NDArray[np.bool_]:
+        """Nodes of loose bodies that nothing touches, shape (N,)."""
+        out = np.zeros(len(self._mesh.nodes), dtype=bool)
+        if self._bodies:
+            touched = np.zeros(len(out), dtype=bool)
+            for p, r in zip(contact.points, contact.responses, strict=True):
+                touched[p.weights[np.flatnonzero(r.active)].indices] = True
+            for nodes in self._bodies:
+                out[nodes] = not touched[nodes].any()
+        return out
+
+    def trouble(self, interfaces: list[Interface], contact: Contact) -> tuple[Status, str]:
+        """Why no equilibrium was found: a loose body that nothing touches, or that slides wherever it is touched."""
+        for nodes, held in zip(self._bodies, self._held, strict=True):
+            mine = np.zeros(len(self._mesh.nodes), dtype=bool)
+            mine[nodes] = True
+            element = int(np.flatnonzero(mine[self._mesh.elements[:, 0]])[0])
+            what = f"'{self._mesh.region_names[self._mesh.regions[element]]}'"
+            touching = []
+            for interface, p, r in zip(interfaces, contact.points, contact.responses, strict=True):
+                rows = np.flatnonzero(r.active)
+                rows = rows[(p.weights[rows] @ mine.astype(float) != 0.0)] if len(rows) else rows
+                if len(rows):
+                    touching.append((interface.pair.title, bool(r.sticking[rows].any())))
+            points = f"the {held} prescribed points" if held > 1 else "the one prescribed point"
+            if not touching:
+                return Status.UNHELD, f"{points} of {what} cannot hold it" if held else f"nothing holds {what}"
+            if not any(sticks for _, sticks in touching):
+                more = f", and {points} cannot" if held else ""
+                return Status.SLIDING, f"{what} slides at {touching[0][0]}: friction is not enough to hold it{more}"
+        return Status.MAX_ITERATIONS, ""
+
+    def leash(self, move: NDArray[np.float64], reach: float) -> float:
+        """Share of a move (3N,) by which loose bodies go no farther than ``reach`` [m]."""
+        far = max((float(np.abs(move.reshape(-1, 3)[nodes]).max()) for nodes in self._bodies), default=0.0)
+        return min(1.0, reach / far) if far > 0.0 else 1.0
+
+    def steadied(self, matrix: BlockMatrix, turn: int) -> BlockMatrix:
+        """A matrix that holds loose bodies back, less with every turn."""
+        if not self._bodies:
+            return matrix
+        first, falls, least = _HELD
+        nodes = np.sort(np.concatenate(self._bodies))
+        added = max(least, first * falls**turn) * self._stiff[nodes]
+        values = matrix.values.copy()
+        values[matrix.on_diagonal[nodes]] += added[:, None, None] * np.eye(3)
+        return BlockMatrix(matrix.rows, matrix.columns, values)

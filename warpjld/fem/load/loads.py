@@ -1,0 +1,197 @@
+"""Body forces, surface forces and concentrated forces as nodal forces (B eqs. 1–4, R97)."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from warpjld.errors import InputError
+from warpjld.fem.body import Body
+from warpjld.fem.mesh.hexmesh import FACES, HexMesh
+from warpjld.fem.mesh.shape import POINTS, shape_at, slope_at
+from warpjld.fem.solver.block_matrix import BlockMatrix
+
+__all__ = ["Centrifugal", "Loads", "external_forces", "subtract_pressure_stiffness", "volumes"]
+
+_QUAD = np.array([[-1, -1], [1, -1], [1, 1], [-1, 1]], dtype=float)
+
+
+@dataclass(frozen=True)
+class Centrifugal:
+    """A body turning steadily: each element is driven outwards by ρ ω² × its distance from the axis.
+
+    Attributes:
+        axis: Direction of the axis, any length but zero.
+        point: A point on it [m].
+        speed: Angular speed [rad/s].
+    """
+
+    axis: tuple[float, float, float]
+    speed: float
+    point: tuple[float, float, float] = (0.0, 0.0, 0.0)
+
+
+@dataclass(frozen=True)
+class Loads:
+    """Everything that pushes on a body, at full strength; load instants scale it (R99).
+
+    Attributes:
+        gravity: Acceleration [m/s²].
+        centrifugal: A steady turn, or None.
+        pressure: Pressure on named faces [Pa], against their outward normal; it follows the deformed surface where the
+            law is for large strain.
+        traction: Force per rest area on named faces [Pa], of constant direction.
+        forces: Concentrated force [N], shared equally by the nodes of a set.
+        nodal: Concentrated force on every node [N], shape (N, 3), or None.
+    """
+
+    gravity: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    centrifugal: Centrifugal | None = None
+    pressure: Mapping[str, float] = field(default_factory=dict)
+    traction: Mapping[str, tuple[float, float, float]] = field(default_factory=dict)
+    forces: Mapping[str, tuple[float, float, float]] = field(default_factory=dict)
+    nodal: NDArray[np.float64] | None = None
+
+    def scaled(self, share: float) -> Loads:
+        """A share of the loads: forces in proportion, and a slower turn."""
+        turn = self.centrifugal
+        return Loads(
+            gravity=_scaled(self.gravity, share),
+            centrifugal=turn and replace(turn, speed=turn.speed * float(np.sqrt(share))),
+            pressure={name: share * p for name, p in self.pressure.items()},
+            traction={name: _scaled(t, share) for name, t in self.traction.items()},
+            forces={name: _scaled(f, share) for name, f in self.forces.items()},
+            nodal=None if self.nodal is None else share * self.nodal,
+        )
+
+
+def external_forces(body: Body, loads: Loads, displacement: NDArray[np.float64] | None = None) -> NDArray[np.float64]:
+    """Nodal forces of the loads [N], shape (3N,); pressure and centrifugal force as the displaced body meets them.
+
+    Raises:
+        InputError: A load on faces or nodes the mesh lacks, or that is not finite.
+    """
+    mesh = body.mesh
+    now = mesh.nodes if displacement is None else mesh.nodes + displacement.reshape(-1, 3)
+    out = np.zeros((len(mesh.nodes), 3))
+    gravity = _vector(loads.gravity, "gravity")
+    if gravity.any() or loads.centrifugal is not None:
+        shape = shape_at(POINTS)
+        weight = volumes(mesh) * body.density[:, None]
+        if gravity.any():
+            share = weight @ shape
+            _scatter(out, mesh.elements, share[:, :, None] * gravity)
+        if loads.centrifugal is not None:
+            axis = _vector(loads.centrifugal.axis, "centrifugal axis")
+            length = float(np.linalg.norm(axis))
+            if length == 0.0:
+                raise InputError("loads: the centrifugal axis has no direction")
+            axis /= length
+            at = shape @ now[mesh.elements] - _vector(loads.centrifugal.point, "centrifugal point")
+            at -= (at @ axis)[:, :, None] * axis
+            pull = (loads.centrifugal.speed**2 * weight)[:, :, None] * at
+            _scatter(out, mesh.elements, np.einsum("qa,eqi->eai", shape, pull))
+    for name, pressure in loads.pressure.items():
+        corners = mesh.quads(_faces(mesh, name, "pressure"))
+        value = float(_vector(pressure, f"pressure on {name}"))
+        _scatter(out, corners, -value * _area_vectors(now[corners]))
+    for name, traction in loads.traction.items():
+        corners = mesh.quads(_faces(mesh, name, "traction"))
+        x = mesh.nodes[corners]
+        area = np.zeros(corners.shape)
+        for n, along, across in _quad_points():
+            size = np.linalg.norm(np.cross(along @ x, across @ x), axis=1)
+            area += size[:, None] * n
+        _scatter(out, corners, area[:, :, None] * _vector(traction, f"traction on {name}"))
+    for name, force in loads.forces.items():
+        nodes = mesh.node_set(name)
+        out[nodes] += _vector(force, f"force on {name}") / len(nodes)
+    if loads.nodal is not None:
+        if loads.nodal.shape != out.shape or not np.isfinite(loads.nodal).all():
+            raise InputError(f"loads: nodal forces want shape {out.shape} and finite values")
+        out += loads.nodal
+    return out.reshape(-1)
+
+
+def subtract_pressure_stiffness(
+    stiffness: BlockMatrix, body: Body, loads: Loads, displacement: NDArray[np.float64], factor: float = 1.0
+) -> None:
+    """Subtract what following pressure adds to the stiffness, in place, symmetric part.
+
+    Over a closed surface, or one whose rim is held, the skew parts of neighbouring faces cancel: nothing is lost.
+    """
+    mesh = body.mesh
+    now = mesh.nodes + displacement.reshape(-1, 3)
+    for name, pressure in loads.pressure.items():
+        faces = _faces(mesh, name, "pressure")
+        corners = mesh.quads(faces)
+        x = now[corners]
+        tangent = np.zeros((len(corners), 4, 4, 3, 3))
+        for n, along, across in _quad_points():
+            first, second = _cross_matrix(along @ x), _cross_matrix(across @ x)
+            for a in range(4):
+                for b in range(4):
+                    tangent[:, a, b] -= factor * pressure * n[a] * (across[b] * first - along[b] * second)
+        tangent = 0.5 * (tangent + tangent.transpose(0, 2, 1, 4, 3))
+        local = FACES[faces[:, 1]]
+        slot = body.pattern.slots[faces[:, 0][:, None, None], 8 * local[:, :, None] + local[:, None, :]]
+        np.subtract.at(stiffness.values, slot.reshape(-1), tangent.reshape(-1, 3, 3))
+
+
+def volumes(mesh: HexMesh) -> NDArray[np.float64]:
+    """Rest volume at each of the eight integration points [m³], shape (E, 8)."""
+    jacobian = np.einsum("eai,qaj->eqij", mesh.nodes[mesh.elements], slope_at(POINTS))
+    out: NDArray[np.float64] = np.linalg.det(jacobian)
+    return out
+
+
+def _quad_points() -> list[tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]]:
+    """Shape functions and their two derivatives at the 2 × 2 points of a face."""
+    out = []
+    for s, t in _QUAD / np.sqrt(3.0):
+        u, v = 1.0 + _QUAD[:, 0] * s, 1.0 + _QUAD[:, 1] * t
+        out.append((u * v / 4.0, _QUAD[:, 0] * v / 4.0, _QUAD[:, 1] * u / 4.0))
+    return out
+
+
+def _area_vectors(x: NDArray[np.float64]) -> NDArray[np.float64]:
+    out = np.zeros(x.shape)
+    for n, along, across in _quad_points():
+        out += n[:, None] * np.cross(along @ x, across @ x)[:, None, :]
+    return out
+
+
+def _cross_matrix(v: NDArray[np.float64]) -> NDArray[np.float64]:
+    out = np.zeros((len(v), 3, 3))
+    out[:, 0, 1], out[:, 0, 2], out[:, 1, 2] = -v[:, 2], v[:, 1], -v[:, 0]
+    return out - out.transpose(0, 2, 1)
+
+
+def _scatter(out: NDArray[np.float64], corners: NDArray[np.int32], values: NDArray[np.float64]) -> None:
+    for axis in range(3):
+        out[:, axis] += np.bincount(corners.ravel(), weights=values[:, :, axis].ravel(), minlength=len(out))
+
+
+def _faces(mesh: HexMesh, name: str, kind: str) -> NDArray[np.int32]:
+    try:
+        faces = mesh.face_set(name)
+    except InputError as error:
+        raise InputError(f"loads: {kind} on a missing face set: {error.message}") from error
+    if len(faces) == 0:
+        raise InputError(f"loads: {kind} on face set '{name}', which is empty")
+    return faces
+
+
+def _scaled(vector: tuple[float, float, float], share: float) -> tuple[float, float, float]:
+    x, y, z = (share * float(v) for v in vector)
+    return x, y, z
+
+
+def _vector(value: ArrayLike, name: str) -> NDArray[np.float64]:
+    out = np.array(value, dtype=np.float64)
+    if out.shape not in {(), (3,)} or not np.isfinite(out).all():
+        raise InputError(f"loads: {name}: want finite numbers, got {out}")
+    return out

@@ -1,0 +1,176 @@
+"""Balls, cylinders and fingers of hexahedra: an O-grid laid over round shapes (a cubed sphere and its relatives)."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from warpjld.errors import InputError
+from warpjld.fem.mesh.hexmesh import HexMesh
+from warpjld.fem.mesh.ogrid import Ogrid, ogrid
+
+__all__ = ["ball", "cylinder", "finger"]
+
+_ALL = ("x-", "x+", "y-", "y+", "z-", "z+")
+_ROUND = 0.45
+"""How far the core leans from a cube (0) to a ball (1): angles stay open enough at its edges."""
+
+
+def ball(
+    radius: float = 1.0, *, inner: float = 0.0, n: int = 8, layers: int | None = None, octant: bool = False
+) -> HexMesh:
+    """A ball or a spherical shell about the origin.
+
+    Regions: ``core`` and ``envelope`` when solid, ``envelope`` when hollow. Faces: ``outer``; ``inner`` of a shell; and
+    of an octant (x, y, z ≥ 0) the symmetry planes ``x0``, ``y0``, ``z0``.
+
+    Args:
+        radius: Outer radius [m].
+        inner: Inner radius of a shell [m]; 0 for a solid ball.
+        n: Elements along an edge of each of the six patches (of an octant's three: the same edge, cut in half).
+        layers: Elements through the wall, or from core to surface; by default n/2 when solid, else as thick as wide.
+        octant: Only one eighth.
+
+    Raises:
+        InputError: Radii or counts that make no ball.
+    """
+    if not radius > 0 or not 0 <= inner < radius:
+        raise InputError(f"want 0 ≤ inner < radius, got inner = {inner} and radius = {radius}")
+    if n < 1:
+        raise InputError(f"n: want at least one element, got {n}")
+    solid = inner == 0.0
+    if layers is None:
+        wide = (1.0 if octant else 0.5) * n
+        layers = max(1, round(wide if solid else wide * 1.27 * 2 * (radius - inner) / (radius + inner)))
+    sides = ("x+", "y+", "z+") if octant else _ALL
+    topology = ogrid((n, n, n), layers, sides, core=solid)
+    s = topology.place / n if octant else 2.0 * topology.place / n - 1.0
+    nodes = _round(s, topology.layer / layers, radius, 0.5 * radius if solid else inner, np.ones(3), solid)
+    return _mesh(
+        topology, nodes, ("core", "envelope") if solid else ("envelope",), {"x-": "x0", "y-": "y0", "z-": "z0"}
+    )
+
+
+def cylinder(
+    radius: float = 1.0,
+    length: float = 2.0,
+    *,
+    inner: float = 0.0,
+    n: int = 8,
+    layers: int | None = None,
+    along: int = 8,
+    quarter: bool = False,
+) -> HexMesh:
+    """A cylinder about the z axis from z = 0, solid with a core (its bone, say) or a tube.
+
+    Regions: ``core`` and ``envelope`` when solid, ``envelope`` when hollow. Faces: ``outer``, ``bottom``, ``top``;
+    ``inner`` of a tube; of a quarter (x, y ≥ 0) the symmetry planes ``x0``, ``y0``.
+
+    Args:
+        radius: Outer radius [m].
+        length: Length [m].
+        inner: Radius of the bore [m]; 0 for a solid cylinder, whose core has half the radius.
+        n: Elements along an edge of each of the four patches (a quarter's two: half of it).
+        layers: Elements through the wall; by default n/2.
+        along: Elements along z.
+        quarter: Only one quarter.
+
+    Raises:
+        InputError: Radii, length or counts that make no cylinder.
+    """
+    if not radius > 0 or not 0 <= inner < radius or not length > 0:
+        raise InputError(f"want 0 ≤ inner < radius and length > 0, got {inner}, {radius} and {length}")
+    solid = inner == 0.0
+    layers = layers or max(1, n if quarter else n // 2)
+    sides = ("x+", "y+") if quarter else _ALL[:4]
+    topology = ogrid((n, n, along), layers, sides, core=solid)
+    s = topology.place / n if quarter else 2.0 * topology.place / n - 1.0
+    s[:, 2] = 0.0
+    flat = np.array([1.0, 1.0, 0.0])
+    nodes = _round(s, topology.layer / layers, radius, 0.5 * radius if solid else inner, flat, solid)
+    nodes[:, 2] = topology.place[:, 2] * (length / along)
+    names = {"z-": "bottom", "z+": "top", "x-": "x0", "y-": "y0"}
+    return _mesh(topology, nodes, ("core", "envelope") if solid else ("envelope",), names)
+
+
+def finger(
+    radius: float = 0.008,
+    length: float = 0.05,
+    *,
+    bone: float = 0.45,
+    n: int = 8,
+    layers: int | None = None,
+    along: int = 16,
+) -> HexMesh:
+    """A finger about the z axis, open base at z = 0 and round tip at z = length, with a bone inside.
+
+    Regions: ``bone`` and ``flesh``. Faces: ``skin`` (outer) and ``base``.
+
+    Args:
+        radius: Radius of the skin [m].
+        length: From base to tip [m].
+        bone: Radius of the bone over that of the skin.
+        n: Elements across the bone, an even number.
+        layers: Elements from bone to skin; by default n/2.
+        along: Elements along the straight part.
+
+    Raises:
+        InputError: Measures that make no finger.
+    """
+    if not 0 < radius < length or not 0 < bone < 1:
+        raise InputError(f"want 0 < radius < length and 0 < bone < 1, got {radius}, {length} and {bone}")
+    if n < 2 or n % 2:
+        raise InputError(f"n: want an even number of elements across the bone, got {n}")
+    layers = layers or n // 2
+    cap = n // 2
+    topology = ogrid((n, n, along + cap), layers, (*_ALL[:4], "z+"), core=True)
+    straight = np.minimum(topology.place[:, 2], along)
+    s = 2.0 * topology.place / n - 1.0
+    s[:, 2] = (topology.place[:, 2] - straight) / cap
+    nodes = _round(s, topology.layer / layers, radius, bone * radius, np.ones(3), True)
+    nodes[:, 2] += straight * ((length - radius) / along)
+    mesh = _mesh(topology, nodes, ("bone", "flesh"), {"z-": "base"})
+    return HexMesh(
+        mesh.nodes,
+        mesh.elements,
+        mesh.regions,
+        mesh.region_names,
+        {"skin" if name == "outer" else name: faces for name, faces in mesh.faces.items()},
+        {},
+        mesh.blocks,
+    )
+
+
+def _round(
+    s: NDArray[np.float64],
+    depth: NDArray[np.float64],
+    outer: float,
+    inner: float,
+    axes: NDArray[np.float64],
+    solid: bool,
+) -> NDArray[np.float64]:
+    """Points of the cube |s| ≤ 1 (or square, where ``axes`` says so) and of the layers around it, made round.
+
+    Directions are equiangular, tan(π s/4), which keeps elements of a patch alike in size.
+    """
+    bent = np.tan(0.25 * np.pi * s) * axes
+    norm = np.linalg.norm(bent, axis=1)
+    direction = np.divide(bent, norm[:, None], out=np.zeros_like(bent), where=norm[:, None] > 0)
+    if not solid:
+        return direction * (inner + (outer - inner) * depth)[:, None]
+    reach = np.abs(s * axes).max(axis=1)
+    corner = np.sqrt(axes.sum())
+    # a cube and a ball of like size, blended: the core; straight lines from it to the surface: the layers
+    cube = s * axes * (2.0 / (1.0 + corner))
+    core = inner * ((1.0 - _ROUND) * cube + _ROUND * direction * reach[:, None])
+    return core + depth[:, None] * (outer * direction - core)
+
+
+def _mesh(topology: Ogrid, nodes: NDArray[np.float64], regions: tuple[str, ...], names: dict[str, str]) -> HexMesh:
+    faces = {"outer": topology.outer}
+    if len(topology.inner):
+        faces["inner"] = topology.inner
+    faces |= {names[side]: found for side, found in topology.ends.items()}
+    region = np.zeros(len(topology.elements), np.int32)
+    region[topology.core :] = len(regions) - 1
+    return HexMesh(nodes, topology.elements, region, regions, faces, {}, topology.blocks)

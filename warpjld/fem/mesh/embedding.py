@@ -1,0 +1,125 @@
+"""A visible surface carried by a volume mesh: the deformed envelope in its own topology (R104)."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from warpjld.errors import InputError
+from warpjld.fem.mesh.hexmesh import HexMesh
+from warpjld.fem.mesh.shape import CENTRE_GRADIENT, shape_at, slope_at
+
+__all__ = ["Embedding", "embed", "embed_between"]
+
+_NEAR = 12
+"""Elements looked at for each point, nearest centres first."""
+
+
+@dataclass(frozen=True, eq=False)
+class Embedding:
+    """Points held by the corners of the element they lie in, or nearest to.
+
+    Attributes:
+        corners: Nodes, shape (P, 8).
+        weights: Shape functions there, rows summing to one, shape (P, 8).
+        outside: How far each point is from its element, 0 inside, in element sizes, shape (P,).
+    """
+
+    corners: NDArray[np.int32]
+    weights: NDArray[np.float64]
+    outside: NDArray[np.float64]
+
+    def carry(self, displacement: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Displacement of the points [m], shape (P, 3), from that of the nodes, shape (N, 3)."""
+        out: NDArray[np.float64] = np.einsum("pa,pai->pi", self.weights, displacement[self.corners])
+        return out
+
+    def gather(self, forces: NDArray[np.float64], count: int) -> NDArray[np.float64]:
+        """Nodal forces that do the work of forces on the points: the transpose of ``carry``, shape (count, 3)."""
+        out = np.zeros((count, 3))
+        for axis in range(3):
+            pushes = (self.weights * forces[:, axis : axis + 1]).ravel()
+            out[:, axis] = np.bincount(self.corners.ravel(), weights=pushes, minlength=count)
+        return out
+
+
+def embed(mesh: HexMesh, points: NDArray[np.float64], *, reach: float = 1.0) -> Embedding:
+    """Find the element and the place in it of every point; points beyond the boundary are extrapolated.
+
+    Args:
+        mesh: The volume mesh, at rest.
+        points: [m], shape (P, 3).
+        reach: How far beyond an element a point may lie, in element sizes.
+
+    Raises:
+        InputError: A point further from the mesh than that.
+    """
+    from scipy.spatial import cKDTree
+
+    x = mesh.nodes[mesh.elements]
+    _, near = cKDTree(x.mean(axis=1)).query(points, k=min(_NEAR, len(x)))
+    near = near.reshape(len(points), -1)
+    best = np.full(len(points), np.inf)
+    place = np.zeros((len(points), 3))
+    owner = np.zeros(len(points), np.int64)
+    for column in range(near.shape[1]):
+        todo = np.flatnonzero(best > 1e-6)
+        if len(todo) == 0:
+            break
+        at = _local(x[near[todo, column]], points[todo])
+        beyond = 0.5 * np.maximum(np.abs(at).max(axis=1) - 1.0, 0.0)
+        better = beyond < best[todo]
+        chosen = todo[better]
+        best[chosen], place[chosen], owner[chosen] = beyond[better], at[better], near[chosen, column]
+    # beyond the boundary, where Newton's method may fail: from the nearest element's middle, straight on
+    lost = np.flatnonzero(best > 1.0)
+    if len(lost):
+        element = x[near[lost, 0]]
+        jacobian = np.einsum("pai,aj->pij", element, CENTRE_GRADIENT)
+        at = np.linalg.solve(jacobian, (points[lost] - element.mean(axis=1))[:, :, None])[:, :, 0]
+        best[lost] = 0.5 * np.maximum(np.abs(at).max(axis=1) - 1.0, 0.0)
+        place[lost], owner[lost] = np.clip(at, -2.0, 2.0), near[lost, 0]
+    if not (best <= reach).all():
+        worst = int(np.argmax(best))
+        raise InputError(f"point {worst} lies {best[worst]:.2g} element sizes outside the mesh, more than {reach:g}")
+    return Embedding(mesh.elements[owner], shape_at(place), best)
+
+
+def embed_between(mesh: HexMesh, ends: Embedding, edges: NDArray[np.integer], points: NDArray[np.float64]) -> Embedding:
+    """Embed points between others in the elements of these: another part of the mesh may lie nearer, but is not theirs.
+
+    Args:
+        mesh: The volume mesh, at rest.
+        ends: How it carries the others.
+        edges: The two that each point lies between, shape (P, 2).
+        points: [m], shape (P, 3).
+    """
+    corners, weights = ends.corners[edges[:, 0]].copy(), ends.weights[edges[:, 0]].copy()
+    best = np.full(len(points), np.inf)
+    for side in edges.T:
+        at = _local(mesh.nodes[ends.corners[side]], points)
+        beyond = 0.5 * np.maximum(np.abs(at).max(axis=1) - 1.0, 0.0)
+        better = beyond < best
+        best[better], corners[better] = beyond[better], ends.corners[side[better]]
+        weights[better] = shape_at(at[better])
+    best = np.where(np.isfinite(best), best, ends.outside[edges[:, 0]])
+    return Embedding(corners, weights, best)
+
+
+def _local(x: NDArray[np.float64], points: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Reference coordinates of points in elements (Newton's method), infinite where it does not converge."""
+    at = np.zeros(points.shape)
+    for _ in range(12):
+        shape, slope = shape_at(at), slope_at(at)
+        wrong = np.einsum("pa,pai->pi", shape, x) - points
+        jacobian = np.einsum("pai,paj->pij", x, slope)
+        det = np.linalg.det(jacobian)
+        jacobian[np.abs(det) < 1e-300] = np.eye(3)
+        step = np.linalg.solve(jacobian, wrong[:, :, None])[:, :, 0]
+        at = np.clip(at - step, -5.0, 5.0)
+    size = np.linalg.norm(np.ptp(x, axis=1), axis=1)
+    wrong = np.einsum("pa,pai->pi", shape_at(at), x) - points
+    at[np.linalg.norm(wrong, axis=1) > 1e-6 * size] = np.inf
+    return at

@@ -1,0 +1,253 @@
+"""Hexahedra inside any closed surface: a regular grid, one layer grown from it to the surface, nodes moved to fit."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from warpjld.errors import InputError
+from warpjld.fem.mesh.core import core_of
+from warpjld.fem.mesh.envelope import Envelope
+from warpjld.fem.mesh.hexmesh import HexMesh, elements_of
+from warpjld.fem.mesh.untangle import improve
+from warpjld.rotations import unit
+
+__all__ = ["Fit", "fit_mesh", "mesh_surface_file"]
+
+_REPAIRS = 5
+"""Further rounds in which the pull is relaxed where elements suffer."""
+_RETURNS = 6
+"""And rounds after those, in which what was relaxed goes on being pulled."""
+_CLOSE = 0.05
+"""Distance of all boundary nodes from the surface, in spacings, that ends this."""
+_NEARER = 0.9
+"""So does a greatest distance that does not fall below this share of the best so far."""
+_LED = 0.3
+"""Pull of nodes that go where their neighbours go, over that of others."""
+
+
+@dataclass(frozen=True, eq=False)
+class Fit:
+    """A fitted mesh and how well it fits.
+
+    Attributes:
+        mesh: Faces ``surface`` are the boundary.
+        least: Least scaled Jacobian.
+        mean: Mean scaled Jacobian.
+        gap: Greatest distance of a boundary node from the surface [m].
+        volume: Volume of the mesh over that of the surface.
+        notes: What was found and done, for people.
+    """
+
+    mesh: HexMesh
+    least: float
+    mean: float
+    gap: float
+    volume: float
+    notes: tuple[str, ...]
+
+
+def fit_mesh(envelope: Envelope, spacing: float, *, least: float = 0.1, name: str = "body", rounds: int = 4) -> Fit:
+    """Mesh the inside of a surface.
+
+    Args:
+        envelope: The surface, watertight or not.
+        spacing: Edge length of the elements [m].
+        least: Least scaled Jacobian: boundary nodes stay off the surface where it asks for worse.
+        name: Region name.
+        rounds: Times the nodes are moved and asked for their closest points again.
+
+    Raises:
+        InputError: A spacing too coarse for the surface, or so fine that memory would not do; quality not reached.
+    """
+    if not spacing > 0:
+        raise InputError(f"spacing: want a length above 0 m, got {spacing}")
+    notes: list[str] = []
+    if not envelope.watertight:
+        notes.append(
+            f"the surface is not watertight ({envelope.open_edges} open edges, {envelope.crowded_edges} edges with "
+            "more than two faces): holes were closed, inside and outside told apart by winding number"
+        )
+    cells, origin = core_of(envelope, spacing, notes)
+    mesh, boundary = _grown(cells, origin, spacing, name)
+    fitted, backed = _settled(mesh, boundary, envelope, spacing, least, rounds)
+    quality = fitted.scaled_jacobian()
+    if quality.min() < least:
+        raise InputError(
+            f"mesh: least scaled Jacobian {quality.min():.3f} below {least} ({int((quality < least).sum())} of "
+            f"{len(quality)} elements): a smaller spacing than {spacing:g} m is needed"
+        )
+    gap = float(np.abs(envelope.ask(fitted.nodes[boundary]).distance).max())
+    if backed:
+        notes.append(f"{backed} of {len(boundary)} boundary nodes stay off the surface, by {1e3 * gap:.2g} mm at most")
+    x = fitted.nodes[fitted.quads(fitted.face_set("surface"))]
+    volume = float(np.einsum("fi,fi->", x.mean(axis=1), np.cross(x[:, 2] - x[:, 0], x[:, 3] - x[:, 1]))) / 6.0
+    return Fit(fitted, float(quality.min()), float(quality.mean()), gap, volume / envelope.volume, tuple(notes))
+
+
+def mesh_surface_file(path: Path, *, spacing: float, scale: float = 1.0) -> Fit:
+    """Mesh the inside of a surface file (OBJ, STL, PLY, …), scaled to metres.
+
+    Raises:
+        InputError: Unreadable, or it cannot be meshed at this spacing.
+    """
+    import trimesh
+
+    if not path.is_file():
+        raise InputError("no such file", path=path)
+    try:
+        loaded = trimesh.load(path, force="mesh", process=True)
+    except Exception as error:
+        raise InputError(f"not a surface that can be read: {error}", path=path) from error
+    return fit_mesh(Envelope(scale * np.asarray(loaded.vertices), np.asarray(loaded.faces)), spacing)
+
+
+def _grown(
+    cells: NDArray[np.bool_], origin: NDArray[np.float64], spacing: float, name: str
+) -> tuple[HexMesh, NDArray[np.int64]]:
+    """The cells and one layer of elements on each of their free faces."""
+    shape = [n + 1 for n in cells.shape]
+    every = elements_of(np.arange(int(np.prod(shape)), dtype=np.int32).reshape(shape))[cells.ravel()]
+    used, elements = np.unique(every, return_inverse=True)
+    elements = np.asarray(elements.reshape(-1, 8), dtype=np.int32)
+    lattice = np.stack(np.unravel_index(used, shape), axis=1).astype(np.int32)
+    nodes = origin + spacing * lattice
+    core = HexMesh(nodes, np.asarray(elements, dtype=np.int32), np.zeros(len(elements), np.int32), (name,))
+    quads = core.quads(core.boundary())
+    skin = np.unique(quads)
+    outer = np.full(len(nodes), -1, np.int32)
+    outer[skin] = len(nodes) + np.arange(len(skin), dtype=np.int32)
+    x = nodes[quads]
+    normal = np.zeros_like(nodes)
+    np.add.at(normal, quads, np.cross(x[:, 2] - x[:, 0], x[:, 3] - x[:, 1])[:, None, :].repeat(4, axis=1))
+    outwards = unit(normal[skin])
+    layer = np.concatenate([quads, outer[quads]], axis=1)
+    all_elements = np.concatenate([elements, layer]).astype(np.int32)
+    faces = np.stack([len(elements) + np.arange(len(layer)), np.full(len(layer), 5)], axis=1).astype(np.int32)
+    # multigrid's grid: a layer node is where it was grown to, one cell outwards
+    grown = lattice[skin] + np.rint(outwards * 1.2).astype(np.int32)
+    mesh = HexMesh(
+        np.concatenate([nodes, nodes[skin] + 0.6 * spacing * outwards]),
+        all_elements,
+        np.zeros(len(all_elements), np.int32),
+        (name,),
+        {"surface": faces},
+        {},
+        (),
+        np.concatenate([lattice, grown]),
+    )
+    return mesh, len(nodes) + np.arange(len(skin))
+
+
+def _settled(
+    mesh: HexMesh, boundary: NDArray[np.int64], envelope: Envelope, spacing: float, least: float, rounds: int
+) -> tuple[HexMesh, int]:
+    """Boundary nodes on the surface and well-shaped elements, as far as both go together.
+
+    Boundary nodes are pulled to their closest points ever harder; where elements suffer the pull is relaxed, and where
+    the closest point looks the other way (the far side of a fold, a neighbouring finger) nodes go where neighbours
+    go. Once all elements are good, what is still off the surface is pulled on, as long as that brings it nearer.
+    """
+    quads = mesh.quads(mesh.face_set("surface"))
+    links = _links(quads, boundary)
+    nodes = mesh.nodes
+    relaxed = np.ones(len(boundary))
+    best: tuple[HexMesh, int] | None = None
+    nearest = np.inf
+    for number in range(rounds + _REPAIRS + _RETURNS):
+        answer = envelope.ask(nodes[boundary])
+        x = nodes[quads]
+        outwards = np.zeros_like(nodes)
+        np.add.at(outwards, quads, np.cross(x[:, 2] - x[:, 0], x[:, 3] - x[:, 1])[:, None, :].repeat(4, axis=1))
+        agrees = np.einsum("bi,bi->b", outwards[boundary], answer.normal) > 0.0
+        target, normal = _led(nodes[boundary], answer.closest, answer.normal, agrees, links)
+        strength = (2.0, 10.0, 30.0)[min(number, 2)] * relaxed * np.where(agrees, 1.0, _LED)
+        nodes = improve(
+            nodes,
+            mesh.elements,
+            spacing,
+            boundary,
+            target,
+            normal,
+            pull=strength,
+            softness=0.3 if number == 0 else 0.03,
+        )
+        if number + 1 < rounds:
+            continue
+        moved = replace(mesh, nodes=nodes)
+        snapped = _snapped(moved, boundary, agrees & (relaxed > 0.01), envelope, least)
+        if snapped[0].scaled_jacobian().min() >= least:
+            away = float(np.abs(envelope.ask(snapped[0].nodes[boundary]).distance).max())
+            if best is None or away < _NEARER * nearest:
+                best, nearest = snapped, away
+            elif number + 1 >= rounds + _REPAIRS:
+                return best
+            if nearest < _CLOSE * spacing or number + 1 == rounds + _REPAIRS + _RETURNS:
+                return best
+            nodes = snapped[0].nodes
+            relaxed = np.minimum(1.0, 8.0 * relaxed)
+            continue
+        if best is not None and number + 1 >= rounds + _REPAIRS:
+            return best
+        quality = moved.scaled_jacobian()
+        suffering = np.zeros(len(nodes), dtype=bool)
+        suffering[mesh.elements[quality < 2.0 * least]] = True
+        for _ in range(2):
+            suffering[mesh.elements[suffering[mesh.elements].any(axis=1)]] = True
+        relaxed[suffering[boundary]] *= 0.03
+    return snapped if best is None else best
+
+
+def _links(quads: NDArray[np.int32], boundary: NDArray[np.int64]) -> Any:
+    """Which boundary nodes share an edge, symmetric ``csr_array`` (B, B)."""
+    from scipy.sparse import csr_array
+
+    row = np.searchsorted(boundary, quads)
+    one, other = row.ravel(), np.roll(row, -1, axis=1).ravel()
+    table = csr_array((np.ones(len(one)), (one, other)), shape=(len(boundary), len(boundary)))
+    return table + table.T
+
+
+def _led(
+    nodes: NDArray[np.float64],
+    closest: NDArray[np.float64],
+    normal: NDArray[np.float64],
+    agrees: NDArray[np.bool_],
+    links: Any,
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Targets and normals; nodes whose own closest point is none for them move as their neighbours do."""
+    move = np.where(agrees[:, None], closest - nodes, 0.0)
+    facing = np.where(agrees[:, None], normal, 0.0)
+    known = agrees.copy()
+    while not known.all():
+        count = links @ known.astype(float)
+        next_ = ~known & (count > 0.0)
+        if not next_.any():
+            break
+        move[next_] = (links @ np.where(known[:, None], move, 0.0))[next_] / count[next_, None]
+        facing[next_] = (links @ np.where(known[:, None], facing, 0.0))[next_]
+        known |= next_
+    size = np.linalg.norm(facing, axis=1, keepdims=True)
+    return nodes + move, np.where(size > 1e-6, facing / np.maximum(size, 1e-6), normal)
+
+
+def _snapped(
+    mesh: HexMesh, boundary: NDArray[np.int64], chosen: NDArray[np.bool_], envelope: Envelope, least: float
+) -> tuple[HexMesh, int]:
+    """Boundary nodes put on the surface, less far where an element would become worse than ``least``."""
+    start = mesh.nodes
+    goal = start.copy()
+    goal[boundary] = envelope.ask(start[boundary]).closest
+    share = np.ones(len(start))
+    share[boundary[~chosen]] = 0.0
+    for _ in range(12):
+        there = replace(mesh, nodes=start + share[:, None] * (goal - start))
+        bad = there.scaled_jacobian() < least
+        if not bad.any():
+            break
+        share[np.unique(mesh.elements[bad])] *= 0.5
+    return there, int((share[boundary] < 1.0).sum())

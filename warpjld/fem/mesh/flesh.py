@@ -1,0 +1,218 @@
+"""Flesh between skin and bones: a rig's surface meshed, with bones along its segments (B §3.3 Fig. 7, R105, R110)."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from warpjld.errors import InputError
+from warpjld.fem.load.prescribed import Prescribed, prescribe
+from warpjld.fem.mesh.bones import Bone, claimed, fitted
+from warpjld.fem.mesh.embedding import Embedding, embed
+from warpjld.fem.mesh.envelope import Envelope
+from warpjld.fem.mesh.fit import Fit, fit_mesh
+from warpjld.fem.mesh.hexmesh import HexMesh
+from warpjld.rig import Rig
+from warpjld.skeleton.kinematics import Poses
+
+__all__ = ["Flesh", "flesh_of"]
+
+
+@dataclass(frozen=True, eq=False)
+class Flesh:
+    """A rig's volume.
+
+    Attributes:
+        mesh: Regions ``flesh`` and ``bone``; each bone's nodes are a set named ``bone.`` and the joint at its far end.
+        bones: Far joint of each bone, in the skeleton's numbering.
+        parents: Near joint of each bone, itself for the piece behind a root.
+        names: Name of each bone's node set.
+        shafts: Their shapes.
+        skin: The rig's own surface, carried by the mesh.
+        fit: Quality of the mesh.
+        rest: Rest positions of the joints [m], shape (J, 3).
+    """
+
+    mesh: HexMesh
+    bones: tuple[int, ...]
+    parents: tuple[int, ...]
+    names: tuple[str, ...]
+    shafts: tuple[Bone, ...]
+    skin: Embedding
+    fit: Fit
+    rest: NDArray[np.float64]
+
+    def held(self, poses: Poses | None = None, frame: int = 0) -> Prescribed:
+        """Bones prescribed: at rest, or moved by a pose of the skeleton (R110)."""
+        from scipy.spatial.transform import Rotation
+
+        out = Prescribed(np.empty(0, np.int64), np.empty(0))
+        for name, parent in zip(self.names, self.parents, strict=True):
+            nodes = self.mesh.node_sets[name]
+            if poses is None:
+                out = out + prescribe(self.mesh, nodes, x=0.0, y=0.0, z=0.0)
+                continue
+            turn = Rotation.from_quat(poses.rotations[frame, parent])
+            x = self.mesh.nodes[nodes]
+            moved = turn.apply(x - self.rest[parent]) + poses.positions[frame, parent] - x
+            out = out + prescribe(self.mesh, nodes, displacement=moved)
+        return out
+
+
+def flesh_of(
+    rig: Rig,
+    spacing: float,
+    *,
+    bone: float = 0.45,
+    flush: float = 0.4,
+    gap: float = 0.08,
+    head: float | None = None,
+    least: float = 0.1,
+) -> Flesh:
+    """Mesh the inside of a rig's surface and mark its bones.
+
+    A bone follows a segment. Its radius is a share of the depth of the flesh, and it lies towards the back of the hand
+    (the side of the normal, segment direction × flexion axis, R20), where real bones are close under the skin (R105).
+
+    Args:
+        rig: Surface and skeleton.
+        spacing: Edge length of the elements [m].
+        bone: Radius of a bone over the depth of its segment under the skin.
+        flush: Shift towards the back over that depth; bone + flush = 1 makes it touch the skin.
+        gap: Part of a segment that is left soft at either end, so that joints can move.
+        head: The same at the far end where another segment follows, by default ``gap``; small, so that the bone's head
+            makes the knuckle as it does in a real hand.
+        least: Least scaled Jacobian.
+
+    Raises:
+        InputError: Shares that make no bone, a surface that cannot be meshed, or no bone at this spacing.
+    """
+    far = gap if head is None else head
+    if not 0 < bone < 1 or not 0 <= flush < 1 or not 0 <= gap < 0.5 or not 0 <= far < 0.5:
+        raise InputError(f"want 0 < bone < 1, 0 ≤ flush < 1, 0 ≤ gap, head < 0.5, got {bone}, {flush}, {gap}, {far}")
+    envelope = Envelope(rig.surface.vertices, rig.surface.faces)
+    fit = fit_mesh(envelope, spacing, least=least, name="flesh")
+    mesh = fit.mesh
+    skeleton = rig.skeleton
+    shafts = _shafts(rig, envelope, bone, flush, gap, far)
+    owner = _owner(mesh, shafts, skeleton.parents, jointed=head is not None)
+    joints = [int(j) for j in np.unique(owner[owner >= 0])]
+    if not joints:
+        raise InputError(f"spacing: at {spacing:g} m no element fits inside a bone")
+    mesh = fitted(mesh, {j: mesh.elements[owner == j] for j in joints}, shafts, spacing)
+    quality = mesh.scaled_jacobian()
+    names = tuple(f"bone.{skeleton.names[j]}" for j in joints)
+    sets = {n: np.unique(mesh.elements[owner == j]).astype(np.int32) for n, j in zip(names, joints, strict=True)}
+    mesh = replace(
+        mesh,
+        regions=(owner >= 0).astype(np.int32),
+        region_names=("flesh", "bone"),
+        node_sets={**mesh.node_sets, **sets},
+    )
+    try:
+        skin = embed(mesh, rig.surface.vertices, reach=3.0)
+    except InputError as error:
+        raise InputError(
+            f"spacing: {spacing:g} m is too coarse, thin parts are not meshed ({error.message})"
+        ) from error
+    return Flesh(
+        mesh,
+        tuple(joints),
+        tuple(int(skeleton.parents[j]) if skeleton.parents[j] >= 0 else j for j in joints),
+        names,
+        tuple(shafts[j] for j in joints),
+        skin,
+        replace(fit, mesh=mesh, least=float(quality.min()), mean=float(quality.mean())),
+        skeleton.rest.copy(),
+    )
+
+
+def _shafts(rig: Rig, envelope: Envelope, bone: float, flush: float, gap: float, head: float) -> dict[int, Bone]:
+    """The shape of every bone by the joint at its far end; shares as in ``flesh_of``."""
+    skeleton = rig.skeleton
+    shafts: dict[int, Bone] = {}
+    for joint, parent in enumerate(skeleton.parents):
+        if parent < 0:
+            # what lies behind the root (the forearm's stump) is held with it
+            parent, start = joint, skeleton.rest[joint]
+            along = _backwards(rig, envelope, joint)
+        else:
+            start = skeleton.rest[parent]
+            along = skeleton.rest[joint] - start
+        length = float(np.linalg.norm(along))
+        if length == 0.0:
+            continue
+        t = np.linspace(0.0, 1.0, 24)
+        depth = np.maximum(-envelope.ask(start + t[:, None] * along).distance, 0.0)
+        back = np.cross(along / length, skeleton.axes[parent])
+        size = float(np.linalg.norm(back))
+        back = back / size if size > 1e-9 else np.zeros(3)
+        end = 1.0 if parent == joint else 1.0 - (head if skeleton.children[joint] else gap)
+        shafts[joint] = Bone(start, along, flush * depth[:, None] * back, bone * depth, gap, end)
+    return shafts
+
+
+def _backwards(rig: Rig, envelope: Envelope, root: int) -> NDArray[np.float64]:
+    """From a root joint away from its children, as far as the surface goes [m]."""
+    skeleton = rig.skeleton
+    children = skeleton.rest[np.asarray(skeleton.parents) == root] - skeleton.rest[root]
+    away = -children.mean(axis=0) if len(children) else np.zeros(3)
+    size = float(np.linalg.norm(away))
+    if size == 0.0:
+        return away
+    steps = np.linspace(0.0, envelope.size, 400)
+    inside = envelope.ask(skeleton.rest[root] + steps[:, None] * (away / size)).distance < 0.0
+    reach = steps[int(np.argmin(inside))] if not inside.all() else 0.0
+    out: NDArray[np.float64] = away * (reach / size)
+    return out
+
+
+def _owner(mesh: HexMesh, shafts: dict[int, Bone], parents: NDArray[np.int32], *, jointed: bool) -> NDArray[np.int64]:
+    """Bone of every element by the joint at its far end, -1 in flesh.
+
+    In thin fingers of large elements a bone that is covered by flesh may have no element left: it may then reach the
+    skin.
+    """
+    ends = np.array(list(shafts))
+    bare: list[int] = []
+    for _ in range(2):
+        owner = claimed(mesh, list(shafts.values()), bare)
+        owner = _apart(mesh, np.where(owner >= 0, ends[owner], -1))
+        if jointed:
+            owner = _jointed(mesh, owner, parents)
+        bare = np.flatnonzero(~np.isin(ends, owner)).tolist()
+        if not bare:
+            break
+    return owner
+
+
+def _jointed(mesh: HexMesh, owner: NDArray[np.int64], parents: NDArray[np.int32]) -> NDArray[np.int64]:
+    """At least two elements of flesh between bones that meet at a joint: one would have to bear its whole motion."""
+    owner = owner.copy()
+    for joint, parent in enumerate(parents):
+        if parent < 0 or not (owner == joint).any() or not (owner == parent).any():
+            continue
+        own, before = (np.zeros(len(mesh.nodes), dtype=bool) for _ in range(2))
+        own[mesh.elements[owner == joint]] = True
+        before[mesh.elements[owner == parent]] = True
+        bridge = own[mesh.elements].any(axis=1) & before[mesh.elements].any(axis=1)
+        near = np.zeros(len(mesh.nodes), dtype=bool)
+        near[mesh.elements[bridge]] = True
+        thin = (owner == joint) & (near & own)[mesh.elements].any(axis=1)
+        if not thin[owner == joint].all():
+            owner[thin] = -1
+    return owner
+
+
+def _apart(mesh: HexMesh, owner: NDArray[np.int64]) -> NDArray[np.int64]:
+    """No node in two bones: where they meet, elements of the later one turn to flesh."""
+    owner = owner.copy()
+    first = np.full(len(mesh.nodes), np.iinfo(np.int64).max)
+    bony = owner >= 0
+    for corner in range(8):
+        np.minimum.at(first, mesh.elements[bony, corner], owner[bony])
+    clash = bony & (first[mesh.elements].min(axis=1) < owner)
+    owner[clash] = -1
+    return owner

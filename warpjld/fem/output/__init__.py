@@ -1,0 +1,1 @@
+"""Stresses, files for ParaView, pictures, and tables of a solution."""

@@ -1,0 +1,70 @@
+"""Stresses of a solution: Cauchy stress in the elements, smoothed to the nodes for pictures."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from warpjld.fem.body import Body
+from warpjld.fem.material.materials import NEO_HOOKE
+from warpjld.fem.mesh.shape import CENTRE_GRADIENT
+
+__all__ = ["at_nodes", "cauchy", "mises"]
+
+
+def cauchy(body: Body, displacement: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Cauchy stress at the centre of each element [Pa], xx yy zz xy yz zx, shape (E, 6).
+
+    The pressure is the element's own (mean dilatation), which does not oscillate within it.
+    """
+    u = displacement.reshape(-1, 3)[body.mesh.elements]
+    x = body.mesh.nodes[body.mesh.elements]
+    jacobian = np.einsum("eai,aj->eij", x, CENTRE_GRADIENT)
+    slope = np.einsum("eai,aj->eij", u, CENTRE_GRADIENT) @ np.linalg.inv(jacobian)
+    c10, c01, bulk, stiffening = body.constants.T
+    identity = np.eye(3)
+    strain = 0.5 * (slope + slope.transpose(0, 2, 1))
+    spread = np.einsum("eii->e", strain)
+    linear = 4.0 * (c10 + c01)[:, None, None] * (strain - spread[:, None, None] / 3.0 * identity)
+    linear += (bulk * spread)[:, None, None] * identity
+    stress = linear + _matrix(body.initial_stress)
+    large = body.kinds >= NEO_HOOKE
+    if large.any():
+        f = identity + slope[large]
+        volume = np.linalg.det(f)
+        b = f @ f.transpose(0, 2, 1) * (volume ** (-2.0 / 3.0))[:, None, None]
+        first = np.einsum("eii->e", b)[:, None, None]
+        slope = c10[large, None, None] * np.exp(stiffening[large, None, None] * (first - 3.0))
+        tau = 2.0 * slope * b + 2.0 * c01[large, None, None] * (first * b - b @ b)
+        tau -= np.einsum("eii->e", tau)[:, None, None] / 3.0 * identity
+        tau += f @ _matrix(body.initial_stress[large]) @ f.transpose(0, 2, 1)
+        pressure = body.at(displacement, stiffness=False).pressures[large]
+        stress[large] = tau / volume[:, None, None] + pressure[:, None, None] * identity
+    return np.stack([stress[:, i, j] for i, j in ((0, 0), (1, 1), (2, 2), (0, 1), (1, 2), (2, 0))], axis=1)
+
+
+def mises(stress: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Von Mises' equivalent stress of (…, 6)."""
+    xx, yy, zz, xy, yz, zx = np.moveaxis(stress, -1, 0)
+    squared = 0.5 * ((xx - yy) ** 2 + (yy - zz) ** 2 + (zz - xx) ** 2) + 3.0 * (xy**2 + yz**2 + zx**2)
+    out: NDArray[np.float64] = np.sqrt(squared)
+    return out
+
+
+def at_nodes(body: Body, values: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Element values averaged over the elements at each node, weighted by their volume, shape (N, …)."""
+    from warpjld.fem.load.loads import volumes
+
+    weight = volumes(body.mesh).sum(axis=1)
+    flat = values.reshape(len(values), -1)
+    corners = body.mesh.elements.ravel()
+    count = len(body.mesh.nodes)
+    total = np.bincount(corners, weights=np.repeat(weight, 8), minlength=count)
+    out = np.empty((count, flat.shape[1]))
+    for k in range(flat.shape[1]):
+        out[:, k] = np.bincount(corners, weights=np.repeat(weight * flat[:, k], 8), minlength=count) / total
+    return out.reshape(count, *values.shape[1:])
+
+
+def _matrix(voigt: NDArray[np.float64]) -> NDArray[np.float64]:
+    return voigt[:, [[0, 3, 5], [3, 1, 4], [5, 4, 2]]]

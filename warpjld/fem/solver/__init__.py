@@ -1,0 +1,1 @@
+"""Sparse block matrices, linear solvers, Newton's method."""

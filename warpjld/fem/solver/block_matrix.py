@@ -1,0 +1,93 @@
+"""Sparse matrices of 3×3 blocks: three degrees of freedom a node."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from warpjld.fem.launch import on_rows, shared, threads_of
+
+__all__ = ["BlockMatrix", "padded"]
+
+
+def padded(count: int, dtype: Any = np.float64) -> NDArray[Any]:
+    """A zero vector for ``count`` values with room behind it: kernels read three values as four."""
+    return np.zeros(count + 8, dtype=dtype)[:count]
+
+
+@dataclass(frozen=True, eq=False)
+class BlockMatrix:
+    """N × N blocks in compressed rows; symmetric, both triangles stored.
+
+    Attributes:
+        rows: Where each row of blocks begins, shape (N + 1,).
+        columns: Column of each block, ascending in a row, shape (B,).
+        values: Blocks, shape (B, 3, 3).
+    """
+
+    rows: NDArray[np.int32]
+    columns: NDArray[np.int32]
+    values: NDArray[Any]
+
+    @property
+    def size(self) -> int:
+        """Number of rows of blocks, N."""
+        return len(self.rows) - 1
+
+    @property
+    def arguments(self) -> list[Any]:
+        """Kernel arguments: rows, columns, values."""
+        return [shared(self.rows), shared(self.columns), shared(self.values.reshape(-1))]
+
+    def product(self, x: NDArray[Any], out: NDArray[Any] | None = None, *, threads: int | None = None) -> NDArray[Any]:
+        """A x, shape (3N,)."""
+        from warpjld_kernels import fem_blocks
+
+        source = padded(3 * self.size, self.values.dtype)
+        source[:] = x.reshape(-1)
+        result = np.empty(3 * self.size, self.values.dtype) if out is None else out
+        on_rows(
+            fem_blocks.product,
+            self.size,
+            [*self.arguments, shared(source), shared(result)],
+            threads=threads_of(threads),
+        )
+        return result
+
+    @property
+    def on_diagonal(self) -> NDArray[np.int64]:
+        """Which blocks lie on the diagonal, one for each row, shape (N,)."""
+        row = np.repeat(np.arange(self.size, dtype=np.int32), np.diff(self.rows))
+        return np.flatnonzero(row == self.columns)
+
+    def diagonal(self) -> NDArray[Any]:
+        """Diagonal blocks, shape (N, 3, 3)."""
+        return np.asarray(self.values[self.on_diagonal])
+
+    def masked(self, free: NDArray[np.bool_], dtype: Any = np.float64) -> BlockMatrix:
+        """K11 in place: rows and columns of prescribed degrees of freedom set to zero (R107).
+
+        Args:
+            free: Free degrees of freedom, shape (3N,).
+            dtype: Of the result.
+        """
+        values = self.values.astype(dtype)
+        kept = free.reshape(-1, 3)
+        touched: NDArray[np.bool_] = np.asarray(~kept.all(axis=1))
+        if touched.any():
+            row = np.repeat(np.arange(self.size, dtype=np.int32), np.diff(self.rows))
+            block = np.flatnonzero(touched[row])
+            values[block] *= kept[row[block]][:, :, None]
+            block = np.flatnonzero(touched[self.columns])
+            values[block] *= kept[self.columns[block]][:, None, :]
+        return BlockMatrix(self.rows, self.columns, values)
+
+    def to_scipy(self) -> Any:
+        """The same matrix as ``scipy.sparse.bsr_array``."""
+        from scipy.sparse import bsr_array
+
+        n = 3 * self.size
+        return bsr_array((self.values, self.columns, self.rows), shape=(n, n))

@@ -1,0 +1,73 @@
+"""Chebyshev smoothing: its coefficients, and the highest eigenvalue they are made for."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from warpjld.fem.solver.block_matrix import BlockMatrix
+from warpjld.fem.solver.dots import dot
+
+__all__ = ["chebyshev_steps", "highest_eigenvalue"]
+
+
+def chebyshev_steps(degree: int, low: float, high: float) -> list[tuple[float, float]]:
+    """Momentum and scale of each step of the Chebyshev polynomial over [low, high].
+
+    With step ← momentum · step + scale · (b − A x) and x ← x + step, from x = 0, the error's part of eigenvalue λ is
+    multiplied by T(c(λ)) / T(c(0)), T Chebyshev's polynomial of that degree and c(λ) = (low + high − 2λ)/(high − low).
+    """
+    centre, half = 0.5 * (high + low), 0.5 * (high - low)
+    sigma = centre / half
+    rho = 1.0 / sigma
+    steps = [(0.0, 1.0 / centre)]
+    for _ in range(degree - 1):
+        following = 1.0 / (2.0 * sigma - rho)
+        steps.append((following * rho, 2.0 * following / half))
+        rho = following
+    return steps
+
+
+def highest_eigenvalue(matrix: BlockMatrix, inverse: NDArray[Any], threads: int, rounds: int = 16) -> float:
+    """Highest eigenvalue of D⁻¹A, from a fixed start: Lanczos, by way of conjugate gradients' coefficients.
+
+    A few badly shaped elements make a few high eigenvalues far apart from the rest; the power method finds them too
+    late, and a smoother that does not know them amplifies them.
+
+    Args:
+        matrix: A, symmetric, no eigenvalue of it below zero.
+        inverse: Inverted diagonal blocks D⁻¹, shape (N, 3, 3), in the matrix's type.
+        threads: Threads.
+        rounds: Most steps.
+    """
+    kind = matrix.values.dtype
+    rng = np.random.default_rng(0)
+
+    def scaled(v: NDArray[Any]) -> NDArray[Any]:
+        return np.einsum("nij,nj->ni", inverse, v.reshape(-1, 3)).ravel()
+
+    r = rng.uniform(-1.0, 1.0, 3 * matrix.size).astype(kind)
+    z = scaled(r)
+    p, rz = z, dot(r, z)
+    diagonal, beside = [], []
+    ratio, before = 0.0, 1.0
+    for _ in range(rounds):
+        q = matrix.product(p, threads=threads)
+        curvature = dot(p, q)
+        if not (curvature > 0.0 and rz > 0.0):
+            break
+        alpha = rz / curvature
+        diagonal.append(1.0 / alpha + ratio / before)
+        r = r - kind.type(alpha) * q
+        z = scaled(r)
+        ratio, rz = dot(r, z) / rz, dot(r, z)
+        beside.append(np.sqrt(max(ratio, 0.0)) / alpha)
+        p = z + kind.type(ratio) * p
+        before = alpha
+    if not diagonal:
+        return 1.0
+    from scipy.linalg import eigh_tridiagonal
+
+    return float(eigh_tridiagonal(np.array(diagonal), np.array(beside[:-1]), eigvals_only=True)[-1])

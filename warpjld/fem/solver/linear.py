@@ -1,0 +1,235 @@
+"""Solving K11 U_u = R_k − K12 U_k (B eq. 7): one solver for a mesh and its prescribed degrees of freedom."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from copy import copy
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from warpjld.errors import InputError
+from warpjld.fem.launch import Launch, shared, threads_of
+from warpjld.fem.mesh.hexmesh import HexMesh
+from warpjld.fem.solver.block_diagonal import block_inverse
+from warpjld.fem.solver.block_matrix import BlockMatrix, padded
+from warpjld.fem.solver.conjugate import Iteration, Status, conjugate_gradients
+from warpjld.fem.solver.dots import norm
+from warpjld.fem.solver.gmres import minimal_residuals
+from warpjld.fem.solver.hierarchy import hierarchy_of
+from warpjld.fem.solver.indefinite import IndefiniteError
+from warpjld.fem.solver.multigrid import Multigrid
+
+__all__ = ["METHODS", "LinearSolver"]
+
+METHODS = ("auto", "multigrid", "aggregation", "jacobi", "direct")
+PRECISIONS = ("float64", "float32")
+_SMALL = 1500
+"""Degrees of freedom below which ``auto`` solves directly."""
+_STIFF = 0.4
+"""Poisson's ratio above which smoothing is given more work."""
+
+
+class LinearSolver:
+    """Solves with one stiffness matrix for any number of right sides.
+
+    Args:
+        stiffness: Full K, float64.
+        free: Free degrees of freedom, shape (3N,).
+        mesh: Where a multigrid hierarchy comes from.
+        method: ``multigrid`` (geometric where the mesh allows, otherwise on a regular grid laid around it),
+            ``aggregation`` (smoothed aggregation with rigid-body modes, from pyamg), ``jacobi`` (3×3 blocks),
+            ``direct`` (SuperLU), or ``auto``.
+        precision: ``float64``, or ``float32`` with float64 residual refinement.
+        poisson: Highest Poisson's ratio: how much smoothing pays.
+        hierarchy: Weights from an earlier solver for the same mesh.
+        definite: Whether ``direct`` insists on a positive definite matrix.
+        threads: Threads, by default all.
+
+    Raises:
+        IndefiniteError: Found while setting up.
+        InputError: Unknown method.
+    """
+
+    def __init__(
+        self,
+        stiffness: BlockMatrix,
+        free: NDArray[np.bool_],
+        mesh: HexMesh,
+        *,
+        method: str = "auto",
+        precision: str = "float64",
+        poisson: float = 0.3,
+        hierarchy: list[Any] | None = None,
+        definite: bool = True,
+        threads: int | None = None,
+    ) -> None:
+        if method not in METHODS:
+            raise InputError(f"method: want one of {', '.join(METHODS)}, got '{method}'")
+        if precision not in PRECISIONS:
+            raise InputError(f"precision: want {' or '.join(PRECISIONS)}, got '{precision}'")
+        if method == "auto":
+            method = "direct" if int(free.sum()) < _SMALL else "multigrid"
+        self.method = method
+        self.threads = threads_of(threads)
+        self.free = free
+        self.hierarchy = hierarchy
+        self._precision = precision
+        self._stiffness = stiffness
+        self._mesh = mesh
+        self._mask = free.astype(np.float64)
+        self._product = _Product(stiffness, self.threads)
+        self._precondition: Callable[[NDArray[Any]], NDArray[Any]]
+        if method == "multigrid":
+            if hierarchy is None:
+                self.hierarchy = hierarchy_of(mesh)
+            degree, spread = (8, 50.0) if poisson > _STIFF else (2, 5.0)
+            assert self.hierarchy is not None
+            self._precondition = Multigrid(
+                stiffness, free, self.hierarchy, degree=degree, spread=spread, threads=self.threads
+            )
+        elif method == "aggregation":
+            from warpjld.fem.solver.aggregation import Aggregation
+
+            self._precondition = Aggregation(stiffness, free, mesh.nodes)
+        elif method == "jacobi":
+            inverse = block_inverse(stiffness, free)
+            self._precondition = lambda r: np.einsum("nij,nj->ni", inverse, r.reshape(-1, 3)).ravel().astype(r.dtype)
+        else:
+            self._factor = _factor(stiffness, free, definite)
+
+    def of(self, stiffness: BlockMatrix) -> LinearSolver:
+        """A solver for a matrix that differs little from this one's: the preconditioner stays, a factor does not."""
+        if self.method == "direct":
+            return LinearSolver(stiffness, self.free, self._mesh, method="direct", threads=self.threads)
+        return self.over(stiffness)
+
+    def over(self, stiffness: BlockMatrix) -> LinearSolver:
+        """The same preconditioner, a factor included, for another matrix."""
+        out = copy(self)
+        out._stiffness = stiffness
+        out._product = _Product(stiffness, self.threads)
+        return out
+
+    def solve(self, b: NDArray[np.float64], *, tolerance: float = 1e-8, iterations: int = 4000) -> Iteration:
+        """U_u for a right side of which only the free part counts, shape (3N,); zero where prescribed."""
+        right = b * self._mask
+        if self.method == "direct":
+            return self._direct(right)
+        if self._precision == "float64":
+            return conjugate_gradients(
+                self.masked_product, self._precondition, right, tolerance=tolerance, iterations=iterations
+            )
+        return self._refined(right, tolerance, iterations)
+
+    def solve_beside(
+        self, beside: Any, b: NDArray[np.float64], *, tolerance: float = 1e-8, iterations: int = 400
+    ) -> Iteration:
+        """(K11 + E11) x = b with an E (3N, 3N) that need not be symmetric nor definite, by minimal residuals; what
+        preconditions K preconditions the sum.
+        """
+        right = b * self._mask
+        mask = self._mask
+
+        def product(x: NDArray[np.float64]) -> NDArray[np.float64]:
+            return self.masked_product(x) + mask * (beside @ x)
+
+        def precondition(r: NDArray[np.float64]) -> NDArray[np.float64]:
+            if self.method != "direct":
+                return np.asarray(self._precondition(r))
+            x = np.zeros_like(r)
+            x[self.free] = self._factor.solve(r[self.free])
+            return x
+
+        return minimal_residuals(product, precondition, right, tolerance=tolerance, iterations=iterations)
+
+    def masked_product(self, x: NDArray[Any]) -> NDArray[Any]:
+        """K11 x."""
+        y = self._product(x)
+        y *= self._mask
+        return y
+
+    def _refined(self, b: NDArray[np.float64], tolerance: float, iterations: int) -> Iteration:
+        """float32 iterations to 1e-2, the residual recomputed in float64, again until done."""
+        single = self._stiffness.masked(self.free, np.float32)
+        product = _Product(single, self.threads)
+        x = np.zeros_like(b)
+        size = norm(b)
+        done = 0
+        history: list[float] = []
+        if size == 0.0:
+            return Iteration(x, Status.CONVERGED, 0, 0.0, np.array(history))
+        r, now = b, 1.0
+        status = Status.MAX_ITERATIONS
+        while done < iterations:
+            inner = conjugate_gradients(
+                product,
+                self._precondition,
+                (r / norm(r)).astype(np.float32),
+                tolerance=1e-2,
+                iterations=iterations - done,
+            )
+            done += max(1, inner.iterations)
+            x = x + norm(r) * inner.x
+            r = b - self.masked_product(x)
+            before, now = now, norm(r) / size
+            history.append(now)
+            if inner.status in (Status.INDEFINITE, Status.NOT_FINITE) or not np.isfinite(now):
+                status = inner.status
+                break
+            if now <= tolerance:
+                status = Status.CONVERGED
+                break
+            if now > 0.9 * before:
+                status = Status.STAGNATED
+                break
+        return Iteration(x, status, done, now, np.array(history))
+
+    def _direct(self, b: NDArray[np.float64]) -> Iteration:
+        size = norm(b)
+        x = np.zeros_like(b)
+        if not np.isfinite(size):
+            return Iteration(x, Status.NOT_FINITE, 0, float("nan"), np.empty(0))
+        if size == 0.0:
+            return Iteration(x, Status.CONVERGED, 0, 0.0, np.empty(0))
+        x[self.free] = self._factor.solve(b[self.free])
+        r = b - self.masked_product(x)
+        x[self.free] += self._factor.solve(r[self.free])
+        residual = norm(b - self.masked_product(x)) / size
+        if not np.isfinite(residual):
+            return Iteration(x, Status.NOT_FINITE, 0, residual, np.empty(0))
+        return Iteration(x, Status.CONVERGED if residual < 1e-6 else Status.INDEFINITE, 0, residual, np.empty(0))
+
+
+class _Product:
+    """x → A x through fixed buffers."""
+
+    def __init__(self, matrix: BlockMatrix, threads: int) -> None:
+        from warpjld_kernels import fem_blocks
+
+        kind = matrix.values.dtype
+        self._x = padded(3 * matrix.size, kind)
+        self._y = padded(3 * matrix.size, kind)
+        self._matrix = matrix
+        arguments = [*matrix.arguments, shared(self._x), shared(self._y)]
+        self._launch = Launch(fem_blocks.product, matrix.size, arguments, threads=threads)
+
+    def __call__(self, x: NDArray[Any]) -> NDArray[Any]:
+        self._x[:] = x
+        self._launch()
+        return self._y.copy()
+
+
+def _factor(stiffness: BlockMatrix, free: NDArray[np.bool_], definite: bool) -> Any:
+    from scipy.sparse.linalg import splu
+
+    inside = stiffness.to_scipy().tocsr()[free][:, free].tocsc()
+    pivoting = 0.0 if definite else 0.1
+    try:
+        factor = splu(inside, permc_spec="MMD_AT_PLUS_A", options={"SymmetricMode": True}, diag_pivot_thresh=pivoting)
+    except RuntimeError as error:
+        raise IndefiniteError(f"the stiffness is singular: {error}") from error
+    if definite and (factor.U.diagonal() <= 0.0).any():
+        raise IndefiniteError("the stiffness is not positive definite")
+    return factor

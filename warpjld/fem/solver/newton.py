@@ -1,0 +1,182 @@
+"""Newton's method through load instants: full steps where they go, searched and halved ones where they do not (R99)."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+from numpy.typing import NDArray
+
+from warpjld.fem.body import Tangent
+from warpjld.fem.solver.block_matrix import BlockMatrix
+from warpjld.fem.solver.conjugate import Iteration, Status
+from warpjld.fem.solver.dots import norm
+from warpjld.fem.solver.indefinite import IndefiniteError
+from warpjld.fem.solver.problem import Problem
+from warpjld.fem.solver.solution import Instant, Solution
+
+__all__ = ["Newton"]
+
+_HALVINGS = 8
+_ITERATIONS, _CAUTIOUS = 16, 25
+_LINE_SEARCH = 8
+_ROUNDING, _PLACES = 1e-13, 0.03
+"""As in ``contact.walk``."""
+_DIRECT = 40_000
+"""Degrees of freedom up to which a step with an indefinite stiffness is solved directly."""
+
+Progress = Callable[[str], None]
+
+
+class Newton:
+    """Newton's method with line search.
+
+    Args:
+        problem: What is to be in equilibrium.
+        tolerance: Relative residual of each equilibrium.
+        guess: First guess of the displacement at the full load [m], shape (N, 3).
+    """
+
+    def __init__(self, problem: Problem, tolerance: float, guess: NDArray[np.float64] | None = None) -> None:
+        self._problem = problem
+        self._tolerance = tolerance
+        self._guess = guess
+        self._tangent: Tangent | None = None
+
+    def run(self, steps: list[float], held: NDArray[np.int64], progress: Progress | None) -> Solution:
+        """Instant after instant; one that fails is tried again at half the step."""
+        u = self._problem.start.copy()
+        reached: list[Instant] = []
+        factor, halvings = 0.0, 0
+        todo = list(steps)
+        while todo:
+            target = todo[0]
+            status, found = self._from_guess(target)
+            if status is not Status.CONVERGED:
+                status, found = self._equilibrium(u, target, cautious=False)
+            if status is not Status.CONVERGED:
+                status, found = self._equilibrium(u, target, cautious=True)
+            if found is not None and status is Status.CONVERGED:
+                u, factor = found.displacement.reshape(-1), target
+                reached.append(found)
+                todo.pop(0)
+                halvings = max(0, halvings - 1)
+                if progress:
+                    progress(
+                        f"load {target:.3g}: {found.newton} Newton steps, {found.iterations} iterations, "
+                        f"residual {found.residual:.1e}"
+                    )
+                continue
+            halvings += 1
+            if halvings > _HALVINGS:
+                message = f"no equilibrium found above load {factor:.4g} (tried {target:.4g}): {status.value}"
+                some = tuple(reached) or (self._problem.beginning(),)
+                return Solution(status, some, message, held, self._problem.loads)
+            if progress:
+                progress(f"load {target:.3g}: {status.value}; halving the step")
+            todo.insert(0, 0.5 * (factor + target))
+        return Solution(Status.CONVERGED, tuple(reached), Status.CONVERGED.value, held, self._problem.loads)
+
+    def _from_guess(self, target: float) -> tuple[Status, Instant | None]:
+        """The full load's equilibrium from a first guess of it, where there is one."""
+        if self._guess is None or target != 1.0:
+            return Status.STAGNATED, None
+        u = self._guess.astype(np.float64).reshape(-1)
+        u[self._problem.prescribed.degrees] = self._problem.known(target)
+        if not (self._problem.body.at(u, stiffness=False).lowest > 0).all():
+            return Status.INVERTED, None
+        # a guess squeezes elements here and there: their false pressures would make K indefinite, those of the
+        # equilibrium before do not
+        pressures = self._problem.body.at(self._problem.start, stiffness=False).pressures
+        return self._equilibrium(u, target, cautious=False, guessed=pressures)
+
+    def _equilibrium(
+        self, u: NDArray[np.float64], target: float, *, cautious: bool, guessed: NDArray[np.float64] | None = None
+    ) -> tuple[Status, Instant | None]:
+        """Newton's method at one load.
+
+        Full steps first: in slender and nearly incompressible bodies the residual rises before it falls, and a search
+        that forbids it would creep. Only steps that turn elements inside out are shortened. ``cautious`` then insists
+        on a falling residual.
+        """
+        body, free = self._problem.body, self._problem.free
+        u = u.copy()
+        known = self._problem.prescribed.degrees
+        jump = np.zeros_like(u)
+        jump[known] = self._problem.known(target) - u[known]
+        iterations = 0
+        start = 0.0
+        pressures = guessed
+        for step in range(_CAUTIOUS if cautious else _ITERATIONS):
+            tangent = self._tangent = body.at(u, pressures=pressures, reuse=self._tangent)
+            stiffness = tangent.stiffness
+            assert stiffness is not None
+            external = self._problem.external(target, u)
+            self._problem.subtract_pressure(stiffness, target, u)
+            residual = np.where(free, external - tangent.forces, 0.0)
+            now = norm(residual)
+            # forces of a guess that is off are no measure of those in equilibrium
+            start = max(start, now) if step == 0 and guessed is None else start
+            scale = max(start, norm(external), norm(np.where(free, 0.0, tangent.forces - external)), 1e-300)
+            moved = not jump.any()
+            # a body that is carried along as a whole ends without a force: of stiffness times place, this much is noise
+            stiff = np.einsum("nii->n", stiffness.diagonal()) / 3.0
+            noise = _ROUNDING * (norm(np.repeat(stiff, 3) * u) + _PLACES * norm(stiff) * body.mesh.size)
+            if moved and now <= max(self._tolerance * scale, noise):
+                reactions = self._problem.reactions(tangent.forces - external)
+                return Status.CONVERGED, Instant(target, u.reshape(-1, 3), reactions, step, iterations, now / scale)
+            right = residual - stiffness.product(jump, threads=body.threads)
+            inner = self._step(stiffness, right, 1e-3 if not moved else 1e-5)
+            iterations += inner.iterations
+            if inner.status in (Status.INDEFINITE, Status.NOT_FINITE):
+                return inner.status, None
+            direction = inner.x + jump
+            length, status = self._line_search(u, direction, target, now if moved and cautious else None)
+            if length == 0.0:
+                return status, None
+            pressures = body.at(u, stiffness=False, increment=length * direction).pressures
+            u = u + length * direction
+            jump = (1.0 - length) * jump
+            if length == 1.0:
+                jump[:] = 0.0
+                u[known] = self._problem.known(target)
+        return Status.MAX_ITERATIONS, None
+
+    def _line_search(
+        self, u: NDArray[np.float64], direction: NDArray[np.float64], target: float, before: float | None
+    ) -> tuple[float, Status]:
+        """Longest of 1, ½, ¼ … that keeps elements upright and, where ``before`` is given, lowers the residual."""
+        length, best = 1.0, (np.inf, 0.0)
+        upright = False
+        for _ in range(_LINE_SEARCH):
+            there = u + length * direction
+            trial = self._problem.body.at(there, stiffness=False)
+            if (trial.lowest > 0).all():
+                upright = True
+                if before is None:
+                    return length, Status.CONVERGED
+                external = self._problem.external(target, there)
+                size = norm(np.where(self._problem.free, external - trial.forces, 0.0))
+                if size < best[0]:
+                    best = (size, length)
+                if size < (1.0 - 1e-4 * length) * before:
+                    return length, Status.CONVERGED
+            length *= 0.5
+        if not upright:
+            return 0.0, Status.INVERTED
+        assert before is not None
+        if best[0] < 4.0 * before:
+            return best[1], Status.CONVERGED
+        return 0.0, Status.STAGNATED
+
+    def _step(self, stiffness: BlockMatrix, right: NDArray[np.float64], tolerance: float) -> Iteration:
+        """One Newton step. On the way to a stable equilibrium K may be indefinite for a while (a slender body pushed
+        before it has turned): conjugate gradients cannot pass there, a direct solve of moderate size can.
+        """
+        try:
+            done = self._problem.solver(stiffness).solve(right, tolerance=tolerance)
+        except IndefiniteError:
+            done = Iteration(np.zeros_like(right), Status.INDEFINITE, 0, 1.0, np.empty(0))
+        if done.status is Status.INDEFINITE and int(self._problem.free.sum()) <= _DIRECT:
+            return self._problem.direct_solver(stiffness).solve(right)
+        return done

@@ -1,0 +1,103 @@
+"""Which blocks a mesh fills and where each element adds to them: found once, used by every assembly."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+from numpy.typing import NDArray
+
+from warpjld.errors import InputError
+from warpjld.fem.launch import on_rows, shared, threads_of
+from warpjld.fem.mesh.hexmesh import HexMesh
+from warpjld.fem.solver.product import product_pattern
+
+__all__ = ["Batches", "Pattern", "batches_of", "pattern_of"]
+
+_LANES = 8  # as in warpjld_kernels.fem_element
+
+
+@dataclass(frozen=True, eq=False)
+class Pattern:
+    """Block rows of a mesh.
+
+    Attributes:
+        rows: Where each node's row begins, shape (N + 1,).
+        columns: Neighbours of each node, itself included, ascending, shape (B,).
+        slots: Block that corners (a, b) of an element add to, shape (E, 64).
+        starts: Where each node's elements begin in ``incident``, shape (N + 1,).
+        incident: Elements at each node, ascending, shape (8 E,).
+    """
+
+    rows: NDArray[np.int32]
+    columns: NDArray[np.int32]
+    slots: NDArray[np.int32]
+    starts: NDArray[np.int32]
+    incident: NDArray[np.int32]
+
+
+@dataclass(frozen=True, eq=False)
+class Batches:
+    """Elements eight at a time, for ranges of rows that are assembled side by side (see ``fem_element``)."""
+
+    ranges: NDArray[np.int32]
+    range_batches: NDArray[np.int32]
+    elements: NDArray[np.int32]
+    kinds: NDArray[np.int32]
+    counts: NDArray[np.int32]
+
+
+def pattern_of(mesh: HexMesh, *, threads: int | None = None) -> Pattern:
+    """Block pattern of a mesh.
+
+    Raises:
+        InputError: A node that belongs to no element.
+    """
+    from warpjld_kernels import fem_pattern
+
+    workers = threads_of(threads)
+    count, elements = len(mesh.nodes), np.ascontiguousarray(mesh.elements)
+    flat = elements.ravel()
+    used = np.bincount(flat, minlength=count)
+    if (used == 0).any():
+        raise InputError(f"mesh: node {int(np.argmin(used))} belongs to no element")
+    starts = np.zeros(count + 1, np.int32)
+    np.cumsum(used, out=starts[1:])
+    incident = (np.argsort(flat, kind="stable") // 8).astype(np.int32)
+    numbers = np.arange(len(elements) + 1, dtype=np.int32)
+    # node → its elements → themselves → their nodes
+    product = product_pattern((starts, incident), (numbers, numbers[:-1]), (8 * numbers, flat), count, threads=workers)
+    slots = np.empty((len(elements), 64), np.int32)
+    on_rows(
+        fem_pattern.element_slots,
+        len(elements),
+        [shared(elements), shared(product.rows), shared(product.columns), shared(slots)],
+        threads=workers,
+    )
+    return Pattern(product.rows, product.columns, slots, starts, incident)
+
+
+def batches_of(pattern: Pattern, kinds: NDArray[np.int32], parts: int) -> Batches:
+    """Divide the rows into ``parts`` ranges of like work, and the elements that touch each into batches of one kind."""
+    count = len(pattern.starts) - 1
+    edges = np.searchsorted(pattern.starts, np.linspace(0, pattern.starts[-1], parts + 1)).astype(np.int32)
+    edges[0], edges[-1] = 0, count
+    elements, owner, sizes = [], [], []
+    first = [0]
+    for low, high in pairwise(edges):
+        touched = np.unique(pattern.incident[pattern.starts[low] : pattern.starts[high]])
+        for kind in np.unique(kinds[touched]):
+            chosen = touched[kinds[touched] == kind]
+            full = -(-len(chosen) // _LANES)
+            filled = np.full(full * _LANES, chosen[-1], np.int32)
+            filled[: len(chosen)] = chosen
+            elements.append(filled.reshape(-1, _LANES))
+            owner.append(np.full(full, kind, np.int32))
+            size = np.full(full, _LANES, np.int32)
+            size[-1] = len(chosen) - (full - 1) * _LANES
+            sizes.append(size)
+        first.append(sum(map(len, owner)))
+    return Batches(
+        edges, np.array(first, np.int32), np.concatenate(elements), np.concatenate(owner), np.concatenate(sizes)
+    )

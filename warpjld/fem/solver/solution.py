@@ -1,0 +1,82 @@
+"""What a static solve gives back."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from warpjld.errors import WarpjldError
+from warpjld.fem.load.loads import Loads
+from warpjld.fem.solver.conjugate import Status
+
+__all__ = ["Instant", "Solution", "SolveError"]
+
+
+@dataclass(frozen=True, eq=False)
+class Instant:
+    """Equilibrium at one load instant (R99).
+
+    Attributes:
+        factor: Share of the loads and prescribed displacements, 1 at the end.
+        displacement: U [m], shape (N, 3).
+        reactions: Forces that hold the prescribed degrees of freedom [N], zero elsewhere, shape (N, 3) (B eq. 8).
+        newton: Newton iterations (1 for a linear solve).
+        iterations: Iterations of the linear solver, all together.
+        residual: True residual |R − K U| over |R| of the free degrees of freedom, float64.
+    """
+
+    factor: float
+    displacement: NDArray[np.float64]
+    reactions: NDArray[np.float64]
+    newton: int
+    iterations: int
+    residual: float
+
+
+@dataclass(frozen=True, eq=False)
+class Solution:
+    """Equilibria reached, the last one first in importance.
+
+    Attributes:
+        status: How the solve ended.
+        instants: Every equilibrium reached, in order.
+        message: For people: what ended it.
+        held: Degrees of freedom that were held because a body was free.
+        loads: The loads, at full strength.
+    """
+
+    status: Status
+    instants: tuple[Instant, ...]
+    message: str
+    held: NDArray[np.int64]
+    loads: Loads
+
+    @property
+    def converged(self) -> bool:
+        """Whether the full load was reached."""
+        return self.status is Status.CONVERGED
+
+    @property
+    def last(self) -> Instant:
+        """The last equilibrium."""
+        return self.instants[-1]
+
+    @property
+    def displacement(self) -> NDArray[np.float64]:
+        """U of the last equilibrium [m], shape (N, 3)."""
+        return self.last.displacement
+
+    @property
+    def reactions(self) -> NDArray[np.float64]:
+        """Reactions of the last equilibrium [N], shape (N, 3)."""
+        return self.last.reactions
+
+
+class SolveError(WarpjldError):
+    """A solve that did not reach the full load. ``solution`` holds what was reached."""
+
+    def __init__(self, solution: Solution) -> None:
+        self.solution = solution
+        super().__init__(solution.message)

@@ -1,0 +1,133 @@
+"""Static equilibrium K U = R: linear solves, or Newton's method through load instants (B eq. 5, R99, R107)."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+from numpy.typing import NDArray
+
+from warpjld.errors import InputError
+from warpjld.fem.body import Body
+from warpjld.fem.load.loads import Loads
+from warpjld.fem.load.prescribed import Prescribed, held_in_place, refuse_free
+from warpjld.fem.solver.conjugate import Status
+from warpjld.fem.solver.indefinite import IndefiniteError
+from warpjld.fem.solver.newton import Newton
+from warpjld.fem.solver.problem import Problem
+from warpjld.fem.solver.solution import Instant, Solution, SolveError
+
+__all__ = ["solve"]
+
+FREE = ("refuse", "hold")
+
+
+def solve(
+    body: Body,
+    prescribed: Prescribed,
+    loads: Loads | None = None,
+    *,
+    after: Solution | None = None,
+    guess: NDArray[np.float64] | None = None,
+    instants: int | list[float] = 1,
+    free: str = "refuse",
+    method: str = "auto",
+    precision: str = "float64",
+    tolerance: float = 1e-8,
+    check: bool = True,
+    progress: Callable[[str], None] | None = None,
+) -> Solution:
+    """Displacements and reactions under loads and prescribed displacements.
+
+    Args:
+        body: Mesh and laws.
+        prescribed: Known displacements.
+        loads: Known forces.
+        after: Equilibrium to start from: loads and prescribed displacements go from what they were there to what is
+            given here, and degrees of freedom that are released let go of their reactions gradually.
+        guess: First guess of the displacement at the full load [m], shape (N, 3): where Newton's method for that
+            instant starts, if no element is inside out there. Linear laws need none.
+        instants: Load instants, as a number of equal steps or as rising factors that end with 1; steps that fail are
+            halved. One is enough for linear laws.
+        free: What to do with a body that can move as a whole: ``refuse`` it, or ``hold`` it by as few degrees
+            of freedom as possible (``held_in_place`` states the rule).
+        method: Linear solver (see ``LinearSolver``).
+        precision: ``float64``, or ``float32`` refined to float64 residuals.
+        tolerance: Relative residual of each equilibrium.
+        check: Raise when the full load is not reached; otherwise return the status.
+        progress: Called with a line of text after each instant.
+
+    Raises:
+        InputError: Wrong arguments, or a free body (``FreeBodyError``).
+        SolveError: The full load was not reached; its ``solution`` has what was.
+    """
+    if free not in FREE:
+        raise InputError(f"free: want {' or '.join(FREE)}, got '{free}'")
+    steps = _steps(instants)
+    if after is not None and after.displacement.size != body.degrees:
+        raise InputError(f"after: is of a body with {after.displacement.size} degrees of freedom, not {body.degrees}")
+    held = np.empty(0, np.int64)
+    if free == "hold":
+        wanted = prescribed.degrees
+        prescribed = held_in_place(body, prescribed)
+        held = np.setdiff1d(prescribed.degrees, wanted)
+        if after is not None:
+            prescribed.values[np.isin(prescribed.degrees, held)] = after.displacement.reshape(-1)[held]
+    else:
+        refuse_free(body, prescribed)
+    if guess is not None and guess.size != body.degrees:
+        raise InputError(f"guess: want {body.degrees} values, got {guess.size}")
+    problem = Problem(body, prescribed, loads or Loads(), after, method=method, precision=precision)
+    if body.large_strain:
+        solution = Newton(problem, tolerance, guess).run(steps, held, progress)
+    else:
+        solution = _linear(problem, steps, tolerance, held, progress)
+    if check and not solution.converged:
+        raise SolveError(solution)
+    return solution
+
+
+def _linear(
+    problem: Problem,
+    steps: list[float],
+    tolerance: float,
+    held: NDArray[np.int64],
+    progress: Callable[[str], None] | None,
+) -> Solution:
+    """K is the same at every instant: one set-up, and a solve each."""
+    body = problem.body
+    rest = body.at()
+    stiffness = rest.stiffness
+    assert stiffness is not None
+    try:
+        solver = problem.solver(stiffness)
+    except IndefiniteError as error:
+        return Solution(Status.INDEFINITE, (problem.beginning(),), str(error), held, problem.loads)
+    reached = []
+    status, message = Status.CONVERGED, Status.CONVERGED.value
+    for factor in steps:
+        u = np.zeros(body.degrees)
+        u[problem.prescribed.degrees] = problem.known(factor)
+        external = problem.external(factor, None)
+        right = external - rest.forces - stiffness.product(u, threads=body.threads)
+        done = solver.solve(right, tolerance=tolerance)
+        u = u + done.x
+        forces = rest.forces + stiffness.product(u, threads=body.threads)
+        reactions = problem.reactions(forces - external)
+        reached.append(Instant(factor, u.reshape(-1, 3), reactions, 1, done.iterations, done.residual))
+        if progress:
+            progress(f"load {factor:.3g}: {done.iterations} iterations, residual {done.residual:.1e}")
+        if done.status is not Status.CONVERGED:
+            status, message = done.status, f"at load {factor:g}: {done.status.value} (residual {done.residual:.1e})"
+            break
+    return Solution(status, tuple(reached), message, held, problem.loads)
+
+
+def _steps(instants: int | list[float]) -> list[float]:
+    if isinstance(instants, int):
+        if instants < 1:
+            raise InputError(f"instants: want at least one, got {instants}")
+        return [(k + 1) / instants for k in range(instants)]
+    if not instants or any(b <= a for a, b in zip([0.0, *instants], instants, strict=False)):
+        raise InputError(f"instants: want rising factors above 0, got {instants}")
+    return [float(f) for f in instants]

@@ -1,8 +1,0 @@
-"""Motions out: poses, on the rig's own joints, in the files that animation programs read."""
-
-from __future__ import annotations
-
-from warpjld.io.motion_out.source_motion import SourceMotion, source_motion
-from warpjld.io.motion_out.write import MOTION_OUT, Timing, WrittenMotion, check_motion_out, write_motion
-
-__all__ = ["MOTION_OUT", "SourceMotion", "Timing", "WrittenMotion", "check_motion_out", "source_motion", "write_motion"]

@@ -1,0 +1,106 @@
+"""Writing binary glTF with animated joints: the rig's own file with a further animation, or a new one.
+
+A rig that was read from glTF keeps its file as it is, meshes, materials, skins and nodes to the letter; the new
+animation stands before the file's own ones, since programs play the first. Any other rig becomes a file of its own:
+the surface, a skin and the joints in metres with Y up. Rotations turn every joint, translations are there only for
+those that move against their parent, and scale stays as at rest. Time starts at 0.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from warpjld.motion.out.baked_skin import BakedSkin
+from warpjld.motion.out.glb_file import GlbFile
+from warpjld.motion.out.gltf_new import new_document
+from warpjld.motion.out.gltf_own import own_document
+from warpjld.motion.out.local_motion import local_motion
+from warpjld.motion.out.node_tree import NodeTree
+from warpjld.motion.out.source_motion import SourceMotion, source_motion
+from warpjld.motion.out.write import Timing, WrittenMotion
+from warpjld.rig import Rig
+from warpjld.skeleton import Poses
+
+__all__ = ["animate", "write_glb"]
+
+_CONSTANT = 1e-7  # of the joints' size: those that stray by less from their place under their parent stay there
+_SHEARED = 1e-3  # of a joint's scale
+
+
+def write_glb(path: Path, rig: Rig, poses: Poses, timing: Timing) -> WrittenMotion:
+    """Write a motion of a rig's own joints as binary glTF; a :class:`~warpjld.motion.out.write.Writer`."""
+    motion = source_motion(rig, poses)
+    notes = list(motion.notes)
+    warnings: list[str] = []
+    file, nodes = own_document(rig, motion, notes, warnings) or new_document(rig, motion, notes)
+    animate(file, nodes, motion, timing, warnings)
+    if timing.start_frame:
+        notes.append(f"time starts at 0, which is frame {timing.start_frame}")
+    file.write(path)
+    return WrittenMotion(tuple(notes), tuple(warnings))
+
+
+def animate(
+    file: GlbFile,
+    nodes: NodeTree,
+    motion: SourceMotion,
+    timing: Timing,
+    warnings: list[str],
+    baked: BakedSkin | None = None,
+) -> None:
+    """Add an animation of the joints, and of baked shapes, before those that the file has."""
+    count, frames = len(nodes.joints), len(motion)
+    at = nodes.joints
+    given = np.isin(np.arange(len(nodes.parents)), at)
+    rotations = np.empty((frames, count, 4), np.float32)
+    translations = np.empty((frames, count, 3), np.float32)
+    strays, sheared = np.zeros(count), np.zeros(count)
+    for block in motion.blocks():
+        worlds = np.zeros((block.stop - block.start, len(given), 4, 4))
+        worlds[:, at] = nodes.worlds(block)
+        local = local_motion(worlds, nodes.parents, nodes.rest, nodes.scales, given)
+        rotations[block], translations[block] = local.rotations[:, at], local.translations[:, at]
+        away = np.linalg.norm(local.translations[:, at] - nodes.rest[at, :3, 3], axis=-1).max(axis=0)
+        strays = np.maximum(strays, away * nodes.reach)
+        sheared = np.maximum(sheared, local.sheared[at])
+    _continuous(rotations)
+    moved = np.flatnonzero(nodes.under(motion.owner >= 0)).tolist()
+    times = file.add((np.arange(frames) / timing.rate).astype("<f4"), "SCALAR", bounds=True)
+    samplers: list[dict[str, Any]] = []
+    channels: list[dict[str, Any]] = []
+
+    def channel(joint: int, path: str, values: NDArray[np.float32], kind: str) -> None:
+        samplers.append({"input": times, "interpolation": "LINEAR", "output": file.add(values, kind)})
+        target = {"node": int(nodes.numbers[at[joint]]), "path": path}
+        channels.append({"sampler": len(samplers) - 1, "target": target})
+
+    for joint in moved:
+        nodes.make_animatable(joint)
+        channel(joint, "rotation", rotations[:, joint], "VEC4")
+        if strays[joint] > _CONSTANT * nodes.size:
+            channel(joint, "translation", translations[:, joint], "VEC3")
+    if baked is not None and baked.names:
+        shown = file.add(baked.over_time.astype("<f4").reshape(-1), "SCALAR")
+        samplers.append({"input": times, "interpolation": "LINEAR", "output": shown})
+        mesh = next(n for n, node in enumerate(nodes.records) if "mesh" in node)
+        channels.append({"sampler": len(samplers) - 1, "target": {"node": mesh, "path": "weights"}})
+    file.content.setdefault("animations", []).insert(
+        0, {"name": timing.name, "samplers": samplers, "channels": channels}
+    )
+    bent = [motion.tree.names[j] for j in moved if sheared[j] > _SHEARED]
+    if bent:
+        warnings.append(
+            f"{len(bent)} joints hang below one scaled by different factors ({', '.join(bent[:4])}): glTF cannot hold "
+            f"the shear of their turns, up to {100 * sheared.max():.1f} % of their scale; their places are right"
+        )
+
+
+def _continuous(rotations: NDArray[np.float32]) -> None:
+    """Signs such that every rotation is interpolated the short way, in place, shape (F, N, 4)."""
+    for frame in range(1, len(rotations)):
+        far = (rotations[frame] * rotations[frame - 1]).sum(-1) < 0.0
+        rotations[frame][far] *= -1.0

@@ -1,0 +1,78 @@
+"""Poses of a rig's hand → MANO's parameters."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial.transform import Rotation
+
+from warpjld.errors import InputError
+from warpjld.motion.hand_motion import IDENTITY
+from warpjld.motion.mano_rest import MANO_DIGITS, MANO_JOINTS, mano_rest
+from warpjld.motion.out.write import Timing, WrittenMotion
+from warpjld.rig import Rig
+from warpjld.rotations import conjugate, multiply
+from warpjld.skeleton import Poses, Skeleton
+
+__all__ = ["hand_parameters", "write_mano"]
+
+
+def write_mano(path: Path, rig: Rig, poses: Poses, timing: Timing) -> WrittenMotion:
+    """Write a hand's motion as MANO-family parameters; a :class:`~warpjld.motion.out.write.Writer`.
+
+    Fields: ``global_orient`` (F, 3) and ``hand_pose`` (F, 45), axis-angle [rad]; ``transl`` (F, 3), where the wrist is
+    [m]; ``joint_order`` (15 names), ``side``, ``fps``, ``flat_hand_mean`` (true: no rotation is the flat hand) and
+    ``frame``, "rig": orientation and place are in the rig's own axes. Of a rig with two hands the first three have
+    ``left_`` and ``right_`` before them, and ``side`` is not there. MANO's ``transl`` adds to the place of its wrist in
+    its template, which is the licensed model's: subtract it. Joints that the rig lacks do not turn.
+
+    Raises:
+        InputError: The rig has no hand.
+    """
+    sides = [side for side in ("left", "right") if f"{side}.wrist" in rig.skeleton.names]
+    if not sides:
+        raise InputError("MANO's parameters are a hand's: this rig has none")
+    fields: dict[str, NDArray[Any]] = {
+        "joint_order": np.array(MANO_JOINTS),
+        "fps": np.array(float(timing.rate)),
+        "flat_hand_mean": np.array(True),
+        "frame": np.array("rig"),
+    }
+    if len(sides) == 1:
+        fields["side"] = np.array(sides[0])
+    for side in sides:
+        prefix = f"{side}_" if len(sides) > 1 else ""
+        fields |= {prefix + name: value for name, value in hand_parameters(rig.skeleton, poses, side).items()}
+    with path.open("wb") as file:
+        np.savez(file, allow_pickle=False, **fields)
+    return WrittenMotion(("MANO's axis-angles from the flat hand; metacarpals, which MANO has not, in the fingers'",))
+
+
+def hand_parameters(skeleton: Skeleton, poses: Poses, side: str) -> dict[str, NDArray[np.float64]]:
+    """``global_orient``, ``hand_pose`` and ``transl`` of one hand.
+
+    With Q the rotation of a bone relative to the wrist, W and A as in ``ManoTrack.turns``, the bone's rotation from the
+    flat hand is R = Wᵀ Q A⁻¹ W; MANO has no moving metacarpals, so that theirs is in the fingers'.
+    """
+    rest = mano_rest(skeleton, side)
+    wrist = skeleton.index(f"{side}.wrist")
+    back = conjugate(poses.rotations[:, wrist])
+    local = np.tile(IDENTITY, (len(poses), len(MANO_JOINTS), 1))
+    for d in range(len(MANO_DIGITS)):
+        before = np.tile(IDENTITY, (len(poses), 1))
+        for m in range(3 * d, 3 * d + 3):
+            if rest.joints[m] < 0:
+                continue
+            bone = multiply(multiply(back, poses.rotations[:, rest.joints[m]]), conjugate(rest.align[m]))
+            world = multiply(multiply(conjugate(rest.axes), bone), rest.axes)
+            local[:, m] = multiply(conjugate(before), world)
+            before = world
+    orient = multiply(poses.rotations[:, wrist], rest.axes)
+    return {
+        "global_orient": Rotation.from_quat(orient).as_rotvec(),
+        "hand_pose": Rotation.from_quat(local.reshape(-1, 4)).as_rotvec().reshape(len(poses), 45),
+        "transl": poses.positions[:, wrist],
+    }

@@ -1,0 +1,130 @@
+"""Poses of a rig → a motion file; the suffix says which kind."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from importlib import import_module
+from pathlib import Path
+from typing import Protocol
+
+from warpjld.errors import InputError
+from warpjld.folders import make_folder
+from warpjld.rig import Rig
+from warpjld.skeleton import Poses
+from warpjld.whole_file import whole_file
+
+__all__ = ["MOTION_OUT", "Timing", "Writer", "WrittenMotion", "check_motion_out", "write_motion"]
+
+MOTION_OUT = {
+    ".bvh": "BVH: the rig's own joints, metres, Y up",
+    ".glb": "binary glTF: the skinned rig with its joints animated",
+    ".usd": "UsdSkel, binary: the skinned rig and a SkelAnimation, in the rig's own file's units and axes",
+    ".usda": "UsdSkel as text",
+    ".usdc": "UsdSkel, binary",
+    ".npz": "MANO-family parameters of the rig's hands, as NumPy arrays",
+}
+"""What each suffix is, for help texts."""
+
+_WRITERS = {
+    ".bvh": ("bvh", "write_bvh"),
+    ".glb": ("glb", "write_glb"),
+    ".usd": ("usd", "write_usd"),
+    ".usda": ("usd", "write_usd"),
+    ".usdc": ("usd", "write_usd"),
+    ".npz": ("mano", "write_mano"),
+}
+"""Module in this package and function, a :class:`Writer`, of each suffix: libraries are imported when needed."""
+
+
+@dataclass(frozen=True)
+class Timing:
+    """When frames are, and what the clip is called.
+
+    Attributes:
+        rate: Frames a second.
+        start_frame: Number of the first frame, where a format counts frames.
+        name: Name of the clip inside the file.
+    """
+
+    rate: float
+    start_frame: int = 0
+    name: str = "motion"
+
+    def __post_init__(self) -> None:
+        if not (math.isfinite(self.rate) and self.rate > 0.0):
+            raise InputError(f"rate: want frames a second, above 0, got {self.rate:g}")
+
+
+@dataclass(frozen=True)
+class WrittenMotion:
+    """What was written.
+
+    Attributes:
+        notes: What whoever opens the file should know.
+        warnings: What of the motion the file does not hold: told on stderr by every command.
+    """
+
+    notes: tuple[str, ...] = ()
+    warnings: tuple[str, ...] = ()
+
+
+class Writer(Protocol):
+    """Writes one kind of file to a place whose suffix is right but whose name is not the last."""
+
+    def __call__(self, path: Path, rig: Rig, poses: Poses, timing: Timing) -> WrittenMotion:
+        """Write all frames; OSError is told by the caller."""
+
+
+def check_motion_out(path: str | Path) -> None:
+    """Raise what ``write_motion`` would for a file's name: to be called before any long work.
+
+    Raises:
+        InputError: Unknown suffix.
+        MissingExtraError: The format needs an optional dependency.
+    """
+    path = Path(path)
+    suffix = path.suffix.lower()
+    if suffix not in _WRITERS:
+        listed = "; ".join(f"{suffix} ({what})" for suffix, what in MOTION_OUT.items())
+        raise InputError(f"unknown kind of motion file '{path.suffix}'; known: {listed}", path=path)
+    if suffix.startswith(".usd"):
+        from warpjld.io.caches import check_cache
+
+        check_cache(path)  # needs what caches of the kind need
+
+
+def write_motion(
+    path: str | Path, rig: Rig, poses: Poses, *, rate: float, start_frame: int = 0, name: str | None = None
+) -> WrittenMotion:
+    """Write a motion on the rig's own joints; see ``MOTION_OUT`` for the suffixes.
+
+    The file appears when it is complete, with its folder.
+
+    Args:
+        path: The file.
+        rig: What moves.
+        poses: Poses of its skeleton.
+        rate: Frames a second.
+        start_frame: Number of the first frame, where the format counts frames.
+        name: Name of the clip inside the file; the file's stem by default.
+
+    Raises:
+        InputError: Unknown suffix, poses of another rig, or a place that cannot be written.
+        MissingExtraError: The format needs an optional dependency.
+    """
+    path = Path(path)
+    check_motion_out(path)
+    timing = Timing(rate, start_frame, path.stem if name is None else name)
+    module, function = _WRITERS[path.suffix.lower()]
+    write: Writer = getattr(import_module(f"warpjld.motion.out.{module}"), function)
+    make_folder(path.parent)
+    try:
+        with whole_file(path) as part:
+            return write(part, rig, poses, timing)
+    except OSError as error:
+        raise InputError(f"cannot be written: {error.strerror or error}", path=path) from error
+    except InputError as error:
+        if error.path is not None:
+            raise
+        raise InputError(error.message, path=path) from error

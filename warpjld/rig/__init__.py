@@ -1,0 +1,5 @@
+"""A surface and its skeleton, as everything here takes them."""
+
+from warpjld.rig.rig import Rig, Skin
+
+__all__ = ["Rig", "Skin"]
