@@ -16,10 +16,10 @@ import numpy as np
 from warpjld.fem import Body, LinearElastic, Prescribed, box, merge, prescribe
 from warpjld.fem.contact import Pair
 from warpjld.fem.hand import hand_laws
-from warpjld.fem.hand.grip import Grip, GripStatus, gentlest_grip
-from warpjld.fem.hand.holding import Holding
-from warpjld.fem.hand.tactile import tactile_of_pairs
-from warpjld.fem.hand.tactile_files import draw_tactile, write_tactile
+from warpjld.simulation.grip.search import Grip, GripStatus, gentlest_grip
+from warpjld.simulation.grip.holding import Holding
+from warpjld.simulation.report.tactile import tactile_of_pairs
+from warpjld.simulation.report.tactile_files import draw_tactile, write_tactile
 
 EDGE = 0.03  # of the block [m]
 PAD = (0.004, 0.024, 0.024)  # [m]

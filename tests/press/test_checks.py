@@ -5,9 +5,9 @@ from __future__ import annotations
 import pytest
 
 from warpjld.errors import InputError
-from warpjld.press.bodies import Bodies, assemble
-from warpjld.press.checks import refuse_hopeless
-from warpjld.press.wishes import GripWish
+from warpjld.simulation.bodies.model import Bodies, assemble
+from warpjld.simulation.solve.checks import refuse_hopeless
+from warpjld.simulation.specification import GripWish
 from warpjld.script import Interpreter, Scene
 from warpjld.script.press_bodies import object_body, prop_obstacle
 

@@ -14,9 +14,9 @@ from warpjld.fem.contact import Pair, press
 from warpjld.fem.contact.obstacles.facets import Facets
 from warpjld.fem.contact.obstacles.solids import Plane
 from warpjld.fem.mesh.embedding import embed
-from warpjld.press.clear import Shown, clear
-from warpjld.press.outside import outside, outside_of_nodes
-from warpjld.press.overlap import SurfacePart
+from warpjld.simulation.display.separate import Shown, clear
+from warpjld.simulation.bodies.surface_offset import outside, outside_of_nodes
+from warpjld.simulation.display.overlap import SurfacePart
 
 RADIUS = 0.01
 

@@ -10,12 +10,12 @@ from numpy.typing import NDArray
 
 from warpjld.fem.hand.bone_loads import loads_from_contact
 from warpjld.fem.hand.muscles import Effort, effort_of
-from warpjld.press.bodies import Bodies
-from warpjld.press.efforts import effort_at
-from warpjld.press.frames import SolvedFrame
-from warpjld.press.hand_body import HandBody
+from warpjld.simulation.bodies.model import Bodies
+from warpjld.simulation.report.efforts import effort_at
+from warpjld.simulation.solve.solved_frame import SolvedFrame
+from warpjld.simulation.bodies.flesh_body import HandBody
 from warpjld.script import Interpreter, Scene
-from warpjld.script.press_rows import PressRows
+from warpjld.simulation.report.table import PressRows
 from warpjld.script.pressing import PressReport, run_press
 from warpjld.skeleton import Poses
 

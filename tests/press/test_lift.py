@@ -14,12 +14,12 @@ from numpy.typing import NDArray
 from warpjld.fem import Body, LinearElastic, Prescribed, box, merge, prescribe
 from warpjld.fem.contact import ContactSolution, Pair, press
 from warpjld.fem.contact.obstacles.solids import Plane
-from warpjld.fem.hand.grip import GripStatus, Outcome, gentlest_grip
+from warpjld.simulation.grip.search import GripStatus, Outcome, gentlest_grip
 from warpjld.fem.load.loads import Loads
 from warpjld.fem.mesh.hexmesh import HexMesh
-from warpjld.press.bodies import Bodies, PairOf
-from warpjld.press.lift import Lift
-from warpjld.press.wishes import GripWish
+from warpjld.simulation.bodies.model import Bodies, PairOf
+from warpjld.simulation.grip.hold import Lift
+from warpjld.simulation.specification import GripWish
 from warpjld.script import Interpreter, Scene
 from warpjld.script.press_bodies import object_body
 

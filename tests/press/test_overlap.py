@@ -9,9 +9,9 @@ import trimesh
 from warpjld.covering import bind
 from warpjld.fem.contact.obstacles.facets import Facets
 from warpjld.fem.hand.flesh_hand import build_flesh_hand
-from warpjld.press.clear import Shown, clear
-from warpjld.press.overlap import SurfacePart, within_itself
-from warpjld.press.skin_parts import SkinParts, skin_parts
+from warpjld.simulation.display.separate import Shown, clear
+from warpjld.simulation.display.overlap import SurfacePart, within_itself
+from warpjld.simulation.bodies.skin_parts import SkinParts, skin_parts
 from warpjld.rig import Rig
 from warpjld.skeleton import poses_from_angles
 

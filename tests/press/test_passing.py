@@ -10,7 +10,7 @@ import pytest
 
 from warpjld.errors import InputError
 from warpjld.fem.contact.obstacles.solids import Box, Plane, Sphere
-from warpjld.press.passing import half_thickness, way_past
+from warpjld.simulation.solve.substeps import half_thickness, way_past
 from warpjld.script import Scene
 from warpjld.script.pressing import run_press
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from warpjld.press.pinched import pinched
+from warpjld.simulation.solve.friction_closure import pinched
 
 
 def wedge(lean: float, turn: float = 0.0) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:

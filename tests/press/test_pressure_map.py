@@ -11,8 +11,8 @@ import trimesh
 from warpjld.fem import HexMesh, ball, merge
 from warpjld.fem.contact.results.nodal_contact import skin_around
 from warpjld.fem.mesh.embedding import Embedding, embed
-from warpjld.press.finer import finer
-from warpjld.press.pressure_map import pressure_map
+from warpjld.simulation.display.refine import finer
+from warpjld.simulation.display.pressure_map import pressure_map
 
 MESH = ball(1.0, n=8)
 OUTER = np.unique(MESH.quads(MESH.face_set("outer")))

@@ -11,7 +11,7 @@ from warpjld.covering import Covering, bind
 from warpjld.fem.contact.obstacles.facets import Facets
 from warpjld.fem.hand.flesh_hand import FleshHand, build_flesh_hand
 from warpjld.io import load_rig
-from warpjld.press.rest import part_of, posed
+from warpjld.simulation.bodies.rest_shape import part_of, posed
 from warpjld.rig import Rig
 from warpjld.skeleton import Poses, poses_from_angles
 from warpjld.skeleton.kinematics import rest_poses

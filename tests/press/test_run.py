@@ -13,10 +13,10 @@ import pytest
 from warpjld.errors import InputError
 from warpjld.fem import Status
 from warpjld.grasp import Places
-from warpjld.press.settle import settle
-from warpjld.press.state import load_state
+from warpjld.simulation.solve.free_object import settle
+from warpjld.simulation.solve.checkpoint import load_state
 from warpjld.script import Scene
-from warpjld.script.approach import approach
+from warpjld.simulation.solve.start_frame import approach
 from warpjld.script.pressing import run_press
 from warpjld.script.runner import run_scene
 

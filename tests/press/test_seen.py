@@ -9,10 +9,10 @@ from types import SimpleNamespace
 import numpy as np
 
 from warpjld.fem import Status
-from warpjld.press.overlap import Over, SurfacePart
-from warpjld.press.run import Solved
-from warpjld.press.seen import missed
-from warpjld.press.verdict import verdict_of
+from warpjld.simulation.display.overlap import Over, SurfacePart
+from warpjld.simulation.solve.frames import Solved
+from warpjld.simulation.report.visible_overlap import missed
+from warpjld.simulation.report.verdict import verdict_of
 from warpjld.script import Scene
 from warpjld.script.pressing import run_press
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import trimesh
 
-from warpjld.press.smooth import Smoother
+from warpjld.simulation.display.smooth import Smoother
 
 MESH = trimesh.creation.icosphere(4)
 VERTICES, FACES = np.asarray(MESH.vertices), np.asarray(MESH.faces)

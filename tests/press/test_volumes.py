@@ -11,8 +11,8 @@ from warpjld.fem import Body, Loads, Prescribed, solve
 from warpjld.fem.load.loads import volumes
 from warpjld.grasp import GraspObject, Places, make_object
 from warpjld.grasp.shapes import ball, box, cylinder, glass
-from warpjld.press.matter import Physical
-from warpjld.press.volumes import ObjectVolume, object_volume
+from warpjld.simulation.specification import Physical
+from warpjld.simulation.bodies.object_mesh import ObjectVolume, object_volume
 
 PLACE = Places.of((0.1, 0.2, 0.3), (0.1, 0.2, 0.3, 0.9))
 NOTHING = Prescribed(np.empty(0, np.int64), np.empty(0))

@@ -12,8 +12,8 @@ from warpjld.errors import InputError
 from warpjld.fem.contact.obstacles.barr import Barr
 from warpjld.fem.contact.obstacles.meshes import Keyframed
 from warpjld.fem.contact.obstacles.solids import Box, Sphere
-from warpjld.press.grips import FoundGrip
-from warpjld.press.state_variables import Points
+from warpjld.simulation.grip.find import FoundGrip
+from warpjld.simulation.state_variables import Points
 from warpjld.script.press_bodies import prop_obstacle
 from warpjld.script.press_keys import gripped_keys
 from warpjld.script.props import prop_places

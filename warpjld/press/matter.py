@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Literal
 import numpy as np
 
 from warpjld.errors import InputError
-from warpjld.press.where import Where
+from warpjld.simulation.specification import Where
 
 if TYPE_CHECKING:
     from warpjld.fem import Material

@@ -19,7 +19,7 @@ from warpjld.skeleton import Poses, Skeleton
 if TYPE_CHECKING:
     from warpjld.covering import Covering
     from warpjld.grasp import Places
-    from warpjld.press.pressed import Pressed
+    from warpjld.simulation.display.surfaces import Pressed
     from warpjld.render import Camera as RenderCamera
     from warpjld.render import Solid
     from warpjld.touch.contact import SkinContact

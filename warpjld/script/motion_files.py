@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from warpjld.errors import InputError
-from warpjld.press.where import placed
+from warpjld.simulation.specification import placed
 from warpjld.script.folder import OutputFolder
 from warpjld.script.outputs import MotionFile, Output
 from warpjld.script.per_actor import actors_of, file_of

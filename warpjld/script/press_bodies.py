@@ -11,10 +11,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from warpjld.errors import InputError
-from warpjld.press.matter import FleshWish
-from warpjld.press.state_variables import Points, Prescribing
-from warpjld.press.where import placed
-from warpjld.press.wishes import GripWish
+from warpjld.simulation.specification import FleshWish
+from warpjld.simulation.state_variables import Points, Prescribing
+from warpjld.simulation.specification import placed
+from warpjld.simulation.specification import GripWish
 from warpjld.script.binding import cover
 from warpjld.script.staging import stage
 
@@ -22,11 +22,11 @@ if TYPE_CHECKING:
     from warpjld.fem.contact import Obstacle
     from warpjld.fem.hand.flesh_hand import FleshHand
     from warpjld.grasp import Places
-    from warpjld.press.drive import Drive
-    from warpjld.press.hand_body import HandBody
-    from warpjld.press.object_body import ObjectBody
-    from warpjld.press.support import Support
-    from warpjld.press.volumes import ObjectVolume
+    from warpjld.simulation.bodies.flesh_body import Drive
+    from warpjld.simulation.bodies.flesh_body import HandBody
+    from warpjld.simulation.bodies.object_body import ObjectBody
+    from warpjld.simulation.bodies.support import Support
+    from warpjld.simulation.bodies.object_mesh import ObjectVolume
     from warpjld.script.props import Prop
     from warpjld.script.scene import Actor, Scene
     from warpjld.skeleton import Poses
@@ -49,9 +49,9 @@ def hand_body(scene: Scene, actor: Actor, wish: FleshWish, start: float, notes: 
     from warpjld.fem.hand.cushion import coarse_note
     from warpjld.fem.hand.flesh_hand import build_flesh_hand
     from warpjld.fem.hand.laws import hand_laws
-    from warpjld.press.hand_body import HandBody
-    from warpjld.press.rest import part_of, posed
-    from warpjld.press.skin_parts import skin_parts
+    from warpjld.simulation.bodies.flesh_body import HandBody
+    from warpjld.simulation.bodies.rest_shape import part_of, posed
+    from warpjld.simulation.bodies.skin_parts import skin_parts
 
     poses = stage(actor, np.array([start]), scene.rate)
     skin = cover(actor).deform(poses)[0].astype(np.float64)
@@ -81,7 +81,7 @@ def hand_body(scene: Scene, actor: Actor, wish: FleshWish, start: float, notes: 
 
 
 def _drive(scene: Scene, actor: Actor, hand: FleshHand, start: float) -> Drive:
-    from warpjld.press.drive import Drive
+    from warpjld.simulation.bodies.flesh_body import Drive
     from warpjld.skeleton import poses_from_angles
 
     def pose(time: float) -> Poses:
@@ -106,8 +106,8 @@ def object_body(scene: Scene, prop: Prop, start: float, place: Places | None = N
     Raises:
         InputError: It cannot be meshed; names the line of its PHYSICAL.
     """
-    from warpjld.press.object_body import ObjectBody
-    from warpjld.press.volumes import object_volume
+    from warpjld.simulation.bodies.object_body import ObjectBody
+    from warpjld.simulation.bodies.object_mesh import object_volume
 
     physical = scene.contact.physical[prop.name]
     at = _places(scene, prop, start)
@@ -135,9 +135,9 @@ def object_body(scene: Scene, prop: Prop, start: float, place: Places | None = N
 
 def _lifted(scene: Scene, wish: GripWish, volume: ObjectVolume) -> tuple[ObjectVolume, Support]:
     """The object with its weight, and what it stands on."""
-    from warpjld.fem.hand.weighed import handle_of
+    from warpjld.simulation.grip.shared_weight import handle_of
     from warpjld.fem.load.loads import volumes
-    from warpjld.press.support import Support
+    from warpjld.simulation.bodies.support import Support
 
     pull = np.array(scene.contact.pull)
     axis = int(np.argmax(np.abs(pull)))

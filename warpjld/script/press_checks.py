@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from warpjld.errors import InputError
-from warpjld.press.where import placed
-from warpjld.press.wishes import ContactWishes, GripWish, Pressing
+from warpjld.simulation.specification import placed
+from warpjld.simulation.specification import ContactWishes, GripWish, Pressing
 
 if TYPE_CHECKING:
     from warpjld.script.scene import Scene

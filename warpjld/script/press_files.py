@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from warpjld.errors import InputError
-from warpjld.press.where import placed
+from warpjld.simulation.specification import placed
 from warpjld.script.folder import OutputFolder
 from warpjld.script.outputs import Film, Grips, Output, Picture, Table, Touch, Volume
 
@@ -55,9 +55,9 @@ def check_press(scene: Scene, outputs: Sequence[Output], frames: NDArray[np.floa
 
 def write_press(report: PressReport, outputs: Sequence[Output], out: OutputFolder) -> None:
     """Tables and volumes."""
-    from warpjld.press.grips import write_grips
-    from warpjld.press.table import write_table
-    from warpjld.press.volume_series import write_volumes
+    from warpjld.simulation.grip.find import write_grips
+    from warpjld.simulation.report.table import write_table
+    from warpjld.simulation.report.volume_series import write_volumes
 
     for output in outputs:
         if isinstance(output, Table):
@@ -71,7 +71,7 @@ def write_press(report: PressReport, outputs: Sequence[Output], out: OutputFolde
 
 
 def _write_touch(report: PressReport, output: Touch, path: Path) -> None:
-    from warpjld.fem.hand.tactile_files import draw_tactile, write_tactile
+    from warpjld.simulation.report.tactile_files import draw_tactile, write_tactile
 
     actor = output.actor or next((hand.name for hand in report.pressed.bodies.hands), "nobody")
     felt = report.tactile(actor)

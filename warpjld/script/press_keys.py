@@ -11,7 +11,7 @@ from warpjld.script.scene import SplineConstants
 from warpjld.skeleton import CHANNELS
 
 if TYPE_CHECKING:
-    from warpjld.press.grips import FoundGrip
+    from warpjld.simulation.grip.find import FoundGrip
     from warpjld.script.scene import Actor, Scene
 
 __all__ = ["REST", "corrected_keys", "gripped_keys"]

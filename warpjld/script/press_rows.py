@@ -10,9 +10,9 @@ from warpjld.script.staging import stage
 
 if TYPE_CHECKING:
     from warpjld.fem.hand.muscles import Effort
-    from warpjld.press.bodies import Bodies
-    from warpjld.press.frames import SolvedFrame
-    from warpjld.press.table import Row
+    from warpjld.simulation.bodies.model import Bodies
+    from warpjld.simulation.solve.solved_frame import SolvedFrame
+    from warpjld.simulation.report.table import Row
     from warpjld.script.scene import Scene
 
 __all__ = ["PressRows"]
@@ -37,8 +37,8 @@ class PressRows:
 
     def take(self, solved: SolvedFrame) -> str | None:
         """Add rows; a text where muscles can do no more (R118)."""
-        from warpjld.press.efforts import effort_at
-        from warpjld.press.table import rows_of
+        from warpjld.simulation.report.efforts import effort_at
+        from warpjld.simulation.report.table import rows_of
 
         reason = None
         for hand in self._bodies.hands:

@@ -12,24 +12,24 @@ import numpy as np
 from numpy.typing import NDArray
 
 from warpjld.errors import InputError
-from warpjld.press.where import placed
-from warpjld.press.wishes import ContactWishes, GripWish, Pressing
-from warpjld.script.approach import approach
+from warpjld.simulation.specification import placed
+from warpjld.simulation.specification import ContactWishes, GripWish, Pressing
+from warpjld.simulation.solve.start_frame import approach
 from warpjld.script.binding import cover
 from warpjld.script.press_bodies import hand_body, object_body, prop_obstacle
 from warpjld.script.press_checks import check_wishes
 from warpjld.script.press_keys import corrected_keys, gripped_keys
-from warpjld.script.press_rows import PressRows
+from warpjld.simulation.report.table import PressRows
 from warpjld.script.staging import stage
 
 if TYPE_CHECKING:
     from warpjld.fem.contact import ContactSolution
-    from warpjld.fem.hand.tactile import Tactile
-    from warpjld.press.bodies import Bodies
-    from warpjld.press.grips import FoundGrip
-    from warpjld.press.pressed import Pressed
-    from warpjld.press.table import Row
-    from warpjld.press.verdict import Verdict
+    from warpjld.simulation.report.tactile import Tactile
+    from warpjld.simulation.bodies.model import Bodies
+    from warpjld.simulation.grip.find import FoundGrip
+    from warpjld.simulation.display.surfaces import Pressed
+    from warpjld.simulation.report.table import Row
+    from warpjld.simulation.report.verdict import Verdict
     from warpjld.script.scene import Scene
 
 __all__ = ["PressReport", "run_press"]
@@ -61,7 +61,7 @@ class PressReport:
         Raises:
             InputError: Its flesh was not solved, or no frame was.
         """
-        from warpjld.press.feel import felt
+        from warpjld.simulation.report.tactile_readings import felt
 
         hands = [hand for hand in self.pressed.bodies.hands if hand.name == actor]
         if not hands:
@@ -86,14 +86,14 @@ def run_press(scene: Scene, folder: Path, progress: Report = lambda what, done, 
 
 
 def _run(scene: Scene, pressing: Pressing, folder: Path, progress: Report) -> PressReport:
-    from warpjld.press.bodies import assemble
-    from warpjld.press.checks import refuse_hopeless
-    from warpjld.press.identity import identity_of
-    from warpjld.press.mend import Mending
-    from warpjld.press.pressed import Pressed
-    from warpjld.press.run import solve_frames
-    from warpjld.press.seen import missed, seen
-    from warpjld.press.verdict import verdict_of
+    from warpjld.simulation.bodies.model import assemble
+    from warpjld.simulation.solve.checks import refuse_hopeless
+    from warpjld.simulation.solve.identity import identity_of
+    from warpjld.simulation.grip.correct_frames import Mending
+    from warpjld.simulation.display.surfaces import Pressed
+    from warpjld.simulation.solve.frames import solve_frames
+    from warpjld.simulation.report.visible_overlap import missed, seen
+    from warpjld.simulation.report.verdict import verdict_of
 
     wishes = scene.contact
     check_wishes(scene, pressing)
@@ -159,7 +159,7 @@ def _frames(pressing: Pressing, wishes: ContactWishes, start: float) -> list[flo
 
 def _pauses(scene: Scene, bodies: Bodies, found: list[FoundGrip]) -> dict[float, Callable[[ContactSolution], None]]:
     """What to do at frames at which grips are searched for."""
-    from warpjld.press.grips import find_grip
+    from warpjld.simulation.grip.find import find_grip
 
     def search(wish: GripWish, solution: ContactSolution) -> None:
         grip = find_grip(bodies, wish, solution, scene.contact.strength.get(wish.actor, {}))

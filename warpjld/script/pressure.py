@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from warpjld import render
-from warpjld.press.finer import Finer, finer
+from warpjld.simulation.display.refine import Finer, finer
 
 if TYPE_CHECKING:
     from warpjld.script.crowd import Crowd

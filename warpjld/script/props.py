@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from warpjld.fem.contact.obstacles.barr import Barr
     from warpjld.fem.contact.obstacles.obstacle import Motion
     from warpjld.grasp.keyframes import KeyframedShape
-    from warpjld.press.state_variables import Barred
+    from warpjld.simulation.state_variables import Barred
     from warpjld.script.scene import Scene
     from warpjld.surface import Surface
 

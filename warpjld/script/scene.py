@@ -12,8 +12,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from warpjld.errors import InputError
-from warpjld.press.where import Where
-from warpjld.press.wishes import ContactWishes
+from warpjld.simulation.specification import Where
+from warpjld.simulation.specification import ContactWishes
 from warpjld.script.outputs import Camera, Output
 from warpjld.script.placement import Placement
 from warpjld.suggest import did_you_mean

@@ -10,7 +10,7 @@ from warpjld.fem import Body, LinearElastic, Loads, ball, box, merge, prescribe
 from warpjld.fem.contact import ContactInstant, Pair, press
 from warpjld.fem.contact.obstacles.solids import Plane
 from warpjld.fem.contact.results.nodal_contact import skin_around, stacked
-from warpjld.fem.hand.tactile import tactile_of_pairs
+from warpjld.simulation.report.tactile import tactile_of_pairs
 
 STEP, FRICTION, DEPTH = 2e-4, 0.3, 1e-4
 

@@ -15,7 +15,7 @@ from warpjld.fem.hand import FleshHand, hand_laws
 from warpjld.fem.hand.alone import FleshAlone, Untouched
 from warpjld.fem.hand.bone_loads import loads_from_reactions
 from warpjld.fem.hand.muscles import effort_of
-from warpjld.press.rest import part_of
+from warpjld.simulation.bodies.rest_shape import part_of
 from warpjld.skeleton import Poses, poses_from_angles, rest_poses
 
 FORCE = 2.0

@@ -7,7 +7,7 @@ import math
 import pytest
 
 from warpjld.errors import InputError
-from warpjld.fem.hand.firmness import Firmness, FirmStatus, grip_of_force
+from warpjld.simulation.grip.force import Firmness, FirmStatus, grip_of_force
 
 
 def pad(stiffness: float = 4e3, touch: float = 1e-3, limit: float = math.inf):  # type: ignore[no-untyped-def]

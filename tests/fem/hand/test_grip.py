@@ -7,7 +7,7 @@ import math
 import pytest
 
 from warpjld.errors import InputError
-from warpjld.fem.hand.grip import GripStatus, Outcome, Trial, gentlest_grip
+from warpjld.simulation.grip.search import GripStatus, Outcome, Trial, gentlest_grip
 
 
 def ended(held: bool) -> Outcome:

@@ -11,9 +11,9 @@ import pytest
 from warpjld.errors import InputError
 from warpjld.fem.contact import Pair
 from warpjld.fem.contact.obstacles.solids import Plane
-from warpjld.fem.hand.grip import GripStatus, Outcome, gentlest_grip
-from warpjld.fem.hand.holding import Holding
-from warpjld.fem.hand.tactile import tactile_of_pairs
+from warpjld.simulation.grip.search import GripStatus, Outcome, gentlest_grip
+from warpjld.simulation.grip.holding import Holding
+from warpjld.simulation.report.tactile import tactile_of_pairs
 
 EXAMPLE = Path(__file__).resolve().parents[3] / "examples" / "hold_block.py"
 WEIGHT, FRICTION = 0.6, 0.5

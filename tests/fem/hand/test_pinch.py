@@ -13,10 +13,10 @@ from warpjld.fem import Body
 from warpjld.fem.contact import ContactSolution, Pair, press
 from warpjld.fem.hand import FleshHand, hand_laws
 from warpjld.hand import build_hand
-from warpjld.press.drive import Drive
-from warpjld.press.hand_body import HandBody
-from warpjld.press.rest import part_of, posed
-from warpjld.press.skin_parts import skin_parts
+from warpjld.simulation.bodies.flesh_body import Drive
+from warpjld.simulation.bodies.flesh_body import HandBody
+from warpjld.simulation.bodies.rest_shape import part_of, posed
+from warpjld.simulation.bodies.skin_parts import skin_parts
 from warpjld.skeleton import CHANNELS, Poses, Skeleton, poses_from_angles
 
 pytestmark = pytest.mark.slow

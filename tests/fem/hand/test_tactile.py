@@ -15,8 +15,8 @@ from warpjld.errors import InputError
 from warpjld.fem.contact import Pair
 from warpjld.fem.contact.results.nodal_contact import Imprint, skin_around
 from warpjld.fem.hand import FleshHand
-from warpjld.fem.hand.tactile import tactile_of
-from warpjld.fem.hand.tactile_files import TACTILE_COLUMNS, draw_tactile, write_tactile
+from warpjld.simulation.report.tactile import tactile_of
+from warpjld.simulation.report.tactile_files import TACTILE_COLUMNS, draw_tactile, write_tactile
 
 
 @dataclass(frozen=True, eq=False)

@@ -7,7 +7,7 @@ sum over all bones is the sum of all reactions.
 **Which of the two.** Reactions are exact: they are in equilibrium with contact, whatever the flesh does. They hold the
 flesh of bent joints in shape, too, so those of the same pose without contact are taken off (``FleshAlone``).
 Contact forces handed on by nearness (``loads_from_contact``) need no second equilibrium. They differ where they act
-near a joint, whose bones share them otherwise than by nearness: ``warpjld.press.efforts`` says by how much.
+near a joint, whose bones share them otherwise than by nearness: ``warpjld.simulation.report.efforts`` says by how much.
 """
 
 from __future__ import annotations

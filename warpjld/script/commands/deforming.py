@@ -7,7 +7,7 @@ from dataclasses import asdict
 from typing import Literal, cast
 
 from warpjld.motion import Key, Track
-from warpjld.press.state_variables import Barred, Points, Prescribing
+from warpjld.simulation.state_variables import Barred, Points, Prescribing
 from warpjld.script.arguments import Arguments
 from warpjld.script.commands.physical import read_object
 from warpjld.script.registry import command

@@ -6,7 +6,7 @@ import math
 from typing import TYPE_CHECKING, cast
 
 from warpjld.errors import InputError
-from warpjld.press.wishes import GripWish
+from warpjld.simulation.specification import GripWish
 from warpjld.script.arguments import Arguments
 from warpjld.script.commands.animation import FINGERS
 from warpjld.script.commands.physical import place, read_object

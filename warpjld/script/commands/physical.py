@@ -5,9 +5,9 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, cast
 
 from warpjld.errors import InputError
-from warpjld.press.matter import LAWS, Bonded, FleshWish, Physical
-from warpjld.press.where import Where
-from warpjld.press.wishes import pair
+from warpjld.simulation.specification import LAWS, Bonded, FleshWish, Physical
+from warpjld.simulation.specification import Where
+from warpjld.simulation.specification import pair
 from warpjld.script.arguments import Arguments
 from warpjld.script.commands.animation import FINGERS
 from warpjld.script.registry import command

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from warpjld.press.wishes import Pressing
+from warpjld.simulation.specification import Pressing
 from warpjld.script.arguments import Arguments
 from warpjld.script.commands.output import ask_for
 from warpjld.script.commands.physical import place

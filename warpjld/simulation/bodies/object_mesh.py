@@ -1,0 +1,205 @@
+"""The volume of an object: hexahedra inside its surface, or through the wall of a hollow one (R104)."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from warpjld.errors import InputError
+from warpjld.fem import Body, HexMesh, LinearElastic, Loads, Prescribed, ball, box, cylinder, solve
+from warpjld.fem.mesh.embedding import Embedding, embed
+from warpjld.fem.mesh.envelope import Envelope
+from warpjld.fem.mesh.fit import fit_mesh
+from warpjld.fem.output.stress import cauchy
+from warpjld.grasp.objects import GraspObject, Places
+from warpjld.simulation.specification import Physical
+from warpjld.rotations import unit
+
+__all__ = ["ObjectVolume", "object_volume"]
+
+_ACROSS = 12
+"""Elements across an object's smallest extent, where their size is not given."""
+
+_WALL = 2
+"""Elements through a wall."""
+_MANY = 1e6
+"""Elements of an object that are too many."""
+
+_FLAT = 0.03
+"""Mean square by which the faces at a node turn from their mean normal, from which on they are an edge."""
+
+_UPRIGHT = 0.02
+"""Scaled Jacobian of a wall's elements."""
+
+_REACH = 3.0
+"""How far a visible surface may lie outside its mesh, in elements."""
+
+
+@dataclass(frozen=True, eq=False)
+class ObjectVolume:
+    """An object that deforms, where it stands at time 0.
+
+    Attributes:
+        name: Its region and the face set of its outside; ``<name>.inside`` is that of its inside.
+        mesh: On the stage.
+        local: The nodes in the object's own frame [m], shape (N, 3).
+        physical: Law, wall and pressure.
+        visible: Its surface, carried by the mesh.
+        surface: Its surface at time 0 [m], shape (V, 3).
+        faces: Triangles of its surface, shape (T, 3).
+        stress: Stress that holds the pressure inside in its shape at time 0 [Pa], shape (E, 6) (R98).
+    """
+
+    name: str
+    mesh: HexMesh
+    local: NDArray[np.float64]
+    physical: Physical
+    visible: Embedding
+    surface: NDArray[np.float64]
+    faces: NDArray[np.int32]
+    stress: NDArray[np.float64]
+
+    @property
+    def inside(self) -> str:
+        """Face set of its inside."""
+        return f"{self.name}.inside"
+
+    def worn(self, displacement: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Its surface [m], shape (V, 3), under a displacement of its nodes (N, 3)."""
+        return self.surface + self.visible.carry(displacement)
+
+
+def object_volume(name: str, thing: GraspObject, physical: Physical, place: Places) -> ObjectVolume:
+    """Mesh an object.
+
+    Built-in balls, boxes and cylinders get regular meshes; other surfaces a grid fitted to them. The wall of a hollow
+    one follows its outside at an even depth.
+
+    Args:
+        name: Of the object.
+        thing: Its surface.
+        physical: How it deforms.
+        place: One placement: where it is at time 0.
+
+    Raises:
+        InputError: Elements too large for it, a wall too thick, or a pressure its wall cannot hold.
+    """
+    size = physical.element or float(thing.size.min()) / _ACROSS
+    _refuse_many(thing, physical.wall, size)
+    if thing.origin == "ball":
+        mesh = _ball(thing, physical.wall, size)
+    else:
+        if thing.origin == "box":
+            counts = np.maximum(1, np.round(thing.size / size)).astype(int)
+            mesh = box(thing.size, tuple(counts), origin=-0.5 * thing.size)
+        elif thing.origin == "cylinder" and not physical.wall:  # its faces are narrow at the rims
+            mesh = _cylinder(thing, size)
+        else:
+            mesh = fit_mesh(Envelope(thing.vertices, thing.faces), size).mesh
+        mesh = _shell(mesh, physical.wall) if physical.wall else replace(mesh, faces={"outer": mesh.boundary()})
+    faces = {name: mesh.faces["outer"]}
+    if physical.wall:
+        faces[f"{name}.inside"] = mesh.faces["inner"]
+    mesh = replace(
+        mesh, regions=np.zeros(len(mesh.elements), np.int32), region_names=(name,), faces=faces, node_sets={}
+    )
+    stress = _holding(mesh, f"{name}.inside", physical) if physical.pressure else np.zeros((len(mesh.elements), 6))
+    try:
+        thin = min(1.0, physical.wall / (_WALL * size)) if physical.wall else 1.0
+        visible = embed(mesh, thing.vertices, reach=_REACH / thin)
+    except InputError as error:
+        raise InputError(f"elements of {size:g} m are too large, thin parts are left out ({error.message})") from error
+    turn = place.apply(np.eye(3))[0] - place.apply(np.zeros((1, 3)))[0]
+    moved = replace(mesh, nodes=place.apply(mesh.nodes)[0])
+    return ObjectVolume(
+        name,
+        moved,
+        mesh.nodes,
+        physical,
+        visible,
+        place.apply(thing.vertices)[0],
+        thing.faces,
+        _turned(stress, turn.T),
+    )
+
+
+def _refuse_many(thing: GraspObject, wall: float, size: float) -> None:
+    """Raise before hours are spent on meshing."""
+    x, y, z = (float(extent) for extent in thing.size)
+    room = 2.0 * _WALL * (x * y + y * z + z * x) * size if wall else x * y * z
+    if room > _MANY * size**3:
+        least = (room / size / _MANY) ** 0.5 if wall else (room / _MANY) ** (1.0 / 3.0)
+        raise InputError(
+            f"elements of {size:g} m would be some {room / size**3:,.0f}: more than can be solved; take {least:.2g} m "
+            "or more"
+        )
+
+
+def _ball(thing: GraspObject, wall: float, size: float) -> HexMesh:
+    radius = 0.5 * float(thing.size.max())
+    count = max(4, 2 * round(0.25 * np.pi * radius / size))
+    return ball(radius, inner=radius - wall if wall else 0.0, n=count, layers=_WALL if wall else None)
+
+
+def _cylinder(thing: GraspObject, size: float) -> HexMesh:
+    radius, length = 0.5 * float(thing.size[0]), float(thing.size[1])
+    count = max(4, 2 * round(0.25 * np.pi * radius / size))
+    mesh = cylinder(radius, length, n=count, along=max(2, round(length / size)))
+    x, y, z = mesh.nodes.T
+    upright = np.stack([x, z - 0.5 * length, -y], axis=1)
+    return replace(mesh, nodes=upright)
+
+
+def _shell(solid: HexMesh, wall: float) -> HexMesh:
+    """Elements through a wall under the surface of a mesh; as thick at edges as elsewhere, where faces are wide enough.
+
+    Raises:
+        InputError: The wall folds.
+    """
+    quads = solid.quads(solid.boundary())
+    used, corners = np.unique(quads, return_inverse=True)
+    corners = corners.reshape(-1, 4)
+    x = solid.nodes[used]
+    facing = unit(np.cross(x[corners[:, 2]] - x[corners[:, 0]], x[corners[:, 3]] - x[corners[:, 1]]))
+    number = np.bincount(corners.ravel())[:, None]
+    normal, planes = np.zeros_like(x), np.zeros((len(x), 3, 3))
+    np.add.at(normal, corners, facing[:, None])
+    np.add.at(planes, corners, (facing[:, :, None] * facing[:, None, :])[:, None])
+    even = np.einsum("nij,nj->ni", np.linalg.pinv(planes / number[:, :, None], rcond=_FLAT), normal / number)
+    layers = [
+        np.concatenate([corners + k * len(x), corners + (k + 1) * len(x)], axis=1).astype(np.int32)
+        for k in range(_WALL)
+    ]
+    elements = np.concatenate(layers)
+    count = len(corners)
+    outer = np.stack([(_WALL - 1) * count + np.arange(count), np.full(count, 5)], axis=1).astype(np.int32)
+    inner = np.stack([np.arange(count), np.full(count, 4)], axis=1).astype(np.int32)
+    for inwards in (even, 0.5 * (even + unit(normal)), unit(normal)):
+        nodes = np.concatenate([x - depth * inwards for depth in np.linspace(wall, 0.0, _WALL + 1)])
+        mesh = HexMesh(nodes, elements, np.zeros(len(elements), np.int32), ("body",), {"outer": outer, "inner": inner})
+        if mesh.scaled_jacobian().min() > _UPRIGHT:
+            return mesh
+    raise InputError(f"wall: {wall:g} m is too thick, the wall would fold; take a thinner one")
+
+
+def _holding(mesh: HexMesh, inside: str, physical: Physical) -> NDArray[np.float64]:
+    """Stress in equilibrium with the pressure inside, as a linear body of that shape would carry it [Pa], (E, 6)."""
+    body = Body(mesh, LinearElastic(physical.young, physical.poisson))
+    nothing = Prescribed(np.empty(0, np.int64), np.empty(0))
+    found = solve(body, nothing, Loads(pressure={inside: physical.pressure}), free="hold")
+    strain = float(np.abs(found.displacement).max()) / mesh.size
+    if strain > 0.5:
+        raise InputError(
+            f"pressure: {physical.pressure:g} Pa would burst a wall of {physical.wall:g} m with a modulus of "
+            f"{physical.young:g} Pa"
+        )
+    return cauchy(body, found.displacement)
+
+
+def _turned(stress: NDArray[np.float64], turn: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Stresses xx yy zz xy yz zx (E, 6) in turned axes."""
+    full = stress[:, [[0, 3, 5], [3, 1, 4], [5, 4, 2]]]
+    full = np.einsum("ij,ejk,lk->eil", turn, full, turn)
+    return np.stack([full[:, i, j] for i, j in ((0, 0), (1, 1), (2, 2), (0, 1), (1, 2), (2, 0))], axis=1)

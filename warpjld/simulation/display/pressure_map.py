@@ -1,0 +1,114 @@
+"""Contact forces of nodes as pressure on a visible surface, with the sum they have (R95)."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from warpjld.fem.contact.obstacles.facets import Facets
+from warpjld.fem.contact.results.nodal_contact import skin_around
+from warpjld.fem.mesh.embedding import Embedding, embed_between
+from warpjld.fem.mesh.hexmesh import HexMesh
+from warpjld.simulation.display.refine import Finer, finer
+
+__all__ = ["PressureMap", "pressure_map"]
+
+_SEEN = 0.5
+"""Share of the element faces around a node that its visible surface has at least: what presses on others, where a
+surface is coarser than elements or cut off, goes to the place nearest to them."""
+
+
+class PressureMap:
+    """Spreads what presses on a volume's outer nodes over the surface it carries.
+
+    A node's force is shared among the vertices it carries in proportion to their weights and areas: between nodes
+    pressures go straight from one to the next, and their integral is the force.
+
+    Args:
+        mesh: The volume, as it rests.
+        faces: Its face set.
+        carried: How it carries the vertices.
+        vertices: At the same moment [m], shape (V, 3).
+        triangles: Of the whole surface, shape (T, 3).
+        worn: Vertices that the volume carries, shape (V,).
+    """
+
+    def __init__(
+        self,
+        mesh: HexMesh,
+        faces: str,
+        carried: Embedding,
+        vertices: NDArray[np.float64],
+        triangles: NDArray[np.int32],
+        worn: NDArray[np.bool_],
+    ) -> None:
+        from scipy.sparse import csr_array, diags_array
+
+        count, total = len(vertices), len(mesh.nodes)
+        self._triangles, self._count = triangles, count
+        around = skin_around(mesh, faces, mesh.nodes)
+        weights = np.maximum(carried.weights, 0.0) * (around > 0.0)[carried.corners]
+        weights *= worn[:, None]
+        weights /= np.maximum(weights.sum(axis=1), 1e-12)[:, None]
+        table = csr_array((weights.ravel(), carried.corners.ravel(), 8 * np.arange(count + 1)), shape=(count, total))
+        seen = table.T @ self._areas(vertices) > _SEEN * np.maximum(around, 1e-300)
+        self._table: Any = table @ diags_array(seen.astype(float))
+        self._bare = np.flatnonzero((around > 0.0) & ~seen)
+        self._nearest: Any = csr_array((count, len(self._bare)))
+        whole = triangles[worn[triangles].all(axis=1)]
+        if len(self._bare) and len(whole):
+            surface = Facets(vertices, whole)
+            place = surface.locate(mesh.nodes[self._bare])[1]
+            corners = surface.faces[place.face]
+            columns = 3 * np.arange(len(self._bare) + 1)
+            shape = (len(self._bare), count)
+            self._nearest = csr_array((place.weights.ravel(), corners.ravel(), columns), shape=shape).T
+
+    def of(self, force: NDArray[np.float64], vertices: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Pressure at the vertices, where they are now (V, 3) [Pa], shape (V,), of forces on the nodes (N,) [N]."""
+        area = self._areas(vertices)
+        out = self._table @ _over(force, self._table.T @ area)
+        return np.asarray(out + _over(self._nearest @ force[self._bare], area), np.float64)
+
+    def _areas(self, vertices: NDArray[np.float64]) -> NDArray[np.float64]:
+        """A third of the triangles around every vertex [m²], shape (V,)."""
+        x = vertices[self._triangles]
+        size = np.linalg.norm(np.cross(x[:, 1] - x[:, 0], x[:, 2] - x[:, 0]), axis=1) / 6.0
+        return np.asarray(np.bincount(self._triangles.ravel(), np.repeat(size, 3), self._count), np.float64)
+
+
+def pressure_map(
+    mesh: HexMesh,
+    faces: str,
+    carried: Embedding,
+    vertices: NDArray[np.float64],
+    triangles: NDArray[np.int32],
+    force: NDArray[np.float64],
+    worn: NDArray[np.bool_] | None = None,
+) -> tuple[Finer, PressureMap]:
+    """A surface split where nodes are pressed, about as fine as they are far apart or finer, and its map.
+
+    Args:
+        mesh, faces, carried, vertices: As of ``PressureMap``.
+        triangles: Of the whole surface, shape (T, 3).
+        force: That ever presses on the nodes [N], shape (N,).
+        worn: Vertices that the volume carries, where it does not carry all of them, shape (V,).
+    """
+    count = len(vertices)
+    worn = np.ones(count, dtype=bool) if worn is None else worn
+    pressed = worn & (np.where(carried.weights > 0.0, force[carried.corners], 0.0).max(axis=1) > 0.0)
+    surface = finer(triangles, worn[triangles].all(axis=1) & pressed[triangles].any(axis=1), count)
+    where = surface.of(vertices)
+    if len(surface.edges):
+        middles = embed_between(mesh, carried, surface.edges, where[count:])
+        columns = (getattr(carried, name) for name in ("corners", "weights", "outside"))
+        more = (getattr(middles, name) for name in ("corners", "weights", "outside"))
+        carried = Embedding(*(np.concatenate(pair) for pair in zip(columns, more, strict=True)))
+    inside = np.concatenate([worn, worn[surface.edges].all(axis=1)])
+    return surface, PressureMap(mesh, faces, carried, where, surface.faces, inside)
+
+
+def _over(force: NDArray[np.float64], area: NDArray[np.float64]) -> NDArray[np.float64]:
+    return np.divide(force, area, out=np.zeros(len(area)), where=area > 0.0)

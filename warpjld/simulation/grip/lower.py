@@ -1,0 +1,186 @@
+"""An object lowered into a hand until the hand bears all of its weight, or is seen not to (R122–R124).
+
+With a force on the object there is no equilibrium beyond what friction bears, and a solver that finds none has not
+proved it. With the height of the object's middle prescribed there is one at every height: what its handle bears there
+is measured, and that the hand bears no more however deep the object sinks is found and not guessed.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from warpjld.fem.contact import ContactInstant, ContactSolution
+from warpjld.simulation.grip.search import Outcome
+from warpjld.simulation.grip.shared_weight import Weighed
+
+__all__ = ["Descent", "descend"]
+
+_FIRST = 1.0 / 240.0
+"""First step down, over the object's height, and how much longer the next may be."""
+_LONGER = 2.5
+_FAR, _LONGEST = 0.25, 0.25
+"""An object that sinks by this share of its height is not held; and part of that way that one step may be long."""
+_MOST = 20
+"""Steps."""
+_PART, _FORESEEN = 0.5, (_FIRST, 0.06)
+"""Part of the way that is foreseen to take in one step, and bounds of this step, over the object's height."""
+_SHORTER, _TRIES = 1.0 / 3.0, 4
+"""What becomes of a step that finds no equilibrium, and how many are tried."""
+_LEFT, _LITTLE = 0.01, 0.001
+"""Share of the weight that may be left on the handle when it lets go; and the same where that was too much."""
+_SPARE = 0.002
+"""Share of the weight that is to be borne beyond all of it where all slides: nothing may be left then."""
+_LESS = 0.02
+"""Share of the weight that the hand may bear less than it did before the object is said to slip out."""
+_TOO_FAR = 0.1
+"""Share of the weight that the hand may bear beyond all of it before a step is taken again, and shorter: friction
+remembers, and does not let an object rise to where it would have stayed."""
+_PROBE = 0.05
+"""Step once all slides, over ``far``: long enough to see whether more will be borne."""
+_ALL = 1.0 - 1e-9
+
+
+@dataclass(frozen=True, eq=False)
+class Descent:
+    """How a descent ended.
+
+    Attributes:
+        outcome: How.
+        solution: The last equilibrium: where the object is held, the one that nothing but the hand holds.
+        instants: All equilibria after the one it began with, in order.
+        borne: Largest share of the weight that the hand bore on the way; what it could bear where it holds.
+        sunk: How far it sank [m].
+        path: How far it had sunk [m] and which share the hand bore, at every equilibrium with the handle.
+    """
+
+    outcome: Outcome
+    solution: ContactSolution
+    instants: tuple[ContactInstant, ...]
+    borne: float
+    sunk: float
+    path: tuple[tuple[float, float], ...]
+
+
+@dataclass(frozen=True, eq=False)
+class _Place:
+    """An equilibrium with the handle: shares of the weight, and how far the object has sunk [m]."""
+
+    solution: ContactSolution
+    sunk: float
+    left: float
+    elsewhere: float
+    slides: bool
+
+    @property
+    def borne(self) -> float:
+        """By the hand."""
+        return 1.0 - self.left - self.elsewhere
+
+
+def descend(
+    weighed: Weighed,
+    bare: ContactSolution,
+    moved: Callable[[ContactSolution, float], ContactSolution],
+    released: Callable[[ContactSolution], ContactSolution],
+    *,
+    foreseen: float | None = None,
+) -> Descent:
+    """Lower the handle until nothing is left on it, then let go.
+
+    Args:
+        weighed: The object.
+        bare: Equilibrium in which the handle bears what the hand does not.
+        moved: Equilibrium after another, with the handle at a height [m].
+        released: Equilibrium after another, without the handle.
+        foreseen: How far it sank at a grip like this one [m].
+    """
+    begin, far = weighed.height(bare.last), _FAR * weighed.tall
+
+    def place(solution: ContactSolution) -> _Place:
+        there = solution.last
+        sunk = weighed.sunk(begin, weighed.height(there))
+        slides = weighed.sliding(there) >= _ALL
+        return _Place(solution, sunk, weighed.left(there), weighed.elsewhere(there), slides)
+
+    def onward(here: _Place, step: float) -> _Place | None:
+        """Deeper by a step [m], or by less where that finds no equilibrium or goes too far."""
+        ahead = None
+        for _ in range(_TRIES):
+            solution = moved(here.solution, weighed.lower(weighed.height(here.solution.last), step))
+            if not solution.converged:
+                step *= _SHORTER
+                continue
+            ahead = place(solution)
+            if ahead.left >= -_TOO_FAR:
+                break
+            step *= here.left / (here.left - ahead.left)
+        return ahead
+
+    places = [place(bare)]
+
+    def ended(outcome: Outcome, free: ContactSolution | None = None) -> Descent:
+        last = free or places[-1].solution
+        borne = max(one.borne for one in places)
+        if free is not None:
+            borne = 1.0 + 0.5 * (1.0 / max(weighed.used(free.last), _LEFT) - 1.0)
+        instants = [instant for one in places[1:] for instant in one.solution.instants]
+        sunk = weighed.sunk(begin, weighed.height(last.last))
+        path = tuple((one.sunk, one.borne) for one in places)
+        return Descent(outcome, last, (*instants, *(free.instants if free else ())), borne, sunk, path)
+
+    first = _FIRST if foreseen is None else float(np.clip(_PART * foreseen / weighed.tall, *_FORESEEN))
+    step, enough = first * weighed.tall, _LEFT
+    while len(places) < _MOST:
+        here = places[-1]
+        outcome = _seen(weighed, places, far)
+        if outcome is not None:
+            return ended(outcome)
+        if here.left <= (0.0 if here.slides else enough):
+            free = released(here.solution)
+            if free.converged:
+                return ended(Outcome.HELD, free)
+            if here.left <= _LITTLE:
+                break
+            enough = _LITTLE
+        ahead = onward(here, _step(places, step, far))
+        if ahead is None:
+            break
+        step = ahead.sunk - here.sunk
+        places.append(ahead)
+    return ended(Outcome.UNSOLVED)
+
+
+def _seen(weighed: Weighed, places: list[_Place], far: float) -> Outcome | None:
+    """Whether it can be seen that the hand does not hold the object."""
+    here = places[-1]
+    if here.elsewhere > _LEFT:
+        return Outcome.STANDS
+    if here.left <= (0.0 if here.slides else _LEFT):
+        return None
+    if not weighed.force(here.solution.last) > 0.0:
+        return Outcome.APART
+    if len(places) > 1 and here.slides and places[-2].slides:
+        return Outcome.SLIDES if max(_slope(places), 0.0) * (far - here.sunk) < here.left else None
+    if here.borne < max(one.borne for one in places) - _LESS:
+        return Outcome.GIVES
+    return Outcome.SANK if here.sunk > far else None
+
+
+def _step(places: list[_Place], step: float, far: float) -> float:
+    """How much deeper to go, after a step [m]."""
+    here = places[-1]
+    if len(places) == 1:
+        return step
+    if here.slides and not places[-2].slides:
+        return _PROBE * far
+    longest, slope = min(_LONGER * step, _LONGEST * far), _slope(places)
+    return min((here.left + _SPARE * here.slides) / slope, longest) if slope > 0.0 else longest
+
+
+def _slope(places: list[_Place]) -> float:
+    """How much more of the weight the hand bears for each metre that the object sank last."""
+    before, here = places[-2:]
+    return (here.borne - before.borne) / (here.sunk - before.sunk)

@@ -1,0 +1,97 @@
+"""What a run that was cut off goes on from: all frames solved so far and the contact's memory, in one file."""
+
+from __future__ import annotations
+
+import json
+import zipfile
+from dataclasses import dataclass, fields
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from warpjld.errors import InputError
+from warpjld.fem import Loads, Status
+from warpjld.fem.contact import ContactInstant, ContactSolution
+from warpjld.fem.contact.law.law import Memory
+from warpjld.fem.contact.results.nodal_contact import Imprint
+from warpjld.simulation.solve.solved_frame import SolvedFrame
+from warpjld.whole_file import whole_file
+
+__all__ = ["State", "load_state", "save_state"]
+
+
+@dataclass(frozen=True, eq=False)
+class State:
+    """Frames so far, and the solution to go on from.
+
+    Attributes:
+        identity: What it belongs to: hashes by name (see ``identity_of``).
+        frames: In order.
+        solution: Of the last of them.
+    """
+
+    identity: dict[str, str]
+    frames: tuple[SolvedFrame, ...]
+    solution: ContactSolution
+
+
+def save_state(path: Path, state: State) -> None:
+    """Write it beside its place and rename it: a cut leaves the one before.
+
+    Raises:
+        InputError: It cannot be written.
+    """
+    arrays: dict[str, Any] = {
+        "identity": json.dumps(state.identity),
+        "count": len(state.frames),
+        "time": state.solution.last.time,
+    }
+    for k, frame in enumerate(state.frames):
+        for one in fields(SolvedFrame):
+            if one.name != "imprint":
+                arrays[f"frame{k}.{one.name}"] = getattr(frame, one.name)
+        for one in fields(Imprint):
+            arrays[f"frame{k}.imprint.{one.name}"] = getattr(frame.imprint, one.name)
+    if state.solution.course is not None:
+        arrays["course"] = state.solution.course
+    arrays["memories"] = len(state.solution.memory)
+    for k, memory in enumerate(state.solution.memory):
+        for one in fields(Memory):
+            arrays[f"memory{k}.{one.name}"] = getattr(memory, one.name)
+    try:
+        with whole_file(path) as part, part.open("wb") as file:
+            np.savez(file, **arrays)
+    except OSError as error:
+        raise InputError(f"cannot write: {error.strerror}", path=path) from error
+
+
+def load_state(path: Path) -> State:
+    """Read it.
+
+    Raises:
+        InputError: It is no state.
+    """
+    try:
+        with np.load(path, allow_pickle=False) as file:
+            if "identity" not in file:
+                raise ValueError("it does not say what it belongs to")
+            frames = []
+            for k in range(int(file["count"])):
+                imprint = Imprint(*(file[f"frame{k}.imprint.{f.name}"] for f in fields(Imprint)))
+                one = {f.name: file[f"frame{k}.{f.name}"] for f in fields(SolvedFrame) if f.name != "imprint"}
+                one |= {"frame": float(one["frame"]), "solves": int(one["solves"])}
+                one["penetration"] = float(one["penetration"])
+                frames.append(SolvedFrame(imprint=imprint, **one))
+            memory = tuple(
+                Memory(*(file[f"memory{k}.{f.name}"] for f in fields(Memory))) for k in range(int(file["memories"]))
+            )
+            identity, time = json.loads(str(file["identity"])), float(file["time"])
+            course = file.get("course")
+    except (OSError, KeyError, ValueError, zipfile.BadZipFile) as error:
+        raise InputError(f"no state of a contact solve: {error}", path=path) from error
+    last = frames[-1]
+    instant = ContactInstant(time, last.displacement, last.reactions, (), last.solves, 0, 0.0)
+    return State(
+        identity, tuple(frames), ContactSolution(Status.CONVERGED, (instant,), "", memory, (), Loads(), course)
+    )

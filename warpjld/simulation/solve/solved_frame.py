@@ -1,0 +1,61 @@
+"""What one frame of a contact solve leaves: shapes, forces, pressures (R95)."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from warpjld.fem.contact import ContactInstant
+from warpjld.fem.contact.results.nodal_contact import Imprint, skin_around, stacked
+from warpjld.simulation.bodies.model import Bodies
+
+__all__ = ["SolvedFrame", "solved_frame"]
+
+
+@dataclass(frozen=True, eq=False)
+class SolvedFrame:
+    """One frame.
+
+    Attributes:
+        frame: Its number.
+        displacement: From time 0, of all nodes [m], shape (N, 3).
+        reactions: Forces that hold the prescribed nodes [N], shape (N, 3).
+        nodal: Contact forces of each pair on all nodes, friction included [N], shape (P, N, 3).
+        imprint: What presses, its area and slip, of each pair on all nodes, shape (P, N).
+        solves: Linear solves it took.
+        penetration: Deepest overlap [m].
+    """
+
+    frame: float
+    displacement: NDArray[np.float64]
+    reactions: NDArray[np.float64]
+    nodal: NDArray[np.float64]
+    imprint: Imprint
+    solves: int
+    penetration: float
+
+    def pressure(self, bodies: Bodies) -> NDArray[np.float64]:
+        """Contact pressure at the nodes: what presses on one over the area around it [Pa], shape (N,)."""
+        mesh = bodies.body.mesh
+        x = mesh.nodes + self.displacement
+        area = np.zeros(len(x))
+        for name in bodies.surfaces.values():
+            area += skin_around(mesh, name, x)
+        force = self.imprint.force.sum(axis=0)
+        return np.divide(force, area, out=np.zeros(len(x)), where=area > 0.0)
+
+
+def solved_frame(frame: float, instants: Sequence[ContactInstant]) -> SolvedFrame:
+    """What equilibria on the way from the frame before leave, the last of them at the frame."""
+    last = instants[-1]
+    count = len(last.displacement)
+    nodal = np.stack([t.nodal for t in last.touches]) if last.touches else np.zeros((0, count, 3))
+    imprint = stacked([t.imprint for t in last.touches], count)
+    slid = sum((stacked([t.imprint for t in instant.touches], count).slid for instant in instants[:-1]), imprint.slid)
+    deepest = max((float(np.maximum(-t.gap, 0.0).max(initial=0.0)) for t in last.touches), default=0.0)
+    solves = sum(instant.solves for instant in instants)
+    whole = replace(imprint, slid=slid)
+    return SolvedFrame(frame, last.displacement, last.reactions, nodal, whole, solves, deepest)
