@@ -11,8 +11,8 @@ import tempfile
 from dataclasses import replace
 from pathlib import Path
 
+from warpjld.script.contact import run_contact
 from warpjld.script.interpreter import Interpreter
-from warpjld.script.pressing import run_press
 from warpjld.script.scene import Scene
 
 SCRIPT = Path(__file__).with_name("press_plate.jld")
@@ -29,8 +29,8 @@ def main(sizes: list[float]) -> list[list[float]]:
             scene = Scene(folder=Path(folder), say=lambda text: None)
             Interpreter(scene).run_file(SCRIPT)
             scene.contact.flesh["LEFT"] = replace(scene.contact.flesh["LEFT"], element=1e-3 * size)
-            report = run_press(scene, Path(folder))
-        row = [size, float(len(report.pressed.bodies.body.mesh.elements))]
+            report = run_contact(scene, Path(folder))
+        row = [size, float(len(report.model.body.mesh.elements))]
         for frame in FRAMES:
             pads = [pad for pad in report.rows if pad.frame == frame and pad.force_n > 0.0]
             row += [sum(pad.force_n for pad in pads), sum(pad.area_mm2 for pad in pads)]

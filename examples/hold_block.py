@@ -16,8 +16,8 @@ import numpy as np
 from warpjld.fem import Body, LinearElastic, Prescribed, box, merge, prescribe
 from warpjld.fem.contact import Pair
 from warpjld.fem.hand import hand_laws
+from warpjld.simulation.grip.hold import PrescribedTrials
 from warpjld.simulation.grip.search import Grip, GripStatus, gentlest_grip
-from warpjld.simulation.grip.holding import Holding
 from warpjld.simulation.report.tactile import tactile_of_pairs
 from warpjld.simulation.report.tactile_files import draw_tactile, write_tactile
 
@@ -26,7 +26,7 @@ PAD = (0.004, 0.024, 0.024)  # [m]
 GRAVITY = 9.81
 
 
-def pads_and_block(weight: float, friction: float) -> Holding:
+def pads_and_block(weight: float, friction: float) -> PrescribedTrials:
     """Two soft pads on rigid backs touch a block from both sides; a grip is the way [m] by which each back closes."""
     half = 0.5 * EDGE
     block = box((EDGE, EDGE, EDGE), (3, 3, 3), origin=(-half, -half, -half), name="block")
@@ -46,10 +46,10 @@ def pads_and_block(weight: float, friction: float) -> Holding:
         Pair("pad.left", "block.x-", friction=friction, name="pad.left"),
         Pair("pad.right", "block.x+", friction=friction, name="pad.right"),
     ]
-    return Holding(body, closed, pads, "block", (0.0, 0.0, -GRAVITY))
+    return PrescribedTrials(body, closed, pads, "block", (0.0, 0.0, -GRAVITY))
 
 
-def draw(path: Path, holding: Holding, grip: float, title: str) -> None:
+def draw(path: Path, holding: PrescribedTrials, grip: float, title: str) -> None:
     """The deformed pads and block cut along the grip, before the weight came on and under it."""
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.collections import PolyCollection

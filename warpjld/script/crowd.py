@@ -19,9 +19,9 @@ from warpjld.skeleton import Poses, Skeleton
 if TYPE_CHECKING:
     from warpjld.covering import Covering
     from warpjld.grasp import Places
-    from warpjld.simulation.display.surfaces import Pressed
     from warpjld.render import Camera as RenderCamera
     from warpjld.render import Solid
+    from warpjld.simulation.display.surfaces import DeformedSurfaces
     from warpjld.touch.contact import SkinContact
 
 __all__ = ["Crowd", "Role", "role_of"]
@@ -74,7 +74,7 @@ class Crowd:
     device: str = "cpu"
     props: Sequence[Prop] = ()
     whereabouts: Callable[[Prop, NDArray[np.float64]], Places] | None = None
-    pressed: Pressed | None = None
+    pressed: DeformedSurfaces | None = None
 
     @cached_property
     def faces(self) -> NDArray[np.int32]:

@@ -9,10 +9,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from warpjld.errors import InputError
-from warpjld.simulation.specification import placed
 from warpjld.script.folder import OutputFolder
 from warpjld.script.outputs import MotionFile, Output
 from warpjld.script.per_actor import actors_of, file_of
+from warpjld.simulation.specification import located
 
 if TYPE_CHECKING:
     from warpjld.script.crowd import Crowd
@@ -48,7 +48,7 @@ def write_motions(
                 )
             except InputError as error:
                 said = error.message if error.path == place else str(error)  # its place for now is no one's concern
-                raise placed(InputError(f"'{name}': {said}"), scene.asked.get(output.name)) from error
+                raise located(InputError(f"'{name}': {said}"), scene.asked.get(output.name)) from error
             notes += [f"{name}: {note}" for note in written.notes]
             scene.warned(f"{name}: {warning}" for warning in written.warnings)
     return notes

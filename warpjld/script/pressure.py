@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from warpjld import render
-from warpjld.simulation.display.refine import Finer, finer
+from warpjld.simulation.display.refine import RefinedSurface, refine_surface
 
 if TYPE_CHECKING:
     from warpjld.script.crowd import Crowd
@@ -43,18 +43,18 @@ class PressureView:
         self._colored = [k for k, p in enumerate(crowd.props) if p in colored and only in (None, p.name)]
         self._plain = [k for k, p in enumerate(crowd.props) if k not in self._colored and only in (None, p.name)]
         faces, start = [], 0
-        self._finer: list[Finer] = []
+        self._refined: list[RefinedSurface] = []
         shown = [(role.actor.name, role.covering.surface.faces, span.stop - span.start) for role, span in self._roles]
         things = [crowd.props[k] for k in self._colored]
         shown += [(prop.name, prop.thing.faces, len(prop.thing.vertices)) for prop in things]
         for name, triangles, count in shown:
             surface = self._surface(name, triangles, count)
-            self._finer.append(surface)
+            self._refined.append(surface)
             faces.append(self._of_digits(name, surface, digits) + start)
             start += count + len(surface.edges)
         if not faces:  # an obstacle alone: nothing is known of its own pressure
             prop = crowd.props[self._plain[0]]
-            self._finer = [self._surface(prop.name, prop.thing.faces, len(prop.thing.vertices))]
+            self._refined = [self._surface(prop.name, prop.thing.faces, len(prop.thing.vertices))]
             faces, self._colored, self._plain = [prop.thing.faces], self._plain[:1], []
         self._faces = np.concatenate(faces).astype(np.int32)
         highest = _NOTHING if pressed is None else max(_NOTHING, pressed.high)
@@ -83,7 +83,7 @@ class PressureView:
         shown: list[tuple[str, NDArray[np.floating]]] = []
         shown += [(role.actor.name, vertices[span]) for role, span in self._roles]
         shown += [(self.crowd.props[k].name, solids[k]) for k in self._colored]
-        points = [surface.of(at) for surface, (_, at) in zip(self._finer, shown, strict=True)]
+        points = [surface.of(at) for surface, (_, at) in zip(self._refined, shown, strict=True)]
         values = [self._pressure(name, number, len(at)) for (name, _), at in zip(shown, points, strict=True)]
         return np.concatenate(points), np.concatenate(values)
 
@@ -92,16 +92,16 @@ class PressureView:
         solids = self.crowd.solid_vertices(frame)
         return [solids[k] for k in self._plain]
 
-    def _surface(self, name: str, faces: NDArray[np.int32], count: int) -> Finer:
+    def _surface(self, name: str, faces: NDArray[np.int32], count: int) -> RefinedSurface:
         pressed = self.crowd.pressed
         if pressed is None:
-            return finer(faces, np.zeros(len(faces), dtype=bool), count)
-        return pressed.finer(name, faces, count)
+            return refine_surface(faces, np.zeros(len(faces), dtype=bool), count)
+        return pressed.refined(name, faces, count)
 
-    def _of_digits(self, name: str, surface: Finer, digits: Sequence[str]) -> NDArray[np.int32]:
+    def _of_digits(self, name: str, surface: RefinedSurface, digits: Sequence[str]) -> NDArray[np.int32]:
         """Faces of an actor's digits."""
         pressed = self.crowd.pressed
-        hands = [] if pressed is None or not digits else [hand for hand in pressed.bodies.hands if hand.name == name]
+        hands = [] if pressed is None or not digits else [hand for hand in pressed.model.hands if hand.name == name]
         if not hands:
             return surface.faces
         parts = hands[0].parts

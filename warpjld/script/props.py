@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
@@ -17,8 +18,8 @@ if TYPE_CHECKING:
     from warpjld.fem.contact.obstacles.barr import Barr
     from warpjld.fem.contact.obstacles.obstacle import Motion
     from warpjld.grasp.keyframes import KeyframedShape
-    from warpjld.simulation.state_variables import Barred
-    from warpjld.script.scene import Scene
+    from warpjld.script.scene import Actor
+    from warpjld.simulation.state_variables import BarrKeys
     from warpjld.surface import Surface
 
 __all__ = ["COLORS", "Prop", "prop_places", "prop_surface"]
@@ -48,7 +49,7 @@ class Prop:
     associations: list[Association] = field(default_factory=list)
     placement: Placement = field(default_factory=Placement)
     shapes: KeyframedShape | None = None
-    barred: Barred | None = None
+    barred: BarrKeys | None = None
     assumed: str | None = None
 
     @property
@@ -86,12 +87,12 @@ class Prop:
         return sorted({key.frame for track in tracks for key in track.keys})
 
 
-def prop_places(scene: Scene, prop: Prop, frames: NDArray[np.float64]) -> Places:
-    """Where an object is at F frames (R70–R72), its own keys put on top."""
+def prop_places(actors: Mapping[str, Actor], rate: float, prop: Prop, frames: NDArray[np.float64]) -> Places:
+    """Where an object is at F frames (R70–R72), its own keys put on top, of actors at ``rate`` frames a second."""
 
     def basis(association: Association, at: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        actor = scene.actor(association.actor)
-        return joint_basis(actor.skeleton, stage(actor, at, scene.rate), association.joint)
+        actor = actors[association.actor]
+        return joint_basis(actor.skeleton, stage(actor, at, rate), association.joint)
 
     places = carried(prop.thing.place, prop.associations, frames, basis)
     return prop.placement.apply_to_places(places, frames)

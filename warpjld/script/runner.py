@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from warpjld.overwriting import check_outputs
+from warpjld.script.contact import check_contact, run_contact, write_contact
 from warpjld.script.crowd import Crowd, role_of
 from warpjld.script.folder import OutputFolder
 from warpjld.script.formats import check_available, video_is_available
@@ -20,7 +21,6 @@ from warpjld.script.motion_files import write_motions
 from warpjld.script.outputs import ContactSheet, Export, Film, Grips, MotionFile, Output, Picture, Table
 from warpjld.script.per_actor import actors_of, file_of
 from warpjld.script.pictures import draw_contact_sheet, draw_picture, film_studio
-from warpjld.script.press_files import check_press, write_press
 from warpjld.script.props import Prop, prop_surface
 from warpjld.script.scene import Scene
 from warpjld.script.staging import frame_numbers, held, notes, stage
@@ -79,7 +79,7 @@ def run_scene(
     check_available([output.name for output in outputs])
     read = scene.read if script is None else [*scene.read, script]
     check_outputs(dict.fromkeys(folder / name for name in _names(scene, outputs)), read)
-    summary.notes += check_press(scene, outputs, frames)
+    summary.notes += check_contact(scene, outputs, frames)
     for actor in scene.actors.values():
         stage(actor, frames[:1], scene.rate)  # keys beyond limits are found here
         summary.notes += notes(actor, frames)
@@ -89,20 +89,18 @@ def run_scene(
     with OutputFolder(folder) as out:
         with summary.timed("bind"):
             crowd = cast(scene, frames, device=device, progress=progress)
-        report = None
+        simulated = None
         if scene.contact.pressing is not None:
-            from warpjld.script.pressing import run_press
-
             with summary.timed("contact"):
-                report = run_press(scene, folder, progress)
-            crowd = replace(cast(scene, frames, device=device), pressed=report.pressed)
-            summary.press = report.verdict.content() | {"searches": [one.content() for one in report.grips]}
-            summary.notes += report.notes
+                simulated = run_contact(scene, folder, progress)
+            crowd = replace(cast(scene, frames, device=device), pressed=simulated.surfaces)
+            summary.press = simulated.verdict.content() | {"searches": [one.content() for one in simulated.grips]}
+            summary.notes += simulated.notes
         with summary.timed("frames"):
             _make_sequences(scene, crowd, frames, outputs, out, threads, progress)
         summary.notes += write_motions(scene, crowd, frames, outputs, out)
-        if report is not None:
-            write_press(report, outputs, out)
+        if simulated is not None:
+            write_contact(simulated, outputs, out)
         if scene.props:
             with summary.timed("contacts"):
                 summary.contacts = contact_reports(scene, crowd)

@@ -12,10 +12,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from warpjld.errors import InputError
-from warpjld.simulation.specification import Where
-from warpjld.simulation.specification import ContactWishes
 from warpjld.script.outputs import Camera, Output
 from warpjld.script.placement import Placement
+from warpjld.simulation.specification import ContactSpecification, SourceLocation
 from warpjld.suggest import did_you_mean
 
 if TYPE_CHECKING:
@@ -128,7 +127,7 @@ class Scene:
     actors: dict[str, Actor] = field(default_factory=dict)
     props: dict[str, Prop] = field(default_factory=dict)
     attempts: list[Attempt] = field(default_factory=list)
-    contact: ContactWishes = field(default_factory=ContactWishes)
+    contact: ContactSpecification = field(default_factory=ContactSpecification)
     grips: dict[str, dict[str, float]] = field(default_factory=dict)
     current: str | None = None
     first: int | None = None
@@ -138,7 +137,7 @@ class Scene:
     camera: Camera = field(default_factory=Camera)
     size: tuple[int, int] = (960, 720)
     outputs: list[Output] = field(default_factory=list)
-    asked: dict[str, Where] = field(default_factory=dict)
+    asked: dict[str, SourceLocation] = field(default_factory=dict)
     folder: Path = Path("out")
     read: list[Path] = field(default_factory=list)
     say: Callable[[str], None] = print
@@ -209,7 +208,7 @@ class Scene:
         """Where an object is at F frames."""
         from warpjld.script.props import prop_places
 
-        return prop_places(self, prop, frames)
+        return prop_places(self.actors, self.rate, prop, frames)
 
     def actor_with(self, side: str) -> Actor:
         """The actor whose left or right limbs are meant: the current one if it has any, else the only one that has.

@@ -6,9 +6,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from warpjld.errors import InputError
-from warpjld.rotations import unit
 from warpjld.script.scene import Actor, Scene
 from warpjld.skeleton import Poses
+from warpjld.skeleton.between import poses_between
 
 __all__ = ["frame_numbers", "held", "notes", "stage"]
 
@@ -52,7 +52,7 @@ def stage(actor: Actor, frames: NDArray[np.float64], rate: float) -> Poses:
         poses = actor.motion.poses(actor.skeleton, frames)
     else:
         recorded, own_rate = actor.recorded
-        poses = _resample(recorded, frames * own_rate / rate)
+        poses = poses_between(recorded, frames * own_rate / rate)
     return actor.placement.apply(poses, frames)
 
 
@@ -76,20 +76,3 @@ def held(actor: Actor, frames: NDArray[np.float64], rate: float) -> list[str]:
             which = f"frame {out[0]:g} holds" if len(out) == 1 else f"frames {out[0]:g} to {out[-1]:g} hold"
             found.append(f"{actor.name}: its motion goes from frame 0 to {last:g}: {which} its {name} pose")
     return found
-
-
-def _resample(poses: Poses, at: NDArray[np.float64]) -> Poses:
-    """Poses between recorded ones; before the first and after the last they hold."""
-    at = np.clip(at, 0, len(poses) - 1)
-    before = np.floor(at).astype(int)
-    after = np.minimum(before + 1, len(poses) - 1)
-    part = (at - before)[:, None, None]
-    if not part.any():
-        return Poses(poses.positions[before], poses.rotations[before], poses.flexion[before])
-    first, second = poses.rotations[before], poses.rotations[after]
-    # one sign for the whole frame: signs are aligned along the tree, and stay so
-    flip = np.where((first * second).sum((1, 2)) < 0, -1.0, 1.0)[:, None, None]
-    rotations = unit((1 - part) * first + part * flip * second)
-    positions = (1 - part) * poses.positions[before] + part * poses.positions[after]
-    flexion = (1 - part[..., 0]) * poses.flexion[before] + part[..., 0] * poses.flexion[after]
-    return Poses(positions, rotations, flexion)

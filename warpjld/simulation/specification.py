@@ -1,24 +1,141 @@
-"""What a scene says about contact: plain records, filled by the commands of the language."""
+"""What is asked of a simulation of contact: materials, friction, grips to find and frames to solve, as plain records.
+
+Whoever fills them, commands of a script or a program in Python, says where each was asked for, so that messages can.
+"""
 
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from typing import Literal
+from typing import TYPE_CHECKING, Literal
 
-from warpjld.simulation.specification import Bonded, FleshWish, Physical
-from warpjld.simulation.state_variables import Points, Prescribing
-from warpjld.simulation.specification import Where
+import numpy as np
 
-__all__ = ["ContactWishes", "GripWish", "Pressing", "pair"]
+from warpjld.errors import InputError
+from warpjld.simulation.state_variables import Points, PrescribedPoints
+
+if TYPE_CHECKING:
+    from warpjld.fem import Material
+
+__all__ = [
+    "LAWS",
+    "BondStrength",
+    "ContactSpecification",
+    "FleshMaterial",
+    "GripSpecification",
+    "ObjectMaterial",
+    "SolveSpecification",
+    "SourceLocation",
+    "located",
+    "name_pair",
+]
 
 _FRICTION = 0.6
 """Skin on aluminium (Seo 2009)."""
 _EARTH = 9.81
 """[m/s²]"""
 
+SourceLocation = tuple[str, int, int]
+"""File, line and column of a command, for messages."""
+
+Law = Literal["linear", "neo-hooke", "mooney-rivlin"]
+LAWS: tuple[Law, ...] = ("linear", "neo-hooke", "mooney-rivlin")
+
 
 @dataclass(frozen=True)
-class GripWish:
+class ObjectMaterial:
+    """An object that deforms (R92, R109).
+
+    Attributes:
+        law: Constitutive law.
+        young: Young's modulus at small strain [Pa].
+        poisson: Poisson's ratio at small strain.
+        density: [kg/m³].
+        wall: Thickness of its wall [m]; 0 for a solid object.
+        pressure: Inside a hollow one, above that outside [Pa] (R111).
+        element: Edge length of its elements [m]; None chooses.
+        where: Place in a script, for messages.
+    """
+
+    law: Law = "neo-hooke"
+    young: float = 1e6
+    poisson: float = 0.45
+    density: float = 1000.0
+    wall: float = 0.0
+    pressure: float = 0.0
+    element: float | None = None
+    where: SourceLocation | None = None
+
+    def __post_init__(self) -> None:
+        self.material()
+        if not (np.isfinite(self.wall) and self.wall >= 0.0):
+            raise InputError(f"wall: want a thickness of 0 m (solid) or more, got {self.wall:g}")
+        if not np.isfinite(self.pressure):
+            raise InputError(f"pressure: want a finite pressure in Pa, got {self.pressure:g}")
+        if self.pressure and not self.wall:
+            raise InputError("pressure: only a hollow object has an inside to put under pressure")
+
+    def material(self) -> Material:
+        """The law with its constants.
+
+        Raises:
+            InputError: A modulus, ratio or density that no material has.
+        """
+        from warpjld.fem import LinearElastic, MooneyRivlin, NeoHooke
+
+        if self.law == "linear":
+            return LinearElastic(self.young, self.poisson, self.density)
+        if self.law == "neo-hooke":
+            return NeoHooke(self.young, self.poisson, self.density)
+        # Mooney and Rivlin's constants in the usual ratio of rubber, of the same modulus at small strain
+        shear = self.young / (2.0 * (1.0 + self.poisson))
+        return MooneyRivlin(0.4 * shear, 0.1 * shear, self.poisson, self.density)
+
+
+@dataclass(frozen=True)
+class FleshMaterial:
+    """An actor whose flesh deforms (R105).
+
+    Attributes:
+        digits: Those whose flesh is meshed, as ``index``, or ``palm``; empty for the whole hand. With the thumb comes
+            its ball.
+        element: Edge length of the elements [m].
+        flesh: Young's modulus of what lies between skin and bone [Pa].
+        skin: Young's modulus of the outermost layer of elements [Pa].
+        poisson: Poisson's ratio of both.
+        stiffening: Exponent of Fung's law; 0 is neo-Hookean.
+        itself: Whether the skin may touch itself (R126).
+        where: Place in a script, for messages.
+    """
+
+    digits: tuple[str, ...] = ()
+    element: float = 0.003
+    flesh: float = 34e3
+    skin: float = 80e3
+    poisson: float = 0.48
+    stiffening: float = 3.0
+    itself: bool = True
+    where: SourceLocation | None = None
+
+
+@dataclass(frozen=True)
+class BondStrength:
+    """Two objects that are one until the traction between them is too much (R101, R102).
+
+    Attributes:
+        one, other: Objects.
+        normal, shear: Strength [Pa].
+        where: Place in a script, for messages.
+    """
+
+    one: str
+    other: str
+    normal: float
+    shear: float
+    where: SourceLocation | None = None
+
+
+@dataclass(frozen=True)
+class GripSpecification:
     """A grip that is to be found: the gentlest that holds an object's weight, or the one that presses with a force.
 
     Attributes:
@@ -45,7 +162,7 @@ class GripWish:
     weight: float | None = None
     force: float | None = None
     digits: tuple[str, ...] = ()
-    where: Where | None = None
+    where: SourceLocation | None = None
 
     @property
     def middle(self) -> float:
@@ -54,7 +171,7 @@ class GripWish:
 
 
 @dataclass(frozen=True)
-class Pressing:
+class SolveSpecification:
     """Frames to solve contact at.
 
     Attributes:
@@ -76,12 +193,12 @@ class Pressing:
     stop: bool = False
     correct: bool = False
     state: str | None = None
-    where: Where | None = None
+    where: SourceLocation | None = None
 
 
 @dataclass(eq=False)
-class ContactWishes:
-    """Everything a scene says about contact.
+class ContactSpecification:
+    """Everything that is asked of contact.
 
     Attributes:
         physical: Objects that deform, by name.
@@ -97,17 +214,17 @@ class ContactWishes:
         pressing: What to solve, if anything.
     """
 
-    physical: dict[str, Physical] = field(default_factory=dict)
-    flesh: dict[str, FleshWish] = field(default_factory=dict)
+    physical: dict[str, ObjectMaterial] = field(default_factory=dict)
+    flesh: dict[str, FleshMaterial] = field(default_factory=dict)
     points: dict[tuple[str, str], Points] = field(default_factory=dict)
-    prescribed: dict[tuple[str, str], Prescribing] = field(default_factory=dict)
-    bonds: list[Bonded] = field(default_factory=list)
+    prescribed: dict[tuple[str, str], PrescribedPoints] = field(default_factory=dict)
+    bonds: list[BondStrength] = field(default_factory=list)
     friction: dict[tuple[str, str], float] = field(default_factory=dict)
     everywhere: float | None = None
     gravity: tuple[float, float, float] = (0.0, 0.0, 0.0)
     strength: dict[str, dict[str, float]] = field(default_factory=dict)
-    grips: list[GripWish] = field(default_factory=list)
-    pressing: Pressing | None = None
+    grips: list[GripSpecification] = field(default_factory=list)
+    pressing: SolveSpecification | None = None
 
     @property
     def pull(self) -> tuple[float, float, float]:
@@ -115,7 +232,7 @@ class ContactWishes:
         lifts = any(wish.lift for wish in self.grips)
         return (0.0, -_EARTH, 0.0) if lifts and not any(self.gravity) else self.gravity
 
-    def lifted(self, name: str) -> GripWish | None:
+    def lifted(self, name: str) -> GripSpecification | None:
         """The grip that is to hold an object, if any."""
         return next((wish for wish in self.grips if wish.lift and wish.object == name), None)
 
@@ -123,16 +240,24 @@ class ContactWishes:
         """Friction between two."""
         paper = self.pressing is not None and self.pressing.method == "paper"
         usual = 0.0 if paper else _FRICTION
-        return self.friction.get(pair(one, other), usual if self.everywhere is None else self.everywhere)
+        return self.friction.get(name_pair(one, other), usual if self.everywhere is None else self.everywhere)
 
-    def bond(self, one: str, other: str) -> Bonded | None:
+    def bond(self, one: str, other: str) -> BondStrength | None:
         """The bond between two objects, if any."""
         for bonded in self.bonds:
-            if pair(bonded.one, bonded.other) == pair(one, other):
+            if name_pair(bonded.one, bonded.other) == name_pair(one, other):
                 return bonded
         return None
 
 
-def pair(one: str, other: str) -> tuple[str, str]:
+def name_pair(one: str, other: str) -> tuple[str, str]:
     """Two names in alphabetical order."""
     return (one, other) if one <= other else (other, one)
+
+
+def located(error: InputError, where: SourceLocation | None) -> InputError:
+    """The same error at a place in a script, unless it has one."""
+    if where is None or error.line is not None:
+        return error
+    path, line, column = where
+    return InputError(str(error), path=path, line=line, column=column)

@@ -13,7 +13,7 @@ from warpjld.errors import InputError
 if TYPE_CHECKING:
     from warpjld.motion import Track
 
-__all__ = ["Barred", "Points", "Prescribing"]
+__all__ = ["BarrKeys", "Points", "PrescribedPoints"]
 
 
 @dataclass(frozen=True)
@@ -55,7 +55,7 @@ class Points:
 
 
 @dataclass(eq=False)
-class Prescribing:
+class PrescribedPoints:
     """A state variable: displacements of object points from where they are at first, over keys (R128).
 
     Attributes:
@@ -76,7 +76,7 @@ class Prescribing:
 
 
 @dataclass(eq=False)
-class Barred:
+class BarrKeys:
     """Barr's deformations of an object, over keys (R94).
 
     Attributes:

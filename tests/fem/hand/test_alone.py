@@ -15,7 +15,7 @@ from warpjld.fem.hand import FleshHand, hand_laws
 from warpjld.fem.hand.alone import FleshAlone, Untouched
 from warpjld.fem.hand.bone_loads import loads_from_reactions
 from warpjld.fem.hand.muscles import effort_of
-from warpjld.simulation.bodies.rest_shape import part_of
+from warpjld.simulation.bodies.rest_shape import cut_to_digits
 from warpjld.skeleton import Poses, poses_from_angles, rest_poses
 
 FORCE = 2.0
@@ -49,7 +49,7 @@ class Pushed:
 @pytest.fixture(scope="module")
 def pushed(hand: FleshHand) -> Pushed:
     skeleton = hand.skeleton
-    part = part_of(hand, rest_poses(skeleton), hand.surface.vertices, ["index"])
+    part = cut_to_digits(hand, rest_poses(skeleton), hand.surface.vertices, ["index"])
     finger = part.hand
     angles = np.zeros((1, len(skeleton), 4))
     for joint, degrees in BEND.items():

@@ -12,11 +12,11 @@ from warpjld.fem.contact.obstacles.solids import Plane
 from warpjld.fem.hand import hand_laws
 from warpjld.fem.hand.blend import Moves, moves_of
 from warpjld.fem.hand.bone_loads import BoneLoads
-from warpjld.simulation.grip.correct import Correction, correct_angles
 from warpjld.fem.hand.fingertip import Fingertip, build_fingertip
 from warpjld.fem.hand.muscles import Effort, effort_of
 from warpjld.fem.hand.suggestions import suggestions
 from warpjld.hand import build_hand
+from warpjld.simulation.grip.correct import Correction, correct_angles
 from warpjld.skeleton import Skeleton, poses_from_angles
 
 JOINTS = ("index.base", "index.knuckle2", "index.knuckle3")

@@ -16,13 +16,13 @@ from warpjld.fem.hand import FleshHand, HandMotion, build_flesh_hand, hand_laws,
 from warpjld.fem.hand.alone import FleshAlone
 from warpjld.fem.hand.bone_loads import BoneLoads, loads_from_contact, loads_from_reactions
 from warpjld.fem.hand.muscles import Effort, effort_of
-from warpjld.simulation.report.tactile import tactile_of
 from warpjld.grasp import ObjectSet, Places
 from warpjld.grasp.close import close_hand
 from warpjld.grasp.digits import digit_chains
 from warpjld.grasp.postures import posture_angles
 from warpjld.grasp.shapes import ball
 from warpjld.hand import build_hand
+from warpjld.simulation.report.tactile import tactile_of
 from warpjld.skeleton import poses_from_angles
 
 pytestmark = pytest.mark.slow

@@ -11,12 +11,12 @@ from warpjld.errors import InputError
 from warpjld.fem import Body, solve
 from warpjld.fem.hand import FleshHand, hand_laws
 from warpjld.fem.hand.bone_loads import BoneLoads, loads_from_contact, loads_from_reactions
-from warpjld.simulation.grip.correct import Correction, correct_angles
 from warpjld.fem.hand.limits import FORCE_LIMITS, force_limits
 from warpjld.fem.hand.muscles import effort_of
 from warpjld.fem.hand.suggestions import suggestions
 from warpjld.fem.load.loads import Loads
 from warpjld.hand import build_hand
+from warpjld.simulation.grip.correct import Correction, correct_angles
 from warpjld.skeleton import Skeleton, rest_poses
 
 

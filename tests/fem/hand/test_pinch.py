@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -13,9 +14,8 @@ from warpjld.fem import Body
 from warpjld.fem.contact import ContactSolution, Pair, press
 from warpjld.fem.hand import FleshHand, hand_laws
 from warpjld.hand import build_hand
-from warpjld.simulation.bodies.flesh_body import Drive
-from warpjld.simulation.bodies.flesh_body import HandBody
-from warpjld.simulation.bodies.rest_shape import part_of, posed
+from warpjld.simulation.bodies.flesh_body import BoneMotion, FleshBody
+from warpjld.simulation.bodies.rest_shape import cut_to_digits, rest_in_pose
 from warpjld.simulation.bodies.skin_parts import skin_parts
 from warpjld.skeleton import CHANNELS, Poses, Skeleton, poses_from_angles
 
@@ -54,12 +54,12 @@ class Hand:
 
         surface = build_hand("left", resolution=4000).surface
         skin = bind(skeleton, surface).deform(poses(0.0))[0].astype(np.float64)
-        hand, _ = posed(whole, poses(0.0), skin)
-        part = part_of(hand, poses(0.0), skin, digits)
+        hand, _ = rest_in_pose(whole, poses(0.0), skin)
+        part = cut_to_digits(hand, poses(0.0), skin, digits)
         self.hand = part.hand
         self.laws = hand_laws(self.hand.mesh.region_names)
-        drive = Drive(hand, whole.skeleton, poses)
-        self.driven = HandBody("hand", part, self.laws, drive.moves, 80e3, True, drive, skin_parts(whole))
+        bones = BoneMotion(hand, SimpleNamespace(pose=poses), 0.0)  # type: ignore[arg-type]
+        self.driven = FleshBody("hand", part, self.laws, 80e3, True, bones, skin_parts(whole))
 
     def pressed(self, times: Sequence[float], friction: float = 0.0) -> ContactSolution:
         pair = Pair("hand", "hand", friction, exclusion=self.hand.self_contact(), name="itself")

@@ -7,11 +7,11 @@ from dataclasses import asdict
 from typing import Literal, cast
 
 from warpjld.motion import Key, Track
-from warpjld.simulation.state_variables import Barred, Points, Prescribing
 from warpjld.script.arguments import Arguments
 from warpjld.script.commands.physical import read_object
 from warpjld.script.registry import command
 from warpjld.script.scene import Scene
+from warpjld.simulation.state_variables import BarrKeys, Points, PrescribedPoints
 from warpjld.suggest import did_you_mean
 
 _KEYS = "<key1> <key2> <step>"
@@ -108,7 +108,7 @@ def deform(scene: Scene, arguments: Arguments) -> None:
     kind = arguments.choice("the deformation", ("TAPER", "TWIST", "BEND")).lower()
     axis = cast(Literal["x", "y", "z"], arguments.choice("the axis", _AXES).lower())
     if prop.barred is None:
-        prop.barred = Barred(axis)
+        prop.barred = BarrKeys(axis)
     elif prop.barred.axis != axis:
         raise arguments.error(f"{prop.name} is deformed along {prop.barred.axis.upper()} already: one axis an object")
     keys, value = arguments.keys_and_value("the share" if kind == "taper" else "the angle in degrees")
@@ -117,7 +117,7 @@ def deform(scene: Scene, arguments: Arguments) -> None:
     _set(scene, prop.barred.tracks, kind, keys, value if kind == "taper" else math.radians(value))
 
 
-def _state(scene: Scene, arguments: Arguments) -> Prescribing:
+def _state(scene: Scene, arguments: Arguments) -> PrescribedPoints:
     """Read an object and its points."""
     prop = read_object(scene, arguments)
     name = arguments.name("the name of points").upper()
@@ -126,7 +126,7 @@ def _state(scene: Scene, arguments: Arguments) -> Prescribing:
         more = did_you_mean(name, known) or f"; name them with POINTS {prop.name} {name} …"
         raise arguments.error(f"{prop.name} has no points {name}{more}")
     chosen = scene.contact.points[prop.name, name]
-    return scene.contact.prescribed.setdefault((prop.name, name), Prescribing(chosen))
+    return scene.contact.prescribed.setdefault((prop.name, name), PrescribedPoints(chosen))
 
 
 def _set(scene: Scene, tracks: dict[str, Track], channel: str, keys: list[float], value: float) -> None:

@@ -6,14 +6,14 @@ import math
 from typing import TYPE_CHECKING, cast
 
 from warpjld.errors import InputError
-from warpjld.simulation.specification import GripWish
 from warpjld.script.arguments import Arguments
 from warpjld.script.commands.animation import FINGERS
 from warpjld.script.commands.physical import place, read_object
+from warpjld.script.contact import REST
 from warpjld.script.grips import flexions_of_grip, gripping_actor, read_actor, read_frames
-from warpjld.script.press_keys import REST
 from warpjld.script.registry import command
 from warpjld.script.scene import Scene
+from warpjld.simulation.specification import GripSpecification
 
 if TYPE_CHECKING:
     from warpjld.script.scene import Actor
@@ -52,7 +52,7 @@ def squeeze(scene: Scene, arguments: Arguments) -> None:
         if digit not in closing:
             raise arguments.error(f"{digit} does not close here; {', '.join(sorted(closing))} do", arguments.position)
     here = place(arguments)
-    wish = GripWish(actor.name, "", first, last, channels, most, force=force, digits=tuple(digits), where=here)
+    wish = GripSpecification(actor.name, "", first, last, channels, most, force=force, digits=tuple(digits), where=here)
     scene.contact.grips.append(wish)
 
 
@@ -80,7 +80,7 @@ def lift(scene: Scene, arguments: Arguments) -> None:
     most = math.radians(float(cast(float, options.get("most", _MOST))))
     channels = _held_keys(scene, actor, arguments, first, round(0.5 * (first + last)), last)
     weight = cast("float | None", options.get("weight"))
-    wish = GripWish(
+    wish = GripSpecification(
         actor.name, prop.name, first, last, channels, most, lift=True, weight=weight, where=place(arguments)
     )
     scene.contact.grips.append(wish)

@@ -5,13 +5,18 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, cast
 
 from warpjld.errors import InputError
-from warpjld.simulation.specification import LAWS, Bonded, FleshWish, Physical
-from warpjld.simulation.specification import Where
-from warpjld.simulation.specification import pair
 from warpjld.script.arguments import Arguments
 from warpjld.script.commands.animation import FINGERS
 from warpjld.script.registry import command
 from warpjld.script.scene import Scene
+from warpjld.simulation.specification import (
+    LAWS,
+    BondStrength,
+    FleshMaterial,
+    ObjectMaterial,
+    SourceLocation,
+    name_pair,
+)
 from warpjld.suggest import did_you_mean
 
 if TYPE_CHECKING:
@@ -51,7 +56,7 @@ def physical(scene: Scene, arguments: Arguments) -> None:
             f"a wall must be thinner than half of {prop.name}, {0.5 * prop.thing.size.min():g} m", where
         )
     try:
-        scene.contact.physical[prop.name] = Physical(**options, where=place(arguments))  # type: ignore[arg-type]
+        scene.contact.physical[prop.name] = ObjectMaterial(**options, where=place(arguments))  # type: ignore[arg-type]
     except InputError as error:
         raise arguments.error(error.message, where) from None
 
@@ -88,7 +93,7 @@ def flesh(scene: Scene, arguments: Arguments) -> None:
     if "young" in options:
         options["flesh"] = options.pop("young")
     named = tuple(dict.fromkeys(digits))
-    scene.contact.flesh[actor.name] = FleshWish(named, **options, where=place(arguments))  # type: ignore[arg-type]
+    scene.contact.flesh[actor.name] = FleshMaterial(named, **options, where=place(arguments))  # type: ignore[arg-type]
 
 
 @command(
@@ -103,7 +108,7 @@ def friction(scene: Scene, arguments: Arguments) -> None:
         scene.contact.everywhere = _coefficient(arguments)
         return
     one, other = _body(scene, arguments), _body(scene, arguments)
-    scene.contact.friction[pair(one, other)] = _coefficient(arguments)
+    scene.contact.friction[name_pair(one, other)] = _coefficient(arguments)
 
 
 @command(
@@ -124,7 +129,7 @@ def bond(scene: Scene, arguments: Arguments) -> None:
         raise arguments.error(f"{names[0]} cannot be bonded to itself")
     normal = arguments.number("the tension in Pa at which they part", above=0.0)
     shear = arguments.number("the shear in Pa at which they part", above=0.0) if arguments else normal
-    scene.contact.bonds.append(Bonded(names[0], names[1], normal, shear, place(arguments)))
+    scene.contact.bonds.append(BondStrength(names[0], names[1], normal, shear, place(arguments)))
 
 
 @command(
@@ -147,7 +152,7 @@ def read_object(scene: Scene, arguments: Arguments) -> Prop:
         raise arguments.error(error.message) from None
 
 
-def place(arguments: Arguments) -> Where:
+def place(arguments: Arguments) -> SourceLocation:
     """Where the command stands."""
     return arguments.position.path, arguments.position.line, arguments.position.column
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from warpjld.simulation.specification import Pressing
 from warpjld.script.arguments import Arguments
 from warpjld.script.commands.output import ask_for
 from warpjld.script.commands.physical import place
@@ -10,6 +9,7 @@ from warpjld.script.formats import PICTURES, TABLES, VOLUMES
 from warpjld.script.outputs import Table, Touch, Volume
 from warpjld.script.registry import command
 from warpjld.script.scene import Scene
+from warpjld.simulation.specification import SolveSpecification
 
 
 @command(
@@ -49,7 +49,7 @@ def press(scene: Scene, arguments: Arguments) -> None:
             f"line {before.where[1]} asks for frames {before.first} to {before.last} already: one PRESS is enough",
             arguments.position,
         )
-    scene.contact.pressing = Pressing(first, last, **options, where=place(arguments))  # type: ignore[arg-type]
+    scene.contact.pressing = SolveSpecification(first, last, **options, where=place(arguments))  # type: ignore[arg-type]
 
 
 @command(

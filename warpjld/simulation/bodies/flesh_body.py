@@ -1,60 +1,185 @@
-"""A hand that bones drive, as contact takes it (R110)."""
+"""A hand as a deformable body: flesh around bones that follow an animation (R105, R110)."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass
-from functools import cached_property
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from functools import lru_cache
+from typing import Self
 
 import numpy as np
 from numpy.typing import NDArray
 
-from warpjld.fem import Body, Material, Prescribed
+from warpjld.errors import InputError
+from warpjld.fem import Body, HexMesh, Material, Prescribed
+from warpjld.fem.contact.interface.pairs import Exclusion
 from warpjld.fem.hand.alone import FleshAlone
 from warpjld.fem.hand.blend import Moves
-from warpjld.simulation.bodies.flesh_body import Drive
-from warpjld.simulation.bodies.rest_shape import Part
-from warpjld.simulation.bodies.skin_parts import SkinParts
+from warpjld.fem.hand.cushion import coarse_note
+from warpjld.fem.hand.flesh_hand import FleshHand, build_flesh_hand
+from warpjld.fem.hand.laws import hand_laws
+from warpjld.fem.mesh.embedding import Embedding
+from warpjld.simulation.animation import ActorAnimation
+from warpjld.simulation.bodies.deformable_body import History, Surroundings
+from warpjld.simulation.bodies.rest_shape import RestShape, cut_to_digits, rest_in_pose
+from warpjld.simulation.bodies.skin_parts import SkinParts, skin_parts
+from warpjld.simulation.specification import FleshMaterial, located
+from warpjld.skeleton import Poses, Skeleton
 
-__all__ = ["WORN", "HandBody"]
+__all__ = ["FLESHED", "BoneMotion", "FleshBody", "build_flesh_body"]
 
-WORN = 0.5
+FLESHED = 0.5
 """Share of the flesh in skin from which on it has flesh to give way with."""
 
 
 @dataclass(frozen=True, eq=False)
-class HandBody:
-    """A hand that is driven by its bones.
+class BoneMotion:
+    """Joint angles, poses and motions of the bones of a hand at times [frames] from ``start``.
+
+    Attributes:
+        hand: Whose bones move.
+        animation: What drives them.
+        start: Frame of time 0.
+        moves: Motions of the bones from the rig's rest at a time.
+    """
+
+    hand: FleshHand
+    animation: ActorAnimation
+    start: float
+    moves: Callable[[float], Moves] = field(init=False, repr=False)
+
+    def __post_init__(self) -> None:
+        moves = lru_cache(maxsize=8)(lambda time: self.hand.moves(self.pose(time)))
+        object.__setattr__(self, "moves", moves)
+
+    @property
+    def skeleton(self) -> Skeleton:
+        """As the animation has it, limits included."""
+        return self.animation.skeleton
+
+    @property
+    def bendable(self) -> bool:
+        """Whether the joints have angles that a search may change."""
+        return self.animation.bendable
+
+    def pose(self, time: float) -> Poses:
+        """One pose."""
+        return self.animation.pose(self.start + time)
+
+    def angles(self, time: float) -> NDArray[np.float64]:
+        """Joint angles [rad], shape (J, 4)."""
+        return self.animation.angles(self.start + time)
+
+    def posed(self, angles: NDArray[np.float64], time: float) -> Poses:
+        """The pose of other angles (J, 4)."""
+        return self.animation.posed(angles, self.start + time)
+
+    def moves_of(self, angles: NDArray[np.float64], time: float) -> Moves:
+        """Motions of the bones at other angles (J, 4)."""
+        return self.hand.moves(self.posed(angles, time))
+
+    def steps(self, ends: Sequence[tuple[NDArray[np.float64], float]], length: float) -> int:
+        """How many steps of at most a length [m] the joints' way takes from angles at a time to others."""
+        one, other = (self.posed(angles, time).positions[0] for angles, time in ends)
+        return max(1, int(np.ceil(float(np.linalg.norm(other - one, axis=1).max()) / length)))
+
+
+@dataclass(frozen=True, eq=False)
+class FleshBody:
+    """A hand that is driven by its bones (see ``DeformableBody``).
 
     Attributes:
         name: Of the actor.
-        part: Its flesh at time 0.
+        shape: Its flesh at time 0.
         laws: By region.
-        moves: Motions of its bones from the rig's rest at a time.
-        softness: Young's modulus of its skin [Pa].
-        itself: Whether its skin may touch itself.
-        drive: What moves them, for searches that bend its joints otherwise.
+        modulus: Young's modulus of its skin [Pa].
+        touches_itself: Whether its skin may touch itself.
+        bones: What moves them.
         parts: Of its visible skin.
+        alone: Its flesh without what touches it; one for all copies of the body, since it knows the poses it was in.
+        moves: Motions of its bones from the rig's rest at a time, where not as ``bones`` has them.
     """
 
     name: str
-    part: Part
+    shape: RestShape
     laws: Mapping[str, Material]
-    moves: Callable[[float], Moves]
-    softness: float
-    itself: bool
-    drive: Drive
+    modulus: float
+    touches_itself: bool
+    bones: BoneMotion
     parts: SkinParts
+    alone: FleshAlone = None  # type: ignore[assignment]
+    moves: Callable[[float], Moves] = None  # type: ignore[assignment]
 
-    def worn(self, part: str) -> bool:
+    def __post_init__(self) -> None:
+        if self.moves is None:
+            object.__setattr__(self, "moves", self.bones.moves)
+        if self.alone is None:
+            body, degrees = Body(self.mesh, self.laws), self.prescribed(0.0).degrees
+            object.__setattr__(self, "alone", FleshAlone(self.hand, body, degrees, self.bones.pose(0.0)))
+
+    @property
+    def hand(self) -> FleshHand:
+        """Its mesh, with the bones and what they carry."""
+        return self.shape.hand
+
+    @property
+    def mesh(self) -> HexMesh:
+        return self.hand.mesh
+
+    @property
+    def faces(self) -> str:
+        return self.hand.name
+
+    @property
+    def stress(self) -> NDArray[np.float64]:
+        return np.zeros((len(self.mesh.elements), 6))
+
+    @property
+    def surface(self) -> NDArray[np.float64]:
+        return self.shape.skin
+
+    @property
+    def triangles(self) -> NDArray[np.int32]:
+        return self.hand.surface.faces
+
+    @property
+    def embedding(self) -> Embedding:
+        return self.hand.flesh.skin
+
+    @property
+    def embedded(self) -> NDArray[np.bool_]:
+        return np.asarray(self.shape.blend > 0.0)
+
+    @property
+    def pressure_inside(self) -> None:
+        return None
+
+    @property
+    def self_contact(self) -> Exclusion | None:
+        return self.hand.self_contact() if self.touches_itself else None
+
+    @property
+    def fleshed(self) -> NDArray[np.bool_]:
+        """Vertices with flesh to give way with, shape (V,)."""
+        return np.asarray(self.shape.blend > FLESHED)
+
+    @property
+    def pressing(self) -> NDArray[np.bool_]:
+        return self.fleshed & self.touches_itself
+
+    def has_flesh(self, part: str) -> bool:
         """Whether most of a digit's skin, or the palm's, has flesh to give way with."""
-        mine = self.parts.part_of[self.parts.labels] == self.parts.names.index(part)
-        return bool((self.part.blend[mine] > WORN).mean() > 0.5)
+        return bool(self.fleshed[self.parts.mask(part)].mean() > 0.5)
 
-    def prescribed(self, time: float) -> Prescribed:
+    def deformed(self, displacement: NDArray[np.float64], covered: NDArray[np.floating] | None) -> NDArray[np.float64]:
+        """Its skin [m], shape (V, 3): under a displacement (N, 3), as ``covered`` (V, 3) where it has no flesh."""
+        assert covered is not None
+        return self.shape.deformed(displacement, covered)
+
+    def prescribed(self, time: float, history: History | None = None) -> Prescribed:
         """Displacements of the bones' nodes and of those where the flesh was cut off."""
-        hand, cut = self.part.hand, self.part.cut
-        moves = self.part.start.to(self.moves(time))
+        hand, cut = self.hand, self.shape.cut
+        moves = self.shape.start.to(self.moves(time))
         known = hand.prescribed_by(moves)
         cut = np.setdiff1d(cut, known.degrees[::3] // 3)
         if not len(cut):
@@ -62,16 +187,67 @@ class HandBody:
         x = hand.mesh.nodes[cut]
         return known + _whole(cut, moves.blended(hand.weights[cut], x) - x)
 
-    def guess(self, before: float, time: float, displacement: NDArray[np.float64]) -> NDArray[np.float64]:
-        """First guess of a displacement (N, 3) from that at an earlier time."""
-        start = self.part.start
-        return self.part.hand.guess(start.to(self.moves(before)), start.to(self.moves(time)), displacement)
+    def guess(
+        self, before: float, time: float, displacement: NDArray[np.float64], around: Surroundings | None = None
+    ) -> NDArray[np.float64]:
+        """First guess of a displacement (N, 3): flesh carried along by its bones."""
+        start = self.shape.start
+        return self.hand.guess(start.to(self.moves(before)), start.to(self.moves(time)), displacement)
 
-    @cached_property
-    def alone(self) -> FleshAlone:
-        """Its flesh without what touches it."""
-        hand = self.part.hand
-        return FleshAlone(hand, Body(hand.mesh, self.laws), self.prescribed(0.0).degrees, self.drive.pose(0.0))
+    def carry(self, before: float, time: float, points: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Where points (n, 3) [m] go that go along with the hand as a whole."""
+        return self.moves(before).to(self.moves(time)).of(np.zeros(len(points), np.int64), points)
+
+    def skin_points(self, displacement: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Nodes of the skin under a displacement (N, 3) [m], shape (n, 3)."""
+        skin = np.unique(self.mesh.quads(self.hand.skin_faces))
+        return self.mesh.nodes[skin] + displacement[skin]
+
+    def way(
+        self, times: Sequence[float], displacement: NDArray[np.float64], nodes: NDArray[np.integer]
+    ) -> list[NDArray[np.float64]]:
+        """Where nodes are, and are expected to be [m]."""
+        rest, first = self.mesh.nodes[nodes], times[0]
+        return [rest + (displacement if t == first else self.guess(first, t, displacement))[nodes] for t in times]
+
+    def timed(self, clock: Callable[[float], float]) -> Self:
+        """The same hand, driven as it is at ``clock(time)``."""
+        moves = self.moves
+        return replace(self, moves=lambda time: moves(clock(time)))
+
+    def driven(self, animation: ActorAnimation) -> Self:
+        """The same hand, driven by an animation of the same actor with edits laid over it."""
+        bones = replace(self.bones, animation=animation)
+        return replace(self, bones=bones, moves=bones.moves)
+
+
+def build_flesh_body(actor: ActorAnimation, material: FleshMaterial, start: float) -> tuple[FleshBody, list[str]]:
+    """An actor's flesh, in the shape it has at a frame, and notes on its mesh.
+
+    Raises:
+        InputError: It cannot be meshed in that pose; names the line of its FLESH.
+    """
+    poses, skin, notes = actor.pose(start), actor.skin(start), []
+    try:
+        built = build_flesh_hand(actor.rig, material.element, name=actor.name.lower())
+    except InputError as error:
+        what = error.message.replace("spacing:", "ELEMENT:")
+        raise located(InputError(f"FLESH {actor.name}: {what}"), material.where) from error
+    if (coarse := coarse_note(built, material.element, material.digits)) is not None:
+        notes.append(f"{actor.name}: {coarse}")
+    hand, gap = rest_in_pose(built, poses, skin)
+    if gap > 0.5 * material.element:
+        notes.append(f"{actor.name}: the volume stays up to {1e3 * gap:.1f} mm off the skin where it folds")
+    shape = cut_to_digits(hand, poses, skin, material.digits)
+    laws = hand_laws(
+        shape.hand.mesh.region_names,
+        flesh=material.flesh,
+        skin=material.skin,
+        poisson=material.poisson,
+        stiffening=material.stiffening,
+    )
+    bones = BoneMotion(shape.hand, actor, start)
+    return FleshBody(actor.name, shape, laws, material.skin, material.itself, bones, skin_parts(built)), notes
 
 
 def _whole(nodes: NDArray[np.int64], moved: NDArray[np.float64]) -> Prescribed:

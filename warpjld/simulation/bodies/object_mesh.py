@@ -14,10 +14,10 @@ from warpjld.fem.mesh.envelope import Envelope
 from warpjld.fem.mesh.fit import fit_mesh
 from warpjld.fem.output.stress import cauchy
 from warpjld.grasp.objects import GraspObject, Places
-from warpjld.simulation.specification import Physical
 from warpjld.rotations import unit
+from warpjld.simulation.specification import ObjectMaterial
 
-__all__ = ["ObjectVolume", "object_volume"]
+__all__ = ["ObjectMesh", "mesh_object"]
 
 _ACROSS = 12
 """Elements across an object's smallest extent, where their size is not given."""
@@ -38,7 +38,7 @@ _REACH = 3.0
 
 
 @dataclass(frozen=True, eq=False)
-class ObjectVolume:
+class ObjectMesh:
     """An object that deforms, where it stands at time 0.
 
     Attributes:
@@ -55,7 +55,7 @@ class ObjectVolume:
     name: str
     mesh: HexMesh
     local: NDArray[np.float64]
-    physical: Physical
+    physical: ObjectMaterial
     visible: Embedding
     surface: NDArray[np.float64]
     faces: NDArray[np.int32]
@@ -66,12 +66,8 @@ class ObjectVolume:
         """Face set of its inside."""
         return f"{self.name}.inside"
 
-    def worn(self, displacement: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Its surface [m], shape (V, 3), under a displacement of its nodes (N, 3)."""
-        return self.surface + self.visible.carry(displacement)
 
-
-def object_volume(name: str, thing: GraspObject, physical: Physical, place: Places) -> ObjectVolume:
+def mesh_object(name: str, thing: GraspObject, physical: ObjectMaterial, place: Places) -> ObjectMesh:
     """Mesh an object.
 
     Built-in balls, boxes and cylinders get regular meshes; other surfaces a grid fitted to them. The wall of a hollow
@@ -113,7 +109,7 @@ def object_volume(name: str, thing: GraspObject, physical: Physical, place: Plac
         raise InputError(f"elements of {size:g} m are too large, thin parts are left out ({error.message})") from error
     turn = place.apply(np.eye(3))[0] - place.apply(np.zeros((1, 3)))[0]
     moved = replace(mesh, nodes=place.apply(mesh.nodes)[0])
-    return ObjectVolume(
+    return ObjectMesh(
         name,
         moved,
         mesh.nodes,
@@ -184,7 +180,7 @@ def _shell(solid: HexMesh, wall: float) -> HexMesh:
     raise InputError(f"wall: {wall:g} m is too thick, the wall would fold; take a thinner one")
 
 
-def _holding(mesh: HexMesh, inside: str, physical: Physical) -> NDArray[np.float64]:
+def _holding(mesh: HexMesh, inside: str, physical: ObjectMaterial) -> NDArray[np.float64]:
     """Stress in equilibrium with the pressure inside, as a linear body of that shape would carry it [Pa], (E, 6)."""
     body = Body(mesh, LinearElastic(physical.young, physical.poisson))
     nothing = Prescribed(np.empty(0, np.int64), np.empty(0))

@@ -21,7 +21,7 @@ from warpjld.fem.mesh.hexmesh import HexMesh
 from warpjld.fem.mesh.untangle import as_far, improve
 from warpjld.skeleton import Poses
 
-__all__ = ["Part", "part_of", "posed"]
+__all__ = ["RestShape", "cut_to_digits", "rest_in_pose"]
 
 _LEAST = 0.05
 """Scaled Jacobian that carried elements must keep; skin nodes stay off the skin where it asks for worse."""
@@ -43,7 +43,7 @@ _OWN = 0.5
 """Share of its digits' bones from which on flesh belongs to a part of a hand."""
 
 
-def posed(hand: FleshHand, poses: Poses, skin: NDArray[np.float64]) -> tuple[FleshHand, float]:
+def rest_in_pose(hand: FleshHand, poses: Poses, skin: NDArray[np.float64]) -> tuple[FleshHand, float]:
     """The hand at rest in a pose.
 
     Args:
@@ -78,7 +78,7 @@ def posed(hand: FleshHand, poses: Poses, skin: NDArray[np.float64]) -> tuple[Fle
     if moved.scaled_jacobian().min() < least:
         shape = Facets(skin, hand.surface.faces)
         for _ in range(1 + _YIELDS):
-            moved = _mended(replace(mesh, nodes=nodes), change, outer, bone, shape, least)
+            moved = _untangled(replace(mesh, nodes=nodes), change, outer, bone, shape, least)
             crushed = np.unique(mesh.elements[moved.scaled_jacobian() <= 0.0])
             if not len(crushed):
                 break
@@ -93,7 +93,7 @@ def posed(hand: FleshHand, poses: Poses, skin: NDArray[np.float64]) -> tuple[Fle
     return replace(hand, flesh=replace(hand.flesh, mesh=replace(moved, node_sets=moved.node_sets | sets))), gap
 
 
-def _mended(
+def _untangled(
     mesh: HexMesh,
     change: NDArray[np.float64],
     outer: NDArray[np.integer],
@@ -156,7 +156,7 @@ def _mended(
 
 
 @dataclass(frozen=True, eq=False)
-class Part:
+class RestShape:
     """A hand, or those digits of it whose flesh is meshed.
 
     Attributes:
@@ -173,7 +173,7 @@ class Part:
     blend: NDArray[np.float64]
     skin: NDArray[np.float64]
 
-    def worn(self, displacement: NDArray[np.float64], covered: NDArray[np.floating]) -> NDArray[np.float64]:
+    def deformed(self, displacement: NDArray[np.float64], covered: NDArray[np.floating]) -> NDArray[np.float64]:
         """The rig's surface [m], shape (V, 3): displaced by the flesh (N, 3) where it is meshed, as the covering has it
         (V, 3) elsewhere."""
         inside = self.blend > 0.0
@@ -186,15 +186,9 @@ class Part:
         out[inside] = share * carried + (1.0 - share) * out[inside]
         return out
 
-    @property
-    def faces(self) -> NDArray[np.int32]:
-        """Triangles of the surface whose flesh is meshed, shape (T, 3)."""
-        faces = self.hand.surface.faces
-        return np.asarray(faces[(self.blend[faces] > 0.0).all(axis=1)])
 
-
-def part_of(hand: FleshHand, poses: Poses, skin: NDArray[np.float64], digits: Sequence[str] = ()) -> Part:
-    """A posed hand (see ``posed``) or some digits of it.
+def cut_to_digits(hand: FleshHand, poses: Poses, skin: NDArray[np.float64], digits: Sequence[str] = ()) -> RestShape:
+    """A posed hand (see ``rest_in_pose``) or some digits of it.
 
     Args:
         hand: At rest in ``poses``.
@@ -208,7 +202,7 @@ def part_of(hand: FleshHand, poses: Poses, skin: NDArray[np.float64], digits: Se
     """
     start = hand.moves(poses)
     if not digits:
-        return Part(hand, start, np.empty(0, np.int64), np.ones(len(skin)), skin)
+        return RestShape(hand, start, np.empty(0, np.int64), np.ones(len(skin)), skin)
     mine = np.array([bool(_digits(segment) & set(digits)) for segment in hand.segments])
     if not mine.any():
         raise InputError(f"flesh: no bone belongs to {', '.join(digits)}")
@@ -248,7 +242,7 @@ def part_of(hand: FleshHand, poses: Poses, skin: NDArray[np.float64], digits: Se
         skin_labels=hand.skin_labels[faces],
         skin_fringes=hand.skin_fringes[faces],
     )
-    return Part(smaller, start, cut, blend, skin)
+    return RestShape(smaller, start, cut, blend, skin)
 
 
 def _digits(segment: str) -> set[str]:

@@ -12,7 +12,7 @@ from warpjld.fem.contact.obstacles.facets import Facets
 from warpjld.fem.hand.flesh_hand import FleshHand
 from warpjld.skeleton import DIGITS
 
-__all__ = ["SkinPart", "SkinParts", "skin_parts"]
+__all__ = ["SkinPart", "SkinParts", "digit_of_label", "skin_parts"]
 
 
 @dataclass(frozen=True, eq=False)
@@ -71,6 +71,10 @@ class SkinParts:
                 out.append(SkinPart(name, mine, np.concatenate([faces, *caps]).astype(np.int32), tuple(loops)))
         return tuple(out)
 
+    def mask(self, name: str) -> NDArray[np.bool_]:
+        """Vertices of a part, shape (V,)."""
+        return np.asarray(self.part_of[self.labels] == self.names.index(name))
+
     def name_of(self, vertices: NDArray[np.integer]) -> list[str]:
         """Names of the parts that vertices belong to, the largest share first."""
         count = np.bincount(self.part_of[self.labels[vertices]], minlength=len(self.names))
@@ -90,12 +94,12 @@ def skin_parts(hand: FleshHand) -> SkinParts:
     middle = hand.mesh.nodes[hand.mesh.quads(hand.skin_faces)].mean(axis=1)
     labels = hand.skin_labels[cKDTree(middle).query(hand.surface.vertices)[1]]
     names = (*DIGITS, "palm")
-    part_of = np.array([names.index(_part(name)) for name in hand.label_names], np.int32)
+    part_of = np.array([names.index(digit_of_label(name)) for name in hand.label_names], np.int32)
     return SkinParts(labels, hand.excluded, part_of, names, hand.surface.faces)
 
 
-def _part(label: str) -> str:
-    """``left.index.distal`` → ``index``; ``left.palm.index`` → ``palm``."""
+def digit_of_label(label: str) -> str:
+    """Digit of a label of the skin, or the palm: ``left.index.distal`` → ``index``; ``left.palm.index`` → ``palm``."""
     words = label.split(".")
     found = [word for word in words if word in DIGITS]
     return found[0] if found and "palm" not in words else "palm"

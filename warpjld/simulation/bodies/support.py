@@ -8,19 +8,20 @@ descent under control, which finds it also where friction is almost used up.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from warpjld.fem.load.prescribed import Prescribed
+from warpjld.simulation.bodies.deformable_body import Bearing
 
-__all__ = ["Support"]
+__all__ = ["Support", "handle_of"]
 
 _NOTHING = Prescribed(np.empty(0, np.int64), np.empty(0))
 
 
-@dataclass(eq=False)
+@dataclass(frozen=True, eq=False)
 class Support:
     """An object's support over time.
 
@@ -31,8 +32,6 @@ class Support:
         bare: Time at which its points hold it no more.
         free: Time from which on it is free.
         lowered: Displacement of the handle along the axis from ``bare`` to ``free`` [m].
-        forces: Of its points at ``begins`` [N], shape (N, 3); None until they are known.
-        height: Displacement of the handle along the axis then [m].
     """
 
     handle: int
@@ -41,33 +40,36 @@ class Support:
     bare: float = np.inf
     free: float = np.inf
     lowered: float = 0.0
-    forces: NDArray[np.float64] | None = None
-    height: float = field(default=0.0)
 
     def stands(self, time: float) -> bool:
         """Whether its points hold the object."""
         return time <= self.begins + 1e-9
 
-    def prescribed(self, time: float) -> Prescribed:
+    def prescribed(self, time: float, bearing: Bearing | None) -> Prescribed:
         """Displacement of the handle, while it holds anything."""
         if self.stands(time) or time >= self.free - 1e-9:
             return _NOTHING
         down = self.lowered * max(0.0, (time - self.bare) / (self.free - self.bare))
-        return Prescribed(np.array([3 * self.handle + self.axis]), np.array([self.height + down]))
+        height = 0.0 if bearing is None else bearing.height
+        return Prescribed(np.array([3 * self.handle + self.axis]), np.array([height + down]))
 
-    def fading(self, time: float) -> NDArray[np.float64] | None:
+    def fading(self, time: float, bearing: Bearing | None) -> NDArray[np.float64] | None:
         """What is left of the forces of its points [N], shape (N, 3)."""
-        if self.forces is None or self.stands(time) or time >= self.bare:
+        if bearing is None or self.stands(time) or time >= self.bare:
             return None
-        return (self.bare - time) / (self.bare - self.begins) * self.forces
+        return (self.bare - time) / (self.bare - self.begins) * bearing.forces
 
-    def release(self, begins: float, free: float, lowered: float) -> None:
-        """Let go from one time to another, while the object's middle sinks so far [m]."""
-        self.begins, self.free, self.lowered = begins, free, lowered
-        self.bare = 0.5 * (begins + free)
+    def released(self, begins: float, free: float, lowered: float) -> Support:
+        """The same, letting go from one time to another, while the object's middle sinks so far [m]."""
+        return replace(self, begins=begins, free=free, lowered=lowered, bare=0.5 * (begins + free))
 
-    def note(self, time: float, displacement: NDArray[np.float64], reactions: NDArray[np.float64]) -> None:
-        """Remember what it bears at the moment it begins to let go, from the object's rows (N, 3)."""
-        if abs(time - self.begins) < 1e-9:
-            self.forces = reactions.copy()
-            self.height = float(displacement[self.handle, self.axis])
+    def bearing(self, time: float, displacement: NDArray[np.float64], reactions: NDArray[np.float64]) -> Bearing | None:
+        """What it bears, from the object's rows (N, 3), at the moment it begins to let go; None at others."""
+        if abs(time - self.begins) >= 1e-9:
+            return None
+        return Bearing(reactions.copy(), float(displacement[self.handle, self.axis]))
+
+
+def handle_of(nodes: NDArray[np.float64]) -> int:
+    """The node nearest to the middle of all (N, 3): the weight acts there."""
+    return int(np.argmin(np.linalg.norm(nodes - nodes.mean(axis=0), axis=1)))

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from warpjld.fem.contact.obstacles.facets import Facets
 from warpjld.fem.mesh.hexmesh import HexMesh
 
-__all__ = ["outer_triangles", "outside", "outside_of_nodes"]
+__all__ = ["element_edge", "face_offsets", "face_triangles", "node_offsets", "outer_surface"]
 
 _FINE = 0.4
 """Distance between the points where the surface is looked at, in edges of elements."""
@@ -25,7 +25,7 @@ _FACING = 0.3
 """Least cosine between a visible facet and the element face that is nearest to it: others lie across a fold."""
 
 
-def outer_triangles(mesh: HexMesh, faces: str) -> tuple[NDArray[np.int64], NDArray[np.int32]]:
+def face_triangles(mesh: HexMesh, faces: str) -> tuple[NDArray[np.int64], NDArray[np.int32]]:
     """Nodes of a face set, shape (m,), and triangles over them, two for each face, shape (2 F, 3)."""
     nodes, corners = np.unique(mesh.quads(mesh.face_set(faces)), return_inverse=True)
     corners = corners.reshape(-1, 4)
@@ -33,7 +33,20 @@ def outer_triangles(mesh: HexMesh, faces: str) -> tuple[NDArray[np.int64], NDArr
     return nodes.astype(np.int64), triangles.astype(np.int32)
 
 
-def outside(
+def outer_surface(mesh: HexMesh, faces: str) -> Facets:
+    """A face set of a mesh as it rests, as triangles over its own nodes."""
+    nodes, triangles = face_triangles(mesh, faces)
+    return Facets(mesh.nodes[nodes], triangles)
+
+
+def element_edge(mesh: HexMesh, faces: str) -> float:
+    """Median edge of a face set at rest [m]."""
+    nodes, triangles = face_triangles(mesh, faces)
+    x = mesh.nodes[nodes[triangles]]
+    return float(np.median(np.linalg.norm(x[:, 1] - x[:, 0], axis=1)))
+
+
+def face_offsets(
     mesh: HexMesh, faces: str, vertices: NDArray[np.float64], triangles: NDArray[np.integer]
 ) -> NDArray[np.float64]:
     """Mean height of a visible surface over the faces around every node [m], negative where it lies within, shape (N,).
@@ -45,10 +58,8 @@ def outside(
         triangles: Of the surface, as far as the volume carries it, shape (T, 3).
     """
     out = np.zeros(len(mesh.nodes))
-    nodes, outer = outer_triangles(mesh, faces)
-    shape = Facets(mesh.nodes[nodes], outer)
-    x = shape.vertices[shape.faces]
-    edge = float(np.median(np.linalg.norm(x[:, 1] - x[:, 0], axis=1)))
+    nodes, outer = face_triangles(mesh, faces)
+    shape, edge = Facets(mesh.nodes[nodes], outer), element_edge(mesh, faces)
     points, normals, area = _sampled(vertices[triangles], _FINE * edge)
     if not len(points):
         return out
@@ -63,7 +74,7 @@ def outside(
     return out
 
 
-def outside_of_nodes(
+def node_offsets(
     mesh: HexMesh, faces: str, vertices: NDArray[np.float64], triangles: NDArray[np.integer]
 ) -> NDArray[np.float64]:
     """Height of a visible surface over every node of a face set [m], negative where it lies within, shape (N,).
@@ -76,7 +87,7 @@ def outside_of_nodes(
         vertices: The surface it carries, at the same moment [m], shape (V, 3).
         triangles: Of the surface, as far as the volume carries it, shape (T, 3).
     """
-    out = outside(mesh, faces, vertices, triangles)
+    out = face_offsets(mesh, faces, vertices, triangles)
     if not len(triangles):
         return out
     quads = mesh.quads(mesh.face_set(faces))

@@ -1,4 +1,4 @@
-"""Vertices of visible surfaces that are inside others, or inside other parts of their own."""
+"""Overlap of visible surfaces: vertices that are inside others, or inside other parts of their own."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from warpjld.fem.contact.obstacles.facets import Facets
 from warpjld.fem.contact.obstacles.obstacle import Touching
 from warpjld.simulation.bodies.skin_parts import SkinParts
 
-__all__ = ["Over", "SurfacePart", "over", "within_itself"]
+__all__ = ["Overlap", "SurfacePart", "overlap_of", "self_overlaps"]
 
 _FACING = 0.3
 """Surfaces that meet look at each other: cosine between their normals, at most."""
@@ -32,7 +32,7 @@ class SurfacePart(NamedTuple):
 
 
 @dataclass(frozen=True, eq=False)
-class Over:
+class Overlap:
     """Vertices that are inside something, and the way out [m]."""
 
     vertices: NDArray[np.integer]
@@ -43,15 +43,15 @@ class Over:
         """Of the deepest [m]."""
         return float(np.linalg.norm(self.way, axis=1).max(initial=0.0))
 
-    def of(self, some: NDArray[np.bool_]) -> Over:
+    def of(self, some: NDArray[np.bool_]) -> Overlap:
         """Those of some of the surface's vertices (V,)."""
         chosen = some[self.vertices]
-        return Over(self.vertices[chosen], self.way[chosen])
+        return Overlap(self.vertices[chosen], self.way[chosen])
 
 
-def over(
+def overlap_of(
     at: NDArray[np.float64], normals: NDArray[np.float64], some: NDArray[np.integer], found: Touching
-) -> tuple[Over, NDArray[np.bool_]]:
+) -> tuple[Overlap, NDArray[np.bool_]]:
     """Of vertices (n) for which something was found, those inside that look at what they are in; and which they are.
 
     Args:
@@ -62,15 +62,15 @@ def over(
     """
     facing = np.einsum("vi,vi->v", normals[some], found.normal) < _FACING
     chosen = (found.distance < 0.0) & facing
-    return Over(some[chosen], found.closest[chosen] - at[some[chosen]]), chosen
+    return Overlap(some[chosen], found.closest[chosen] - at[some[chosen]]), chosen
 
 
-def within_itself(
+def self_overlaps(
     parts: SkinParts, at: NDArray[np.float64], normals: NDArray[np.float64]
-) -> Mapping[tuple[str, str], Over]:
+) -> Mapping[tuple[str, str], Overlap]:
     """Vertices (V, 3) [m] of parts of a skin inside other parts: by the names of both, none where nothing overlaps."""
     boxes = [(at[part.vertices].min(axis=0), at[part.vertices].max(axis=0)) for part in parts.parts]
-    out: dict[tuple[str, str], Over] = {}
+    out: dict[tuple[str, str], Overlap] = {}
     for other, (low, high) in zip(parts.parts, boxes, strict=True):
         surface: Facets | None = None
         for one in parts.parts:
@@ -82,11 +82,11 @@ def within_itself(
                 continue
             surface = surface or other.surface(at)
             found, place = surface.locate(at[some])
-            inside, chosen = over(at, normals, some, found)
+            inside, chosen = overlap_of(at, normals, some, found)
             corner = surface.faces[place.face[chosen]]
             met = np.ones(len(corner), dtype=bool)
             for k in range(3):
                 met &= parts.meet(inside.vertices, corner[:, k])
             if met.any():
-                out[one.name, other.name] = Over(inside.vertices[met], inside.way[met])
+                out[one.name, other.name] = Overlap(inside.vertices[met], inside.way[met])
     return out

@@ -11,7 +11,8 @@ from warpjld.fem.contact.obstacles.facets import Facets
 from warpjld.fem.contact.results.nodal_contact import skin_around
 from warpjld.fem.mesh.embedding import Embedding, embed_between
 from warpjld.fem.mesh.hexmesh import HexMesh
-from warpjld.simulation.display.refine import Finer, finer
+from warpjld.simulation.bodies.deformable_body import DeformableBody
+from warpjld.simulation.display.refine import RefinedSurface, refine_surface
 
 __all__ = ["PressureMap", "pressure_map"]
 
@@ -32,7 +33,7 @@ class PressureMap:
         carried: How it carries the vertices.
         vertices: At the same moment [m], shape (V, 3).
         triangles: Of the whole surface, shape (T, 3).
-        worn: Vertices that the volume carries, shape (V,).
+        embedded: Vertices that the volume carries, shape (V,).
     """
 
     def __init__(
@@ -42,7 +43,7 @@ class PressureMap:
         carried: Embedding,
         vertices: NDArray[np.float64],
         triangles: NDArray[np.int32],
-        worn: NDArray[np.bool_],
+        embedded: NDArray[np.bool_],
     ) -> None:
         from scipy.sparse import csr_array, diags_array
 
@@ -50,14 +51,14 @@ class PressureMap:
         self._triangles, self._count = triangles, count
         around = skin_around(mesh, faces, mesh.nodes)
         weights = np.maximum(carried.weights, 0.0) * (around > 0.0)[carried.corners]
-        weights *= worn[:, None]
+        weights *= embedded[:, None]
         weights /= np.maximum(weights.sum(axis=1), 1e-12)[:, None]
         table = csr_array((weights.ravel(), carried.corners.ravel(), 8 * np.arange(count + 1)), shape=(count, total))
         seen = table.T @ self._areas(vertices) > _SEEN * np.maximum(around, 1e-300)
         self._table: Any = table @ diags_array(seen.astype(float))
         self._bare = np.flatnonzero((around > 0.0) & ~seen)
         self._nearest: Any = csr_array((count, len(self._bare)))
-        whole = triangles[worn[triangles].all(axis=1)]
+        whole = triangles[embedded[triangles].all(axis=1)]
         if len(self._bare) and len(whole):
             surface = Facets(vertices, whole)
             place = surface.locate(mesh.nodes[self._bare])[1]
@@ -79,35 +80,25 @@ class PressureMap:
         return np.asarray(np.bincount(self._triangles.ravel(), np.repeat(size, 3), self._count), np.float64)
 
 
-def pressure_map(
-    mesh: HexMesh,
-    faces: str,
-    carried: Embedding,
-    vertices: NDArray[np.float64],
-    triangles: NDArray[np.int32],
-    force: NDArray[np.float64],
-    worn: NDArray[np.bool_] | None = None,
-) -> tuple[Finer, PressureMap]:
-    """A surface split where nodes are pressed, about as fine as they are far apart or finer, and its map.
+def pressure_map(body: DeformableBody, force: NDArray[np.float64]) -> tuple[RefinedSurface, PressureMap]:
+    """A body's surface split where nodes are pressed, about as fine as they are far apart or finer, and its map.
 
     Args:
-        mesh, faces, carried, vertices: As of ``PressureMap``.
-        triangles: Of the whole surface, shape (T, 3).
+        body: At rest.
         force: That ever presses on the nodes [N], shape (N,).
-        worn: Vertices that the volume carries, where it does not carry all of them, shape (V,).
     """
-    count = len(vertices)
-    worn = np.ones(count, dtype=bool) if worn is None else worn
-    pressed = worn & (np.where(carried.weights > 0.0, force[carried.corners], 0.0).max(axis=1) > 0.0)
-    surface = finer(triangles, worn[triangles].all(axis=1) & pressed[triangles].any(axis=1), count)
-    where = surface.of(vertices)
+    triangles, carried, embedded = body.triangles, body.embedding, body.embedded
+    count = len(body.surface)
+    pressed = embedded & (np.where(carried.weights > 0.0, force[carried.corners], 0.0).max(axis=1) > 0.0)
+    surface = refine_surface(triangles, embedded[triangles].all(axis=1) & pressed[triangles].any(axis=1), count)
+    where = surface.of(body.surface)
     if len(surface.edges):
-        middles = embed_between(mesh, carried, surface.edges, where[count:])
+        middles = embed_between(body.mesh, carried, surface.edges, where[count:])
         columns = (getattr(carried, name) for name in ("corners", "weights", "outside"))
         more = (getattr(middles, name) for name in ("corners", "weights", "outside"))
         carried = Embedding(*(np.concatenate(pair) for pair in zip(columns, more, strict=True)))
-    inside = np.concatenate([worn, worn[surface.edges].all(axis=1)])
-    return surface, PressureMap(mesh, faces, carried, where, surface.faces, inside)
+    inside = np.concatenate([embedded, embedded[surface.edges].all(axis=1)])
+    return surface, PressureMap(body.mesh, body.faces, carried, where, surface.faces, inside)
 
 
 def _over(force: NDArray[np.float64], area: NDArray[np.float64]) -> NDArray[np.float64]:

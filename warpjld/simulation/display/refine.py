@@ -1,4 +1,4 @@
-"""A surface with some of its triangles split in four, so that colours change within them."""
+"""Refined surfaces: some triangles are split in four, so that colours change within them."""
 
 from __future__ import annotations
 
@@ -8,11 +8,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["Finer", "finer"]
+__all__ = ["RefinedSurface", "refine_surface"]
 
 
 @dataclass(frozen=True, eq=False)
-class Finer:
+class RefinedSurface:
     """The vertices of a surface, and behind them the middles of some edges.
 
     Attributes:
@@ -28,7 +28,7 @@ class Finer:
         return np.concatenate([values, 0.5 * (values[self.edges[:, 0]] + values[self.edges[:, 1]])], dtype=np.float64)
 
 
-def finer(faces: NDArray[np.integer], chosen: NDArray[np.bool_], count: int) -> Finer:
+def refine_surface(faces: NDArray[np.integer], chosen: NDArray[np.bool_], count: int) -> RefinedSurface:
     """Split triangles (T, 3) over ``count`` vertices in four where they are chosen (T,), and those beside them in two
     or three: edges have a middle on both sides or on neither."""
     sides = np.sort(faces[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2), axis=1).astype(np.int64)
@@ -46,7 +46,7 @@ def finer(faces: NDArray[np.integer], chosen: NDArray[np.bool_], count: int) -> 
         if k == 0:
             parts += _triangles(turned.all(axis=1), (a, ab, ca), (ab, b, bc), (ca, bc, c), (ab, bc, ca))
     edges = np.stack([split // count, split % count], axis=1)
-    return Finer(np.concatenate(parts).astype(np.int32), edges.astype(np.int32))
+    return RefinedSurface(np.concatenate(parts).astype(np.int32), edges.astype(np.int32))
 
 
 def _triangles(some: Any, *corners: tuple[NDArray[np.integer], ...]) -> list[NDArray[np.integer]]:

@@ -15,16 +15,16 @@ from numpy.typing import NDArray
 
 from warpjld.fem.contact import Obstacle
 from warpjld.fem.contact.obstacles.facets import Facets
-from warpjld.simulation.display.overlap import Over, SurfacePart, over, within_itself
 from warpjld.simulation.bodies.skin_parts import SkinParts
+from warpjld.simulation.display.overlap import Overlap, SurfacePart, overlap_of, self_overlaps
 
-__all__ = ["Cleared", "Shown", "clear"]
+__all__ = ["SeparatedSurfaces", "VisibleSurface", "separate_surfaces"]
 
 _ROUNDS = 3
 
 
 @dataclass(frozen=True, eq=False)
-class Shown:
+class VisibleSurface:
     """A visible surface of a body that deforms.
 
     Attributes:
@@ -33,7 +33,7 @@ class Shown:
         modulus: Of what lies under it [Pa].
         most: How far a vertex may be moved [m]: a fraction of an element.
         parts: Parts of it that may overlap, if any.
-        presses: Vertices whose overlap with other parts contact knows of, shape (V,); None: all.
+        pressing: Vertices whose overlap with other parts contact knows of, shape (V,); None: all.
     """
 
     vertices: NDArray[np.float64]
@@ -41,11 +41,11 @@ class Shown:
     modulus: float
     most: float
     parts: SkinParts | None = None
-    presses: NDArray[np.bool_] | None = None
+    pressing: NDArray[np.bool_] | None = None
 
 
 @dataclass(frozen=True, eq=False)
-class Cleared:
+class SeparatedSurfaces:
     """Surfaces that no longer overlap.
 
     Attributes:
@@ -57,7 +57,7 @@ class Cleared:
 
     vertices: dict[str, NDArray[np.float64]]
     moved: dict[str, float]
-    inside: dict[tuple[SurfacePart, SurfacePart], Over] = field(default_factory=dict)
+    inside: dict[tuple[SurfacePart, SurfacePart], Overlap] = field(default_factory=dict)
 
     @property
     def left(self) -> dict[tuple[SurfacePart, SurfacePart], float]:
@@ -69,7 +69,9 @@ class Cleared:
         return out
 
 
-def clear(surfaces: Mapping[str, Shown], obstacles: Mapping[str, Obstacle], time: float) -> Cleared:
+def separate_surfaces(
+    surfaces: Mapping[str, VisibleSurface], obstacles: Mapping[str, Obstacle], time: float
+) -> SeparatedSurfaces:
     """Move the vertices of surfaces that are inside others, or inside obstacles, onto them.
 
     Args:
@@ -77,7 +79,7 @@ def clear(surfaces: Mapping[str, Shown], obstacles: Mapping[str, Obstacle], time
         obstacles: Which do not give way, by name.
         time: The obstacles' time.
     """
-    bodies = {name: _Body(shown) for name, shown in surfaces.items()}
+    bodies = {name: _MovingSurface(shown) for name, shown in surfaces.items()}
     names = list(bodies)
     pairs = [(one, other) for k, one in enumerate(names) for other in names[k + 1 :]]
     pairs = [pair for pair in pairs if bodies[pair[0]].near(bodies[pair[1]])]
@@ -96,7 +98,7 @@ def clear(surfaces: Mapping[str, Shown], obstacles: Mapping[str, Obstacle], time
     for body in bodies.values():
         for obstacle in obstacles.values():
             body.put(body.sunk(obstacle, time), 1.0)
-    inside: dict[tuple[SurfacePart, SurfacePart], Over] = {}
+    inside: dict[tuple[SurfacePart, SurfacePart], Overlap] = {}
     for one, other in pairs:
         inside[SurfacePart(one), SurfacePart(other)] = bodies[other].over(bodies[one])
         inside[SurfacePart(other), SurfacePart(one)] = bodies[one].over(bodies[other])
@@ -105,17 +107,17 @@ def clear(surfaces: Mapping[str, Shown], obstacles: Mapping[str, Obstacle], time
         inside |= {(SurfacePart(name, part), SurfacePart(name, other)): found for (part, other), found in parts}
         for solid, obstacle in obstacles.items():
             inside[SurfacePart(name), SurfacePart(solid)] = body.sunk(obstacle, time)
-    return Cleared(
+    return SeparatedSurfaces(
         {name: body.at for name, body in bodies.items()},
         {name: body.moved for name, body in bodies.items()},
         inside,
     )
 
 
-class _Body:
+class _MovingSurface:
     """A surface on the move."""
 
-    def __init__(self, shown: Shown) -> None:
+    def __init__(self, shown: VisibleSurface) -> None:
         self.shown = shown
         self.at = np.array(shown.vertices, dtype=np.float64)
         self._used = np.unique(shown.faces)
@@ -124,36 +126,36 @@ class _Body:
     def moved(self) -> float:
         return float(np.linalg.norm(self.at - self.shown.vertices, axis=1).max(initial=0.0))
 
-    def near(self, other: _Body) -> bool:
+    def near(self, other: _MovingSurface) -> bool:
         """Whether their boxes meet."""
         (low, high), (bottom, top) = ((x.min(axis=0), x.max(axis=0)) for x in (self._points, other._points))
         return bool(((low <= top) & (bottom <= high)).all())
 
-    def over(self, other: _Body) -> Over:
+    def over(self, other: _MovingSurface) -> Overlap:
         """Vertices of the other surface that are inside this one."""
         bottom, top = self._points.min(axis=0), self._points.max(axis=0)
         x = other._points
         some = other._used[((x >= bottom) & (x <= top)).all(axis=1)]
         if not len(some):
-            return Over(some, np.empty((0, 3)))
+            return Overlap(some, np.empty((0, 3)))
         found = Facets(self.at, self.shown.faces).project(other.at[some])
-        return over(other.at, other._normals(), some, found)[0]
+        return overlap_of(other.at, other._normals(), some, found)[0]
 
-    def sunk(self, obstacle: Obstacle, time: float) -> Over:
+    def sunk(self, obstacle: Obstacle, time: float) -> Overlap:
         """Vertices that are inside an obstacle."""
-        return over(self.at, self._normals(), self._used, obstacle.project(self._points, time))[0]
+        return overlap_of(self.at, self._normals(), self._used, obstacle.project(self._points, time))[0]
 
-    def itself(self) -> Mapping[tuple[str, str], Over]:
+    def itself(self) -> Mapping[tuple[str, str], Overlap]:
         """Vertices of its parts that are inside other parts."""
         parts = self.shown.parts
-        return {} if parts is None else within_itself(parts, self.at, self._normals())
+        return {} if parts is None else self_overlaps(parts, self.at, self._normals())
 
     def part_itself(self) -> None:
         """Move the vertices of both parts that overlap half the way out, as far as contact knows of them."""
         for turn in range(_ROUNDS + 2):
             found = self.itself()
-            if self.shown.presses is not None:
-                found = {two: one.of(self.shown.presses) for two, one in found.items()}
+            if self.shown.pressing is not None:
+                found = {two: one.of(self.shown.pressing) for two, one in found.items()}
             if not any(len(one.vertices) for one in found.values()):
                 return
             for (part, against), one in found.items():
@@ -162,7 +164,7 @@ class _Body:
                 elif (part < against) == (turn == _ROUNDS):  # what is left: first the one part, then the other
                     self.put(one, 1.0)
 
-    def put(self, found: Over, share: float) -> None:
+    def put(self, found: Overlap, share: float) -> None:
         """Move vertices a share of the way out, no farther than may be."""
         there = self.at[found.vertices] + share * found.way
         start = self.shown.vertices[found.vertices]

@@ -7,14 +7,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["Smoother"]
+__all__ = ["SurfaceSmoother"]
 
 _LENGTH = 1.0
 """How far values spread, in edges of elements."""
 _MOST = 12
 
 
-class Smoother:
+class SurfaceSmoother:
     """Averages over neighbouring vertices, as often as it takes to spread over an element.
 
     Args:

@@ -11,12 +11,15 @@ from numpy.typing import NDArray
 
 from warpjld.errors import InputError
 from warpjld.fem.hand.muscles import Effort
+from warpjld.simulation.grip.bracket import clipped_inside
 from warpjld.skeleton.tree import CHANNELS, Skeleton
 
-__all__ = ["Corrected", "Correction", "correct_angles"]
+__all__ = ["FLEXION", "KNUCKLES", "CorrectedPose", "Correction", "correct_angles"]
 
-_FLEXION = CHANNELS.index("flexion")
-_KNUCKLES = ("base", "knuckle2", "knuckle3")
+FLEXION = CHANNELS.index("flexion")
+"""Column of the angles."""
+KNUCKLES = ("base", "knuckle2", "knuckle3")
+"""Joints of a digit that open."""
 _FIRST = 0.04
 """Share of the way back that is tried first."""
 
@@ -32,7 +35,7 @@ class Correction(Enum):
 
 
 @dataclass(frozen=True, eq=False)
-class Corrected:
+class CorrectedPose:
     """A corrected pose.
 
     Attributes:
@@ -59,7 +62,7 @@ def correct_angles(
     aim: float = 1.0,
     tolerance: float = 0.05,
     solves: int = 12,
-) -> Corrected:
+) -> CorrectedPose:
     """Open the digits that bear too much until each bears ``aim`` of its limit, or a little less.
 
     A digit opens along the way back to its open posture. All digits are corrected in the same solves; each one's
@@ -83,32 +86,23 @@ def correct_angles(
         raise InputError(f"want 0 < aim ≤ 1 and 0 < tolerance < 1, got {aim} and {tolerance}")
     first = solve(angles)
     if first is None:
-        return Corrected(Correction.NO_SOLUTION, angles.copy(), None, {}, 1)
+        return CorrectedPose(Correction.NO_SOLUTION, angles.copy(), None, {}, 1)
     if first.share <= aim:
-        return Corrected(Correction.NOT_NEEDED, angles.copy(), first, {}, 1)
-    ways = {d.digit: _Way(d.share) for d in first.digits}
+        return CorrectedPose(Correction.NOT_NEEDED, angles.copy(), first, {}, 1)
+    digits = _Digits(skeleton, angles, open_angles, first, aim, tolerance)
     best, at_best = None, angles.copy()
     trial, effort = angles, first
     for number in range(1, solves + 1):
-        for digit in effort.digits:
-            ways[digit.digit].seen(digit.share, aim)
-        within = all(d.share <= aim for d in effort.digits)
-        if within:
+        digits.note(effort)
+        if all(d.share <= aim for d in effort.digits):
             best, at_best = effort, trial
-            if all(w.done(tolerance, aim) for w in ways.values()):
+            if digits.done:
                 return _ended(Correction.CORRECTED, angles, at_best, best, skeleton, number)
-        stuck = [w for w in ways.values() if w.low >= 1.0]
-        if stuck:
+        if digits.stuck:
             return _ended(Correction.TOO_STRONG_WHEN_OPEN, angles, trial, effort, skeleton, number)
         if number == solves:
             break
-        trial = angles.copy()
-        for digit in effort.digits:
-            way = ways[digit.digit]
-            way.step(aim * (1.0 - 0.5 * tolerance))
-            joints = [skeleton.index(f"{digit.digit}.{k}") for k in _KNUCKLES]
-            now, back = angles[joints, _FLEXION], np.minimum(open_angles[joints, _FLEXION], angles[joints, _FLEXION])
-            trial[joints, _FLEXION] = now + way.at * (back - now)
+        trial = digits.opened(effort)
         found = solve(trial)
         if found is None:
             return _ended(Correction.NO_SOLUTION, angles, trial, best, skeleton, number + 1)
@@ -116,6 +110,50 @@ def correct_angles(
     if best is not None:
         return _ended(Correction.CORRECTED, angles, at_best, best, skeleton, solves)
     return _ended(Correction.TOO_MANY_SOLVES, angles, trial, effort, skeleton, solves)
+
+
+class _Digits:
+    """All digits of a hand on their ways back to where they open to."""
+
+    def __init__(
+        self,
+        skeleton: Skeleton,
+        angles: NDArray[np.float64],
+        open_angles: NDArray[np.float64],
+        first: Effort,
+        aim: float,
+        tolerance: float,
+    ) -> None:
+        self._skeleton, self._angles, self._open = skeleton, angles, open_angles
+        self._aim, self._tolerance = aim, tolerance
+        self._ways = {digit.digit: _Way(digit.share) for digit in first.digits}
+
+    def note(self, effort: Effort) -> None:
+        """Take note of what digits bear where they are."""
+        for digit in effort.digits:
+            self._ways[digit.digit].seen(digit.share, self._aim)
+
+    @property
+    def done(self) -> bool:
+        """Whether none needs to be opened by less."""
+        return all(way.done(self._tolerance, self._aim) for way in self._ways.values())
+
+    @property
+    def stuck(self) -> bool:
+        """Whether one cannot be opened farther."""
+        return any(way.low >= 1.0 for way in self._ways.values())
+
+    def opened(self, effort: Effort) -> NDArray[np.float64]:
+        """The angles to try next, shape (J, 4)."""
+        trial, column = self._angles.copy(), FLEXION
+        for digit in effort.digits:
+            way = self._ways[digit.digit]
+            way.step(self._aim * (1.0 - 0.5 * self._tolerance))
+            joints = [self._skeleton.index(f"{digit.digit}.{k}") for k in KNUCKLES]
+            now = self._angles[joints, column]
+            back = np.minimum(self._open[joints, column], now)
+            trial[joints, column] = now + way.at * (back - now)
+        return trial
 
 
 class _Way:
@@ -158,8 +196,7 @@ class _Way:
         else:
             steep = (self.high_share - self.low_share) / (self.high - self.low)
             guess = self.low + (wanted - self.low_share) / steep
-            margin = 0.05 * (self.high - self.low)
-            self.at = float(np.clip(guess, self.low + margin, self.high - margin))
+            self.at = clipped_inside(guess, self.low, self.high, 0.05)
 
 
 def _ended(
@@ -169,11 +206,11 @@ def _ended(
     effort: Effort | None,
     skeleton: Skeleton,
     solves: int,
-) -> Corrected:
+) -> CorrectedPose:
     opened = {}
     for digit in effort.digits if effort is not None else ():
-        joints = [skeleton.index(f"{digit.digit}.{k}") for k in _KNUCKLES]
-        by = wanted[joints, _FLEXION] - angles[joints, _FLEXION]
+        joints = [skeleton.index(f"{digit.digit}.{k}") for k in KNUCKLES]
+        by = wanted[joints, FLEXION] - angles[joints, FLEXION]
         if by.any():
             opened[digit.digit] = by
-    return Corrected(status, angles, effort, opened, solves)
+    return CorrectedPose(status, angles, effort, opened, solves)

@@ -3,31 +3,31 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from warpjld.fem.contact import ContactSolution
-from warpjld.simulation.grip.correct import Corrected, Correction, correct_angles
-from warpjld.fem.hand.muscles import JOINT_WORDS, DigitEffort, Effort
-from warpjld.simulation.bodies.model import Bodies
-from warpjld.simulation.solve.branch import detour
+from warpjld.fem.hand.muscles import JOINT_WORDS, Effort
+from warpjld.simulation.animation import AngleEdit
+from warpjld.simulation.bodies.deformable_body import History
+from warpjld.simulation.bodies.flesh_body import FleshBody
+from warpjld.simulation.bodies.model import ContactModel
+from warpjld.simulation.grip.correct import FLEXION, KNUCKLES, CorrectedPose, Correction, correct_angles
+from warpjld.simulation.grip.squeeze import TRAVEL
 from warpjld.simulation.report.efforts import effort_at
-from warpjld.simulation.bodies.flesh_body import HandBody
-from warpjld.skeleton.tree import CHANNELS
+from warpjld.simulation.solve.branch import solve_branch
 
-__all__ = ["Mended", "Mending"]
+__all__ = ["CorrectedDigit", "CorrectedFrame", "correct_frame", "worst_digits"]
 
-_FLEXION = CHANNELS.index("flexion")
-_KNUCKLES = ("base", "knuckle2", "knuckle3")
-_TRAVEL = 5e-4
-"""Way of a joint in one step [m]."""
+_AIM = 1.0
+"""Share of their limits that digits may reach."""
 
 
 @dataclass(frozen=True)
-class Mended:
+class CorrectedDigit:
     """One digit at one frame.
 
     Attributes:
@@ -57,114 +57,124 @@ class Mended:
         return f"{out} at frame {self.frame:g}; opened {', '.join(by) or 'nothing'} for {self.after:.3g} N"
 
 
-class Mending:
-    """Corrections, frame after frame.
+@dataclass(frozen=True, eq=False)
+class CorrectedFrame:
+    """A frame after all hands that bore too much were corrected.
 
-    Args:
-        bodies: Everything.
-        limits: Largest forces of digits [N], by actor and digit, where they are not the default.
-        write: Told an actor's name, a time before and a time, and new flexions [rad] of joints at the latter: keys.
-        aim: Share of their limits that digits may reach.
+    Attributes:
+        solution: The equilibrium at the corrected angles, or the one found where nothing had to be.
+        edits: The corrected angles.
+        digits: What was opened.
+        failed: What could not be, in words.
     """
 
-    def __init__(
-        self,
-        bodies: Bodies,
-        limits: Mapping[str, Mapping[str, float]],
-        write: Callable[[str, float, float, dict[int, float]], None],
-        *,
-        aim: float = 1.0,
-    ) -> None:
-        self._bodies, self._limits, self._write, self._aim = bodies, limits, write, aim
-        self.done: list[Mended] = []
-        self.failed: list[str] = []
+    solution: ContactSolution
+    edits: tuple[AngleEdit, ...] = ()
+    digits: tuple[CorrectedDigit, ...] = ()
+    failed: tuple[str, ...] = ()
 
-    @property
-    def worst(self) -> list[Mended]:
-        """Of every digit the frame at which it bore most before."""
-        out: dict[tuple[str, str], Mended] = {}
-        for one in self.done:
-            place = (one.actor, one.digit)
-            if place not in out or one.before > out[place].before:
-                out[place] = one
-        return list(out.values())
 
-    def __call__(self, before: ContactSolution, found: ContactSolution) -> ContactSolution:
+def correct_frame(
+    model: ContactModel,
+    history: History,
+    before: ContactSolution,
+    found: ContactSolution,
+    limits: Mapping[str, Mapping[str, float]],
+) -> CorrectedFrame:
+    """Open the digits that bear too much at a frame.
+
+    Args:
+        model: Everything.
+        history: What is known at the frame before.
+        before: Equilibrium there.
+        found: Equilibrium at the frame, at the angles of the animation.
+        limits: Largest forces of digits [N], by actor and digit, where they are not the default.
+    """
+    out = CorrectedFrame(found)
+    for hand in model.hands:
+        if hand.bones.bendable:
+            one = _Hand(model, history, hand, before, limits.get(hand.name)).corrected(out.solution)
+            model = model.edited(one.edits)
+            edits, digits, failed = out.edits + one.edits, out.digits + one.digits, out.failed + one.failed
+            out = CorrectedFrame(one.solution, edits, digits, failed)
+    return out
+
+
+def worst_digits(frames: Sequence[CorrectedFrame]) -> list[CorrectedDigit]:
+    """Of every digit the frame at which it bore most before it was corrected."""
+    out: dict[tuple[str, str], CorrectedDigit] = {}
+    for one in (digit for frame in frames for digit in frame.digits):
+        place = (one.actor, one.digit)
+        if place not in out or one.before > out[place].before:
+            out[place] = one
+    return list(out.values())
+
+
+@dataclass(frozen=True, eq=False)
+class _Hand:
+    """One hand on its way from a frame to the next."""
+
+    model: ContactModel
+    history: History
+    hand: FleshBody
+    before: ContactSolution
+    limits: Mapping[str, float] | None
+
+    def corrected(self, found: ContactSolution) -> CorrectedFrame:
         """The equilibrium at the corrected angles, or the one found where nothing has to be."""
-        for hand in self._bodies.hands:
-            if hand.drive.bendable:
-                found = self._hand(hand, before, found)
-        return found
-
-    def _hand(self, hand: HandBody, before: ContactSolution, found: ContactSolution) -> ContactSolution:
-        drive = hand.drive
-        assert drive.angles is not None
-        time, since = found.last.time, before.last.time
-        wanted, then, opened = drive.angles(time), drive.angles(since), drive.angles(0.0)
-        first = self._effort(hand, wanted, found)
-        if first.share <= self._aim:
-            return found
+        bones, time, since = self.hand.bones, found.last.time, self.before.last.time
+        wanted, then, opened = bones.angles(time), bones.angles(since), bones.angles(0.0)
+        first = self._effort(wanted, found)
+        if first.share <= _AIM:
+            return CorrectedFrame(found)
         tried: list[tuple[NDArray[np.float64], ContactSolution]] = [(wanted, found)]
 
         def solve(angles: NDArray[np.float64]) -> Effort | None:
             if np.array_equal(angles, wanted):
                 return first
-            solution = self._at(hand, before, then, angles, time - since)
+            solution = self._at(then, angles, time - since)
             if not solution.converged:
                 return None
             tried.append((angles.copy(), solution))
-            return self._effort(hand, angles, solution)
+            return self._effort(angles, solution)
 
-        corrected = correct_angles(solve, drive.skeleton, wanted, opened, aim=self._aim)
+        corrected = correct_angles(solve, bones.skeleton, wanted, opened, aim=_AIM)
         chosen = [solution for angles, solution in tried if np.array_equal(angles, corrected.angles)]
-        frame = self._bodies.start + time
+        frame = self.model.start + time
         if corrected.status is not Correction.CORRECTED or not chosen:
-            self.failed.append(f"{hand.name} at frame {frame:g}: {corrected.status.value}")
-            return found
-        self._note(hand, frame, first, corrected)
-        changed = {}
-        for name in corrected.opened:
-            for knuckle in _KNUCKLES:
-                joint = drive.skeleton.index(f"{name}.{knuckle}")
-                changed[joint] = float(corrected.angles[joint, _FLEXION])
-        self._write(hand.name, since, time, changed)
-        drive.changed()
-        return chosen[-1]
+            text = f"{self.hand.name} at frame {frame:g}: {corrected.status.value}"
+            return CorrectedFrame(found, failed=(text,))
+        edits, digits = self._edits(corrected, since, time), self._digits(corrected, first, frame)
+        return CorrectedFrame(chosen[-1], edits, digits)
 
-    def _note(self, hand: HandBody, frame: float, first: Effort, corrected: Corrected) -> None:
-        assert corrected.effort is not None
-        for name, by in corrected.opened.items():
-            was: DigitEffort = first[name]
-            now = corrected.effort[name]
-            opened = (float(by[0]), float(by[1]), float(by[2]))
-            self.done.append(
-                Mended(hand.name, frame, name, was.force, now.force, was.limit, opened, corrected.status.name)
-            )
-
-    def _at(
-        self,
-        hand: HandBody,
-        before: ContactSolution,
-        then: NDArray[np.float64],
-        angles: NDArray[np.float64],
-        duration: float,
-    ) -> ContactSolution:
-        drive, since = hand.drive, before.last.time
-        assert drive.posed is not None
-        ends = [drive.posed(a, since + t).positions[0] for a, t in ((then, 0.0), (angles, duration))]
-        far = float(np.linalg.norm(ends[1] - ends[0], axis=1).max())
-        return detour(
-            self._bodies,
-            before,
-            max(1, int(np.ceil(far / _TRAVEL))),
-            moves=(
-                hand.name,
-                lambda share: drive.moves_of(then + share * (angles - then), since + share * duration),
-            ),
-            duration=duration,
+    def _edits(self, corrected: CorrectedPose, since: float, time: float) -> tuple[AngleEdit, ...]:
+        names = [f"{digit}.{knuckle}" for digit in corrected.opened for knuckle in KNUCKLES]
+        start, joints = self.model.start, [self.hand.bones.skeleton.index(name) for name in names]
+        return tuple(
+            AngleEdit(self.hand.name, joint, start + since, start + time, float(corrected.angles[joint, FLEXION]))
+            for joint in joints
         )
 
-    def _effort(self, hand: HandBody, angles: NDArray[np.float64], solution: ContactSolution) -> Effort:
-        assert hand.drive.posed is not None
-        poses = hand.drive.posed(angles, solution.last.time)
-        return effort_at(self._bodies, hand, poses, solution.last, self._limits.get(hand.name))
+    def _digits(self, corrected: CorrectedPose, first: Effort, frame: float) -> tuple[CorrectedDigit, ...]:
+        assert corrected.effort is not None
+        out = []
+        for name, by in corrected.opened.items():
+            was, now = first[name], corrected.effort[name]
+            opened = (float(by[0]), float(by[1]), float(by[2]))
+            status = corrected.status.name
+            out.append(CorrectedDigit(self.hand.name, frame, name, was.force, now.force, was.limit, opened, status))
+        return tuple(out)
+
+    def _at(self, then: NDArray[np.float64], angles: NDArray[np.float64], duration: float) -> ContactSolution:
+        """Equilibrium at other angles than the animation's, reached from the frame before."""
+        bones, since = self.hand.bones, self.before.last.time
+        steps = bones.steps([(then, since), (angles, since + duration)], TRAVEL)
+        moves = (
+            self.hand.name,
+            lambda share: bones.moves_of(then + share * (angles - then), since + share * duration),
+        )
+        return solve_branch(self.model, self.history, self.before, steps, moves=moves, duration=duration)
+
+    def _effort(self, angles: NDArray[np.float64], solution: ContactSolution) -> Effort:
+        poses = self.hand.bones.posed(angles, solution.last.time)
+        return effort_at(self.model, self.hand, poses, solution.last, self.limits)

@@ -4,21 +4,28 @@ from __future__ import annotations
 
 import csv
 import math
-from collections.abc import Mapping
-from dataclasses import dataclass, field
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
-from warpjld.fem.contact import ContactInstant, ContactSolution
-from warpjld.simulation.grip.force import Firmness, FirmStatus, grip_of_force
-from warpjld.simulation.grip.search import GripStatus, gentlest_grip
-from warpjld.fem.hand.muscles import Effort
-from warpjld.simulation.bodies.model import Bodies
-from warpjld.simulation.grip.hold import Lift
-from warpjld.simulation.grip.squeeze import Tightening
-from warpjld.simulation.specification import GripWish
+import numpy as np
 
-__all__ = ["FoundGrip", "find_grip", "write_grips"]
+from warpjld.fem.contact import ContactInstant, ContactSolution
+from warpjld.fem.hand.muscles import Effort
+from warpjld.simulation.animation import AngleEdit
+from warpjld.simulation.bodies.deformable_body import History
+from warpjld.simulation.bodies.flesh_body import FleshBody
+from warpjld.simulation.bodies.model import ContactModel
+from warpjld.simulation.bodies.object_body import ObjectBody
+from warpjld.simulation.grip.correct import FLEXION
+from warpjld.simulation.grip.force import ForceStatus, PressedForce, force_grip
+from warpjld.simulation.grip.hold import HandTrials
+from warpjld.simulation.grip.search import GripStatus, Trial, gentlest_grip
+from warpjld.simulation.grip.squeeze import Squeeze
+from warpjld.simulation.specification import GripSpecification
+
+__all__ = ["FoundGrip", "SupportRelease", "find_grip", "write_grips"]
 
 _START = math.radians(0.5)
 """First step of a search [rad]."""
@@ -35,6 +42,28 @@ _COLUMNS = (
 )
 
 
+@dataclass(frozen=True)
+class SupportRelease:
+    """A support that lets go of its object.
+
+    Attributes:
+        object: Name.
+        begins, free: From when to when [frames from the model's start].
+        lowered: Displacement of the object's middle along the weight's axis meanwhile [m].
+    """
+
+    object: str
+    begins: float
+    free: float
+    lowered: float
+
+    def applied(self, one: ObjectBody) -> ObjectBody:
+        """An object with its support let go of, if it is the one that is meant."""
+        if one.name != self.object or one.support is None:
+            return one
+        return replace(one, support=one.support.released(self.begins, self.free, self.lowered))
+
+
 @dataclass(frozen=True, eq=False)
 class FoundGrip:
     """A grip that was searched for.
@@ -48,16 +77,20 @@ class FoundGrip:
         force: Sum of the normal forces on the object, or of the digits' forces [N].
         digits: Digit → force [N], largest force [N], largest share of the muscles' limits.
         rows: Every grip tried, for a table.
+        edits: Angles of the digits that close.
+        release: How the object's support lets go; None where it does not.
     """
 
-    wish: GripWish
+    wish: GripSpecification
     status: str
     text: str
     grip: float
     lowered: float | None
     force: float
     digits: Mapping[str, tuple[float, float, float]]
-    rows: tuple[dict[str, Any], ...] = field(default=())
+    rows: tuple[dict[str, Any], ...] = ()
+    edits: tuple[AngleEdit, ...] = ()
+    release: SupportRelease | None = None
 
     def content(self) -> dict[str, Any]:
         """As plain values."""
@@ -77,75 +110,100 @@ class FoundGrip:
         }
 
 
-def find_grip(bodies: Bodies, wish: GripWish, after: ContactSolution, limits: Mapping[str, float]) -> FoundGrip:
-    """Search, from the equilibrium at the wish's first frame."""
-    hand = next(one for one in bodies.hands if one.name == wish.actor)
-    skeleton = hand.drive.skeleton
-    joints = [skeleton.index(channel.rpartition(".")[0]) for channel in wish.channels]
-    grips = Tightening(bodies, hand, joints, after, limits)
-    most = min(wish.most, grips.room)
-    if wish.lift:
-        return _gentlest(bodies, wish, grips, most)
-    return _firm(wish, grips, most)
+def find_grip(
+    model: ContactModel,
+    history: History,
+    wish: GripSpecification,
+    after: ContactSolution,
+    limits: Mapping[str, float],
+) -> FoundGrip:
+    """Search, from the equilibrium at the wish's first frame.
+
+    Args:
+        model: Everything.
+        history: What is known at that frame.
+        wish: What is asked.
+        after: The equilibrium.
+        limits: Digit → largest force [N], where it is not the default.
+    """
+    hand = next(one for one in model.hands if one.name == wish.actor)
+    joints = [hand.bones.skeleton.index(channel.rpartition(".")[0]) for channel in wish.channels]
+    squeeze = Squeeze(model, history, hand, joints, after, limits)
+    most = max(min(wish.most, squeeze.room), 1e-6)
+    found = _gentlest(wish, squeeze, most) if wish.lift else _firm(wish, squeeze, most)
+    release = None
+    if found.lowered is not None:
+        begins, free = wish.middle - model.start, wish.last - model.start
+        release = SupportRelease(wish.object, begins, free, found.lowered)
+    return replace(found, edits=_edits(hand, wish, joints, found.grip), release=release)
 
 
-def _gentlest(bodies: Bodies, wish: GripWish, grips: Tightening, most: float) -> FoundGrip:
-    one = next(body for body in bodies.objects if body.name == wish.object)
+def _edits(hand: FleshBody, wish: GripSpecification, joints: Sequence[int], grip: float) -> tuple[AngleEdit, ...]:
+    """Digits closed on by a grip from where they are held."""
+    if grip == 0.0:
+        return ()
+    now = hand.bones.animation.angles(wish.first)[joints, FLEXION]
+    closed = np.maximum(now, np.minimum(now + grip, hand.bones.skeleton.limits[joints, FLEXION, 1]))
+    return tuple(
+        AngleEdit(hand.name, joint, wish.first, None, float(value)) for joint, value in zip(joints, closed, strict=True)
+    )
+
+
+def _gentlest(wish: GripSpecification, squeeze: Squeeze, most: float) -> FoundGrip:
+    model = squeeze.model
+    one = next(body for body in model.objects if body.name == wish.object)
     friction = max(
         pair.friction
-        for pair, owner in zip(bodies.pairs, bodies.owners, strict=True)
-        if {owner.slave, owner.master} == {wish.actor, wish.object}
+        for pair, owner in zip(model.pairs, model.owners, strict=True)
+        if owner.other(wish.object) == wish.actor
     )
-    lift = Lift(grips, one)
-    heavy, room = lift.weighed.weight, max(most, 1e-6)
-    found = gentlest_grip(lift, 0.0, room, weight=heavy, friction=friction, start=min(_START, room), tolerance=_NEAR)
-    taken = lift.taken(found.grip) if found.status in _HELD else None
-    instant = grips.closed(found.grip).last if taken is None else taken[1]
+    trials = HandTrials(squeeze, one)
+    heavy = trials.weight.weight
+    found = gentlest_grip(trials, 0.0, most, weight=heavy, friction=friction, start=min(_START, most), tolerance=_NEAR)
+    taken = trials.taken(found.grip) if found.status in _HELD else None
+    instant = squeeze.closed(found.grip).last if taken is None else taken[1]
     text = f"{heavy:.3g} N of {wish.object}: {found.text}"
     if taken is not None:
         text += f"; the digits close on by {math.degrees(found.grip):.2f}°"
     text += f"; {found.ended}"
-    effort = grips.effort(found.grip, instant) if instant.touches else None
+    effort = squeeze.effort(found.grip, instant) if instant.touches else None
     rows = [
-        _row(wish, grip, trial.force, trial.share, trial.who, grip == found.grip, found.status.name)
+        _row(wish, grip, trial, grip == found.grip, found.status.name)
         | {"outcome": trial.outcome.name, "held": int(trial.held), "sliding": trial.sliding, "borne": trial.borne}
         for grip, trial in found.trials
     ]
     grip, lowered = (0.0, None) if taken is None else (found.grip, taken[0])
-    digits = _digits(effort, wish)
+    digits = _digits(effort)
     return FoundGrip(wish, found.status.name, text, grip, lowered, found.trial.force, digits, tuple(rows))
 
 
-def _firm(wish: GripWish, grips: Tightening, most: float) -> FoundGrip:
+def _firm(wish: GripSpecification, squeeze: Squeeze, most: float) -> FoundGrip:
     assert wish.force is not None
     counted = wish.digits or tuple(dict.fromkeys(channel.split(".")[-3] for channel in wish.channels))
     instants: dict[float, ContactInstant] = {}
 
-    def press(grip: float) -> Firmness | None:
-        closed = grips.closed(grip)
+    def press(grip: float) -> PressedForce | None:
+        closed = squeeze.closed(grip)
         if not closed.converged:
             return None
         instants[grip] = closed.last
-        effort = grips.effort(grip, closed.last)
+        effort = squeeze.effort(grip, closed.last)
         worst = max(effort.digits, key=lambda digit: digit.share)
         mine = sum(d.force for d in effort.digits if d.digit.rpartition(".")[2] in counted)
-        return Firmness(mine, worst.share, worst.digit)
+        return PressedForce(mine, worst.share, worst.digit)
 
-    found = grip_of_force(press, 0.0, max(most, 1e-6), wish.force, start=min(_START, max(most, 1e-6)))
+    found = force_grip(press, 0.0, most, wish.force, start=min(_START, most))
     text = f"{' + '.join(counted)}: {found.text}"
-    if found.status is FirmStatus.REACHED:
+    if found.status is ForceStatus.REACHED:
         text += f"; they close on by {math.degrees(found.grip):.2f}°"
     instant = instants.get(found.grip)
-    effort = grips.effort(found.grip, instant) if instant is not None else None
-    rows = [
-        _row(wish, grip, one.force, one.share, one.who, grip == found.grip, found.status.name)
-        for grip, one in found.trials
-    ]
-    force = found.firmness.force if found.firmness is not None else 0.0
-    return FoundGrip(wish, found.status.name, text, found.grip, None, force, _digits(effort, wish), tuple(rows))
+    effort = squeeze.effort(found.grip, instant) if instant is not None else None
+    rows = [_row(wish, grip, one, grip == found.grip, found.status.name) for grip, one in found.trials]
+    force = found.pressed.force if found.pressed is not None else 0.0
+    return FoundGrip(wish, found.status.name, text, found.grip, None, force, _digits(effort), tuple(rows))
 
 
-def _digits(effort: Effort | None, wish: GripWish) -> dict[str, tuple[float, float, float]]:
+def _digits(effort: Effort | None) -> dict[str, tuple[float, float, float]]:
     """Digits that press."""
     if effort is None:
         return {}
@@ -154,22 +212,22 @@ def _digits(effort: Effort | None, wish: GripWish) -> dict[str, tuple[float, flo
 
 
 def _row(
-    wish: GripWish, grip: float, force: float, share: float, who: str, chosen: bool, status: str
+    wish: GripSpecification, grip: float, tried: Trial | PressedForce, chosen: bool, status: str
 ) -> dict[str, Any]:
     return {
         "actor": wish.actor,
         "object": wish.object,
         "frame": wish.first,
         "grip_deg": round(math.degrees(grip), 5),
-        "force_n": force,
-        "share": share,
-        "digit": who,
+        "force_n": tried.force,
+        "share": tried.share,
+        "digit": tried.who,
         "chosen": int(chosen),
         "status": status,
     }
 
 
-def write_grips(path: Path, found: list[FoundGrip]) -> None:
+def write_grips(path: Path, found: Sequence[FoundGrip]) -> None:
     """Every grip that was tried as CSV, one row each."""
     with path.open("w", newline="", encoding="utf-8") as file:
         writer = csv.DictWriter(file, _COLUMNS, restval="")

@@ -9,13 +9,14 @@ from enum import Enum
 import numpy as np
 
 from warpjld.errors import InputError
+from warpjld.simulation.grip.bracket import checked_step, clipped_inside, outward
 
-__all__ = ["Firm", "FirmStatus", "Firmness", "grip_of_force"]
+__all__ = ["ForceGrip", "ForceStatus", "PressedForce", "force_grip"]
 
 _ROUNDS = 16
 
 
-class FirmStatus(Enum):
+class ForceStatus(Enum):
     """How a search for a force ended; the value is the message for people."""
 
     REACHED = "the digits press as asked"
@@ -27,7 +28,7 @@ class FirmStatus(Enum):
 
 
 @dataclass(frozen=True)
-class Firmness:
+class PressedForce:
     """What a grip presses with: force [N], the largest share of the muscles' limits, and the digit that has it."""
 
     force: float
@@ -36,33 +37,33 @@ class Firmness:
 
 
 @dataclass(frozen=True)
-class Firm:
+class ForceGrip:
     """The grip found, or the firmest that muscles can hold of those tried.
 
     Attributes:
         status: How the search ended.
         grip: Its measure, as handed to ``press``.
-        firmness: What it presses with; None where no grip was solved.
+        pressed: What it presses with; None where no grip was solved.
         trials: Every grip tried, in order.
         text: For people.
     """
 
-    status: FirmStatus
+    status: ForceStatus
     grip: float
-    firmness: Firmness | None
-    trials: tuple[tuple[float, Firmness], ...]
+    pressed: PressedForce | None
+    trials: tuple[tuple[float, PressedForce], ...]
     text: str
 
 
-def grip_of_force(
-    press: Callable[[float], Firmness | None],
+def force_grip(
+    press: Callable[[float], PressedForce | None],
     low: float,
     high: float,
     force: float,
     *,
     start: float | None = None,
     tolerance: float = 0.02,
-) -> Firm:
+) -> ForceGrip:
     """Close until a force is reached: steps that grow, then regula falsi between the last two.
 
     Args:
@@ -76,67 +77,85 @@ def grip_of_force(
     Raises:
         InputError: A range or a force that is none.
     """
-    if not (np.isfinite([low, high, force]).all() and low < high and force > 0.0 and 0.0 < tolerance < 1.0):
-        raise InputError(
-            f"grip: want low < high, a force above 0 N and a tolerance between 0 and 1, got {low}, {high}, {force}, "
-            f"{tolerance}"
-        )
-    step = (high - low) / 16.0 if start is None else min(float(start), high - low)
-    if not step > 0.0:
-        raise InputError(f"grip: want a first step above 0, got {step}")
-    trials: list[tuple[float, Firmness]] = []
+    step = checked_step(low, high, None if start is None else min(float(start), high - low))
+    if not (np.isfinite(force) and force > 0.0 and 0.0 < tolerance < 1.0):
+        raise InputError(f"grip: want a force above 0 N and a tolerance between 0 and 1, got {force}, {tolerance}")
+    trials: list[tuple[float, PressedForce]] = []
 
-    def ended(status: FirmStatus) -> Firm:
-        able = [one for one in trials if one[1].share <= 1.0]
-        near = able if status is FirmStatus.REACHED else [one for one in able if one[1].force <= force]
-        if not near:
-            return Firm(
-                status, low, trials[0][1] if trials else None, tuple(trials), _text(status, force, trials, None)
-            )
-        best = min(near, key=lambda one: abs(one[1].force - force))
-        return Firm(status, best[0], best[1], tuple(trials), _text(status, force, trials, best[1]))
+    def attempt(grip: float) -> PressedForce | None:
+        found = press(grip)
+        if found is not None:
+            trials.append((grip, found))
+        return found
 
-    grip = below = low
-    least = 0.0
-    found = press(grip)
-    while found is not None:
-        trials.append((grip, found))
-        if abs(found.force - force) <= tolerance * force and found.share <= 1.0:
-            return ended(FirmStatus.REACHED)
-        if found.force >= force:
+    below, status = None, None
+    for grip in outward(low, high, step, 1.5, from_low=False):
+        found = attempt(grip)
+        status = _outward_status(found, force, tolerance, grip >= high)
+        if status is not None or (found is not None and found.force >= force):
             break
-        if found.share > 1.0:
-            return ended(FirmStatus.TOO_WEAK)
-        if grip >= high:
-            return ended(FirmStatus.LIMIT if found.force > 0.0 else FirmStatus.NO_CONTACT)
-        below, least = grip, found.force - force
-        grip = min(high, grip + step)
-        step *= 1.5
-        found = press(grip)
+        below = trials[-1]
+    if status is None and below is not None:
+        status = _narrowed(attempt, below, trials[-1], force, tolerance)
+    return _ended(status or ForceStatus.HARDER_ALREADY, force, low, trials)
+
+
+def _outward_status(found: PressedForce | None, force: float, tolerance: float, last: bool) -> ForceStatus | None:
+    """How the search ends while grips become firmer; None where it goes on, outwards or inside."""
     if found is None:
-        return ended(FirmStatus.NO_SOLUTION)
-    if grip == low:
-        return ended(FirmStatus.HARDER_ALREADY)
-    above, most = grip, found.force - force
+        return ForceStatus.NO_SOLUTION
+    if abs(found.force - force) <= tolerance * force and found.share <= 1.0:
+        return ForceStatus.REACHED
+    if found.force >= force:
+        return None
+    if found.share > 1.0:
+        return ForceStatus.TOO_WEAK
+    if last:
+        return ForceStatus.LIMIT if found.force > 0.0 else ForceStatus.NO_CONTACT
+    return None
+
+
+def _narrowed(
+    attempt: Callable[[float], PressedForce | None],
+    gentle: tuple[float, PressedForce],
+    firm: tuple[float, PressedForce],
+    force: float,
+    tolerance: float,
+) -> ForceStatus:
+    """Regula falsi (Illinois) between a grip that presses too little and one that presses too much."""
+    below, least = gentle[0], gentle[1].force - force
+    above, most = firm[0], firm[1].force - force
     for _ in range(_ROUNDS):
-        share = float(np.clip(least / (least - most), 0.05, 0.95))
+        share = clipped_inside(least / (least - most), 0.0, 1.0, 0.05)
         grip = below + share * (above - below)
-        found = press(grip)
+        found = attempt(grip)
         if found is None:
-            return ended(FirmStatus.NO_SOLUTION)
-        trials.append((grip, found))
+            return ForceStatus.NO_SOLUTION
         if abs(found.force - force) <= tolerance * force:
-            return ended(FirmStatus.REACHED if found.share <= 1.0 else FirmStatus.TOO_WEAK)
+            return ForceStatus.REACHED if found.share <= 1.0 else ForceStatus.TOO_WEAK
         if found.force < force:
             if found.share > 1.0:
-                return ended(FirmStatus.TOO_WEAK)
+                return ForceStatus.TOO_WEAK
             below, least, most = grip, found.force - force, 0.5 * most
         else:
             above, most, least = grip, found.force - force, 0.5 * least
-    return ended(FirmStatus.NO_SOLUTION)
+    return ForceStatus.NO_SOLUTION
 
 
-def _text(status: FirmStatus, force: float, trials: list[tuple[float, Firmness]], best: Firmness | None) -> str:
+def _ended(status: ForceStatus, force: float, low: float, trials: list[tuple[float, PressedForce]]) -> ForceGrip:
+    """The grip of a status: the nearest to the force that muscles can hold, from below if it is not reached."""
+    able = [one for one in trials if one[1].share <= 1.0]
+    near = able if status is ForceStatus.REACHED else [one for one in able if one[1].force <= force]
+    if not near:
+        first = trials[0][1] if trials else None
+        return ForceGrip(status, low, first, tuple(trials), _text(status, force, trials, None))
+    best = min(near, key=lambda one: abs(one[1].force - force))
+    return ForceGrip(status, best[0], best[1], tuple(trials), _text(status, force, trials, best[1]))
+
+
+def _text(
+    status: ForceStatus, force: float, trials: list[tuple[float, PressedForce]], best: PressedForce | None
+) -> str:
     out = f"{status.value}; {force:.3g} N asked for"
     if best is None:
         return out + (f", {trials[0][1].force:.3g} N at the gentlest grip" if trials else "")
@@ -144,7 +163,7 @@ def _text(status: FirmStatus, force: float, trials: list[tuple[float, Firmness]]
     if best.who:
         out += f" with {best.who} at {100.0 * best.share:.0f} % of its limit"
     over = [one for _, one in trials if one.share > 1.0]
-    if status is FirmStatus.TOO_WEAK and over:
+    if status is ForceStatus.TOO_WEAK and over:
         worst = min(over, key=lambda one: one.force)
         out += f"; {worst.force:.3g} N would take {100.0 * worst.share:.0f} % of what {worst.who} can"
     return out

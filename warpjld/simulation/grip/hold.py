@@ -1,140 +1,299 @@
 """Whether a hand holds an object's weight at a grip: its support is taken away, and what comes of it (R122–R124).
 
-First the points that the object stands on let go, and a handle in its middle bears what the hand does not; then the
-handle is lowered (``warpjld.simulation.grip.lower``).
+First what the object stands on lets go, and a handle in its middle bears what the hand does not; then the handle is
+lowered (``warpjld.simulation.grip.lower``).
 """
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+
 import numpy as np
+from numpy.typing import NDArray
 
-from warpjld.fem import Prescribed
-from warpjld.fem.contact import ContactInstant, ContactSolution
-from warpjld.simulation.grip.lower import Descent, descend
-from warpjld.simulation.grip.search import Outcome, Trial
-from warpjld.simulation.grip.shared_weight import Weighed
-from warpjld.simulation.solve.branch import detour
+from warpjld.errors import InputError
+from warpjld.fem.body import Body
+from warpjld.fem.contact import ContactInstant, ContactSolution, Pair, press
+from warpjld.fem.load.loads import Loads
+from warpjld.fem.load.prescribed import Prescribed
 from warpjld.simulation.bodies.object_body import ObjectBody
-from warpjld.simulation.grip.squeeze import Tightening
+from warpjld.simulation.grip.lower import Lowering, lower_object
+from warpjld.simulation.grip.search import Outcome, Trial
+from warpjld.simulation.grip.shared_weight import SharedWeight
+from warpjld.simulation.grip.squeeze import Squeeze
+from warpjld.simulation.solve.branch import solve_branch
 
-__all__ = ["Lift"]
+__all__ = ["HandTrials", "PrescribedTrials", "WeightTrials"]
 
-_HOPELESS = 0.95
-"""A support that could be borne by this share at most is not taken away."""
 _FADING, _LETTING_GO = 3, 1
 """How often a step may be halved while the support goes, and when the handle does; steps down may not: shorter ones are
 tried then."""
+_COMES_ON = 2
+"""The same of the step in which a weight comes on."""
+_NOTHING = Prescribed(np.empty(0, np.int64), np.empty(0))
 
 
-class Lift:
+class WeightTrials(ABC):
     """Grips tried on an object: the callable that ``gentlest_grip`` asks for.
 
     Args:
-        tightening: The hand.
-        one: The object, with its support.
+        weight: The object's weight, and what bears it.
+        hopeless: A support that could be borne by less than this share is not taken away.
 
     Attributes:
-        weighed: The object's weight, and what bears it.
-        descents: How the object was lowered at every grip whose pressures could bear it.
+        found: The equilibria of every grip tried, those on the way included.
+        lowered: How the object was lowered at every grip whose pressures could bear it.
+    """
+
+    def __init__(self, weight: SharedWeight, hopeless: float) -> None:
+        self.weight, self._hopeless = weight, hopeless
+        self.found: dict[float, ContactSolution] = {}
+        self.lowered: dict[float, Lowering] = {}
+        self._begun: dict[float, float] = {}
+
+    def __call__(self, grip: float) -> Trial:
+        """What a grip does."""
+        closed = self.closed(grip)
+        self.found[grip] = closed
+        if not closed.converged:
+            return self._trial(grip, Outcome.UNSOLVED, closed.last, float("nan"))
+        if not self.weight.force(closed.last) > 0.0:
+            return self._trial(grip, Outcome.APART, closed.last, 0.0)
+        most = self.weight.most(closed.last)
+        if most < self._hopeless:
+            return self._trial(grip, Outcome.WEAK, closed.last, most)
+        bare = self.bared(grip, closed)
+        if not bare.converged:
+            return self._trial(grip, Outcome.UNSOLVED, closed.last, float("nan"))
+        self._begun[grip] = self.weight.height(closed.last)
+        lowered = lower_object(
+            self.weight,
+            bare,
+            lambda after, height: self.moved(grip, after, height),
+            lambda after: self.released(grip, after),
+            predicted=self._predicted(grip),
+        )
+        self.lowered[grip] = lowered
+        instants = (*closed.instants, *bare.instants, *lowered.instants)
+        self.found[grip] = replace(lowered.solution, instants=instants)
+        return self._trial(grip, lowered.outcome, lowered.solution.last, lowered.borne)
+
+    @abstractmethod
+    def closed(self, grip: float) -> ContactSolution:
+        """Equilibrium in which the hand has closed, and something else bears the object."""
+
+    @abstractmethod
+    def bared(self, grip: float, closed: ContactSolution) -> ContactSolution:
+        """After it: all the weight on hand and handle."""
+
+    @abstractmethod
+    def moved(self, grip: float, after: ContactSolution, height: float) -> ContactSolution:
+        """After another: the handle at a height [m]."""
+
+    @abstractmethod
+    def released(self, grip: float, after: ContactSolution) -> ContactSolution:
+        """After another: without the handle."""
+
+    @abstractmethod
+    def strain(self, grip: float, instant: ContactInstant) -> tuple[float, str]:
+        """Largest share of the muscles' limits, and the digit that has it."""
+
+    def beneath(self, instant: ContactInstant) -> str:
+        """What else bears the object, and how much."""
+        return ""
+
+    def taken(self, grip: float) -> tuple[float, ContactInstant] | None:
+        """Displacement of the object's middle along the weight's axis when the hand takes it [m], and the equilibrium
+        then; None where it does not."""
+        lowered = self.lowered.get(grip)
+        if lowered is None or lowered.outcome is not Outcome.HELD:
+            return None
+        last = lowered.solution.last
+        return self.weight.height(last) - self._begun[grip], last
+
+    def _trial(self, grip: float, outcome: Outcome, instant: ContactInstant, borne: float) -> Trial:
+        force, sliding = self.weight.force(instant), self.weight.sliding(instant)
+        share, who = self.strain(grip, instant)
+        note = self.beneath(instant) if outcome is Outcome.STANDS else ""
+        return Trial(outcome, sliding, force, borne, share, who, note)
+
+    def _predicted(self, grip: float) -> float | None:
+        """How far the object sank at the nearest grip that held it."""
+        held = [one for one, lowered in self.lowered.items() if lowered.outcome is Outcome.HELD]
+        near = min(held, key=lambda one: abs(one - grip), default=None)
+        return None if near is None else self.lowered[near].sunk
+
+
+class HandTrials(WeightTrials):
+    """Grips of a hand on an object of a simulation, which stands on its support.
+
+    Args:
+        squeeze: The hand.
+        one: The object, with its support.
 
     Raises:
         InputError: An object without a weight, or gravity along no axis.
     """
 
-    def __init__(self, tightening: Tightening, one: ObjectBody) -> None:
-        bodies = tightening.bodies
-        self._grips, self._one = tightening, one
-        self._span = bodies.spans[one.name]
-        holding = [k for k, o in enumerate(bodies.owners) if {o.slave, o.master} == {one.name, tightening.hand.name}]
+    def __init__(self, squeeze: Squeeze, one: ObjectBody) -> None:
+        model = squeeze.model
+        self.squeeze, self._one = squeeze, one
+        self._span = model.spans[one.name]
+        holding = [k for k, owner in enumerate(model.owners) if owner.other(one.name) == squeeze.hand.name]
         nodes = np.arange(self._span.start, self._span.stop)
-        self.weighed = Weighed(bodies.body, nodes, bodies.pairs, holding, bodies.loads.gravity)
-        self.descents: dict[float, Descent] = {}
-        self._begun: dict[float, float] = {}
+        weight = SharedWeight(model.body, nodes, model.pairs, holding, model.loads.gravity)
+        super().__init__(weight, hopeless=0.95)
 
-    def __call__(self, grip: float) -> Trial:
-        """What a grip does."""
-        closed = self._grips.closed(grip)
-        if not closed.converged:
-            return self._trial(grip, Outcome.UNSOLVED, closed.last, float("nan"))
-        if not self.weighed.force(closed.last) > 0.0:
-            return self._trial(grip, Outcome.APART, closed.last, 0.0)
-        most = self.weighed.most(closed.last)
-        if most < _HOPELESS:
-            return self._trial(grip, Outcome.WEAK, closed.last, most)
-        bare = self._bared(grip, closed)
-        if not bare.converged:
-            return self._trial(grip, Outcome.UNSOLVED, closed.last, float("nan"))
-        self._begun[grip] = self.weighed.height(closed.last)
-        descent = descend(
-            self.weighed,
-            bare,
-            lambda after, height: self._moved(grip, after, height),
-            lambda after: self._let_go(grip, after),
-            foreseen=self._foreseen(grip),
-        )
-        self.descents[grip] = descent
-        return self._trial(grip, descent.outcome, descent.solution.last, descent.borne)
+    def closed(self, grip: float) -> ContactSolution:
+        """Joints flexed by the grip."""
+        return self.squeeze.closed(grip)
 
-    def taken(self, grip: float) -> tuple[float, ContactInstant] | None:
-        """Displacement of the object's middle along the weight's axis when the hand takes it [m], and the equilibrium
-        then; None where it does not."""
-        descent = self.descents.get(grip)
-        if descent is None or descent.outcome is not Outcome.HELD:
-            return None
-        last = descent.solution.last
-        return self.weighed.height(last) - self._begun[grip], last
-
-    def _trial(self, grip: float, outcome: Outcome, instant: ContactInstant, borne: float) -> Trial:
-        force, sliding = self.weighed.force(instant), self.weighed.sliding(instant)
-        effort = self._grips.effort(grip, instant)
-        most = max(effort.digits, key=lambda digit: digit.share)
-        note = self._beneath(instant) if outcome is Outcome.STANDS else ""
-        return Trial(outcome, sliding, force, borne, most.share, most.digit, note)
-
-    def _beneath(self, instant: ContactInstant) -> str:
-        """What else bears the object, and how much."""
-        out = []
-        for k, owner in enumerate(self._grips.bodies.owners):
-            names = {owner.slave, owner.master}
-            if self._one.name in names and self._grips.hand.name not in names:
-                push = np.linalg.norm(instant.touches[k].nodal[self._span].sum(axis=0))
-                if push > 0.0:
-                    out.append(f"{', '.join(names - {self._one.name})} bears {push:.3g} N of it")
-        return " and ".join(out)
-
-    def _bared(self, grip: float, closed: ContactSolution) -> ContactSolution:
+    def bared(self, grip: float, closed: ContactSolution) -> ContactSolution:
         """The points it stands on let go, all but the height of its middle."""
-        there = self._at(self.weighed.height(closed.last))
+        there = self._at(self.weight.height(closed.last))
         forces = np.zeros_like(closed.last.reactions)
         forces[self._span] = closed.last.reactions[self._span]
-        return detour(
-            self._grips.bodies,
-            closed,
-            1,
-            moves=self._grips.stays(grip),
-            known=(self._one.name, lambda share: there),
-            nodal=lambda share: (1.0 - share) * forces,
-            halvings=_FADING,
-        )
+        return self._branch(grip, closed, lambda share: there, _FADING, nodal=lambda share: (1.0 - share) * forces)
 
-    def _moved(self, grip: float, now: ContactSolution, height: float) -> ContactSolution:
+    def moved(self, grip: float, after: ContactSolution, height: float) -> ContactSolution:
         """Its middle at another height."""
-        since = self.weighed.height(now.last)
-        way = (self._one.name, lambda share: self._at(since + share * (height - since)))
-        return detour(self._grips.bodies, now, 1, moves=self._grips.stays(grip), known=way, halvings=0)
+        since = self.weight.height(after.last)
+        return self._branch(grip, after, lambda share: self._at(since + share * (height - since)), 0)
 
-    def _let_go(self, grip: float, lowest: ContactSolution) -> ContactSolution:
-        nothing = Prescribed(np.empty(0, np.int64), np.empty(0))
-        way = (self._one.name, lambda share: nothing)
-        return detour(self._grips.bodies, lowest, 1, moves=self._grips.stays(grip), known=way, halvings=_LETTING_GO)
+    def released(self, grip: float, after: ContactSolution) -> ContactSolution:
+        """Held by nothing but the hand."""
+        return self._branch(grip, after, lambda share: _NOTHING, _LETTING_GO)
+
+    def strain(self, grip: float, instant: ContactInstant) -> tuple[float, str]:
+        """Of the hand's muscles."""
+        most = max(self.squeeze.effort(grip, instant).digits, key=lambda digit: digit.share)
+        return most.share, most.digit
+
+    def beneath(self, instant: ContactInstant) -> str:
+        """What else bears the object, and how much."""
+        out = []
+        for owner, touch in zip(self.squeeze.model.owners, instant.touches, strict=True):
+            other = owner.other(self._one.name)
+            if other not in (None, self.squeeze.hand.name):
+                push = np.linalg.norm(touch.nodal[self._span].sum(axis=0))
+                if push > 0.0:
+                    out.append(f"{other} bears {push:.3g} N of it")
+        return " and ".join(out)
+
+    def _branch(
+        self,
+        grip: float,
+        after: ContactSolution,
+        known: Callable[[float], Prescribed],
+        halvings: int,
+        nodal: Callable[[float], NDArray[np.float64]] | None = None,
+    ) -> ContactSolution:
+        """After another equilibrium, the hand as it is at a grip and this prescribed of the object."""
+        model, history = self.squeeze.model, self.squeeze.history
+        moves = self.squeeze.stays(grip)
+        known_of_it = (self._one.name, known)
+        return solve_branch(model, history, after, 1, moves=moves, known=known_of_it, nodal=nodal, halvings=halvings)
 
     def _at(self, height: float) -> Prescribed:
         """The handle at a height, in the object's own numbering."""
-        there = self.weighed.at(height)
+        there = self.weight.at(height)
         return Prescribed(there.degrees - 3 * self._span.start, there.values)
 
-    def _foreseen(self, grip: float) -> float | None:
-        """How far the object sank at the nearest grip that held it."""
-        held = [one for one, descent in self.descents.items() if descent.outcome is Outcome.HELD]
-        near = min(held, key=lambda one: abs(one - grip), default=None)
-        return None if near is None else self.descents[near].sunk
+
+class PrescribedTrials(WeightTrials):
+    """Grips of any bodies in contact that are measured by what is prescribed of them: a way [m], an angle [rad], ….
+
+    A grip closes without gravity in proportion to time from 0 to 1, which keeps the object where the hand meets it; the
+    weight comes on at 2 while the handle keeps its height, and every step down takes one more.
+
+    Args:
+        body: Hand and object, merged.
+        prescribed: Known displacements of a grip; at 0 nothing is displaced.
+        pairs: What holds the object, and nothing else.
+        name: Of the object's region.
+        gravity: Along one axis [m/s²].
+        loads: What else acts from the start, as the pressure inside an object.
+        others: What else the object may touch: what they bear, the hand does not hold.
+        share: Largest share of the muscles' limits at an instant, and who has it.
+
+    Raises:
+        InputError: No pairs, no such object, or gravity along no axis.
+    """
+
+    def __init__(
+        self,
+        body: Body,
+        prescribed: Callable[[float], Prescribed],
+        pairs: Sequence[Pair],
+        name: str,
+        gravity: tuple[float, float, float] = (0.0, 0.0, -9.81),
+        *,
+        loads: Loads | None = None,
+        others: Sequence[Pair] = (),
+        share: Callable[[ContactInstant], tuple[float, str]] | None = None,
+    ) -> None:
+        if not pairs:
+            raise InputError("pairs: want one that may hold the object")
+        mesh = body.mesh
+        if name not in mesh.region_names:
+            raise InputError(f"name: there is no region '{name}'; there are {', '.join(mesh.region_names)}")
+        self.body, self.prescribed, self.pairs, self._share = body, prescribed, [*pairs, *others], share
+        self._loads = loads or Loads()
+        self._heavy = replace(self._loads, gravity=gravity)
+        own = np.unique(mesh.elements[mesh.regions == mesh.region_names.index(name)])
+        super().__init__(SharedWeight(body, own, self.pairs, range(len(pairs)), gravity), hopeless=1.0)
+
+    def closed(self, grip: float) -> ContactSolution:
+        """What is prescribed of the grip is reached, without gravity."""
+        return self._press(lambda time: self._at(grip, time), self._loads, 1.0)
+
+    def bared(self, grip: float, closed: ContactSolution) -> ContactSolution:
+        """The weight comes on, and the handle keeps its height."""
+        return self._lowered(grip, closed, self.weight.height(closed.last), halvings=_COMES_ON)
+
+    def moved(self, grip: float, after: ContactSolution, height: float) -> ContactSolution:
+        """The handle at another height under the whole weight."""
+        return self._lowered(grip, after, height)
+
+    def released(self, grip: float, after: ContactSolution) -> ContactSolution:
+        """The whole weight without a handle."""
+        return self._lowered(grip, after, None)
+
+    def strain(self, grip: float, instant: ContactInstant) -> tuple[float, str]:
+        """As the caller measures it; none where nothing touches."""
+        return self._share(instant) if self._share is not None and instant.touches else (0.0, "")
+
+    def _at(self, grip: float, time: float) -> Prescribed:
+        return self.prescribed(min(time, 1.0) * grip)
+
+    def _lowered(
+        self, grip: float, after: ContactSolution, height: float | None, *, halvings: int = 0
+    ) -> ContactSolution:
+        begin, since = after.last.time, self.weight.height(after.last)
+
+        def known(time: float) -> Prescribed:
+            held = self._at(grip, 1.0)
+            return held if height is None else held + self.weight.at(since + (time - begin) * (height - since))
+
+        return self._press(known, self._heavy, begin + 1.0, after, halvings)
+
+    def _press(
+        self,
+        known: Callable[[float], Prescribed],
+        loads: Loads,
+        time: float,
+        after: ContactSolution | None = None,
+        halvings: int | None = None,
+    ) -> ContactSolution:
+        return press(
+            self.body,
+            known,
+            self.pairs,
+            lambda now: loads,
+            times=[time],
+            after=after,
+            halvings=halvings,
+            check=False,
+        )

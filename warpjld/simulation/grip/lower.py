@@ -1,4 +1,4 @@
-"""An object lowered into a hand until the hand bears all of its weight, or is seen not to (R122–R124).
+"""Lowering: an object goes down into a hand until the hand bears all of its weight, or is seen not to (R122–R124).
 
 With a force on the object there is no equilibrium beyond what friction bears, and a solver that finds none has not
 proved it. With the height of the object's middle prescribed there is one at every height: what its handle bears there
@@ -14,9 +14,9 @@ import numpy as np
 
 from warpjld.fem.contact import ContactInstant, ContactSolution
 from warpjld.simulation.grip.search import Outcome
-from warpjld.simulation.grip.shared_weight import Weighed
+from warpjld.simulation.grip.shared_weight import SharedWeight
 
-__all__ = ["Descent", "descend"]
+__all__ = ["Lowering", "lower_object"]
 
 _FIRST = 1.0 / 240.0
 """First step down, over the object's height, and how much longer the next may be."""
@@ -25,8 +25,8 @@ _FAR, _LONGEST = 0.25, 0.25
 """An object that sinks by this share of its height is not held; and part of that way that one step may be long."""
 _MOST = 20
 """Steps."""
-_PART, _FORESEEN = 0.5, (_FIRST, 0.06)
-"""Part of the way that is foreseen to take in one step, and bounds of this step, over the object's height."""
+_PART, _BOUNDS = 0.5, (_FIRST, 0.06)
+"""Part of the way that is predicted to take in one step, and bounds of this step, over the object's height."""
 _SHORTER, _TRIES = 1.0 / 3.0, 4
 """What becomes of a step that finds no equilibrium, and how many are tried."""
 _LEFT, _LITTLE = 0.01, 0.001
@@ -44,7 +44,7 @@ _ALL = 1.0 - 1e-9
 
 
 @dataclass(frozen=True, eq=False)
-class Descent:
+class Lowering:
     """How a descent ended.
 
     Attributes:
@@ -80,87 +80,100 @@ class _Place:
         return 1.0 - self.left - self.elsewhere
 
 
-def descend(
-    weighed: Weighed,
+def lower_object(
+    weight: SharedWeight,
     bare: ContactSolution,
     moved: Callable[[ContactSolution, float], ContactSolution],
     released: Callable[[ContactSolution], ContactSolution],
     *,
-    foreseen: float | None = None,
-) -> Descent:
+    predicted: float | None = None,
+) -> Lowering:
     """Lower the handle until nothing is left on it, then let go.
 
     Args:
-        weighed: The object.
+        weight: Of the object.
         bare: Equilibrium in which the handle bears what the hand does not.
         moved: Equilibrium after another, with the handle at a height [m].
         released: Equilibrium after another, without the handle.
-        foreseen: How far it sank at a grip like this one [m].
+        predicted: How far it sank at a grip like this one [m].
     """
-    begin, far = weighed.height(bare.last), _FAR * weighed.tall
+    way = _Way(weight, bare, moved)
+    first = _FIRST if predicted is None else float(np.clip(_PART * predicted / weight.tall, *_BOUNDS))
+    step, enough = first * weight.tall, _LEFT
+    while len(way.places) < _MOST:
+        here = way.places[-1]
+        outcome = _outcome(weight, way.places, way.far)
+        if outcome is not None:
+            return way.ended(outcome)
+        if here.left <= (0.0 if here.slides else enough):
+            free = released(here.solution)
+            if free.converged:
+                return way.ended(Outcome.HELD, free)
+            if here.left <= _LITTLE:
+                break
+            enough = _LITTLE
+        ahead = way.onward(here, _step(way.places, step, way.far))
+        if ahead is None:
+            break
+        step = ahead.sunk - here.sunk
+        way.places.append(ahead)
+    return way.ended(Outcome.UNSOLVED)
 
-    def place(solution: ContactSolution) -> _Place:
+
+class _Way:
+    """Places that the object went through on its way down."""
+
+    def __init__(
+        self,
+        weight: SharedWeight,
+        bare: ContactSolution,
+        moved: Callable[[ContactSolution, float], ContactSolution],
+    ) -> None:
+        self._weight, self._moved = weight, moved
+        self._begin, self.far = weight.height(bare.last), _FAR * weight.tall
+        self.places = [self._place(bare)]
+
+    def _place(self, solution: ContactSolution) -> _Place:
         there = solution.last
-        sunk = weighed.sunk(begin, weighed.height(there))
-        slides = weighed.sliding(there) >= _ALL
-        return _Place(solution, sunk, weighed.left(there), weighed.elsewhere(there), slides)
+        sunk = self._weight.sunk(self._begin, self._weight.height(there))
+        slides = self._weight.sliding(there) >= _ALL
+        return _Place(solution, sunk, self._weight.left(there), self._weight.elsewhere(there), slides)
 
-    def onward(here: _Place, step: float) -> _Place | None:
+    def onward(self, here: _Place, step: float) -> _Place | None:
         """Deeper by a step [m], or by less where that finds no equilibrium or goes too far."""
         ahead = None
         for _ in range(_TRIES):
-            solution = moved(here.solution, weighed.lower(weighed.height(here.solution.last), step))
+            height = self._weight.lower(self._weight.height(here.solution.last), step)
+            solution = self._moved(here.solution, height)
             if not solution.converged:
                 step *= _SHORTER
                 continue
-            ahead = place(solution)
+            ahead = self._place(solution)
             if ahead.left >= -_TOO_FAR:
                 break
             step *= here.left / (here.left - ahead.left)
         return ahead
 
-    places = [place(bare)]
-
-    def ended(outcome: Outcome, free: ContactSolution | None = None) -> Descent:
-        last = free or places[-1].solution
-        borne = max(one.borne for one in places)
+    def ended(self, outcome: Outcome, free: ContactSolution | None = None) -> Lowering:
+        """How it went; ``free`` is the equilibrium without the handle."""
+        last = free or self.places[-1].solution
+        borne = max(one.borne for one in self.places)
         if free is not None:
-            borne = 1.0 + 0.5 * (1.0 / max(weighed.used(free.last), _LEFT) - 1.0)
-        instants = [instant for one in places[1:] for instant in one.solution.instants]
-        sunk = weighed.sunk(begin, weighed.height(last.last))
-        path = tuple((one.sunk, one.borne) for one in places)
-        return Descent(outcome, last, (*instants, *(free.instants if free else ())), borne, sunk, path)
-
-    first = _FIRST if foreseen is None else float(np.clip(_PART * foreseen / weighed.tall, *_FORESEEN))
-    step, enough = first * weighed.tall, _LEFT
-    while len(places) < _MOST:
-        here = places[-1]
-        outcome = _seen(weighed, places, far)
-        if outcome is not None:
-            return ended(outcome)
-        if here.left <= (0.0 if here.slides else enough):
-            free = released(here.solution)
-            if free.converged:
-                return ended(Outcome.HELD, free)
-            if here.left <= _LITTLE:
-                break
-            enough = _LITTLE
-        ahead = onward(here, _step(places, step, far))
-        if ahead is None:
-            break
-        step = ahead.sunk - here.sunk
-        places.append(ahead)
-    return ended(Outcome.UNSOLVED)
+            borne = 1.0 + 0.5 * (1.0 / max(self._weight.used(free.last), _LEFT) - 1.0)
+        instants = [instant for one in self.places[1:] for instant in one.solution.instants]
+        sunk = self._weight.sunk(self._begin, self._weight.height(last.last))
+        path = tuple((one.sunk, one.borne) for one in self.places)
+        return Lowering(outcome, last, (*instants, *(free.instants if free else ())), borne, sunk, path)
 
 
-def _seen(weighed: Weighed, places: list[_Place], far: float) -> Outcome | None:
+def _outcome(weight: SharedWeight, places: list[_Place], far: float) -> Outcome | None:
     """Whether it can be seen that the hand does not hold the object."""
     here = places[-1]
     if here.elsewhere > _LEFT:
         return Outcome.STANDS
     if here.left <= (0.0 if here.slides else _LEFT):
         return None
-    if not weighed.force(here.solution.last) > 0.0:
+    if not weight.force(here.solution.last) > 0.0:
         return Outcome.APART
     if len(places) > 1 and here.slides and places[-2].slides:
         return Outcome.SLIDES if max(_slope(places), 0.0) * (far - here.sunk) < here.left else None

@@ -17,6 +17,7 @@ from enum import Enum
 import numpy as np
 
 from warpjld.errors import InputError
+from warpjld.simulation.grip.bracket import checked_step, clipped_inside, outward
 
 __all__ = ["Grip", "GripStatus", "Outcome", "Trial", "gentlest_grip"]
 
@@ -136,45 +137,61 @@ def gentlest_grip(
     Raises:
         InputError: A range that is none.
     """
-    if not (np.isfinite([low, high]).all() and low < high) or not 0.0 < tolerance < 1.0:
-        raise InputError(f"grip: want low < high and a tolerance between 0 and 1, got {low}, {high}, {tolerance}")
+    step = checked_step(low, high, start)
+    if not 0.0 < tolerance < 1.0:
+        raise InputError(f"grip: want a tolerance between 0 and 1, got {tolerance}")
     if not (weight >= 0.0 and np.isfinite(weight) and friction >= 0.0 and np.isfinite(friction)):
         raise InputError(f"grip: want a weight and a friction of 0 or more, got {weight} N and {friction}")
-    step = (high - low) / 16.0 if start is None else float(start)
-    if not 0.0 < step <= high - low:
-        raise InputError(f"grip: want a first step above 0 within the range, got {step}")
     trials: list[tuple[float, Trial]] = []
 
-    def attempt(grip: float) -> Trial:
+    def attempt(grip: float) -> tuple[float, Trial]:
         trials.append((grip, hold(grip)))
-        return trials[-1][1]
+        return trials[-1]
 
     def ended(status: GripStatus, grip: float, trial: Trial) -> Grip:
         return Grip(status, grip, trial, tuple(trials), _text(status, trial))
 
-    grip, trial = low, attempt(low)
-    if trial.held and trial.share <= 1.0:
-        return ended(GripStatus.HELD_AT_ONCE, grip, trial)
-    failed = (low, trial)
-    while not trial.held:
-        if trial.share > 1.0:
-            return ended(GripStatus.TOO_WEAK, grip, trial)
-        if _slides_for_ever(trials, weight / friction if friction else np.inf):
-            return ended(GripStatus.SLIDES, grip, trial)
-        if grip >= high:
-            return ended(_at_last(trial), grip, trial)
-        failed = (grip, trial)
-        grip = min(high, low + step)
-        step *= 2.0
-        trial = attempt(grip)
-    held, shrank = (grip, trial), True
+    needed = weight / friction if friction else np.inf
+    failed = None
+    for grip in outward(low, high, step, 2.0, from_low=True):
+        one = attempt(grip)
+        if one[1].held:
+            break
+        status = _given_up(trials, grip >= high, needed)
+        if status is not None:
+            return ended(status, *one)
+        failed = one
+    if failed is None and one[1].share <= 1.0:
+        return ended(GripStatus.HELD_AT_ONCE, *one)
+    held = _narrowed(attempt, failed or one, one, low, tolerance)
+    return ended(GripStatus.TOO_WEAK if held[1].share > 1.0 else GripStatus.HELD, *held)
+
+
+def _narrowed(
+    attempt: Callable[[float], tuple[float, Trial]],
+    failed: tuple[float, Trial],
+    held: tuple[float, Trial],
+    low: float,
+    tolerance: float,
+) -> tuple[float, Trial]:
+    """The gentlest grip that holds, between one that does not and one that does."""
+    shrank = True
     while (room := held[0] - failed[0]) > tolerance * (held[0] - low):
         middle = 0.5 * (failed[0] + held[0])
-        between = _between(failed, held, tolerance * (held[0] - low)) if shrank else middle
-        one = (between, attempt(between))
+        one = attempt(_between(failed, held, tolerance * (held[0] - low)) if shrank else middle)
         failed, held = (failed, one) if one[1].held else (one, held)
         shrank = held[0] - failed[0] <= 0.5 * room
-    return ended(GripStatus.TOO_WEAK if held[1].share > 1.0 else GripStatus.HELD, *held)
+    return held
+
+
+def _given_up(trials: list[tuple[float, Trial]], last: bool, needed: float) -> GripStatus | None:
+    """Why nothing firmer is tried after a grip that does not hold."""
+    trial = trials[-1][1]
+    if trial.share > 1.0:
+        return GripStatus.TOO_WEAK
+    if _slides_for_ever(trials, needed):
+        return GripStatus.SLIDES
+    return _at_last(trial) if last else None
 
 
 def _between(failed: tuple[float, Trial], held: tuple[float, Trial], width: float) -> float:
@@ -186,7 +203,7 @@ def _between(failed: tuple[float, Trial], held: tuple[float, Trial], width: floa
         return 0.5 * (low + high)
     there = low + room * lacks / (lacks + spares)
     beside = there + 0.5 * width if high - there > there - low else there - 0.5 * width
-    return float(np.clip(beside, low + _INNER * room, high - _INNER * room))
+    return clipped_inside(beside, low, high, _INNER)
 
 
 def _at_last(trial: Trial) -> GripStatus:

@@ -17,11 +17,12 @@ from warpjld.fem.contact import ContactInstant, Pair
 from warpjld.fem.contact.results.solution import Touch
 from warpjld.fem.load.loads import volumes
 from warpjld.fem.load.prescribed import Prescribed
+from warpjld.simulation.bodies.support import handle_of
 
-__all__ = ["Weighed", "handle_of"]
+__all__ = ["SharedWeight"]
 
 
-class Weighed:
+class SharedWeight:
     """An object, its weight, and the pairs by which a hand holds it.
 
     Args:
@@ -128,8 +129,3 @@ class Weighed:
 
     def _touches(self, instant: ContactInstant) -> list[Touch]:
         return [instant.touches[k] for k in self._holding]
-
-
-def handle_of(nodes: NDArray[np.float64]) -> int:
-    """The node nearest to the middle of all (N, 3): the weight acts there."""
-    return int(np.argmin(np.linalg.norm(nodes - nodes.mean(axis=0), axis=1)))

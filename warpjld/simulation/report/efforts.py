@@ -1,7 +1,7 @@
 """What contact puts on the bones of a hand and on its muscles, from an equilibrium (B eq. 8, R118).
 
 Bones are held by reactions. Less those that hold the same hand in the same pose when nothing touches it
-(``HandBody.alone``), they are what contact asks of the muscles. Contact of the hand's own skin, of two fingers, counts
+(``FleshBody.alone``), they are what contact asks of the muscles. Contact of the hand's own skin, of two fingers, counts
 as contact: muscles press them together.
 
 Contact forces handed on to the bones by nearness (``loads_from_contact``) are near, and are what is left where the
@@ -24,17 +24,17 @@ from warpjld.fem import Loads
 from warpjld.fem.contact import ContactInstant
 from warpjld.fem.hand.bone_loads import loads_from_contact, loads_from_reactions
 from warpjld.fem.hand.muscles import Effort, effort_of
-from warpjld.simulation.bodies.model import Bodies
+from warpjld.simulation.bodies.flesh_body import FleshBody
+from warpjld.simulation.bodies.model import ContactModel
 from warpjld.simulation.solve.solved_frame import SolvedFrame
-from warpjld.simulation.bodies.flesh_body import HandBody
 from warpjld.skeleton import Poses
 
 __all__ = ["effort_at"]
 
 
 def effort_at(
-    bodies: Bodies,
-    hand: HandBody,
+    model: ContactModel,
+    hand: FleshBody,
     poses: Poses,
     found: SolvedFrame | ContactInstant,
     limits: Mapping[str, float] | None = None,
@@ -45,21 +45,20 @@ def effort_at(
     digits' ``flesh`` is NaN.
 
     Args:
-        bodies: Everything.
+        model: Everything.
         hand: Whose.
         poses: One pose of it.
         found: The equilibrium in that pose.
         limits: Digit → largest force [N], where it is not the default.
     """
-    span = bodies.spans[hand.name]
-    flesh = hand.part.hand
+    span = model.spans[hand.name]
     u, reactions, contact = found.displacement[span], found.reactions[span], _contact(found, span)
-    alone = hand.alone.at(poses, u, reactions, contact, Loads(gravity=bodies.loads.gravity))
+    alone = hand.alone.at(poses, u, reactions, contact, Loads(gravity=model.loads.gravity))
     if alone is None:
-        return effort_of(hand.drive.skeleton, poses, loads_from_contact(flesh, u, contact), limits=limits)
-    own = loads_from_reactions(flesh, alone.displacement, alone.reactions)
-    loads = loads_from_reactions(flesh, u, reactions) - own
-    return effort_of(hand.drive.skeleton, poses, loads, limits=limits, flesh=own)
+        return effort_of(hand.bones.skeleton, poses, loads_from_contact(hand.hand, u, contact), limits=limits)
+    own = loads_from_reactions(hand.hand, alone.displacement, alone.reactions)
+    loads = loads_from_reactions(hand.hand, u, reactions) - own
+    return effort_of(hand.bones.skeleton, poses, loads, limits=limits, flesh=own)
 
 
 def _contact(found: SolvedFrame | ContactInstant, span: slice) -> NDArray[np.float64]:

@@ -1,23 +1,27 @@
-"""A row for each frame and digit (R95, R118, R122)."""
+"""The table of a simulation: a row for each frame and digit, and what the muscles say (R95, R118–R122)."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
 
 import numpy as np
+from numpy.typing import NDArray
 
 from warpjld.fem.hand.muscles import Effort
-from warpjld.simulation.bodies.model import Bodies
+from warpjld.fem.hand.suggestions import suggestions
+from warpjld.simulation.bodies.flesh_body import FleshBody
+from warpjld.simulation.bodies.model import ContactModel
+from warpjld.simulation.bodies.skin_parts import digit_of_label
+from warpjld.simulation.report.efforts import effort_at
 from warpjld.simulation.solve.solved_frame import SolvedFrame
-from warpjld.simulation.bodies.flesh_body import HandBody
 
-__all__ = ["Row", "rows_of", "write_table"]
+__all__ = ["ContactRow", "ContactTable", "rows_of", "write_table"]
 
 
 @dataclass(frozen=True)
-class Row:
+class ContactRow:
     """What one digit feels and does at one frame.
 
     Attributes:
@@ -60,55 +64,117 @@ class Row:
     state: str
 
 
-def rows_of(bodies: Bodies, hand: HandBody, solved: SolvedFrame, effort: Effort) -> list[Row]:
-    """Rows of a hand at a frame: its digits and its palm."""
-    span = bodies.spans[hand.name]
-    flesh = hand.part.hand
-    labels = [_digit(name) for name in flesh.label_names]
-    digit_of = np.array([*labels, ""])[flesh.node_labels]  # "" for nodes inside
-    imprint = solved.imprint.of((slice(None), span))
-    pressure = solved.pressure(bodies)[span]
-    rows = []
-    for digit in [*(d.digit.rpartition(".")[2] for d in effort.digits), "palm"]:
-        nodes = np.flatnonzero(digit_of == digit)
-        if not len(nodes):
-            continue
-        pushes = solved.nodal[:, span][:, nodes]
-        force = pushes.sum(axis=(0, 1))
-        against = [
-            owner.master if owner.slave == hand.name else owner.slave
-            for owner, push in zip(bodies.owners, pushes, strict=True)
-            if np.abs(push).max(initial=0.0) > 0.0
-        ]
-        area = float(imprint.area[:, nodes].sum())
-        sliding = 1.0 - float(imprint.held[:, nodes].sum()) / area if area > 0.0 else float("nan")
-        work = None if digit == "palm" else effort[digit]
-        rows.append(
-            Row(
-                solved.frame,
-                hand.name,
-                digit,
-                "+".join(dict.fromkeys(against)),
-                float(np.linalg.norm(force)),
-                float(force[0]),
-                float(force[1]),
-                float(force[2]),
-                1e6 * area,
-                1e-3 * float(pressure[nodes].max(initial=0.0)),
-                float(np.linalg.norm(effort.palm)) if work is None else work.force,
-                float("nan") if work is None else work.flesh,
-                float("nan") if work is None else work.limit,
-                float("nan") if work is None else work.share,
-                sliding,
-                _state(sliding),
+class ContactTable:
+    """Rows as frames are solved.
+
+    Args:
+        strength: Largest forces of digits [N], by actor and digit, where they are not the default.
+
+    Attributes:
+        rows: Those so far.
+    """
+
+    def __init__(self, strength: Mapping[str, Mapping[str, float]]) -> None:
+        self._strength = strength
+        self.rows: list[ContactRow] = []
+        self._efforts: dict[str, list[tuple[float, Effort]]] = {}
+
+    def add(self, model: ContactModel, solved: SolvedFrame) -> str | None:
+        """Add the rows of a frame; a text where muscles can do no more (R118)."""
+        reason = None
+        for hand in model.hands:
+            poses = hand.bones.animation.pose(solved.frame)
+            effort = effort_at(model, hand, poses, solved, self._strength.get(hand.name))
+            self._efforts.setdefault(hand.name, []).append((solved.frame, effort))
+            self.rows += rows_of(model, hand, solved, effort)
+            reason = reason or effort.stop()
+        return None if reason is None else f"stopped at frame {solved.frame:g}: {reason}"
+
+    def notes(self) -> list[str]:
+        """Frames at which bones' forces are estimates."""
+        out = []
+        for name, efforts in self._efforts.items():
+            unsure = [frame for frame, effort in efforts if np.isnan(effort.digits[0].flesh)]
+            if unsure:
+                out.append(
+                    f"{name}: flesh alone finds no equilibrium in the pose of frame "
+                    f"{', '.join(f'{frame:g}' for frame in unsure)}: what bones bear is estimated from contact"
+                )
+        return out
+
+    def suggestions(self, model: ContactModel) -> list[str]:
+        """What to open, at the frame that strains an actor most, as the animation is after all."""
+        out = []
+        for hand in model.hands:
+            efforts = self._efforts.get(hand.name, [])
+            if not efforts or not hand.bones.bendable:
+                continue
+            worst = max(range(len(efforts)), key=lambda k: efforts[k][1].share)
+            frame, effort = efforts[worst]
+            angles = hand.bones.animation.angles
+            before, then = efforts[worst - 1] if worst else (frame, None)
+            found = suggestions(
+                hand.bones.skeleton, effort, angles(frame), then, None if then is None else angles(before)
             )
-        )
-    return rows
+            out += [f"{hand.name} at frame {frame:g}: {one.text}" for one in found]
+        return out
 
 
-def write_table(path: Path, rows: Sequence[Row]) -> None:
+def rows_of(model: ContactModel, hand: FleshBody, solved: SolvedFrame, effort: Effort) -> list[ContactRow]:
+    """Rows of a hand at a frame: its digits and its palm."""
+    digits = [*(d.digit.rpartition(".")[2] for d in effort.digits), "palm"]
+    labels = [digit_of_label(name) for name in hand.hand.label_names]
+    digit_of = np.array([*labels, ""])[hand.hand.node_labels]  # "" for nodes inside
+    pressure = solved.pressure(model)[model.spans[hand.name]]
+    nodes = {digit: np.flatnonzero(digit_of == digit) for digit in digits}
+    return [_row(model, hand, solved, effort, digit, nodes[digit], pressure) for digit in digits if len(nodes[digit])]
+
+
+def _row(
+    model: ContactModel,
+    hand: FleshBody,
+    solved: SolvedFrame,
+    effort: Effort,
+    digit: str,
+    nodes: NDArray[np.integer],
+    pressure: NDArray[np.float64],
+) -> ContactRow:
+    """Of a digit's nodes (n,), as the hand numbers them, with the pressure at all of the hand's nodes (N,) [Pa]."""
+    span = model.spans[hand.name]
+    imprint = solved.imprint.of((slice(None), span))
+    pushes = solved.nodal[:, span][:, nodes]
+    force = pushes.sum(axis=(0, 1))
+    against = [
+        str(owner.other(hand.name))
+        for owner, push in zip(model.owners, pushes, strict=True)
+        if np.abs(push).max(initial=0.0) > 0.0
+    ]
+    area = float(imprint.area[:, nodes].sum())
+    sliding = 1.0 - float(imprint.held[:, nodes].sum()) / area if area > 0.0 else float("nan")
+    work = None if digit == "palm" else effort[digit]
+    return ContactRow(
+        solved.frame,
+        hand.name,
+        digit,
+        "+".join(dict.fromkeys(against)),
+        float(np.linalg.norm(force)),
+        float(force[0]),
+        float(force[1]),
+        float(force[2]),
+        1e6 * area,
+        1e-3 * float(pressure[nodes].max(initial=0.0)),
+        float(np.linalg.norm(effort.palm)) if work is None else work.force,
+        float("nan") if work is None else work.flesh,
+        float("nan") if work is None else work.limit,
+        float("nan") if work is None else work.share,
+        sliding,
+        _state(sliding),
+    )
+
+
+def write_table(path: Path, rows: Sequence[ContactRow]) -> None:
     """Write rows as CSV or, by the suffix, Parquet."""
-    columns = {name: [getattr(row, name) for row in rows] for name in Row.__dataclass_fields__}
+    columns = {name: [getattr(row, name) for row in rows] for name in ContactRow.__dataclass_fields__}
     if path.suffix.lower() == ".parquet":
         import pyarrow
         import pyarrow.parquet
@@ -127,15 +193,6 @@ def _short(value: object) -> object:
     if not isinstance(value, float):
         return value
     return "" if np.isnan(value) else f"{value:.6g}"
-
-
-def _digit(label: str) -> str:
-    """Digit of a part of the skin: ``left.index.distal`` → ``index``; ``left.palm.index`` → ``palm``."""
-    from warpjld.skeleton import DIGITS
-
-    parts = label.split(".")
-    found = [part for part in parts if part in DIGITS]
-    return found[0] if found and "palm" not in parts else "palm"
 
 
 def _state(sliding: float) -> str:

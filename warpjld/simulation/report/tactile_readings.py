@@ -9,12 +9,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from warpjld.fem.contact.results.nodal_contact import Imprint
+from warpjld.simulation.bodies.flesh_body import FleshBody
+from warpjld.simulation.bodies.model import ContactModel
 from warpjld.simulation.report.tactile import Tactile, tactile_of
-from warpjld.simulation.bodies.model import Bodies
 from warpjld.simulation.solve.solved_frame import SolvedFrame
-from warpjld.simulation.bodies.flesh_body import HandBody
 
-__all__ = ["felt"]
+__all__ = ["tactile_readings"]
 
 
 @dataclass(frozen=True, eq=False)
@@ -33,20 +33,20 @@ class _Instant:
     touches: tuple[_Touch, ...]
 
 
-def felt(bodies: Bodies, hand: HandBody, frames: Sequence[SolvedFrame]) -> Tactile:
+def tactile_readings(model: ContactModel, hand: FleshBody, frames: Sequence[SolvedFrame]) -> Tactile:
     """Force, centre, area and slip of every pad of a hand; times are frame numbers.
 
     Raises:
         InputError: No frame.
     """
-    span = bodies.spans[hand.name]
-    mine = [k for k, owner in enumerate(bodies.owners) if hand.name in (owner.slave, owner.master)]
+    span = model.spans[hand.name]
+    mine = [k for k, owner in enumerate(model.owners) if owner.other(hand.name) is not None]
     instants = [
         _Instant(
             frame.frame,
             frame.displacement[span],
-            tuple(_Touch(bodies.pairs[k].title, frame.nodal[k, span], frame.imprint.of((k, span))) for k in mine),
+            tuple(_Touch(model.pairs[k].title, frame.nodal[k, span], frame.imprint.of((k, span))) for k in mine),
         )
         for frame in frames
     ]
-    return tactile_of(hand.part.hand, instants)
+    return tactile_of(hand.hand, instants)

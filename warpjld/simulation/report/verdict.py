@@ -9,9 +9,9 @@ from typing import Any
 import numpy as np
 
 from warpjld.fem import Status
-from warpjld.simulation.solve.frames import Solved
-from warpjld.simulation.report.visible_overlap import Missed
-from warpjld.simulation.report.table import Row
+from warpjld.simulation.report.table import ContactRow
+from warpjld.simulation.report.visible_overlap import RemainingOverlap
+from warpjld.simulation.solve.frames import SolveResult
 
 __all__ = ["Verdict", "verdict_of"]
 
@@ -52,7 +52,10 @@ class Verdict:
 
 
 def verdict_of(
-    solved: Solved, rows: Sequence[Row], suggestions: Sequence[str], overlaps: Sequence[Missed] = ()
+    solved: SolveResult,
+    rows: Sequence[ContactRow],
+    suggestions: Sequence[str],
+    overlaps: Sequence[RemainingOverlap] = (),
 ) -> Verdict:
     """Judge what was solved.
 
@@ -64,7 +67,7 @@ def verdict_of(
     """
     frames = (solved.frames[0].frame, solved.frames[-1].frame) if solved.frames else None
     lines = []
-    most: dict[tuple[str, str], Row] = {}
+    most: dict[tuple[str, str], ContactRow] = {}
     for row in rows:
         best = most.get((row.actor, row.digit))
         if row.force_n > 1e-9 and (best is None or row.force_n > best.force_n):
@@ -98,8 +101,8 @@ def verdict_of(
     elif touched:
         share = max((row.share for row in rows if not np.isnan(row.share)), default=0.0)
         text = f"realistic: muscles do at most {100 * share:.0f} % of what they can"
-    elif solved.brushes:
-        text = f"nothing touches at any frame, but between them: {solved.brushes[0].text}"
+    elif solved.missed:
+        text = f"nothing touches at any frame, but between them: {solved.missed[0].text}"
     else:
         text = "nothing touches at any frame"
     return Verdict(status, text, tuple(lines), tuple(suggestions), frames)

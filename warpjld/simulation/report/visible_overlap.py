@@ -1,4 +1,4 @@
-"""What surfaces show that no force knows of: overlap that stays, and skin pushed aside that has no flesh."""
+"""What visible surfaces show that no force knows of: overlap that stays, and skin pushed aside that has no flesh."""
 
 from __future__ import annotations
 
@@ -6,20 +6,19 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-from warpjld.simulation.bodies.flesh_body import WORN, HandBody
-from warpjld.simulation.display.overlap import Over, SurfacePart
-from warpjld.simulation.display.surfaces import Pressed
+from warpjld.simulation.bodies.flesh_body import FLESHED
+from warpjld.simulation.display.overlap import Overlap, SurfacePart
+from warpjld.simulation.display.surfaces import DeformedSurfaces
 
-__all__ = ["Missed", "missed", "seen"]
+__all__ = ["RemainingOverlap", "remaining_overlaps", "visible_overlap_notes"]
 
 _SEEN = 2e-4
 """Overlap that is worth a note [m]."""
 
 
 @dataclass(frozen=True)
-class Missed:
+class RemainingOverlap:
     """Two that overlap, at frames that were solved, by more than contact leaves.
 
     Attributes:
@@ -41,30 +40,29 @@ class Missed:
         return f"{self.one.text} and {self.other.text} overlap by {1e3 * self.depth:.1f} mm at {when}"
 
 
-def missed(pressed: Pressed) -> list[Missed]:
+def remaining_overlaps(surfaces: DeformedSurfaces) -> list[RemainingOverlap]:
     """What contact was to keep apart and did not, deepest first: forces there are wrong."""
-    found: dict[tuple[SurfacePart, SurfacePart], Missed] = {}
-    for frame in (solved.frame for solved in pressed.solved.frames):
-        for one, other, over in _known(pressed, frame):
-            if over.depth > pressed.most(one.surface):
+    found: dict[tuple[SurfacePart, SurfacePart], RemainingOverlap] = {}
+    for frame in (solved.frame for solved in surfaces.frames):
+        for one, other, overlap in _known(surfaces, frame):
+            if overlap.depth > surfaces.most(one.surface):
                 two = (other, one) if (other, one) in found else (one, other)
-                was = found.get(two, Missed(*two, 0.0, frame, frame))
-                found[two] = Missed(*two, max(was.depth, over.depth), was.first, frame)
+                was = found.get(two, RemainingOverlap(*two, 0.0, frame, frame))
+                found[two] = RemainingOverlap(*two, max(was.depth, overlap.depth), was.first, frame)
     return sorted(found.values(), key=lambda one: -one.depth)
 
 
-def seen(pressed: Pressed, frame: float) -> list[str]:
+def visible_overlap_notes(surfaces: DeformedSurfaces, frame: float) -> list[str]:
     """Notes on a frame: overlap that its pictures show, and what pushes skin aside that has no flesh to give way."""
-    shown = pressed.shown(frame)
-    cleared = pressed.cleared(frame)
+    carried, separated = surfaces.carried(frame), surfaces.separated(frame)
     out = []
-    for two, depth in cleared.left.items():
+    for (one, other), depth in separated.left.items():
         if depth > _SEEN:
-            text = f"{two[0].text} and {two[1].text} are seen to overlap by {1e3 * depth:.1f} mm at frame {frame:g}"
-            out.append(f"{text}: {_why(pressed, *two)}")
-    for hand in pressed.bodies.hands:
-        bare = hand.part.blend < WORN
-        away = cleared.vertices[hand.name][bare] - shown[hand.name].vertices[bare]
+            text = f"{one.text} and {other.text} are seen to overlap by {1e3 * depth:.1f} mm at frame {frame:g}"
+            out.append(f"{text}: {_why(surfaces, one, other)}")
+    for hand in surfaces.model.hands:
+        bare = hand.shape.blend < FLESHED
+        away = separated.vertices[hand.name][bare] - carried[hand.name].vertices[bare]
         far = np.linalg.norm(away, axis=1)
         deepest = float(far.max(initial=0.0))
         if deepest > _SEEN:
@@ -77,34 +75,29 @@ def seen(pressed: Pressed, frame: float) -> list[str]:
     return out
 
 
-def _known(pressed: Pressed, frame: float) -> Iterator[tuple[SurfacePart, SurfacePart, Over]]:
+def _known(surfaces: DeformedSurfaces, frame: float) -> Iterator[tuple[SurfacePart, SurfacePart, Overlap]]:
     """Overlap that is contact's concern, of parts of hands by their names."""
-    hands = {hand.name: hand for hand in pressed.bodies.hands}
-    for (one, other), over in pressed.cleared(frame).inside.items():
+    hands = {hand.name: hand for hand in surfaces.model.hands}
+    for (one, other), overlap in surfaces.separated(frame).inside.items():
         hand = hands.get(one.surface)
         if hand is None:
-            yield one, other, over
+            yield one, other, overlap
             continue
-        fleshed = over.of(hand.part.blend > WORN)
+        fleshed = overlap.of(hand.fleshed)
         if not one.part:
             for part in hand.parts.name_of(fleshed.vertices):
-                yield SurfacePart(one.surface, part), other, fleshed.of(_mask(hand, part))
-        elif hand.itself and hand.worn(other.part):
+                yield SurfacePart(one.surface, part), other, fleshed.of(hand.parts.mask(part))
+        elif hand.touches_itself and hand.has_flesh(other.part):
             yield one, other, fleshed
 
 
-def _mask(hand: HandBody, part: str) -> NDArray[np.bool_]:
-    return np.asarray(hand.parts.part_of[hand.parts.labels] == hand.parts.names.index(part))
-
-
-def _why(pressed: Pressed, one: SurfacePart, other: SurfacePart) -> str:
+def _why(surfaces: DeformedSurfaces, one: SurfacePart, other: SurfacePart) -> str:
     """What leaves two overlapping, and what to do."""
-    for hand in pressed.bodies.hands:
-        parts = [one.part, other.part]
-        if one.surface == hand.name and all(parts):
-            bare = [part for part in parts if not hand.worn(part)]
+    for hand in surfaces.model.hands:
+        if one.surface == hand.name and one.part and other.part:
+            bare = [part for part in (one.part, other.part) if not hand.has_flesh(part)]
             if bare:
                 return f"FLESH {hand.name} … {' '.join(bare).upper()} makes them press on each other"
-            if not hand.itself:
+            if not hand.touches_itself:
                 return f"FLESH {hand.name} … ITSELF ON makes them press on each other"
     return "smaller elements follow their shapes better"

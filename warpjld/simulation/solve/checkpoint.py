@@ -1,9 +1,10 @@
-"""What a run that was cut off goes on from: all frames solved so far and the contact's memory, in one file."""
+"""Checkpoints: all frames solved so far and the state of contact, in one file, from which a run goes on."""
 
 from __future__ import annotations
 
 import json
 import zipfile
+from collections.abc import Sequence
 from dataclasses import dataclass, fields
 from pathlib import Path
 from typing import Any
@@ -15,14 +16,18 @@ from warpjld.fem import Loads, Status
 from warpjld.fem.contact import ContactInstant, ContactSolution
 from warpjld.fem.contact.law.law import Memory
 from warpjld.fem.contact.results.nodal_contact import Imprint
+from warpjld.simulation.solve.identity import differences
 from warpjld.simulation.solve.solved_frame import SolvedFrame
 from warpjld.whole_file import whole_file
 
-__all__ = ["State", "load_state", "save_state"]
+__all__ = ["Checkpoint", "CheckpointFile", "load_checkpoint", "save_checkpoint"]
+
+_NAMED = 6
+"""Parts that are named of what differs."""
 
 
 @dataclass(frozen=True, eq=False)
-class State:
+class Checkpoint:
     """Frames so far, and the solution to go on from.
 
     Attributes:
@@ -36,7 +41,45 @@ class State:
     solution: ContactSolution
 
 
-def save_state(path: Path, state: State) -> None:
+@dataclass(frozen=True)
+class CheckpointFile:
+    """Where a run keeps its checkpoint.
+
+    Attributes:
+        path: The file.
+        identity: What it is to belong to.
+    """
+
+    path: Path
+    identity: dict[str, str]
+
+    def load(self) -> Checkpoint | None:
+        """What an earlier run left; None where there is none.
+
+        Raises:
+            InputError: It is no checkpoint, or one of something else.
+        """
+        if not self.path.is_file():
+            return None
+        found = load_checkpoint(self.path)
+        if other := differences(found.identity, self.identity):
+            named = ", ".join(other[:_NAMED]) + " and more" * (len(other) > _NAMED)
+            raise InputError(
+                f"this state belongs to another scene: {named} differ; remove it, or name another after STATE",
+                path=self.path,
+            )
+        return found
+
+    def save(self, frames: Sequence[SolvedFrame], solution: ContactSolution) -> None:
+        """Keep what was solved so far.
+
+        Raises:
+            InputError: It cannot be written.
+        """
+        save_checkpoint(self.path, Checkpoint(self.identity, tuple(frames), solution))
+
+
+def save_checkpoint(path: Path, state: Checkpoint) -> None:
     """Write it beside its place and rename it: a cut leaves the one before.
 
     Raises:
@@ -66,7 +109,7 @@ def save_state(path: Path, state: State) -> None:
         raise InputError(f"cannot write: {error.strerror}", path=path) from error
 
 
-def load_state(path: Path) -> State:
+def load_checkpoint(path: Path) -> Checkpoint:
     """Read it.
 
     Raises:
@@ -92,6 +135,5 @@ def load_state(path: Path) -> State:
         raise InputError(f"no state of a contact solve: {error}", path=path) from error
     last = frames[-1]
     instant = ContactInstant(time, last.displacement, last.reactions, (), last.solves, 0, 0.0)
-    return State(
-        identity, tuple(frames), ContactSolution(Status.CONVERGED, (instant,), "", memory, (), Loads(), course)
-    )
+    solution = ContactSolution(Status.CONVERGED, (instant,), "", memory, (), Loads(), course)
+    return Checkpoint(identity, tuple(frames), solution)

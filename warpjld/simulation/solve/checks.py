@@ -5,18 +5,23 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 import numpy as np
-from numpy.typing import NDArray
 
 from warpjld.errors import InputError
-from warpjld.fem import HexMesh
 from warpjld.fem.contact.interface.surface import surface_of
 from warpjld.fem.contact.obstacles.facets import Facets
-from warpjld.simulation.bodies.model import Bodies
-from warpjld.simulation.bodies.flesh_body import HandBody
-from warpjld.simulation.specification import placed
-from warpjld.simulation.specification import ContactWishes
+from warpjld.simulation.animation import Animation
+from warpjld.simulation.bodies.flesh_body import FleshBody
+from warpjld.simulation.bodies.model import ContactModel
+from warpjld.simulation.bodies.surface_offset import outer_surface
+from warpjld.simulation.specification import (
+    BondStrength,
+    ContactSpecification,
+    GripSpecification,
+    SolveSpecification,
+    located,
+)
 
-__all__ = ["refuse_hopeless", "why_not"]
+__all__ = ["check_model", "check_specification", "explain_failure"]
 
 _APART = 0.3
 """Gap, in elements, that a bond still bridges."""
@@ -28,69 +33,128 @@ _ON = 2e-4
 """Gap from which on an object stands on what is below it [m]."""
 
 
-def refuse_hopeless(bodies: Bodies, wishes: ContactWishes) -> None:
+def check_specification(animation: Animation, contact: ContactSpecification, request: SolveSpecification) -> None:
+    """Refuse names that there are none of, and grips and corrections that cannot be, before anything is meshed.
+
+    Raises:
+        InputError: Names the command's line.
+    """
+    for kind, names, known in (
+        ("actor", contact.flesh, animation.actors),
+        ("object", contact.physical, animation.objects),
+    ):
+        if unknown := [name for name in names if name not in known]:
+            raise InputError(f"there is no {kind} {unknown[0]}; there are {', '.join(known) or 'none'}")
+    begun = set()
+    for wish in contact.grips:
+        try:
+            _check_grip(contact, wish, request)
+            if wish.first in begun:
+                raise InputError(f"another grip begins at frame {wish.first:g}")
+        except InputError as error:
+            raise located(error, wish.where) from None
+        begun.add(wish.first)
+    if request.state is not None and (contact.grips or request.correct):
+        raise InputError("STATE keeps no grips and no corrections: leave it out")
+    if request.correct and request.method == "paper":
+        raise InputError("CORRECT goes on from the frame before: the paper's method cannot")
+    recorded = [name for name in contact.flesh if not animation.actors[name].bendable]
+    if request.correct and recorded:
+        raise InputError(f"actor {recorded[0]} is driven by a MOTION file: no angle can be corrected")
+
+
+def _check_grip(contact: ContactSpecification, wish: GripSpecification, request: SolveSpecification) -> None:
+    if wish.actor not in contact.flesh:
+        raise InputError(f"{wish.actor} has no flesh that deforms: FLESH {wish.actor} makes it so")
+    if wish.first <= request.first or wish.last > request.last:
+        span = f"after {request.first} and up to {request.last}"
+        raise InputError(f"its frames must lie in those of PRESS, {span}, got {wish.first:g} to {wish.last:g}")
+    if request.method == "paper":
+        raise InputError("a grip cannot be searched for by the paper's method, which knows no friction")
+    if not wish.lift:
+        return
+    if np.count_nonzero(contact.pull) != 1:
+        x, y, z = contact.pull
+        raise InputError(f"LIFT wants a GRAVITY along one axis of the stage, got {x:g} {y:g} {z:g}")
+    bonded = next((b for b in contact.bonds if wish.object in (b.one, b.other)), None)
+    if bonded is not None:
+        other = bonded.other if bonded.one == wish.object else bonded.one
+        raise InputError(f"LIFT takes the weight of one object, and {wish.object} is bonded to {other}")
+    if any(state.tracks for (name, _), state in contact.prescribed.items() if name == wish.object):
+        raise InputError("LIFT wants an object that nothing but HOLD keeps in its place: no VECTOR and no PARTIAL")
+    if wish.weight is None and not contact.physical[wish.object].density > 0.0:
+        raise InputError(f"{wish.object} weighs nothing: give it a DENSITY, or LIFT it with a WEIGHT")
+
+
+def check_model(model: ContactModel, contact: ContactSpecification) -> None:
     """Refuse bonds between bodies that do not meet, objects inside flesh, lifting what stands on something else, and
     skin that begins deeper in something than contact looks (R112).
 
     Raises:
         InputError: Names the command's line.
     """
-    surfaces = {one.name: _surface(one.volume.mesh, one.volume.name) for one in bodies.objects}
-    for bonded in wishes.bonds:
-        one, other = surfaces[bonded.one], surfaces[bonded.other]
-        gap = float(other.project(one.vertices).distance.min())
-        edge = np.linalg.norm(one.vertices[one.faces[:, 1]] - one.vertices[one.faces[:, 0]], axis=1).mean()
-        if gap > _APART * float(edge):
-            raise placed(
-                InputError(f"a bond to nothing: {bonded.one} and {bonded.other} are {1e3 * gap:.3g} mm apart"),
-                bonded.where,
-            )
-    for wish in wishes.grips:
-        if wish.lift and (below := _below(bodies, surfaces, wish.object)):
-            raise placed(
+    surfaces = {one.name: outer_surface(one.mesh, one.faces) for one in model.objects}
+    for bonded in contact.bonds:
+        _refuse_apart(surfaces, bonded)
+    for wish in contact.grips:
+        if wish.lift and (below := _below(model, surfaces, wish.object)):
+            raise located(
                 InputError(
                     f"LIFT {wish.object}: it stands on {below}, which bears it however the hand grips: "
                     f"move {below} away, or {wish.object} higher; LIFT has a support of its own"
                 ),
                 wish.where,
             )
-    for hand in bodies.hands:
-        flesh = Facets(hand.part.skin, hand.part.hand.surface.faces)
-        shapes = {one.name: one.volume.surface for one in bodies.objects}
-        shapes |= {name: obstacle.mesh(0.0)[0] for name, obstacle in bodies.obstacles.items()}
+    for hand in model.hands:
+        flesh = Facets(hand.surface, hand.triangles)
+        shapes = {one.name: one.surface for one in model.objects}
+        shapes |= {name: obstacle.mesh(0.0)[0] for name, obstacle in model.obstacles.items()}
         for name, vertices in shapes.items():
             if (flesh.project(np.asarray(vertices)).distance < 0.0).all():
                 raise InputError(f"{name} lies inside {hand.name}: nothing can press it out; move it out of the flesh")
-        _refuse_deep(bodies, hand, surfaces)
+        _refuse_deep(model, hand, surfaces)
 
 
-def _refuse_deep(bodies: Bodies, hand: HandBody, surfaces: Mapping[str, Facets]) -> None:
+def _refuse_apart(surfaces: Mapping[str, Facets], bonded: BondStrength) -> None:
+    """Refuse a bond between objects that do not meet.
+
+    Raises:
+        InputError: Names the command's line.
+    """
+    one, other = surfaces[bonded.one], surfaces[bonded.other]
+    gap = float(other.project(one.vertices).distance.min())
+    edge = np.linalg.norm(one.vertices[one.faces[:, 1]] - one.vertices[one.faces[:, 0]], axis=1).mean()
+    if gap > _APART * float(edge):
+        text = f"a bond to nothing: {bonded.one} and {bonded.other} are {1e3 * gap:.3g} mm apart"
+        raise located(InputError(text), bonded.where)
+
+
+def _refuse_deep(model: ContactModel, hand: FleshBody, surfaces: Mapping[str, Facets]) -> None:
     """Refuse skin that begins deeper in an object than overlap is parted from.
 
     Raises:
         InputError: Names the digits and what they are in.
     """
-    flesh = hand.part.hand
-    skin = surface_of(flesh.mesh, flesh.name, hand.name)
-    x, most = flesh.mesh.nodes[skin.nodes], skin.reach
+    skin = surface_of(hand.mesh, hand.faces, hand.name)
+    x, most = hand.mesh.nodes[skin.nodes], skin.reach
     depths = {name: -surface.project(x).distance for name, surface in surfaces.items()}
-    depths |= {name: -obstacle.project(x, 0.0).distance for name, obstacle in bodies.obstacles.items()}
+    depths |= {name: -obstacle.project(x, 0.0).distance for name, obstacle in model.obstacles.items()}
     for name, depth in depths.items():
         if depth.max() > most:
-            part = hand.parts.part_of[flesh.node_labels[skin.nodes[depth > most]]]
+            part = hand.parts.part_of[hand.hand.node_labels[skin.nodes[depth > most]]]
             digits = " and ".join(hand.parts.names[k] for k in np.unique(part))
-            where = f"{1e3 * depth.max():.2g} mm inside {name} at frame {bodies.start:g}, where contact begins"
+            where = f"{1e3 * depth.max():.2g} mm inside {name} at frame {model.start:g}, where contact begins"
             raise InputError(
                 f"{hand.name} {digits}: {where}; with these elements it parts {1e3 * most:.2g} mm at most: begin "
                 "farther out, or take a larger ELEMENT"
             )
 
 
-def _below(bodies: Bodies, surfaces: dict[str, Facets], name: str) -> str:
+def _below(model: ContactModel, surfaces: dict[str, Facets], name: str) -> str:
     """What an object stands on at time 0, or nothing."""
-    up = -np.array(bodies.loads.gravity) / np.linalg.norm(bodies.loads.gravity)
+    up = -np.array(model.loads.gravity) / np.linalg.norm(model.loads.gravity)
     points = surfaces[name].vertices
-    found = {other: obstacle.project(points, 0.0) for other, obstacle in bodies.obstacles.items()}
+    found = {other: obstacle.project(points, 0.0) for other, obstacle in model.obstacles.items()}
     found |= {other: surface.project(points) for other, surface in surfaces.items() if other != name}
     for other, touching in found.items():
         if ((touching.distance < _ON) & (touching.normal @ up > 0.5)).any():
@@ -98,14 +162,14 @@ def _below(bodies: Bodies, surfaces: dict[str, Facets], name: str) -> str:
     return ""
 
 
-def why_not(bodies: Bodies, time: float) -> str:
+def explain_failure(model: ContactModel, time: float) -> str:
     """What keeps bodies from equilibrium at a time, as far as it shows: bones inside rigid objects; or nothing."""
     worst, found = 0.0, ""
-    for hand in bodies.hands:
+    for hand in model.hands:
         known = hand.prescribed(time)
         nodes = known.degrees[::3] // 3
-        x = hand.part.hand.mesh.nodes[nodes] + known.values.reshape(-1, 3)
-        for name, obstacle in bodies.obstacles.items():
+        x = hand.mesh.nodes[nodes] + known.values.reshape(-1, 3)
+        for name, obstacle in model.obstacles.items():
             depth = -float(obstacle.project(x, time).distance.min())
             if depth > max(worst, _DEEP):
                 worst, found = (
@@ -113,11 +177,3 @@ def why_not(bodies: Bodies, time: float) -> str:
                     f"bones of {hand.name} are {1e3 * depth:.2g} mm inside {name}, which cannot give way",
                 )
     return found
-
-
-def _surface(mesh: HexMesh, name: str) -> Facets:
-    quads = mesh.quads(mesh.face_set(name))
-    used, corners = np.unique(quads, return_inverse=True)
-    corners = corners.reshape(-1, 4)
-    triangles: NDArray[np.int32] = np.concatenate([corners[:, [0, 1, 2]], corners[:, [0, 2, 3]]]).astype(np.int32)
-    return Facets(mesh.nodes[used], triangles)

@@ -1,177 +1,217 @@
-"""Frames solved one after another, each kept as soon as it is done (R99, R110, R118)."""
+"""Frames solved one after another, each kept as soon as it is done (R99, R110, R118, R120, R123)."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
-from pathlib import Path
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from warpjld.errors import InputError
 from warpjld.fem import Instant, Solution, Status, solve
-from warpjld.fem.contact import ContactInstant, ContactSolution, press
-from warpjld.simulation.bodies.model import Bodies
-from warpjld.simulation.solve.missed_contacts import Brush, brushes_between
-from warpjld.simulation.solve.checks import why_not
-from warpjld.simulation.solve.branch import TOLERANCE
+from warpjld.fem.contact import ContactInstant, ContactSolution
+from warpjld.simulation.animation import AngleEdit
+from warpjld.simulation.bodies.deformable_body import History
+from warpjld.simulation.bodies.model import ContactModel
+from warpjld.simulation.grip.correct_frames import CorrectedFrame, correct_frame
+from warpjld.simulation.grip.find import FoundGrip, find_grip
+from warpjld.simulation.solve.branch import solve_onward
+from warpjld.simulation.solve.checkpoint import Checkpoint, CheckpointFile
+from warpjld.simulation.solve.checks import explain_failure
+from warpjld.simulation.solve.missed_contacts import MissedContact, missed_contacts
 from warpjld.simulation.solve.solved_frame import SolvedFrame, solved_frame
-from warpjld.simulation.solve.identity import differences
-from warpjld.simulation.solve.substeps import Passing
-from warpjld.simulation.solve.checkpoint import State, load_state, save_state
+from warpjld.simulation.solve.substeps import Substeps
+from warpjld.simulation.specification import ContactSpecification, GripSpecification, SolveSpecification
 
-__all__ = ["Solved", "solve_frames"]
+__all__ = ["Progress", "SolveResult", "solve_frames"]
 
-_NAMED = 6
-"""Parts that are named of what differs."""
+Progress = Callable[[str, int, int], None]
+"""Told what is being done, how much of it is done, and how much there is."""
+
+Watch = Callable[[ContactModel, SolvedFrame], str | None]
 
 
 @dataclass(frozen=True, eq=False)
-class Solved:
+class SolveResult:
     """Frames that were solved, and how it ended.
 
     Attributes:
         status: Of the last load step.
         message: For people.
-        start: Frame of time 0.
+        model: What was solved, with all edits.
         frames: In order.
         resumed: How many of them an earlier run left.
-        brushes: Touches between frames that no frame shows.
+        missed: Touches between frames that no frame shows.
+        edits: Angles that searches and corrections gave, in order.
+        grips: What came of searches for a grip.
+        corrections: What came of corrections.
     """
 
     status: Status
     message: str
-    start: float
-    frames: tuple[SolvedFrame, ...]
+    model: ContactModel
+    frames: tuple[SolvedFrame, ...] = ()
     resumed: int = 0
-    brushes: tuple[Brush, ...] = ()
+    missed: tuple[MissedContact, ...] = ()
+    edits: tuple[AngleEdit, ...] = ()
+    grips: tuple[FoundGrip, ...] = ()
+    corrections: tuple[CorrectedFrame, ...] = ()
+
+    @property
+    def start(self) -> float:
+        """Frame of time 0."""
+        return self.model.start
 
 
 def solve_frames(
-    bodies: Bodies,
-    start: float,
+    model: ContactModel,
     frames: Sequence[float],
+    contact: ContactSpecification,
+    request: SolveSpecification,
     *,
-    method: str = "augmented",
-    aitken: bool = False,
-    watch: Callable[[SolvedFrame], str | None] | None = None,
-    mend: Callable[[ContactSolution, ContactSolution], ContactSolution] | None = None,
-    pauses: Mapping[float, Callable[[ContactSolution], None]] | None = None,
-    state: Path | None = None,
-    identity: Mapping[str, str] | None = None,
-    progress: Callable[[str, int, int], None] = lambda what, done, total: None,
-) -> Solved:
+    watch: Watch = lambda model, solved: None,
+    checkpoint: CheckpointFile | None = None,
+    progress: Progress = lambda what, done, total: None,
+) -> SolveResult:
     """Solve contact at frames.
 
     Args:
-        bodies: What may touch, at rest at ``start``.
-        start: Frame of time 0, before anything touches or where overlaps begin to be parted (R112).
-        frames: Rising, after ``start``.
-        method: The solver's; ``aitken`` relaxes the paper's loop.
-        watch: Asked after each frame; a text stops the run there (R118).
-        mend: Given the equilibrium before and that of a frame; answers with the one to go on from (R120).
-        pauses: Called with the equilibrium of a frame before it is gone on from: they may change what comes.
-        state: File that holds what was solved so far; an earlier run's is gone on from.
-        identity: What the state belongs to.
-        progress: Told what is being done, how much of it is done, and how much there is.
+        model: What may touch, at rest at its start: before anything touches, or where overlaps begin to part (R112).
+        frames: Rising, after that start.
+        contact: What is asked of contact: grips to find, and how strong muscles are.
+        request: How to solve.
+        watch: Told the model and each frame as it is solved; a text stops the run there (R118).
+        checkpoint: Holds what was solved so far; an earlier run's is gone on from.
+        progress: Told about the work.
 
     Raises:
         InputError: A state that belongs to something else.
     """
+    run = _Run(model, contact, request)
+    if checkpoint is not None and (found := checkpoint.load()) is not None:
+        run.resume(found)
+        for solved in found.frames:
+            if reason := watch(run.model, solved):
+                return run.ended(Status.STOPPED, reason)
+    if not model.pairs:
+        return _untouched(model, frames, watch, progress)
+    for frame in frames[len(run.done) :]:
+        progress(f"contact, frame {frame:g}", len(run.done), len(frames))
+        failure = run.solve(frame)
+        if failure is not None:
+            return failure
+        if checkpoint is not None and run.last is not None:
+            checkpoint.save(run.done, run.last)
+        if reason := watch(run.model, run.done[-1]):
+            return run.ended(Status.STOPPED, reason)
+        for wish in contact.grips:
+            if wish.first == frame:
+                progress(f"looking for a grip, frame {frame:g}", len(run.done), len(frames))
+                run.grip(wish)
+    return run.ended(Status.CONVERGED, Status.CONVERGED.value)
 
-    def ended(status: Status, message: str) -> Solved:
-        return Solved(status, message, start, tuple(done), resumed, tuple(brushes))
 
-    done: list[SolvedFrame] = []
-    resumed = 0
-    after: ContactSolution | None = None
-    passing = Passing(bodies)
-    brushes: list[Brush] = []
-    mine = dict(identity or {})
-    if state is not None and state.is_file():
-        found = load_state(state)
-        if other := differences(found.identity, mine):
-            raise InputError(
-                f"this state belongs to another scene: {', '.join(other[:_NAMED])}{' and more' * (len(other) > _NAMED)} "
-                "differ; remove it, or name another after STATE",
-                path=state,
-            )
-        done, after = list(found.frames), found.solution
-        for one in done:
-            bodies.note(one.frame - start, one.displacement, one.reactions, one.nodal)
-    resumed = len(done)
-    for solved in done:
-        reason = watch(solved) if watch else None
-        if reason:
-            return ended(Status.STOPPED, reason)
-    if not bodies.pairs:
-        return _alone(bodies, start, frames, watch, progress)
-    for frame in frames[len(done) :]:
-        progress(f"contact, frame {frame:g}", len(done), len(frames))
-        before = 0.0 if after is None else after.last.time
-        now = np.zeros_like(bodies.body.mesh.nodes) if after is None else after.last.displacement
-        steps = passing.times(before, frame - start, now)
-        solution = press(
-            bodies.body,
-            bodies.prescribed,
-            bodies.pairs,
-            bodies.loads_at,
-            times=steps,
-            after=after,
-            method=method,
-            aitken=aitken,
-            tolerance=TOLERANCE,
-            guess=bodies.guess,
-            check=False,
+@dataclass(eq=False)
+class _Run:
+    """What is known so far of frames that are being solved."""
+
+    model: ContactModel
+    contact: ContactSpecification
+    request: SolveSpecification
+    history: History = field(default_factory=History)
+    last: ContactSolution | None = None
+    done: list[SolvedFrame] = field(default_factory=list)
+    resumed: int = 0
+    missed: list[MissedContact] = field(default_factory=list)
+    edits: list[AngleEdit] = field(default_factory=list)
+    grips: list[FoundGrip] = field(default_factory=list)
+    corrections: list[CorrectedFrame] = field(default_factory=list)
+
+    def __post_init__(self) -> None:
+        self.substeps = Substeps(self.model)
+
+    def resume(self, found: Checkpoint) -> None:
+        """Go on from what another run left."""
+        self.done, self.last, self.resumed = list(found.frames), found.solution, len(found.frames)
+        for solved in self.done:
+            self._note(solved)
+
+    def solve(self, frame: float) -> SolveResult | None:
+        """Add a frame; what ended all where it cannot be solved."""
+        model, time, before = self.model, frame - self.model.start, self.last
+        now = np.zeros_like(model.body.mesh.nodes) if before is None else before.last.displacement
+        steps = self.substeps.times(model, 0.0 if before is None else before.last.time, time, now)
+        solution = solve_onward(
+            model, self.history, before, steps, method=self.request.method, aitken=self.request.aitken
         )
         if not solution.converged:
-            ahead = [why_not(bodies, time) for time in steps if time > solution.last.time]
+            ahead = [explain_failure(model, step) for step in steps if step > solution.last.time]
             reason = next(filter(None, ahead), solution.message)
-            return ended(solution.status, f"at frame {frame:g}: {reason}")
-        if mend is not None and after is not None:
-            solution = mend(after, solution)
-        brushes += brushes_between(bodies, None if after is None else after.last, solution.instants, start)
-        after = solution
-        solved = solved_frame(float(frame), solution.instants)
-        bodies.note(frame - start, solved.displacement, solved.reactions, solved.nodal)
-        done.append(solved)
-        if state is not None:
-            save_state(state, State(mine, tuple(done), solution))
-        reason = watch(solved) if watch else None
-        if reason:
-            return ended(Status.STOPPED, reason)
-        if pauses and frame in pauses:
-            progress(f"looking for a grip, frame {frame:g}", len(done), len(frames))
-            pauses[frame](solution)
-    return ended(Status.CONVERGED, Status.CONVERGED.value)
+            return self.ended(solution.status, f"at frame {frame:g}: {reason}")
+        if self.request.correct and before is not None:
+            corrected = correct_frame(model, self.history, before, solution, self.contact.strength)
+            self.corrections.append(corrected)
+            solution = corrected.solution
+            self._edit(corrected.edits)
+        self.missed += missed_contacts(model, None if before is None else before.last, solution.instants)
+        self.last = solution
+        self.done.append(solved_frame(float(frame), solution.instants))
+        self._note(self.done[-1])
+        return None
+
+    def grip(self, wish: GripSpecification) -> None:
+        """Look for a grip, and go on with it."""
+        assert self.last is not None
+        limits = self.contact.strength.get(wish.actor, {})
+        found = find_grip(self.model, self.history, wish, self.last, limits)
+        self.grips.append(found)
+        self._edit(found.edits)
+        if found.release is not None:
+            objects = [found.release.applied(one) for one in self.model.objects]
+            self.model = replace(self.model, objects=tuple(objects))
+
+    def ended(self, status: Status, message: str) -> SolveResult:
+        """All of it."""
+        return SolveResult(
+            status,
+            message,
+            self.model,
+            tuple(self.done),
+            self.resumed,
+            tuple(self.missed),
+            tuple(self.edits),
+            tuple(self.grips),
+            tuple(self.corrections),
+        )
+
+    def _edit(self, edits: Sequence[AngleEdit]) -> None:
+        self.edits += edits
+        self.model = self.model.edited(edits)
+
+    def _note(self, solved: SolvedFrame) -> None:
+        time = solved.frame - self.model.start
+        self.history = self.model.after(self.history, time, solved.displacement, solved.reactions, solved.nodal)
 
 
-def _alone(
-    bodies: Bodies,
-    start: float,
-    frames: Sequence[float],
-    watch: Callable[[SolvedFrame], str | None] | None,
-    progress: Callable[[str, int, int], None],
-) -> Solved:
+def _untouched(model: ContactModel, frames: Sequence[float], watch: Watch, progress: Progress) -> SolveResult:
     """Frames of bodies with nothing to touch."""
     done: list[SolvedFrame] = []
-    nothing = np.zeros_like(bodies.body.mesh.nodes)
+    nothing, history = np.zeros_like(model.body.mesh.nodes), History()
     rest = Instant(1.0, nothing, nothing, 0, 0, 0.0)
-    after, before = Solution(Status.CONVERGED, (rest,), "", np.empty(0, np.int64), bodies.loads), 0.0
+    after, before = Solution(Status.CONVERGED, (rest,), "", np.empty(0, np.int64), model.loads), 0.0
     for frame in frames:
         progress(f"frame {frame:g}", len(done), len(frames))
-        known = bodies.prescribed(frame - start)
-        ahead = bodies.guess(before, frame - start, after.displacement)
-        first = replace(after, instants=(replace(after.last, displacement=ahead),), loads=bodies.loads)
-        solution = solve(bodies.body, known, bodies.loads, after=first, free="hold", check=False)
+        time = frame - model.start
+        known = model.prescribed(time, history)
+        ahead = model.guess(before, time, after.displacement, history)
+        first = replace(after, instants=(replace(after.last, displacement=ahead),), loads=model.loads)
+        solution = solve(model.body, known, model.loads, after=first, free="hold", check=False)
         if not solution.converged:
-            return Solved(solution.status, f"at frame {frame:g}: {solution.message}", start, tuple(done))
-        after, last, before = solution, solution.last, frame - start
+            return SolveResult(solution.status, f"at frame {frame:g}: {solution.message}", model, tuple(done))
+        after, last, before = solution, solution.last, time
         instant = ContactInstant(
-            frame - start, last.displacement, last.reactions, (), last.newton, last.iterations, last.residual
+            time, last.displacement, last.reactions, (), last.newton, last.iterations, last.residual
         )
         done.append(solved_frame(float(frame), [instant]))
-        reason = watch(done[-1]) if watch else None
-        if reason:
-            return Solved(Status.STOPPED, reason, start, tuple(done))
-    return Solved(Status.CONVERGED, Status.CONVERGED.value, start, tuple(done))
+        if reason := watch(model, done[-1]):
+            return SolveResult(Status.STOPPED, reason, model, tuple(done))
+    return SolveResult(Status.CONVERGED, Status.CONVERGED.value, model, tuple(done))

@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from warpjld.grasp.quality import Contacts, contact_wrenches
 
-__all__ = ["pinched"]
+__all__ = ["friction_closure"]
 
 _BALANCED = 1e-3
 """Force and moment left over, over the forces that press."""
@@ -15,7 +15,7 @@ _MOST = 200
 """Points looked at: the deepest."""
 
 
-def pinched(
+def friction_closure(
     points: NDArray[np.float64], inward: NDArray[np.float64], depth: NDArray[np.float64], friction: float
 ) -> bool:
     """Whether pushes at points, each inside its friction cone, can balance each other.

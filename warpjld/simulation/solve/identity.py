@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import hashlib
 import json
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import fields
 from typing import Any
 
@@ -16,8 +16,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 import warpjld
-from warpjld.simulation.bodies.model import Bodies
-from warpjld.simulation.specification import ContactWishes
+from warpjld.fem import Prescribed
+from warpjld.simulation.bodies.deformable_body import History
+from warpjld.simulation.bodies.model import ContactModel
+from warpjld.simulation.specification import ContactSpecification
 
 __all__ = ["differences", "identity_of"]
 
@@ -27,30 +29,30 @@ _SILENT = ("where", "state")
 """Fields that decide no result."""
 
 
-def identity_of(bodies: Bodies, wishes: ContactWishes, frames: Sequence[float]) -> dict[str, str]:
+def identity_of(model: ContactModel, contact: ContactSpecification, frames: Sequence[float]) -> dict[str, str]:
     """Hashes by name of what they are of.
 
     Args:
-        bodies: All that may touch, at rest at its first moment.
-        wishes: What was asked for.
+        model: All that may touch, at rest at its first moment.
+        contact: What was asked for.
         frames: Those that are solved; prescribed motion is sampled at them and half-way between.
     """
-    ends = np.array([bodies.start, *frames]) - bodies.start
+    ends = np.array([model.start, *frames]) - model.start
     times = np.sort(np.concatenate([ends, 0.5 * (ends[:-1] + ends[1:])])).tolist()
-    parts: dict[str, Any] = {"version": warpjld.__version__, "frames": [bodies.start, *map(float, frames)]}
-    parts |= dict(_asked(wishes))
-    for pair, owner in zip(bodies.pairs, bodies.owners, strict=True):
+    parts: dict[str, Any] = {"version": warpjld.__version__, "frames": [model.start, *map(float, frames)]}
+    parts |= dict(_asked(contact))
+    for pair, owner in zip(model.pairs, model.owners, strict=True):
         two = " ".join(sorted((owner.slave, owner.master)))
         parts[f"FRICTION {two}"] = pair.friction
         parts[f"BOND {two}"] = None if pair.bond is None else [pair.bond.normal, pair.bond.shear]
     out = {name: hashlib.sha256(json.dumps(value).encode()).hexdigest() for name, value in parts.items()}
-    mesh = bodies.body.mesh
-    for one in (*bodies.hands, *bodies.objects):
-        rows = bodies.spans[one.name]
+    mesh = model.body.mesh
+    for one in model.bodies:
+        rows = model.spans[one.name]
         elements = mesh.elements[(mesh.elements[:, 0] >= rows.start) & (mesh.elements[:, 0] < rows.stop)]
         out[f"shape of {one.name}"] = _hash([elements, mesh.nodes[rows]])
-        out[f"path of {one.name}"] = _hash(_sampled(one.prescribed, times))
-    for name, obstacle in bodies.obstacles.items():
+        out[f"path of {one.name}"] = _hash(_sampled([one.prescribed(time, History()) for time in times]))
+    for name, obstacle in model.obstacles.items():
         out[f"shape of {name}"] = _hash([obstacle.mesh(0.0)[1]])
         out[f"path of {name}"] = _hash([np.asarray(obstacle.mesh(time)[0]) for time in times])
     return out
@@ -61,23 +63,23 @@ def differences(one: Mapping[str, str], other: Mapping[str, str]) -> list[str]:
     return [name for name in {**one, **other} if one.get(name) != other.get(name)]
 
 
-def _asked(wishes: ContactWishes) -> Iterator[tuple[str, Any]]:
+def _asked(contact: ContactSpecification) -> Iterator[tuple[str, Any]]:
     """Settings by command and name."""
-    records: dict[str, Any] = {f"PHYSICAL {name}": one for name, one in wishes.physical.items()}
-    records |= {f"FLESH {name}": one for name, one in wishes.flesh.items()}
-    records |= {} if wishes.pressing is None else {"PRESS": wishes.pressing}
+    records: dict[str, Any] = {f"PHYSICAL {name}": one for name, one in contact.physical.items()}
+    records |= {f"FLESH {name}": one for name, one in contact.flesh.items()}
+    records |= {} if contact.pressing is None else {"PRESS": contact.pressing}
     for command, record in records.items():
         for one in fields(record):
             if one.name not in _SILENT:
                 yield f"{command}: {one.name}", getattr(record, one.name)
-    yield "GRAVITY", wishes.pull
-    yield "STRENGTH", wishes.strength
+    yield "GRAVITY", contact.pull
+    yield "STRENGTH", contact.strength
 
 
-def _sampled(prescribed: Callable[[float], Any], times: Sequence[float]) -> Iterator[NDArray[Any]]:
-    for known in map(prescribed, times):
-        yield known.degrees
-        yield known.values
+def _sampled(known: Sequence[Prescribed]) -> Iterator[NDArray[Any]]:
+    for one in known:
+        yield one.degrees
+        yield one.values
 
 
 def _hash(arrays: Any) -> str:

@@ -8,16 +8,16 @@ from dataclasses import dataclass
 import numpy as np
 
 from warpjld.fem.contact import ContactInstant
-from warpjld.simulation.bodies.model import Bodies
+from warpjld.simulation.bodies.model import ContactModel
 
-__all__ = ["Brush", "brushes_between"]
+__all__ = ["MissedContact", "missed_contacts"]
 
 _LEAST = 1e-6
 """Force that counts as a touch [N]."""
 
 
 @dataclass(frozen=True)
-class Brush:
+class MissedContact:
     """One digit and what it brushes.
 
     Attributes:
@@ -44,41 +44,41 @@ class Brush:
         )
 
 
-def brushes_between(
-    bodies: Bodies, before: ContactInstant | None, instants: Sequence[ContactInstant], start: float
-) -> list[Brush]:
+def missed_contacts(
+    model: ContactModel, before: ContactInstant | None, instants: Sequence[ContactInstant]
+) -> list[MissedContact]:
     """What touches between two frames and at neither.
 
     Args:
-        bodies: Everything.
+        model: Everything.
         before: At the frame before; None where nothing was solved yet.
         instants: After it; the last of them at the frame itself.
-        start: Frame of time 0.
     """
-    known = set() if before is None else set(_touching(bodies, before))
-    known |= set(_touching(bodies, instants[-1]))
+    known = set() if before is None else set(_touching(model, before))
+    known |= set(_touching(model, instants[-1]))
     most: dict[tuple[str, str, str], float] = {}
     for instant in instants[:-1]:
-        for place, force in _touching(bodies, instant).items():
+        for place, force in _touching(model, instant).items():
             if place not in known:
                 most[place] = max(force, most.get(place, 0.0))
-    since = start if before is None else start + before.time
-    return [Brush(*place, since, start + instants[-1].time, force) for place, force in most.items()]
+    since = model.start if before is None else model.start + before.time
+    until = model.start + instants[-1].time
+    return [MissedContact(*place, since, until, force) for place, force in most.items()]
 
 
-def _touching(bodies: Bodies, instant: ContactInstant) -> dict[tuple[str, str, str], float]:
+def _touching(model: ContactModel, instant: ContactInstant) -> dict[tuple[str, str, str], float]:
     """Force [N] by actor, digit, and what it touches."""
     out: dict[tuple[str, str, str], float] = {}
-    for owner, touch in zip(bodies.owners, instant.touches, strict=False):
-        for hand in bodies.hands:
-            if hand.name not in (owner.slave, owner.master) or not touch.imprint.force.any():
+    for owner, touch in zip(model.owners, instant.touches, strict=False):
+        for hand in model.hands:
+            other = owner.other(hand.name)
+            if other is None or not touch.imprint.force.any():
                 continue
-            force = touch.imprint.force[bodies.spans[hand.name]]
-            label = hand.part.hand.node_labels
+            force = touch.imprint.force[model.spans[hand.name]]
+            label = hand.hand.node_labels
             skin = np.flatnonzero((label >= 0) & (force > 0.0))
             digit = hand.parts.part_of[label[skin]]
             total = np.bincount(digit, force[skin], len(hand.parts.names))
-            other = owner.master if owner.slave == hand.name else owner.slave
             for number in np.flatnonzero(total > _LEAST):
                 place = (hand.name, hand.parts.names[number], other)
                 out[place] = out.get(place, 0.0) + float(total[number])

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from warpjld.fem.contact import ContactInstant
 from warpjld.fem.contact.results.nodal_contact import Imprint, skin_around, stacked
-from warpjld.simulation.bodies.model import Bodies
+from warpjld.simulation.bodies.model import ContactModel
 
 __all__ = ["SolvedFrame", "solved_frame"]
 
@@ -37,13 +37,13 @@ class SolvedFrame:
     solves: int
     penetration: float
 
-    def pressure(self, bodies: Bodies) -> NDArray[np.float64]:
+    def pressure(self, model: ContactModel) -> NDArray[np.float64]:
         """Contact pressure at the nodes: what presses on one over the area around it [Pa], shape (N,)."""
-        mesh = bodies.body.mesh
+        mesh = model.body.mesh
         x = mesh.nodes + self.displacement
         area = np.zeros(len(x))
-        for name in bodies.surfaces.values():
-            area += skin_around(mesh, name, x)
+        for one in model.bodies:
+            area += skin_around(mesh, one.faces, x)
         force = self.imprint.force.sum(axis=0)
         return np.divide(force, area, out=np.zeros(len(x)), where=area > 0.0)
 

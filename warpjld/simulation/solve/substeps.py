@@ -14,11 +14,10 @@ from numpy.typing import NDArray
 
 from warpjld.fem.contact import Obstacle
 from warpjld.fem.contact.interface.surface import surface_of
-from warpjld.simulation.bodies.model import Bodies
-from warpjld.simulation.bodies.flesh_body import HandBody
-from warpjld.simulation.bodies.object_body import ObjectBody
+from warpjld.simulation.bodies.flesh_body import FleshBody
+from warpjld.simulation.bodies.model import ContactModel
 
-__all__ = ["Passing", "half_thickness", "way_past"]
+__all__ = ["Substeps", "distance_past", "half_thickness"]
 
 _LOOKS = 4
 """Moments of a step at which its way is looked at."""
@@ -47,7 +46,7 @@ def half_thickness(obstacle: Obstacle, time: float = 0.0) -> float:
     return float(np.percentile(deepest, _THIN))
 
 
-def way_past(obstacle: Obstacle, times: list[float], path: list[NDArray[np.float64]]) -> float:
+def distance_past(obstacle: Obstacle, times: list[float], path: list[NDArray[np.float64]]) -> float:
     """Longest way [m] of points (n, 3), at rising times, past an obstacle that they may touch on it."""
     way = np.zeros(len(path[0]))
     for before, time, x, there in zip(times[:-1], times[1:], path[:-1], path[1:], strict=True):
@@ -56,82 +55,67 @@ def way_past(obstacle: Obstacle, times: list[float], path: list[NDArray[np.float
     return float(way[near].max(initial=0.0))
 
 
-class Passing:
+class Substeps:
     """Cuts steps of bodies so that nothing is stepped over.
 
     Args:
-        bodies: Everything.
+        model: Everything, however it is driven.
     """
 
-    def __init__(self, bodies: Bodies) -> None:
-        self._bodies = bodies
-        mesh = bodies.body.mesh
-        self._surfaces = {name: surface_of(mesh, faces, name) for name, faces in bodies.surfaces.items()}
+    def __init__(self, model: ContactModel) -> None:
+        mesh = model.body.mesh
+        self._surfaces = {one.name: surface_of(mesh, one.faces, one.name) for one in model.bodies}
+        self._obstacles = model.obstacles
 
     @cached_property
     def _thickness(self) -> Mapping[str, float]:
-        return {name: half_thickness(obstacle) for name, obstacle in self._bodies.obstacles.items()}
+        """Of the obstacles, whatever moves them."""
+        return {name: half_thickness(obstacle) for name, obstacle in self._obstacles.items()}
 
-    def times(self, before: float, time: float, displacement: NDArray[np.float64]) -> list[float]:
+    def times(self, model: ContactModel, before: float, time: float, displacement: NDArray[np.float64]) -> list[float]:
         """Rising times, the last of them ``time``, for a step that begins ``before`` at a displacement (N, 3) [m]."""
-        count = min(_MOST, max(1, int(np.ceil(self.over(before, time, displacement) - 1e-9))))
+        count = min(_MOST, max(1, int(np.ceil(self.over(model, before, time, displacement) - 1e-9))))
         return [before + (time - before) * (k + 1) / count for k in range(count - 1)] + [time]
 
-    def over(self, before: float, time: float, displacement: NDArray[np.float64]) -> float:
+    def over(self, model: ContactModel, before: float, time: float, displacement: NDArray[np.float64]) -> float:
         """The farthest way of anything past anything, over what contact can follow in one step."""
-        bodies = self._bodies
         times = [before + (time - before) * k / _LOOKS for k in range(_LOOKS + 1)]
-        movers: list[HandBody | ObjectBody] = [*bodies.hands, *bodies.objects]
-        paths = {one.name: self._path(one, times, displacement) for one in movers}
+        paths = {}
+        for one in model.bodies:
+            span = model.spans[one.name]
+            paths[one.name] = one.way(times, displacement[span], self._surfaces[one.name].nodes - span.start)
         worst = 0.0
         for name, path in paths.items():
             reach = self._surfaces[name].reach
-            for solid, obstacle in bodies.obstacles.items():
-                worst = max(worst, way_past(obstacle, times, path) / min(reach, self._thickness[solid]))
-        for hand in bodies.hands:
-            reach = self._surfaces[hand.name].reach
-            for other in movers:
-                if other is hand:
-                    way = self._past_itself(hand, paths[hand.name]) if hand.itself else 0.0
-                else:
-                    way = _past(paths[hand.name], paths[other.name], reach)
-                worst = max(worst, way / reach)
+            for solid, obstacle in model.obstacles.items():
+                worst = max(worst, distance_past(obstacle, times, path) / min(reach, self._thickness[solid]))
+        for hand in model.hands:
+            reach, path = self._surfaces[hand.name].reach, paths[hand.name]
+            ways = [_past(path, other, reach) for name, other in paths.items() if name != hand.name]
+            if hand.touches_itself:
+                own = self._surfaces[hand.name].nodes - model.spans[hand.name].start
+                ways.append(_past_itself(hand, path, own))
+            worst = max([worst, *(way / reach for way in ways)])
         return worst
 
-    def _path(
-        self, one: HandBody | ObjectBody, times: list[float], displacement: NDArray[np.float64]
-    ) -> list[NDArray[np.float64]]:
-        """Where the nodes of a surface are, and are expected to be [m]."""
-        span = self._bodies.spans[one.name]
-        nodes = self._surfaces[one.name].nodes - span.start
-        own = displacement[span]
-        if isinstance(one, HandBody):
-            rest = one.part.hand.mesh.nodes[nodes]
-            return [rest + (own if t == times[0] else one.guess(times[0], t, own))[nodes] for t in times]
-        x = one.volume.mesh.nodes[nodes] + own[nodes]
-        if not any(one.holds(state, times[-1]) for state, _ in one.states):
-            return [x for _ in times]  # what is free goes where it is pushed
-        local = one.place(times[0]).to_local(x)[0]
-        return [one.place(t).apply(local)[0] for t in times]
 
-    def _past_itself(self, hand: HandBody, path: list[NDArray[np.float64]]) -> float:
-        """Longest way of the skin of one digit past that of another it may touch [m]."""
-        from scipy.spatial import cKDTree
+def _past_itself(hand: FleshBody, path: list[NDArray[np.float64]], nodes: NDArray[np.integer]) -> float:
+    """Longest way of the skin of one digit, its nodes (n,) on a path, past that of another it may touch [m]."""
+    from scipy.spatial import cKDTree
 
-        flesh = hand.part.hand
-        label = flesh.node_labels[self._surfaces[hand.name].nodes - self._bodies.spans[hand.name].start]
-        digit = hand.parts.part_of[label]
-        worst = 0.0
-        for one in np.unique(digit):
-            mine, others = np.flatnonzero(digit == one), np.flatnonzero(digit != one)
-            if not len(others):
-                continue
-            away, near = cKDTree(path[0][others]).query(path[0][mine])
-            near = others[near]
-            way = _relative(path, mine, path, near)
-            meets = ~flesh.excluded[label[mine], label[near]] & (away < way)
-            worst = max(worst, float(way[meets].max(initial=0.0)))
-        return worst
+    label = hand.hand.node_labels[nodes]
+    digit = hand.parts.part_of[label]
+    worst = 0.0
+    for one in np.unique(digit):
+        mine, others = np.flatnonzero(digit == one), np.flatnonzero(digit != one)
+        if not len(others):
+            continue
+        away, near = cKDTree(path[0][others]).query(path[0][mine])
+        near = others[near]
+        way = _relative(path, mine, path, near)
+        meets = ~hand.hand.excluded[label[mine], label[near]] & (away < way)
+        worst = max(worst, float(way[meets].max(initial=0.0)))
+    return worst
 
 
 def _past(path: list[NDArray[np.float64]], other: list[NDArray[np.float64]], reach: float) -> float:

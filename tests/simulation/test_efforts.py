@@ -10,13 +10,14 @@ from numpy.typing import NDArray
 
 from warpjld.fem.hand.bone_loads import loads_from_contact
 from warpjld.fem.hand.muscles import Effort, effort_of
-from warpjld.simulation.bodies.model import Bodies
-from warpjld.simulation.report.efforts import effort_at
-from warpjld.simulation.solve.solved_frame import SolvedFrame
-from warpjld.simulation.bodies.flesh_body import HandBody
 from warpjld.script import Interpreter, Scene
-from warpjld.simulation.report.table import PressRows
-from warpjld.script.pressing import PressReport, run_press
+from warpjld.script.contact import run_contact
+from warpjld.simulation.bodies.flesh_body import FleshBody
+from warpjld.simulation.bodies.model import ContactModel
+from warpjld.simulation.report.efforts import effort_at
+from warpjld.simulation.report.table import ContactTable
+from warpjld.simulation.simulate import Simulation
+from warpjld.simulation.solve.solved_frame import SolvedFrame
 from warpjld.skeleton import Poses
 
 BENDING = """
@@ -39,22 +40,22 @@ class Bending:
     """The script above, made."""
 
     scene: Scene
-    report: PressReport
+    report: Simulation
 
     @property
-    def bodies(self) -> Bodies:
-        return self.report.pressed.bodies
+    def bodies(self) -> ContactModel:
+        return self.report.model
 
     @property
-    def hand(self) -> HandBody:
+    def hand(self) -> FleshBody:
         return self.bodies.hands[0]
 
     @property
     def frames(self) -> tuple[SolvedFrame, ...]:
-        return self.report.pressed.solved.frames
+        return self.report.solved.frames
 
     def poses(self, solved: SolvedFrame) -> Poses:
-        return self.hand.drive.pose(solved.frame - self.bodies.start)
+        return self.hand.bones.pose(solved.frame - self.bodies.start)
 
     def effort(self, solved: SolvedFrame) -> Effort:
         return effort_at(self.bodies, self.hand, self.poses(solved), solved)
@@ -68,7 +69,7 @@ def bending(rig, tmp_path_factory: pytest.TempPathFactory) -> Bending:
     scene = Scene(say=lambda text: None)
     scene.add("left", rig)
     Interpreter(scene).run_text(BENDING)
-    return Bending(scene, run_press(scene, tmp_path_factory.mktemp("bending")))
+    return Bending(scene, run_contact(scene, tmp_path_factory.mktemp("bending")))
 
 
 def test_bones_bear_what_the_plate_puts_on_the_finger(bending: Bending) -> None:
@@ -93,8 +94,8 @@ def test_torques_are_those_of_the_plate(bending: Bending) -> None:
     solved = bending.frames[-1]
     span, poses = bending.bodies.spans[bending.hand.name], bending.poses(solved)
     effort = bending.effort(solved)
-    contact, flesh = bending.contact(solved), bending.hand.part.hand
-    skeleton = bending.hand.drive.skeleton
+    contact, flesh = bending.contact(solved), bending.hand.hand
+    skeleton = bending.hand.bones.skeleton
     x = flesh.mesh.nodes + solved.displacement[span]
     joint = skeleton.index("index.base")
     before = int(skeleton.parents[joint])
@@ -117,9 +118,9 @@ def test_frames_without_contact_ask_nothing_of_muscles(bending: Bending) -> None
 
 def test_without_a_measure_contact_is_handed_on_and_said_so(bending: Bending, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(bending.hand.alone, "at", lambda *_: None)
-    table = PressRows(bending.scene, bending.bodies)
+    table = ContactTable(bending.scene.contact.strength)
     solved = bending.frames[-1]
-    table.take(solved)
+    table.add(bending.bodies, solved)
     row = next(row for row in table.rows if row.digit == "index")
     assert np.isnan(row.flesh_n)
     assert row.bone_n == pytest.approx(row.force_n, rel=0.05)
@@ -131,8 +132,8 @@ def test_without_a_measure_contact_is_handed_on_and_said_so(bending: Bending, mo
 def test_muscles_stop_and_suggest_by_what_bones_bear(bending: Bending, monkeypatch: pytest.MonkeyPatch) -> None:
     """Of 1 N: the run stops, and it is said which joint to open."""
     monkeypatch.setitem(bending.scene.contact.strength, "LEFT", {"index": 1.0})
-    table = PressRows(bending.scene, bending.bodies)
-    told = [table.take(solved) for solved in bending.frames]
+    table = ContactTable(bending.scene.contact.strength)
+    told = [table.add(bending.bodies, solved) for solved in bending.frames]
     solved = bending.frames[-1]
     borne = bending.effort(solved)["index"].force
     assert told[:-1] == [None] * (len(told) - 1)
@@ -140,6 +141,6 @@ def test_muscles_stop_and_suggest_by_what_bones_bear(bending: Bending, monkeypat
     assert told[-1].startswith(
         f"stopped at frame {solved.frame:g}: more than muscles can do: left.index {borne:.3g} N of"
     )
-    (found,) = table.suggestions()
+    (found,) = table.suggestions(bending.bodies)
     assert f"left.index {borne:.3g} N of 1 N" in found
     assert "open " in found

@@ -12,12 +12,11 @@ from warpjld.errors import InputError
 from warpjld.fem.contact.obstacles.barr import Barr
 from warpjld.fem.contact.obstacles.meshes import Keyframed
 from warpjld.fem.contact.obstacles.solids import Box, Sphere
-from warpjld.simulation.grip.find import FoundGrip
-from warpjld.simulation.state_variables import Points
-from warpjld.script.press_bodies import prop_obstacle
-from warpjld.script.press_keys import gripped_keys
+from warpjld.script.contact import SceneAnimation, write_keys
 from warpjld.script.props import prop_places
 from warpjld.script.staging import frame_numbers
+from warpjld.simulation.animation import AngleEdit
+from warpjld.simulation.state_variables import Points
 
 READY = "OBJECT ball BALL 0.06 AT 0.1 0.2 0.3\nOBJECT table BOX 0.4 0.02 0.3\nPHYSICAL ball YOUNG 1e6"
 
@@ -73,7 +72,7 @@ def test_points_are_chosen() -> None:
 def test_objects_move_and_turn_like_actors(run) -> None:
     scene = run(READY + "\nMOVE table 0 0 0 0\nMOVE table 30 0 0.1 0\nTURN table 0 0 0 0\nTURN table 30 0 90 0")
     assert frame_numbers(scene)[-1] == 30
-    places = prop_places(scene, scene.prop("table"), np.array([0.0, 30.0]))
+    places = prop_places(scene.actors, scene.rate, scene.prop("table"), np.array([0.0, 30.0]))
     np.testing.assert_allclose(places.position, [[0, 0, 0], [0, 0.1, 0]], atol=1e-12)
     np.testing.assert_allclose(places.apply([[0.2, 0.0, 0.0]])[1], [[0, 0.1, -0.2]], atol=1e-12)
 
@@ -85,7 +84,7 @@ def test_formulas_deform_objects(run) -> None:
     assert prop.barred.at("bend", 10.0) == pytest.approx(math.pi)
     height = [float(np.ptp(prop.shape(frame)[:, 1])) for frame in (0.0, 5.0, 10.0)]
     assert height[0] > height[1] > height[2]
-    obstacle = prop_obstacle(scene, prop, 4.0)
+    obstacle = SceneAnimation(scene).objects[prop.name].obstacle(4.0)
     assert isinstance(obstacle, Barr)
     np.testing.assert_allclose(obstacle.mesh(6.0)[0], prop.shape(10.0), atol=1e-12)
 
@@ -99,7 +98,7 @@ def test_animated_surfaces_are_objects(run, tmp_path: Path) -> None:
     scene = run(f"OBJECT bag '{tmp_path / 'bag.npz'}' AT 0 1 0 SCALE 0.5")
     prop = scene.prop("bag")
     np.testing.assert_allclose(np.linalg.norm(prop.shape(15.0), axis=1), 0.5 * 1.5 * 0.025, atol=1e-6)
-    obstacle = prop_obstacle(scene, prop, 10.0)
+    obstacle = SceneAnimation(scene).objects[prop.name].obstacle(10.0)
     assert isinstance(obstacle, Keyframed)
     found = obstacle.project(np.array([[0.0, 1.1, 0.0]]), 10.0)
     assert found.distance[0] == pytest.approx(0.1 - 0.025, abs=1e-6)
@@ -118,7 +117,7 @@ def test_animated_surfaces_are_objects(run, tmp_path: Path) -> None:
 
 def test_built_in_shapes_are_exact_obstacles(run) -> None:
     scene = run(READY + "\nMOVE ball 0 0 0 0\nMOVE ball 10 1 0 0")
-    ball, table = (prop_obstacle(scene, scene.prop(name), 5.0) for name in ("ball", "table"))
+    ball, table = (SceneAnimation(scene).objects[name].obstacle(5.0) for name in ("BALL", "TABLE"))
     assert isinstance(ball, Sphere)
     assert isinstance(table, Box)
     assert ball.project(np.array([[1.1, 0.2, 0.3]]), 5.0).distance[0] == pytest.approx(-0.03)
@@ -139,8 +138,11 @@ def test_grips_hold_their_angles_until_something_is_found(run) -> None:
     for channel in force.channels:
         values = motion.value(channel, np.arange(10.0, 31.0))
         np.testing.assert_array_equal(values, values[0])
-    found = FoundGrip(force, "REACHED", "", math.radians(2), None, 3.0, {})
-    gripped_keys(scene.actor("left"), found)
+    actor = scene.actor("left")
+    for channel in force.channels:
+        joint = actor.skeleton.index(channel.rpartition(".")[0])
+        value = float(motion.value(channel, 10.0)) + math.radians(2)
+        write_keys(actor, AngleEdit("LEFT", joint, 10.0, None, value))
     base = motion.value("left.index.base.flexion", np.array([10.0, 14.0, 19.0, 24.0, 30.0, 40.0]))
     np.testing.assert_allclose(base[1:5] - base[0], math.radians(2), atol=1e-12)
     assert base[5] == pytest.approx(0.0, abs=1e-12)

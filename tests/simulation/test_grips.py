@@ -14,8 +14,9 @@ import pytest
 from warpjld.errors import InputError
 from warpjld.fem import Status
 from warpjld.script import Interpreter, Scene
-from warpjld.script.pressing import PressReport, run_press
+from warpjld.script.contact import run_contact
 from warpjld.script.runner import run_scene
+from warpjld.simulation.simulate import Simulation
 
 PLATE = """
 OBJECT plate BOX 0.036 0.006 0.036 AT 0.034 -0.0275 -0.165
@@ -89,9 +90,9 @@ def test_the_pad_feels_what_the_plate_bears(pressed: tuple[Path, dict, Scene]) -
     assert "N" in json.dumps(json.loads((out / "touch.columns.json").read_text(encoding="utf-8")))
 
 
-def solved(scene: Scene, out: Path) -> PressReport:
-    report = run_press(scene, out)
-    assert report.pressed.solved.status is Status.CONVERGED, report.verdict.text
+def solved(scene: Scene, out: Path) -> Simulation:
+    report = run_contact(scene, out)
+    assert report.solved.status is Status.CONVERGED, report.verdict.text
     return report
 
 
@@ -148,7 +149,7 @@ def test_what_is_too_heavy_is_said(
     assert found.lowered is None
     assert any(text in line for line in report.verdict.content()["grips"])
     # the thumb pushes it aside, but its foot keeps it from falling
-    ball = report.pressed.object("BALL", 19.0)
+    ball = report.surfaces.object("BALL", 19.0)
     assert abs(ball[:, 1].min() - (-0.0568 - 0.012)) < 2e-4
 
 
@@ -179,4 +180,4 @@ def test_grips_that_cannot_be_are_refused(
     run: Callable[[str], Scene], tmp_path: Path, lines: str, message: str
 ) -> None:
     with pytest.raises(InputError, match=message):
-        run_press(run(BALL + lines), tmp_path)
+        run_contact(run(BALL + lines), tmp_path)

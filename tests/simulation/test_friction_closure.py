@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from warpjld.simulation.solve.friction_closure import pinched
+from warpjld.simulation.solve.friction_closure import friction_closure
 
 
 def wedge(lean: float, turn: float = 0.0) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
@@ -27,12 +27,12 @@ def wedge(lean: float, turn: float = 0.0) -> tuple[NDArray[np.float64], NDArray[
 @pytest.mark.parametrize(("lean", "held"), [(0.0, True), (20.0, True), (33.0, True), (40.0, False), (60.0, False)])
 def test_wedge_holds_inside_the_cone(lean: float, held: bool, turn: float) -> None:
     """Pads that lean by less than atan μ, 31°, and by the 4° that their edges add, hold; more squeezes the ball out."""
-    assert pinched(*wedge(lean, turn), friction=0.6) is held
+    assert friction_closure(*wedge(lean, turn), friction=0.6) is held
 
 
 def test_one_side_or_slippery_sides_only_push() -> None:
     points, inward, depth = wedge(0.0)
     one = points[:, 0] > 0.0
-    assert not pinched(points[one], inward[one], depth[one], 0.6)
-    assert not pinched(points[:1], inward[:1], depth[:1], 0.6)
-    assert not pinched(*wedge(10.0), friction=0.0)
+    assert not friction_closure(points[one], inward[one], depth[one], 0.6)
+    assert not friction_closure(points[:1], inward[:1], depth[:1], 0.6)
+    assert not friction_closure(*wedge(10.0), friction=0.0)

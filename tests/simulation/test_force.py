@@ -7,23 +7,23 @@ import math
 import pytest
 
 from warpjld.errors import InputError
-from warpjld.simulation.grip.force import Firmness, FirmStatus, grip_of_force
+from warpjld.simulation.grip.force import ForceStatus, PressedForce, force_grip
 
 
 def pad(stiffness: float = 4e3, touch: float = 1e-3, limit: float = math.inf):  # type: ignore[no-untyped-def]
     """Force grows with the square of the way beyond the first touch, as pulp does."""
 
-    def press(grip: float) -> Firmness:
+    def press(grip: float) -> PressedForce:
         force = stiffness * max(0.0, grip - touch) ** 2 * 1e3
-        return Firmness(force, force / limit, "index")
+        return PressedForce(force, force / limit, "index")
 
     return press
 
 
 @pytest.mark.parametrize("force", [0.02, 1.0, 30.0])
 def test_the_force_is_reached(force: float) -> None:
-    found = grip_of_force(pad(), 0.0, 0.01, force, start=1e-4)
-    assert found.status is FirmStatus.REACHED
+    found = force_grip(pad(), 0.0, 0.01, force, start=1e-4)
+    assert found.status is ForceStatus.REACHED
     assert found.firmness is not None
     assert found.firmness.force == pytest.approx(force, rel=0.02)
     assert found.grip == pytest.approx(1e-3 + math.sqrt(force / 4e6), rel=0.02)
@@ -31,8 +31,8 @@ def test_the_force_is_reached(force: float) -> None:
 
 
 def test_muscles_are_too_weak() -> None:
-    found = grip_of_force(pad(limit=2.0), 0.0, 0.01, 3.0, start=1e-4)
-    assert found.status is FirmStatus.TOO_WEAK
+    found = force_grip(pad(limit=2.0), 0.0, 0.01, 3.0, start=1e-4)
+    assert found.status is ForceStatus.TOO_WEAK
     assert found.firmness is not None
     assert found.firmness.force <= 2.0
     assert "more force would be needed than the muscles have; 3 N asked for" in found.text
@@ -40,22 +40,22 @@ def test_muscles_are_too_weak() -> None:
 
 
 def test_reasons_why_a_force_is_out_of_reach() -> None:
-    bent = grip_of_force(pad(), 0.0, 2e-3, 30.0)
-    assert bent.status is FirmStatus.LIMIT
+    bent = force_grip(pad(), 0.0, 2e-3, 30.0)
+    assert bent.status is ForceStatus.LIMIT
     assert bent.grip == 2e-3
     assert "bent as far as they may; 30 N asked for, 4 N reached" in bent.text
-    assert grip_of_force(pad(touch=1.0), 0.0, 0.01, 1.0).status is FirmStatus.NO_CONTACT
-    hard = grip_of_force(pad(touch=-0.01), 0.0, 0.01, 1.0)
-    assert hard.status is FirmStatus.HARDER_ALREADY
+    assert force_grip(pad(touch=1.0), 0.0, 0.01, 1.0).status is ForceStatus.NO_CONTACT
+    hard = force_grip(pad(touch=-0.01), 0.0, 0.01, 1.0)
+    assert hard.status is ForceStatus.HARDER_ALREADY
     assert hard.grip == 0.0
-    lost = grip_of_force(lambda g: None if g > 2e-3 else Firmness(1e-3), 0.0, 0.01, 1.0)
-    assert lost.status is FirmStatus.NO_SOLUTION
-    assert lost.firmness == Firmness(1e-3)
+    lost = force_grip(lambda g: None if g > 2e-3 else PressedForce(1e-3), 0.0, 0.01, 1.0)
+    assert lost.status is ForceStatus.NO_SOLUTION
+    assert lost.firmness == PressedForce(1e-3)
 
 
 @pytest.mark.parametrize(("low", "high", "force"), [(1.0, 0.0, 1.0), (0.0, 1.0, 0.0), (0.0, 1.0, math.nan)])
 def test_what_cannot_be_is_refused(low: float, high: float, force: float) -> None:
     with pytest.raises(InputError, match="want low < high, a force above 0 N"):
-        grip_of_force(pad(), low, high, force)
+        force_grip(pad(), low, high, force)
     with pytest.raises(InputError, match="want a first step above 0"):
-        grip_of_force(pad(), 0.0, 1.0, 1.0, start=-1.0)
+        force_grip(pad(), 0.0, 1.0, 1.0, start=-1.0)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -11,8 +12,8 @@ import trimesh
 from warpjld.fem import HexMesh, ball, merge
 from warpjld.fem.contact.results.nodal_contact import skin_around
 from warpjld.fem.mesh.embedding import Embedding, embed
-from warpjld.simulation.display.refine import finer
-from warpjld.simulation.display.pressure_map import pressure_map
+from warpjld.simulation.display.pressure_map import PressureMap, pressure_map
+from warpjld.simulation.display.refine import RefinedSurface, refine_surface
 
 MESH = ball(1.0, n=8)
 OUTER = np.unique(MESH.quads(MESH.face_set("outer")))
@@ -22,6 +23,21 @@ def cap(mesh: HexMesh) -> np.ndarray:
     """Pressure that falls from 1 at the pole to 0 at half a radius from it, as forces on the nodes."""
     away = np.linalg.norm(mesh.nodes - [0.0, 0.0, 1.0], axis=1)
     return np.maximum(1.0 - (away / 0.5) ** 2, 0.0) * skin_around(mesh, "outer", mesh.nodes)
+
+
+def mapped(
+    mesh: HexMesh,
+    carried: Embedding,
+    vertices: np.ndarray,
+    faces: np.ndarray,
+    force: np.ndarray,
+    embedded: np.ndarray | None = None,
+) -> tuple[RefinedSurface, PressureMap]:
+    some = np.ones(len(vertices), dtype=bool) if embedded is None else embedded
+    body = SimpleNamespace(
+        mesh=mesh, faces="outer", embedding=carried, surface=vertices, triangles=faces, embedded=some
+    )
+    return pressure_map(body, force)  # type: ignore[arg-type]
 
 
 def integral(vertices: np.ndarray, faces: np.ndarray, values: np.ndarray) -> float:
@@ -36,7 +52,7 @@ def test_the_integral_is_the_force(detail: int) -> None:
     visible = trimesh.creation.icosphere(detail)
     vertices, faces = np.asarray(visible.vertices), np.asarray(visible.faces, np.int32)
     force = cap(MESH)
-    surface, spread = pressure_map(MESH, "outer", embed(MESH, vertices, reach=3.0), vertices, faces, force)
+    surface, spread = mapped(MESH, embed(MESH, vertices, reach=3.0), vertices, faces, force)
     for stretch in (np.ones(3), np.array([1.2, 1.0, 0.8])):
         at = surface.of(vertices * stretch)
         found = spread.of(force, at)
@@ -50,7 +66,7 @@ def test_the_peak_is_that_of_the_nodes() -> None:
     force = cap(MESH)
     around = skin_around(MESH, "outer", MESH.nodes)
     highest = float((force[OUTER] / around[OUTER]).max())
-    surface, spread = pressure_map(MESH, "outer", embed(MESH, vertices, reach=3.0), vertices, faces, force)
+    surface, spread = mapped(MESH, embed(MESH, vertices, reach=3.0), vertices, faces, force)
     found = spread.of(force, surface.of(vertices))
     assert found.max() == pytest.approx(highest, rel=0.06)
     assert found[surface.of(vertices)[:, 2] < 0.5].max() == 0.0
@@ -62,7 +78,7 @@ def test_what_a_cut_off_surface_lacks_goes_to_its_border() -> None:
     vertices, faces = np.asarray(visible.vertices), np.asarray(visible.faces, np.int32)
     worn = vertices[:, 0] > 0.0
     force = cap(MESH)
-    surface, spread = pressure_map(MESH, "outer", embed(MESH, vertices, reach=3.0), vertices, faces, force, worn)
+    surface, spread = mapped(MESH, embed(MESH, vertices, reach=3.0), vertices, faces, force, worn)
     found = spread.of(force, surface.of(vertices))
     assert integral(surface.of(vertices), surface.faces, found) == pytest.approx(force.sum(), rel=1e-12)
     assert not found[: len(vertices)][~worn].any()
@@ -72,13 +88,13 @@ def test_finer_triangles_fit_those_beside_them() -> None:
     visible = trimesh.creation.icosphere(2)
     vertices, faces = np.asarray(visible.vertices), np.asarray(visible.faces, np.int32)
     chosen = np.random.default_rng(1).random(len(faces)) < 0.3
-    found = finer(faces, chosen, len(vertices))
+    found = refine_surface(faces, chosen, len(vertices))
     fine = trimesh.Trimesh(found.of(vertices), found.faces, process=False)
     assert fine.is_watertight
     assert fine.is_winding_consistent
     assert fine.volume == pytest.approx(visible.volume, rel=1e-12)
     assert len(found.faces) >= len(faces) + 3 * chosen.sum()
-    whole = finer(faces, np.zeros(len(faces), dtype=bool), len(vertices))
+    whole = refine_surface(faces, np.zeros(len(faces), dtype=bool), len(vertices))
     np.testing.assert_array_equal(whole.faces, faces)
     np.testing.assert_array_equal(whole.of(vertices), vertices)
 
@@ -96,7 +112,7 @@ def test_what_lies_beside_another_part_takes_nothing_of_its_pressure() -> None:
     corners = np.concatenate([apart.corners, apart.corners + len(MESH.nodes)])
     carried = Embedding(corners, np.tile(apart.weights, (2, 1)), np.tile(apart.outside, 2))
     force = np.concatenate([cap(MESH), np.zeros(len(MESH.nodes))])
-    surface, spread = pressure_map(mesh, "outer", carried, vertices, both, force)
+    surface, spread = mapped(mesh, carried, vertices, both, force)
     found = spread.of(force, surface.of(vertices))
     other = np.zeros(len(vertices), dtype=bool)
     other[len(x) :] = True

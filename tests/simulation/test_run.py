@@ -13,12 +13,12 @@ import pytest
 from warpjld.errors import InputError
 from warpjld.fem import Status
 from warpjld.grasp import Places
-from warpjld.simulation.solve.free_object import settle
-from warpjld.simulation.solve.checkpoint import load_state
 from warpjld.script import Scene
-from warpjld.simulation.solve.start_frame import approach
-from warpjld.script.pressing import run_press
+from warpjld.script.contact import SceneAnimation, run_contact
 from warpjld.script.runner import run_scene
+from warpjld.simulation.bodies.free_object import settle_free_object
+from warpjld.simulation.solve.checkpoint import load_checkpoint
+from warpjld.simulation.solve.start_frame import find_start
 
 PLATE = """
 OBJECT plate BOX 0.036 0.006 0.036 AT 0.034 -0.0275 -0.165
@@ -98,8 +98,8 @@ def test_a_finished_state_is_gone_on_from(pressed: tuple[Path, dict], rig, tmp_p
     scene = Scene(say=lambda text: None)
     scene.add("left", rig)
     Interpreter(scene).run_text(PLATE + "PRESS 0 8 EVERY 2 STATE 'state.npz'")
-    again = run_press(scene, tmp_path)
-    assert again.pressed.solved.resumed == len(again.pressed.solved.frames)
+    again = run_contact(scene, tmp_path)
+    assert again.solved.resumed == len(again.solved.frames)
     with (out / "t.csv").open(encoding="utf-8") as file:
         force = [float(row["force_n"]) for row in csv.DictReader(file) if row["digit"] == "index"]
     np.testing.assert_allclose([r.force_n for r in again.rows if r.digit == "index"], force, rtol=1e-5)
@@ -107,21 +107,21 @@ def test_a_finished_state_is_gone_on_from(pressed: tuple[Path, dict], rig, tmp_p
     scene.add("left", rig)
     Interpreter(scene).run_text(PLATE + "PRESS 0 7 EVERY 2 STATE 'state.npz'")
     with pytest.raises(InputError, match=r"state.npz: this state belongs to another scene: frames"):
-        run_press(scene, tmp_path)
+        run_contact(scene, tmp_path)
 
 
 def test_what_is_no_state_is_refused(tmp_path: Path) -> None:
     (tmp_path / "state.npz").write_text("nonsense")
     with pytest.raises(InputError, match="no state of a contact solve"):
-        load_state(tmp_path / "state.npz")
+        load_checkpoint(tmp_path / "state.npz")
 
 
 def test_solving_begins_before_the_first_touch(run: Callable[[str], Scene]) -> None:
     scene = run(PLATE + "PRESS 0 8")
-    found = approach(scene, scene.contact.pressing)
+    found = find_start(SceneAnimation(scene), scene.contact, scene.contact.pressing)
     assert 1 <= found.start <= 5
     far = run("OBJECT moon BALL 0.02 AT 1 0 0\nPHYSICAL moon")
-    assert approach(far, far.contact.pressing).start == found.start
+    assert find_start(SceneAnimation(far), far.contact, far.contact.pressing).start == found.start
 
 
 @pytest.mark.slow
@@ -130,8 +130,8 @@ def test_bones_in_a_rigid_object_are_named(run: Callable[[str], Scene], tmp_path
         "OBJECT plate BOX 0.036 0.006 0.036 AT 0.034 -0.0275 -0.165\nMOVE LEFT 0 0 0.002 0\nMOVE LEFT 2 0 -0.016 0\n"
         "FLESH LEFT INDEX\nPRESS 0 2 EVERY 2"
     )
-    report = run_press(scene, tmp_path)
-    assert report.pressed.solved.status is not Status.CONVERGED
+    report = run_contact(scene, tmp_path)
+    assert report.solved.status is not Status.CONVERGED
     assert "mm inside PLATE, which cannot give way" in report.verdict.text
 
 
@@ -162,7 +162,7 @@ def test_bones_in_a_rigid_object_are_named(run: Callable[[str], Scene], tmp_path
 def test_hopeless_scenes_are_refused(run: Callable[[str], Scene], tmp_path: Path, lines: str, message: str) -> None:
     scene = run(lines + "\nPRESS 0 4")
     with pytest.raises(InputError, match=message):
-        run_press(scene, tmp_path)
+        run_contact(scene, tmp_path)
 
 
 @pytest.mark.parametrize(
@@ -204,16 +204,16 @@ def test_a_free_ball_settles_between_what_closes_on_it() -> None:
     thing = ball(0.02)
     at = Places.of((0.0, 0.0095, 0.0)).apply(thing.vertices)[0]
     ground = Plane()
-    lifted = settle(at, thing.faces, np.empty((0, 3)), [ground], 0.0)
+    lifted = settle_free_object(at, thing.faces, np.empty((0, 3)), [ground], 0.0)
     assert ground.project(lifted.of(at), 0.0).distance.min() > -1e-6
     assert lifted.overlap < 1e-6
     assert np.abs(lifted.shift[[0, 2]]).max() < 1e-6
     # a point pushes from one side: the ball goes; a point on either side: it stays in the middle, held
-    pushed = settle(at, thing.faces, np.array([[0.009, 0.0095, 0.0]]), [], 0.0)
+    pushed = settle_free_object(at, thing.faces, np.array([[0.009, 0.0095, 0.0]]), [], 0.0)
     assert pushed.overlap < 1e-5
     assert pushed.shift[0] == pytest.approx(-0.001, rel=0.05)
     walls = [Plane((-0.0095, 0.0, 0.0), (1.0, 0.0, 0.0)), Plane((0.009, 0.0, 0.0), (-1.0, 0.0, 0.0))]
-    held = settle(at, thing.faces, np.empty((0, 3)), walls, 0.0)
+    held = settle_free_object(at, thing.faces, np.empty((0, 3)), walls, 0.0)
     assert held.shift[0] == pytest.approx(-0.00025, rel=0.1)
     assert held.overlap == pytest.approx(0.00075, rel=0.05)
 
@@ -243,5 +243,5 @@ FINGER23 LEFT THUMB KNUCKLES3 AT 20 24.6
 def test_a_pinch_is_solved_from_where_skin_meets_skin(run: Callable[[str], Scene], flesh: str, meets: bool) -> None:
     scene = run(PINCHED + f"FLESH LEFT {flesh}\nPRESS 0 20\n")
     assert scene.contact.pressing is not None
-    start = approach(scene, scene.contact.pressing).start
+    start = find_start(SceneAnimation(scene), scene.contact, scene.contact.pressing).start
     assert start == (pytest.approx(16.0, abs=2.0) if meets else 19.0)

@@ -9,10 +9,10 @@ import trimesh
 from warpjld.covering import bind
 from warpjld.fem.contact.obstacles.facets import Facets
 from warpjld.fem.hand.flesh_hand import build_flesh_hand
-from warpjld.simulation.display.separate import Shown, clear
-from warpjld.simulation.display.overlap import SurfacePart, within_itself
-from warpjld.simulation.bodies.skin_parts import SkinParts, skin_parts
 from warpjld.rig import Rig
+from warpjld.simulation.bodies.skin_parts import SkinParts, skin_parts
+from warpjld.simulation.display.overlap import SurfacePart, self_overlaps
+from warpjld.simulation.display.separate import VisibleSurface, separate_surfaces
 from warpjld.skeleton import poses_from_angles
 
 RADIUS, OVERLAP = 0.01, 6e-4
@@ -35,11 +35,11 @@ def normals(vertices: np.ndarray, faces: np.ndarray) -> np.ndarray:
 
 def test_both_move_half_the_way() -> None:
     vertices, parts = two_balls()
-    found = within_itself(parts, vertices, normals(vertices, parts.faces))
+    found = self_overlaps(parts, vertices, normals(vertices, parts.faces))
     assert set(found) == {("index", "thumb"), ("thumb", "index")}
     for one in found.values():
         assert one.depth == pytest.approx(OVERLAP, rel=0.05)
-    cleared = clear({"hand": Shown(vertices, parts.faces, 8e4, 1e-3, parts)}, {}, 0.0)
+    cleared = separate_surfaces({"hand": VisibleSurface(vertices, parts.faces, 8e4, 1e-3, parts)}, {}, 0.0)
     at = cleared.vertices["hand"]
     moved = np.linalg.norm(at - vertices, axis=1)
     half = len(vertices) // 2
@@ -54,7 +54,7 @@ def test_both_move_half_the_way() -> None:
 def test_what_contact_does_not_know_of_stays_and_is_said() -> None:
     vertices, parts = two_balls()
     nobody = np.zeros(len(vertices), dtype=bool)
-    cleared = clear({"hand": Shown(vertices, parts.faces, 8e4, 1e-3, parts, nobody)}, {}, 0.0)
+    cleared = separate_surfaces({"hand": VisibleSurface(vertices, parts.faces, 8e4, 1e-3, parts, nobody)}, {}, 0.0)
     np.testing.assert_array_equal(cleared.vertices["hand"], vertices)
     assert cleared.left[SurfacePart("hand", "index"), SurfacePart("hand", "thumb")] == pytest.approx(OVERLAP, rel=0.05)
 
@@ -62,7 +62,7 @@ def test_what_contact_does_not_know_of_stays_and_is_said() -> None:
 def test_neighbours_never_meet() -> None:
     vertices, parts = two_balls()
     beside = SkinParts(parts.labels, np.ones((2, 2), dtype=bool), parts.part_of, parts.names, parts.faces)
-    assert within_itself(beside, vertices, normals(vertices, parts.faces)) == {}
+    assert self_overlaps(beside, vertices, normals(vertices, parts.faces)) == {}
 
 
 def test_parts_of_one_ball_are_closed_where_they_part() -> None:
@@ -77,7 +77,7 @@ def test_parts_of_one_ball_are_closed_where_they_part() -> None:
         assert solid.is_watertight
         volumes.append(solid.volume)
     assert sum(volumes) == pytest.approx(BALL.volume, rel=1e-9)
-    assert within_itself(parts, x, np.asarray(BALL.vertex_normals)) == {}
+    assert self_overlaps(parts, x, np.asarray(BALL.vertex_normals)) == {}
 
 
 def test_a_hand_overlaps_itself_where_digits_cross(rig: Rig) -> None:
@@ -87,10 +87,10 @@ def test_a_hand_overlaps_itself_where_digits_cross(rig: Rig) -> None:
     rest = covering.deform(poses_from_angles(rig.skeleton, angles[None]))[0].astype(np.float64)
     parts = skin_parts(hand)
     assert {part.name for part in parts.parts} == {"thumb", "index", "middle", "ring", "pinky", "palm"}
-    assert within_itself(parts, rest, normals(rest, parts.faces)) == {}
+    assert self_overlaps(parts, rest, normals(rest, parts.faces)) == {}
     for knuckle, degrees in (("base", 90.0), ("knuckle2", 100.0), ("knuckle3", 60.0)):
         angles[rig.skeleton.index(f"left.index.{knuckle}"), 0] = np.radians(degrees)
     bent = covering.deform(poses_from_angles(rig.skeleton, angles[None]))[0].astype(np.float64)
-    found = within_itself(parts, bent, normals(bent, parts.faces))
+    found = self_overlaps(parts, bent, normals(bent, parts.faces))
     assert {frozenset(two) for two in found} >= {frozenset({"index", "palm"})}
     assert max(one.depth for one in found.values()) > 2e-3

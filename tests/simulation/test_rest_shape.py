@@ -11,8 +11,8 @@ from warpjld.covering import Covering, bind
 from warpjld.fem.contact.obstacles.facets import Facets
 from warpjld.fem.hand.flesh_hand import FleshHand, build_flesh_hand
 from warpjld.io import load_rig
-from warpjld.simulation.bodies.rest_shape import part_of, posed
 from warpjld.rig import Rig
+from warpjld.simulation.bodies.rest_shape import cut_to_digits, rest_in_pose
 from warpjld.skeleton import Poses, poses_from_angles
 from warpjld.skeleton.kinematics import rest_poses
 
@@ -37,7 +37,7 @@ def bent(rig: Rig) -> Poses:
 
 
 def test_at_rest_nothing_moves(hand: FleshHand, rig: Rig) -> None:
-    still, gap = posed(hand, rest_poses(rig.skeleton), rig.surface.vertices)
+    still, gap = rest_in_pose(hand, rest_poses(rig.skeleton), rig.surface.vertices)
     np.testing.assert_allclose(still.mesh.nodes, hand.mesh.nodes, atol=1e-7)
     assert gap < 1e-7
 
@@ -46,7 +46,7 @@ def test_skin_nodes_lie_on_the_covered_skin_and_bones_stay_rigid(
     hand: FleshHand, covering: Covering, bent: Poses
 ) -> None:
     skin = covering.deform(bent)[0].astype(np.float64)
-    there, gap = posed(hand, bent, skin)
+    there, gap = rest_in_pose(hand, bent, skin)
     assert there.mesh.scaled_jacobian().min() > 0.02
     assert gap < 1.5e-3
     outer = np.setdiff1d(np.unique(there.mesh.quads(there.skin_faces)), np.concatenate(there.bone_nodes))
@@ -65,26 +65,26 @@ def test_a_finger_curled_into_the_palm_is_upright(hand: FleshHand, covering: Cov
     for joint, degrees in (("base", 88), ("knuckle2", 98), ("knuckle3", 54)):
         angles[0, rig.skeleton.index(f"left.middle.{joint}"), 0] = np.radians(degrees)
     poses = poses_from_angles(rig.skeleton, angles)
-    there, gap = posed(hand, poses, covering.deform(poses)[0].astype(np.float64))
+    there, gap = rest_in_pose(hand, poses, covering.deform(poses)[0].astype(np.float64))
     assert there.mesh.scaled_jacobian().min() > 0.05
     assert gap < 3.5e-3
 
 
 def test_a_part_is_one_digit_and_blends_into_the_covering(hand: FleshHand, covering: Covering, bent: Poses) -> None:
     skin = covering.deform(bent)[0].astype(np.float64)
-    there, _ = posed(hand, bent, skin)
-    part = part_of(there, bent, skin, ("index",))
+    there, _ = rest_in_pose(hand, bent, skin)
+    part = cut_to_digits(there, bent, skin, ("index",))
     assert len(part.hand.mesh.nodes) < 0.15 * len(hand.mesh.nodes)
     assert len(part.cut)
     assert part.hand.mesh.scaled_jacobian().min() == pytest.approx(there.mesh.scaled_jacobian().min(), abs=0.5)
     elsewhere = skin + 1.0
-    still = part.worn(np.zeros_like(part.hand.mesh.nodes), elsewhere)
+    still = part.deformed(np.zeros_like(part.hand.mesh.nodes), elsewhere)
     np.testing.assert_allclose(still[part.blend == 0.0], elsewhere[part.blend == 0.0])
     np.testing.assert_allclose(still[part.blend == 1.0], skin[part.blend == 1.0])
     assert (part.blend == 1.0).sum() > 50
     tip = skin[part.blend == 1.0]
     assert np.ptp(tip, axis=0).max() < 0.08
-    moved = part.worn(np.tile([0.0, 0.002, 0.0], (len(part.hand.mesh.nodes), 1)), skin)
+    moved = part.deformed(np.tile([0.0, 0.002, 0.0], (len(part.hand.mesh.nodes), 1)), skin)
     np.testing.assert_allclose((moved - skin)[:, 1], 0.002 * part.blend, atol=1e-6)
     # what drives the whole hand drives the part in the same way
     again = part.start.to(part.hand.moves(bent))
@@ -93,7 +93,7 @@ def test_a_part_is_one_digit_and_blends_into_the_covering(hand: FleshHand, cover
 
 def test_the_thumb_comes_with_its_ball(hand: FleshHand, rig: Rig) -> None:
     rest = rest_poses(rig.skeleton)
-    thumb, palm = (part_of(hand, rest, rig.surface.vertices, (name,)) for name in ("thumb", "palm"))
+    thumb, palm = (cut_to_digits(hand, rest, rig.surface.vertices, (name,)) for name in ("thumb", "palm"))
     names = np.array(thumb.hand.label_names)
     assert {"left.palm.thumb", "left.thumb.proximal", "left.thumb.distal"} <= set(names[thumb.hand.skin_labels])
     assert not any("index.middle" in name for name in names[thumb.hand.skin_labels])
@@ -102,7 +102,7 @@ def test_the_thumb_comes_with_its_ball(hand: FleshHand, rig: Rig) -> None:
 
 
 def test_a_whole_hand_is_its_own_part(hand: FleshHand, rig: Rig) -> None:
-    part = part_of(hand, rest_poses(rig.skeleton), rig.surface.vertices)
+    part = cut_to_digits(hand, rest_poses(rig.skeleton), rig.surface.vertices)
     assert len(part.cut) == 0
     assert (part.blend == 1.0).all()
     assert part.hand is hand
@@ -117,7 +117,7 @@ def test_bones_that_crush_flesh_between_them_let_it_go(data: Path) -> None:
         angles[0, rig.skeleton.index(f"left.pinky.{joint}"), 0] = np.radians(degrees)
     poses = poses_from_angles(rig.skeleton, angles)
     skin = bind(rig.skeleton, rig.surface).deform(poses)[0].astype(np.float64)
-    hand, _ = posed(built, poses, skin)
+    hand, _ = rest_in_pose(built, poses, skin)
     assert hand.mesh.scaled_jacobian().min() > 0.0
     let_go = [len(before) - len(after) for before, after in zip(built.bone_nodes, hand.bone_nodes, strict=True)]
     assert 0 < sum(let_go) < 10

@@ -10,7 +10,8 @@ import pytest
 
 from warpjld.fem import Status
 from warpjld.script import Scene
-from warpjld.script.pressing import PressReport, run_press
+from warpjld.script.contact import run_contact
+from warpjld.simulation.simulate import Simulation
 
 BLOCK = """
 OBJECT block BOX 0.02 0.02 0.02
@@ -22,18 +23,18 @@ FRICTION 0
 """
 
 
-def heights(report: PressReport, name: str) -> list[float]:
+def heights(report: Simulation, name: str) -> list[float]:
     """Extent along y of an object at every frame that was solved [m]."""
-    frames = report.pressed.solved.frames
-    return [float(np.ptp(report.pressed.object(name, frame.frame)[:, 1])) for frame in frames]
+    frames = report.solved.frames
+    return [float(np.ptp(report.surfaces.object(name, frame.frame)[:, 1])) for frame in frames]
 
 
 def test_points_are_drawn_along_keys(run: Callable[[str], Scene], tmp_path: Path) -> None:
     scene = run(BLOCK + "VECTOR block head AT 0 0 0 0\nVECTOR block head AT 4 0 0.002 0\nPRESS 0 4")
-    report = run_press(scene, tmp_path)
-    assert report.pressed.solved.status is Status.CONVERGED
+    report = run_contact(scene, tmp_path)
+    assert report.solved.status is Status.CONVERGED
     np.testing.assert_allclose(heights(report, "BLOCK"), 0.02 + 0.0005 * np.arange(1, 5), atol=1e-9)
-    pull = [float(np.abs(f.reactions[:, 1]).sum()) / 2 for f in report.pressed.solved.frames]
+    pull = [float(np.abs(f.reactions[:, 1]).sum()) / 2 for f in report.solved.frames]
     np.testing.assert_allclose(np.diff(pull), pull[0], rtol=1e-3)
     # E A ε, a little more as head and foot cannot narrow
     assert 1.0 < pull[-1] / (1e5 * 0.02**2 * 0.1) < 1.2
@@ -43,9 +44,9 @@ def test_partial_points_stay_free_along_the_others(run: Callable[[str], Scene], 
     lines = BLOCK.replace("HOLD block foot\n", "PARTIAL block foot Y AT 0 0\n")
     scene = run(lines + "PARTIAL block head Y AT 0 0\nPARTIAL block head Y AT 2 -0.002\nPRESS 0 2")
     # along y only: nothing pushes it sideways, and a corner is enough to hold it there
-    report = run_press(scene, tmp_path)
-    assert report.pressed.solved.status is Status.CONVERGED
-    shape = report.pressed.object("BLOCK", 2.0)
+    report = run_contact(scene, tmp_path)
+    assert report.solved.status is Status.CONVERGED
+    shape = report.surfaces.object("BLOCK", 2.0)
     np.testing.assert_allclose(np.ptp(shape, axis=0), [0.02 * 1.03, 0.018, 0.02 * 1.03], rtol=2e-3)
     assert np.abs(shape[:, [0, 2]].mean(axis=0)).max() < 4e-4
 
@@ -54,11 +55,11 @@ def test_held_points_go_where_the_object_goes(run: Callable[[str], Scene], tmp_p
     moved = "MOVE block 0 0 0 0\nMOVE block 2 0.1 0 0\nTURN block 0 0 0 0\nTURN block 2 0 90 0\n"
     scene = run(f"{BLOCK}{moved}GRAVITY 0 -9.81 0\nPRESS 0 2")
     scene.contact.physical["BLOCK"] = type(scene.contact.physical["BLOCK"])(young=1e5, poisson=0.3, element=0.005)
-    report = run_press(scene, tmp_path)
-    assert report.pressed.solved.status is Status.CONVERGED
+    report = run_contact(scene, tmp_path)
+    assert report.solved.status is Status.CONVERGED
     place = scene.whereabouts(scene.prop("block"), np.array([2.0]))
     np.testing.assert_allclose(
-        report.pressed.object("BLOCK", 2.0), place.apply(scene.prop("block").thing.vertices)[0], atol=4e-5
+        report.surfaces.object("BLOCK", 2.0), place.apply(scene.prop("block").thing.vertices)[0], atol=4e-5
     )
 
 
@@ -69,12 +70,12 @@ def test_a_bond_holds_until_it_is_pulled_too_hard(run: Callable[[str], Scene], t
         "POINTS lid top UPPER Y 0\nVECTOR lid top AT 0 0 0 0\nVECTOR lid top AT 4 0 0.002 0\n"
         "BOND block lid 3000\nPRESS 0 4"
     )
-    report = run_press(scene, tmp_path)
-    assert report.pressed.solved.status is Status.CONVERGED
+    report = run_contact(scene, tmp_path)
+    assert report.solved.status is Status.CONVERGED
     grown = [h - 0.02 for h in heights(report, "BLOCK")]
     assert grown[0] > 1e-4  # pulled along: 0.5 mm over both
     assert grown[-1] < 1e-6  # let go
-    gap = report.pressed.object("LID", 4.0)[:, 1].min() - report.pressed.object("BLOCK", 4.0)[:, 1].max()
+    gap = report.surfaces.object("LID", 4.0)[:, 1].min() - report.surfaces.object("BLOCK", 4.0)[:, 1].max()
     assert gap == pytest.approx(0.002, abs=1e-5)
 
 
@@ -90,9 +91,9 @@ def test_a_bond_holds_until_it_is_pulled_too_hard(run: Callable[[str], Scene], t
 )
 def test_obstacles_press(run: Callable[[str], Scene], tmp_path: Path, obstacle: str) -> None:
     scene = run(f"{BLOCK}{obstacle}\nPRESS 0 2")
-    report = run_press(scene, tmp_path)
-    assert report.pressed.solved.status is Status.CONVERGED
-    last = report.pressed.solved.frames[-1]
+    report = run_contact(scene, tmp_path)
+    assert report.solved.status is Status.CONVERGED
+    last = report.solved.frames[-1]
     assert last.nodal.sum(axis=(0, 1))[1] < -1e-3
-    assert report.pressed.pressure("BLOCK", 2.0).max() > 100.0
+    assert report.surfaces.pressure("BLOCK", 2.0).max() > 100.0
     assert last.penetration < 1e-5

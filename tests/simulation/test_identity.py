@@ -10,8 +10,9 @@ import pytest
 from warpjld.errors import InputError
 from warpjld.rig import Rig
 from warpjld.script import Interpreter, Scene
-from warpjld.script.pressing import PressReport, run_press
+from warpjld.script.contact import run_contact
 from warpjld.script.runner import run_scene
+from warpjld.simulation.simulate import Simulation
 
 BLOCK = """
 OBJECT block BOX 0.02 0.02 0.02 AT 0 0.0101 0
@@ -37,22 +38,22 @@ PLAIN = {
 }
 
 
-def solved(folder: Path, **other: object) -> PressReport:
+def solved(folder: Path, **other: object) -> Simulation:
     """A block pressed on moving ground, with or without a state there."""
     scene = Scene(say=lambda text: None)
     Interpreter(scene).run_text(BLOCK.format(**PLAIN | other))
-    return run_press(scene, folder)
+    return run_contact(scene, folder)
 
 
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     out = tmp_path_factory.mktemp("state")
-    assert solved(out).pressed.solved.resumed == 0
+    assert solved(out).solved.resumed == 0
     return out
 
 
 def test_the_same_solve_goes_on(folder: Path) -> None:
-    assert solved(folder).pressed.solved.resumed == 2
+    assert solved(folder).solved.resumed == 2
 
 
 @pytest.mark.parametrize(

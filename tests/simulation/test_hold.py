@@ -14,14 +14,16 @@ from numpy.typing import NDArray
 from warpjld.fem import Body, LinearElastic, Prescribed, box, merge, prescribe
 from warpjld.fem.contact import ContactSolution, Pair, press
 from warpjld.fem.contact.obstacles.solids import Plane
-from warpjld.simulation.grip.search import GripStatus, Outcome, gentlest_grip
 from warpjld.fem.load.loads import Loads
 from warpjld.fem.mesh.hexmesh import HexMesh
-from warpjld.simulation.bodies.model import Bodies, PairOf
-from warpjld.simulation.grip.hold import Lift
-from warpjld.simulation.specification import GripWish
 from warpjld.script import Interpreter, Scene
-from warpjld.script.press_bodies import object_body
+from warpjld.script.contact import SceneAnimation
+from warpjld.simulation.bodies.deformable_body import History
+from warpjld.simulation.bodies.model import ContactModel, PairOwners
+from warpjld.simulation.bodies.object_body import build_object_body
+from warpjld.simulation.grip.hold import HandTrials
+from warpjld.simulation.grip.search import GripStatus, Outcome, gentlest_grip
+from warpjld.simulation.specification import GripSpecification
 
 WEIGHT, FRICTION = 0.6, 0.5
 EDGE, PAD = 0.03, (0.004, 0.024, 0.024)
@@ -35,27 +37,36 @@ class Pads:
     moves: Callable[[float], float]
     name: str = "PADS"
 
-    def prescribed(self, time: float) -> Prescribed:
+    def prescribed(self, time: float, history: History) -> Prescribed:
         way = self.moves(time)
         left = prescribe(self.mesh, "left.back", x=way, y=0.0, z=0.0)
         return left + prescribe(self.mesh, "right.back", x=-way, y=0.0, z=0.0)
 
-    def guess(self, before: float, time: float, displacement: NDArray[np.float64]) -> NDArray[np.float64]:
+    def guess(
+        self, before: float, time: float, displacement: NDArray[np.float64], around: object
+    ) -> NDArray[np.float64]:
         return displacement
+
+    def timed(self, clock: Callable[[float], float]) -> Pads:
+        return replace(self, moves=lambda time: self.moves(clock(time)))
 
 
 class Squeeze:
     """In place of a hand's joints: grips are ways of the pads' backs."""
 
-    def __init__(self, bodies: Bodies) -> None:
-        self.bodies, self.hand = bodies, bodies.hands[0]
+    def __init__(self, model: ContactModel) -> None:
+        self.model, self.hand, self.history = model, model.hands[0], History()
         self._closed: dict[float, ContactSolution] = {}
 
     def closed(self, grip: float) -> ContactSolution:
         if grip not in self._closed:
             hand = replace(self.hand, moves=lambda time: min(time, 1.0) * grip)  # type: ignore[arg-type,return-value]
-            here = replace(self.bodies, hands=(hand,))
-            found = press(here.body, here.prescribed, here.pairs, here.loads_at, times=(1.0,), check=False)
+            here = replace(self.model, hands=(hand,))
+            known, loads = (
+                (lambda time: here.prescribed(time, History())),
+                (lambda time: here.loads_at(time, History())),
+            )
+            found = press(here.body, known, here.pairs, loads, times=(1.0,), check=False)
             self._closed[grip] = found
         return self._closed[grip]
 
@@ -75,30 +86,30 @@ def pads() -> HexMesh:
 
 
 @pytest.fixture
-def lift() -> Lift:
+def lift() -> HandTrials:
     """A block of 0.6 N on a foot between the pads; gravity along -z."""
     scene = Scene(say=lambda line: None)
     Interpreter(scene).run_text(
         f"OBJECT BLOCK BOX {EDGE} {EDGE} {EDGE} AT 0 0 0\nGRAVITY 0 0 -9.81\n"
         f"PHYSICAL BLOCK LAW LINEAR YOUNG 1000000 POISSON 0.3 DENSITY {WEIGHT / 9.81 / EDGE**3} ELEMENT 0.01\n"
     )
-    scene.contact.grips.append(GripWish("PADS", "BLOCK", 1.0, 5.0, (), 0.1, lift=True))
-    block = object_body(scene, scene.prop("BLOCK"), 0.0)
+    scene.contact.grips.append(GripSpecification("PADS", "BLOCK", 1.0, 5.0, (), 0.1, lift=True))
+    block = build_object_body(SceneAnimation(scene).objects["BLOCK"], scene.contact, 0.0)
     hand = Pads(pads(), lambda time: 0.0)
-    mesh = merge(hand.mesh, block.volume.mesh)
+    mesh = merge(hand.mesh, block.mesh)
     count = len(hand.mesh.nodes)
     laws = {name: LinearElastic(6e4, 0.3) for name in ("left.flesh", "right.flesh")}
-    body = Body(mesh, {**laws, "BLOCK": block.volume.physical.material()})
-    pairs = tuple(Pair(f"pad.{side}", block.volume.name, FRICTION) for side in ("left", "right"))
-    owner = PairOf("PADS", "BLOCK")
+    body = Body(mesh, {**laws, **block.laws})
+    pairs = tuple(Pair(f"pad.{side}", block.faces, FRICTION) for side in ("left", "right"))
+    owner = PairOwners("PADS", "BLOCK")
     spans = {"PADS": slice(0, count), "BLOCK": slice(count, len(mesh.nodes))}
     loads = Loads(gravity=(0.0, 0.0, -9.81))
-    bodies = Bodies((hand,), (block,), {}, body, spans, pairs, (owner, owner), loads)  # type: ignore[arg-type]
-    return Lift(Squeeze(bodies), block)  # type: ignore[arg-type]
+    model = ContactModel((hand,), (block,), {}, body, spans, pairs, (owner, owner), loads)  # type: ignore[arg-type]
+    return HandTrials(Squeeze(model), block)  # type: ignore[arg-type]
 
 
-def test_the_gentlest_grip_takes_the_block_from_its_foot(lift: Lift) -> None:
-    assert lift.weighed.weight == pytest.approx(WEIGHT, rel=1e-6)
+def test_the_gentlest_grip_takes_the_block_from_its_foot(lift: HandTrials) -> None:
+    assert lift.weight.weight == pytest.approx(WEIGHT, rel=1e-6)
     found = gentlest_grip(lift, 2e-5, 1e-3, weight=WEIGHT, friction=FRICTION, start=1e-4, tolerance=0.05)
     assert found.status is GripStatus.HELD, found.ended
     assert 0.98 * WEIGHT / (2.0 * FRICTION) <= 0.5 * found.trial.force <= 1.08 * WEIGHT / (2.0 * FRICTION)
@@ -111,16 +122,18 @@ def test_the_gentlest_grip_takes_the_block_from_its_foot(lift: Lift) -> None:
     assert -2e-3 < lowered < 0.0
     force = sum(touch.force for touch in instant.touches)
     np.testing.assert_allclose(force, [0.0, 0.0, -WEIGHT], atol=1e-3 * WEIGHT)
-    assert not instant.reactions[lift.weighed.handle].any()
+    assert not instant.reactions[lift.weight.handle].any()
 
 
-def test_a_block_with_a_floor_below_stands_on_it(lift: Lift) -> None:
-    grips = lift._grips
-    bodies = grips.bodies
+def test_a_block_with_a_floor_below_stands_on_it(lift: HandTrials) -> None:
+    squeeze, model = lift.squeeze, lift.squeeze.model
     floor = Plane((0.0, 0.0, -0.5 * EDGE - 5e-5), (0.0, 0.0, 1.0))
-    bodies.pairs += (Pair(bodies.objects[0].volume.name, floor, FRICTION),)
-    bodies.owners += (PairOf("BLOCK", "FLOOR"),)
-    standing = Lift(grips, bodies.objects[0])
+    squeeze.model = replace(
+        model,
+        pairs=(*model.pairs, Pair(model.objects[0].faces, floor, FRICTION)),
+        owners=(*model.owners, PairOwners("BLOCK", "FLOOR")),
+    )
+    standing = HandTrials(squeeze, model.objects[0])
     trial = standing(1.5e-4)
     assert trial.outcome is Outcome.STANDS
     assert trial.note.startswith("FLOOR bears ")

@@ -11,8 +11,9 @@ from warpjld.fem import Body, Loads, Prescribed, solve
 from warpjld.fem.load.loads import volumes
 from warpjld.grasp import GraspObject, Places, make_object
 from warpjld.grasp.shapes import ball, box, cylinder, glass
-from warpjld.simulation.specification import Physical
-from warpjld.simulation.bodies.object_mesh import ObjectVolume, object_volume
+from warpjld.simulation.bodies.object_body import ObjectBody
+from warpjld.simulation.bodies.object_mesh import ObjectMesh, mesh_object
+from warpjld.simulation.specification import ObjectMaterial
 
 PLACE = Places.of((0.1, 0.2, 0.3), (0.1, 0.2, 0.3, 0.9))
 NOTHING = Prescribed(np.empty(0, np.int64), np.empty(0))
@@ -24,16 +25,22 @@ def capsule() -> GraspObject:
     return make_object("capsule", mesh.vertices, mesh.faces)
 
 
-def made(thing: GraspObject, **options: float) -> ObjectVolume:
-    return object_volume("X", thing, Physical(**options), PLACE)  # type: ignore[arg-type]
+def made(thing: GraspObject, **options: float) -> ObjectMesh:
+    return mesh_object("X", thing, ObjectMaterial(**options), PLACE)  # type: ignore[arg-type]
+
+
+def deformed(found: ObjectMesh, displacement: np.ndarray) -> np.ndarray:
+    return ObjectBody(found, lambda time: PLACE, [], 0.0).deformed(displacement)
 
 
 @pytest.mark.parametrize("thing", [ball(0.06), box(), cylinder(), capsule()], ids=lambda thing: thing.name)
 def test_solid_objects_fill_their_surface(thing: GraspObject) -> None:
     found = made(thing, element=0.004)
     assert volumes(found.mesh).sum() == pytest.approx(thing.volume, rel=0.03)
-    np.testing.assert_allclose(found.worn(np.zeros_like(found.mesh.nodes)), PLACE.apply(thing.vertices)[0], atol=1e-12)
-    moved = found.worn(np.tile([0.0, 0.01, 0.0], (len(found.mesh.nodes), 1)))
+    np.testing.assert_allclose(
+        deformed(found, np.zeros_like(found.mesh.nodes)), PLACE.apply(thing.vertices)[0], atol=1e-12
+    )
+    moved = deformed(found, np.tile([0.0, 0.01, 0.0], (len(found.mesh.nodes), 1)))
     np.testing.assert_allclose(moved - found.surface, np.tile([0.0, 0.01, 0.0], (len(moved), 1)), atol=1e-9)
     assert set(found.mesh.faces) == {"X"}
     np.testing.assert_allclose(PLACE.apply(found.local)[0], found.mesh.nodes, atol=1e-12)
@@ -56,7 +63,9 @@ def test_the_wall_of_a_box_is_as_thick_at_its_edges() -> None:
     found = made(thing, element=0.004, wall=wall)
     inside = thing.size - 2.0 * wall
     assert volumes(found.mesh).sum() == pytest.approx(thing.size.prod() - inside.prod(), rel=1e-9)
-    np.testing.assert_allclose(found.worn(np.zeros_like(found.mesh.nodes)), PLACE.apply(thing.vertices)[0], atol=1e-12)
+    np.testing.assert_allclose(
+        deformed(found, np.zeros_like(found.mesh.nodes)), PLACE.apply(thing.vertices)[0], atol=1e-12
+    )
 
 
 def test_a_pressurised_ball_keeps_its_shape() -> None:

@@ -10,9 +10,9 @@ import pytest
 
 from warpjld.errors import InputError
 from warpjld.fem.contact.obstacles.solids import Box, Plane, Sphere
-from warpjld.simulation.solve.substeps import half_thickness, way_past
 from warpjld.script import Scene
-from warpjld.script.pressing import run_press
+from warpjld.script.contact import run_contact
+from warpjld.simulation.solve.substeps import distance_past, half_thickness
 
 PLATE = (
     "OBJECT plate BOX 0.036 0.002 0.036 AT 0.034 -0.0275 -0.165\nSPLINE 1\nFLESH LEFT INDEX ELEMENT 0.004\nRATE 10\n"
@@ -38,12 +38,12 @@ def test_ways_past_what_moves_along_count_for_nothing() -> None:
     gone = [x, x + 0.5 * down, x + down]
     times = [0.0, 0.5, 1.0]
     still = Sphere((0, 0, 0), 0.003)
-    assert way_past(still, times, gone) == pytest.approx(0.01)
-    assert way_past(still, times, [x, x, x]) == 0.0
+    assert distance_past(still, times, gone) == pytest.approx(0.01)
+    assert distance_past(still, times, [x, x, x]) == 0.0
     along = Sphere((0, 0, 0), 0.003, motion=lambda t: ((0.0, 0.0, -0.01 * t), (0, 0, 0, 1)))
-    assert way_past(along, times, gone) == 0.0
+    assert distance_past(along, times, gone) == 0.0
     towards = Sphere((0, 0, 0), 0.003, motion=lambda t: ((0.0, 0.0, 0.01 * t), (0, 0, 0, 1)))
-    assert way_past(towards, times, [x, x, x]) == pytest.approx(0.01)
+    assert distance_past(towards, times, [x, x, x]) == pytest.approx(0.01)
 
 
 def test_a_finger_does_not_jump_through_a_plate(run: Callable[[str], Scene], tmp_path: Path) -> None:
@@ -52,8 +52,8 @@ def test_a_finger_does_not_jump_through_a_plate(run: Callable[[str], Scene], tmp
         PLATE + "MOVE LEFT 0 0 0.006 0\nMOVE LEFT 1 0 0.006 0\nMOVE LEFT 2 0 -0.030 0\nMOVE LEFT 3 0 -0.031 0\n"
         "FRAMES 0 3\nPRESS 0 3\n"
     )
-    report = run_press(scene, tmp_path)
-    assert report.pressed.solved.start == 1.0
+    report = run_contact(scene, tmp_path)
+    assert report.solved.start == 1.0
     assert report.verdict.status != "CONVERGED"
     assert "bones of LEFT are" in report.verdict.text
     assert "inside PLATE" in report.verdict.text
@@ -64,10 +64,10 @@ def test_a_tap_between_two_frames_is_said(run: Callable[[str], Scene], tmp_path:
         PLATE + "MOVE LEFT 0 0 0.002 0\nMOVE LEFT 1 0 -0.0065 0\nMOVE LEFT 2 0 0.002 0\nMOVE LEFT 4 0 0.002 0\n"
         "FRAMES 0 4\nPRESS 0 4 EVERY 2\n"
     )
-    report = run_press(scene, tmp_path)
+    report = run_contact(scene, tmp_path)
     assert report.verdict.status == "CONVERGED"
     assert all(row.force_n < 1e-6 for row in report.rows)
-    (brush,) = report.pressed.solved.brushes
+    (brush,) = report.solved.brushes
     assert (brush.actor, brush.digit, brush.against, brush.before, brush.after) == ("LEFT", "index", "PLATE", 0.0, 2.0)
     assert brush.force > 0.01
     assert report.verdict.text.startswith("nothing touches at any frame, but between them: LEFT index touches PLATE")
@@ -80,4 +80,4 @@ def test_skin_that_begins_too_deep_is_refused(run: Callable[[str], Scene], tmp_p
         "POINTS BALL FOOT LOWER Y 0.1\nHOLD BALL FOOT\nFLESH LEFT INDEX ELEMENT 0.004\nFRAMES 0 2\nPRESS 0 2\n"
     )
     with pytest.raises(InputError, match=r"LEFT index: 1\d mm inside BALL at frame 0, where contact begins"):
-        run_press(scene, tmp_path)
+        run_contact(scene, tmp_path)

@@ -9,32 +9,32 @@ from types import SimpleNamespace
 import numpy as np
 
 from warpjld.fem import Status
-from warpjld.simulation.display.overlap import Over, SurfacePart
-from warpjld.simulation.solve.frames import Solved
-from warpjld.simulation.report.visible_overlap import missed
-from warpjld.simulation.report.verdict import verdict_of
 from warpjld.script import Scene
-from warpjld.script.pressing import run_press
+from warpjld.script.contact import run_contact
+from warpjld.simulation.display.overlap import Overlap, SurfacePart
+from warpjld.simulation.report.verdict import verdict_of
+from warpjld.simulation.report.visible_overlap import remaining_overlaps
+from warpjld.simulation.solve.frames import SolveResult
 
 A, B = SurfacePart("A"), SurfacePart("B")
 
 
-def deep(depth: float) -> Over:
-    return Over(np.array([3]), np.array([[0.0, depth, 0.0]]))
+def deep(depth: float) -> Overlap:
+    return Overlap(np.array([3]), np.array([[0.0, depth, 0.0]]))
 
 
 def test_overlap_that_contact_left_is_a_status_of_its_own() -> None:
     """Two objects that are 4 mm in one another at frames 2 and 3, and 0.5 mm at frame 1, with elements of 4 mm."""
     depths = {1.0: 5e-4, 2.0: 4e-3, 3.0: 3e-3}
     pressed = SimpleNamespace(
-        bodies=SimpleNamespace(hands=()),
-        solved=SimpleNamespace(frames=[SimpleNamespace(frame=frame) for frame in depths]),
-        cleared=lambda frame: SimpleNamespace(inside={(A, B): deep(depths[frame]), (B, A): deep(1e-4)}),
+        model=SimpleNamespace(hands=()),
+        frames=[SimpleNamespace(frame=frame) for frame in depths],
+        separated=lambda frame: SimpleNamespace(inside={(A, B): deep(depths[frame]), (B, A): deep(1e-4)}),
         most=lambda name: 2e-3,
     )
-    (found,) = missed(pressed)  # type: ignore[arg-type]
+    (found,) = remaining_overlaps(pressed)  # type: ignore[arg-type]
     assert found.text == "A and B overlap by 4.0 mm at frames 2 to 3"
-    solved = Solved(Status.CONVERGED, "", 0.0, ())
+    solved = SolveResult(Status.CONVERGED, "", None)  # type: ignore[arg-type]
     verdict = verdict_of(solved, [], [], [found])
     assert verdict.status == "OVERLAP"
     assert verdict.text == "not solved: A and B overlap by 4.0 mm at frames 2 to 3, and forces there are wrong"
@@ -50,7 +50,7 @@ def test_digits_that_meet_skin_without_flesh_are_named(run: Callable[[str], Scen
         "FINGER23 LEFT THUMB KNUCKLES3 AT 0 26.1\nFLESH LEFT THUMB ELEMENT 0.004\n"
         "OBJECT far BALL 0.02 AT 1 0 0\nPRESS 0 1\n"
     )
-    report = run_press(scene, tmp_path)
+    report = run_contact(scene, tmp_path)
     assert report.verdict.status == "CONVERGED"
     (note,) = (note for note in report.notes if "overlap" in note)
     assert note.startswith("LEFT index and LEFT thumb are seen to overlap by ")

@@ -16,7 +16,7 @@ from scipy.spatial.transform import Rotation
 from warpjld.fem.contact import Obstacle
 from warpjld.fem.contact.obstacles.facets import Facets
 
-__all__ = ["Settled", "settle"]
+__all__ = ["RigidMove", "settle_free_object"]
 
 _ROUNDS = 40
 _STILL = 1e-7
@@ -30,7 +30,7 @@ _HARD = 10.0
 
 
 @dataclass(frozen=True, eq=False)
-class Settled:
+class RigidMove:
     """A rigid motion x → R (x − centre) + centre + shift.
 
     Attributes:
@@ -50,13 +50,13 @@ class Settled:
         return np.asarray(self.turn.apply(points - self.centre) + self.centre + self.shift)
 
 
-def settle(
+def settle_free_object(
     nodes: NDArray[np.float64],
     surface: NDArray[np.int32],
     others: NDArray[np.float64],
     obstacles: Sequence[Obstacle],
     time: float,
-) -> Settled:
+) -> RigidMove:
     """Move an object as one to where it overlaps others least, evenly on all sides.
 
     Minimises Σ ½ w d² over all points with a negative distance d, by the Gauss–Newton method in six motions.
@@ -74,7 +74,7 @@ def settle(
     near = others[np.linalg.norm(others - centre, axis=1) < 2.0 * reach]
     turn, shift, overlap = Rotation.identity(), np.zeros(3), 0.0
     if not len(near) and not obstacles:
-        return Settled(turn, centre, shift, overlap)
+        return RigidMove(turn, centre, shift, overlap)
     shape = Facets(nodes, surface)
     for _ in range(_ROUNDS):
         rows, errors, weights = [], [], []
@@ -108,4 +108,4 @@ def settle(
         turn = Rotation.from_rotvec(step[3:]) * turn
         if longest < _STILL * reach:
             break
-    return Settled(turn, centre, shift, overlap)
+    return RigidMove(turn, centre, shift, overlap)

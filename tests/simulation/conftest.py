@@ -6,6 +6,7 @@ from collections.abc import Callable
 
 import pytest
 
+from warpjld.fem.hand import FleshHand, build_flesh_hand
 from warpjld.rig import Rig
 from warpjld.script import Interpreter, Scene
 
@@ -30,3 +31,11 @@ def run(rig: Rig) -> Callable[[str], Scene]:
         return scene
 
     return run_text
+
+
+@pytest.fixture(scope="session")
+def hand() -> FleshHand:
+    """Its flesh, coarsely skinned."""
+    from warpjld.hand import build_hand
+
+    return build_flesh_hand(build_hand("left", resolution=4000), 0.003)

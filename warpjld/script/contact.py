@@ -1,0 +1,253 @@
+"""Contact of a scene: it is handed to the simulation as a specification and an animation; keys and files come of it."""
+
+from __future__ import annotations
+
+import copy
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from warpjld.errors import InputError
+from warpjld.script.binding import cover
+from warpjld.script.folder import OutputFolder
+from warpjld.script.outputs import Film, Grips, Output, Picture, Table, Touch, Volume
+from warpjld.script.props import prop_places
+from warpjld.script.scene import SplineConstants
+from warpjld.script.staging import stage
+from warpjld.simulation.specification import located
+from warpjld.skeleton import CHANNELS, poses_from_angles
+
+if TYPE_CHECKING:
+    from warpjld.covering import Covering
+    from warpjld.fem.contact import Obstacle
+    from warpjld.grasp import GraspObject, Places
+    from warpjld.rig import Rig
+    from warpjld.script.props import Prop
+    from warpjld.script.scene import Actor, Scene
+    from warpjld.simulation.animation import AngleEdit
+    from warpjld.simulation.simulate import Simulation
+    from warpjld.skeleton import Poses, Skeleton
+
+__all__ = ["REST", "SceneAnimation", "check_contact", "run_contact", "write_contact", "write_keys"]
+
+REST = SplineConstants(tension=1.0)
+"""A key at which a joint rests: what follows it does not change what leads to it."""
+
+_THROUGH = SplineConstants()
+
+_FLEXION = CHANNELS.index("flexion")
+
+
+def run_contact(
+    scene: Scene, folder: Path, progress: Callable[[str, int, int], None] = lambda what, done, total: None
+) -> Simulation:
+    """Do what ``PRESS`` asks for; grips that are found, and angles that are corrected, become keys of their actors.
+
+    Raises:
+        InputError: Bodies that cannot be meshed or driven; names the command's line.
+    """
+    from warpjld.simulation.simulate import simulate
+
+    pressing = scene.contact.pressing
+    assert pressing is not None
+    try:
+        found = simulate(scene.contact, SceneAnimation(scene), folder=folder, progress=progress)
+    except InputError as error:
+        raise located(error, pressing.where) from error
+    for edit in found.solved.edits:
+        write_keys(scene.actor(edit.actor), edit)
+    return found
+
+
+@dataclass(frozen=True, eq=False)
+class _StagedActor:
+    """An actor as the simulation asks for it (see ``ActorAnimation``)."""
+
+    actor: Actor
+    rate: float
+
+    @property
+    def name(self) -> str:
+        return self.actor.name
+
+    @property
+    def skeleton(self) -> Skeleton:
+        return self.actor.skeleton
+
+    @property
+    def rig(self) -> Rig:
+        return replace(self.actor.rig, skeleton=self.actor.skeleton)
+
+    @property
+    def covering(self) -> Covering:
+        return cover(self.actor)
+
+    @property
+    def bendable(self) -> bool:
+        return self.actor.recorded is None
+
+    def pose(self, frame: float) -> Poses:
+        return stage(self.actor, np.array([frame]), self.rate)
+
+    def angles(self, frame: float) -> NDArray[np.float64]:
+        return self.actor.motion.sample([frame], self.actor.skeleton)[0][0]
+
+    def posed(self, angles: NDArray[np.float64], frame: float) -> Poses:
+        moment = np.array([frame])
+        root = self.actor.motion.sample(moment, self.actor.skeleton)[1]
+        poses = poses_from_angles(self.actor.skeleton, angles[None], root_position=root)
+        return self.actor.placement.apply(poses, moment)
+
+    def skin(self, frame: float) -> NDArray[np.float64]:
+        return self.covering.deform(self.pose(frame))[0].astype(np.float64)
+
+    def edited(self, edits: Sequence[AngleEdit]) -> _StagedActor:
+        actor = replace(self.actor, motion=copy.deepcopy(self.actor.motion))
+        for edit in edits:
+            write_keys(actor, edit)
+        return replace(self, actor=actor)
+
+
+@dataclass(frozen=True, eq=False)
+class _StagedObject:
+    """An object as the simulation asks for it (see ``ObjectAnimation``)."""
+
+    prop: Prop
+    actors: Mapping[str, Actor]
+    rate: float
+
+    @property
+    def name(self) -> str:
+        return self.prop.name
+
+    @property
+    def thing(self) -> GraspObject:
+        return self.prop.thing
+
+    @property
+    def follows(self) -> set[str]:
+        return {association.actor for association in self.prop.associations}
+
+    def place(self, frame: float) -> Places:
+        return prop_places(self.actors, self.rate, self.prop, np.array([frame]))
+
+    def obstacle(self, start: float) -> Obstacle:
+        from warpjld.fem.contact.obstacles.meshes import Keyframed
+        from warpjld.simulation.bodies.obstacle import rigid_obstacle
+
+        def motion(time: float) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+            here = self.place(start + time)
+            return here.position[0], here.rotation[0]
+
+        prop = self.prop
+        if prop.shapes is not None:
+            return Keyframed(prop.thing.faces, prop.shapes.frames - start, prop.shapes.vertices, motion)
+        return rigid_obstacle(prop.thing, motion) if prop.barred is None else prop.barr(start, motion)
+
+
+class SceneAnimation:
+    """A scene as the simulation asks for it (see ``Animation``)."""
+
+    def __init__(self, scene: Scene, edited: Mapping[str, _StagedActor] | None = None) -> None:
+        self._scene = scene
+        self.actors = {name: _StagedActor(actor, scene.rate) for name, actor in scene.actors.items()}
+        self.actors |= edited or {}
+
+    @cached_property
+    def objects(self) -> dict[str, _StagedObject]:
+        """In their order on the stage."""
+        actors = {name: staged.actor for name, staged in self.actors.items()}
+        return {name: _StagedObject(prop, actors, self._scene.rate) for name, prop in self._scene.props.items()}
+
+    def edited(self, edits: Sequence[AngleEdit]) -> SceneAnimation:
+        """The same with keys set in copies of its actors; objects that follow none of them stay the same."""
+        mine = {edit.actor: [one for one in edits if one.actor == edit.actor] for edit in edits}
+        actors = {name: self.actors[name].edited(some) for name, some in mine.items()}
+        out = SceneAnimation(self._scene, self.actors | actors)
+        for name, one in self.objects.items():
+            if not one.follows & set(actors):
+                out.objects[name] = one
+        return out
+
+
+def write_keys(actor: Actor, edit: AngleEdit) -> None:
+    """Set the keys of an edit: what is kept before it is kept by a key at every frame."""
+    channel = f"{actor.skeleton.names[edit.joint]}.{CHANNELS[_FLEXION]}"
+    track = actor.motion.tracks[channel]
+    if edit.frame is None:
+        was = next(key.value for key in track.keys if key.frame == edit.kept)
+        for key in track.keys:
+            if key.frame > edit.kept and key.value == was:
+                track.set(replace(key, value=edit.value))
+        return
+    first = min(key.frame for key in track.keys)
+    before = np.unique([*np.arange(np.ceil(first), edit.kept + 1e-9), edit.kept])
+    kept = actor.motion.value(channel, before)
+    for frame, value in zip(before.tolist(), kept.tolist(), strict=True):
+        actor.set_keys(channel, [frame], value, _THROUGH)
+    actor.set_keys(channel, [edit.frame], edit.value, _THROUGH)
+
+
+def check_contact(scene: Scene, outputs: Sequence[Output], frames: NDArray[np.float64]) -> list[str]:
+    """Raise where something is asked for that only PRESS gives, at frames it does not solve; notes on the others.
+
+    Args:
+        scene: What the script described.
+        outputs: Files to make.
+        frames: Frames to make, shape (F,).
+    """
+    pressing = scene.contact.pressing
+    span = "" if pressing is None else f"PRESS solves frames {pressing.first} to {pressing.last}"
+    for output in outputs:
+        problem = ""
+        colored = isinstance(output, Film | Picture) and output.style == "pressure"
+        if pressing is None:
+            if colored or isinstance(output, Table | Touch | Volume):
+                problem = "shows contact, but none is solved: PRESS <first> <last> asks for it"
+        elif isinstance(output, Picture) and colored and not pressing.first <= output.frame <= pressing.last:
+            problem = f"shows pressure at frame {output.frame:g}, but {span}"
+        elif isinstance(output, Touch) and (output.actor or "") not in ("", *scene.contact.flesh):
+            problem = f"shows what {output.actor} feels, but it has no flesh: FLESH {output.actor} makes it so"
+        elif isinstance(output, Touch) and not scene.contact.flesh:
+            problem = "shows what skin feels, but no actor has flesh: FLESH <actor> makes it so"
+        if problem:
+            raise located(InputError(f"'{output.name}' {problem}"), scene.asked.get(output.name))
+    if pressing is None:
+        return []
+    first, last = float(frames[0]), float(frames[-1])
+    if pressing.last < first or pressing.first > last:
+        raise located(InputError(f"{span}, but {first:g} to {last:g} are made: see FRAMES"), pressing.where)
+    return [f"{span}, of which those after {last:g} are not made: see FRAMES"] if pressing.last > last else []
+
+
+def write_contact(found: Simulation, outputs: Sequence[Output], out: OutputFolder) -> None:
+    """Tables and volumes."""
+    from warpjld.simulation.grip.find import write_grips
+    from warpjld.simulation.report.table import write_table
+    from warpjld.simulation.report.volume_series import write_volumes
+
+    for output in outputs:
+        if isinstance(output, Table):
+            write_table(out.place(output.name), found.rows)
+        elif isinstance(output, Grips):
+            write_grips(out.place(output.name), found.grips)
+        elif isinstance(output, Touch):
+            _write_touch(found, output, out.place(output.name))
+        elif isinstance(output, Volume):
+            write_volumes(out.place(output.name), found.model, found.solved.frames)
+
+
+def _write_touch(found: Simulation, output: Touch, path: Path) -> None:
+    from warpjld.simulation.report.tactile_files import draw_tactile, write_tactile
+
+    actor = output.actor or next((hand.name for hand in found.model.hands), "nobody")
+    felt = found.tactile(actor)
+    if path.suffix == ".png":
+        draw_tactile(path, felt, f"What the skin of {actor} feels", "frame")
+    else:
+        write_tactile(path, felt)

@@ -1,0 +1,166 @@
+"""What every deformable body of a simulation is to the solver, whatever drives it: a hand with bones, or an object."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Protocol, Self
+
+import numpy as np
+from numpy.typing import NDArray
+
+from warpjld.fem import HexMesh, Material, Prescribed
+from warpjld.fem.contact import Obstacle
+from warpjld.fem.contact.interface.pairs import Exclusion
+from warpjld.fem.mesh.embedding import Embedding
+from warpjld.simulation.bodies.skin_parts import SkinParts
+
+__all__ = ["Bearing", "DeformableBody", "History", "Surroundings"]
+
+
+@dataclass(frozen=True, eq=False)
+class Bearing:
+    """What an object's support bears at the moment it begins to let go.
+
+    Attributes:
+        forces: Of the points the object stands on [N], shape (N, 3).
+        height: Displacement of the object's handle along the weight's axis [m].
+    """
+
+    forces: NDArray[np.float64]
+    height: float
+
+
+@dataclass(frozen=True, eq=False)
+class History:
+    """What is known of the equilibria so far, on which first guesses and fading supports build.
+
+    Attributes:
+        carried: Objects that only hands hold, by the hand that holds most: they go along with it in first guesses.
+        touched: Objects that something touches.
+        bearing: What supports bore when they began to let go, by object.
+    """
+
+    carried: Mapping[str, str] = field(default_factory=dict)
+    touched: frozenset[str] = frozenset()
+    bearing: Mapping[str, Bearing] = field(default_factory=dict)
+
+
+@dataclass(frozen=True, eq=False)
+class Surroundings:
+    """What is around a body when its displacement is guessed.
+
+    Attributes:
+        carry: Where the hand that alone holds it takes points (n, 3) [m]; None where none does.
+        touched: Whether anything touches it.
+        skin: Gives points of hands where they are guessed to be [m], shape (n, 3).
+        obstacles: What does not give way.
+        history: What is known of the equilibria so far.
+    """
+
+    carry: Callable[[NDArray[np.float64]], NDArray[np.float64]] | None
+    touched: bool
+    skin: Callable[[], NDArray[np.float64]]
+    obstacles: Sequence[Obstacle]
+    history: History
+
+
+class DeformableBody(Protocol):
+    """A volume mesh that carries a visible surface, with what is prescribed of it.
+
+    Times are in frames from the moment at which the body rests; displacements count from there.
+    """
+
+    @property
+    def name(self) -> str:
+        """Of the actor or object."""
+        ...
+
+    @property
+    def mesh(self) -> HexMesh:
+        """Its own nodes and elements, N and E of them."""
+        ...
+
+    @property
+    def faces(self) -> str:
+        """Face set of its outside, which may touch others."""
+        ...
+
+    @property
+    def laws(self) -> Mapping[str, Material]:
+        """Constitutive laws by region of the mesh."""
+        ...
+
+    @property
+    def modulus(self) -> float:
+        """Young's modulus under its surface [Pa]: the softer of two gives way more."""
+        ...
+
+    @property
+    def stress(self) -> NDArray[np.float64]:
+        """Stress at rest [Pa], shape (E, 6)."""
+        ...
+
+    @property
+    def surface(self) -> NDArray[np.float64]:
+        """Its visible surface at rest [m], shape (V, 3)."""
+        ...
+
+    @property
+    def triangles(self) -> NDArray[np.int32]:
+        """Of the visible surface, shape (T, 3)."""
+        ...
+
+    @property
+    def embedding(self) -> Embedding:
+        """How the mesh carries the vertices of the surface."""
+        ...
+
+    @property
+    def embedded(self) -> NDArray[np.bool_]:
+        """Vertices that it carries, shape (V,): where flesh is cut off, the others are not."""
+        ...
+
+    @property
+    def pressure_inside(self) -> tuple[str, float] | None:
+        """Face set of its inside, and the pressure there above that outside [Pa]."""
+        ...
+
+    @property
+    def self_contact(self) -> Exclusion | None:
+        """What of its surface never meets, where it may touch itself."""
+        ...
+
+    @property
+    def parts(self) -> SkinParts | None:
+        """Parts of its surface that may overlap one another."""
+        ...
+
+    @property
+    def pressing(self) -> NDArray[np.bool_] | None:
+        """Vertices whose overlap with other parts contact knows of, shape (V,); None: all."""
+        ...
+
+    def deformed(self, displacement: NDArray[np.float64], covered: NDArray[np.floating] | None) -> NDArray[np.float64]:
+        """Its visible surface [m], shape (V, 3), under a displacement (N, 3); ``covered`` is a skin without contact."""
+        ...
+
+    def prescribed(self, time: float, history: History) -> Prescribed:
+        """Known displacements at a time."""
+        ...
+
+    def guess(
+        self, before: float, time: float, displacement: NDArray[np.float64], around: Surroundings
+    ) -> NDArray[np.float64]:
+        """First guess of its displacement at a time from that at an earlier one [m], shape (N, 3)."""
+        ...
+
+    def way(
+        self, times: Sequence[float], displacement: NDArray[np.float64], nodes: NDArray[np.integer]
+    ) -> list[NDArray[np.float64]]:
+        """Where some of its nodes (n,) are at the first of some times, and are expected at the others [m]."""
+        ...
+
+    def timed(self, clock: Callable[[float], float]) -> Self:
+        """The same body, driven as it is at ``clock(time)``."""
+        ...

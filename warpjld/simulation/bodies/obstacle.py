@@ -1,0 +1,27 @@
+"""Rigid objects as obstacles: built-in shapes are exact, with edges rounded."""
+
+from __future__ import annotations
+
+from warpjld.fem.contact import Obstacle
+from warpjld.fem.contact.obstacles.meshes import RigidMesh
+from warpjld.fem.contact.obstacles.obstacle import Motion
+from warpjld.fem.contact.obstacles.solids import Box, Cylinder, Sphere
+from warpjld.grasp import GraspObject
+
+__all__ = ["rigid_obstacle"]
+
+_ROUNDED = 1e-3
+"""Radius of the edges of boxes and cylinders as contact feels them [m]: skin has no corner to lie around."""
+
+
+def rigid_obstacle(thing: GraspObject, motion: Motion) -> Obstacle:
+    """An object that does not give way and moves as a whole."""
+    middle = 0.5 * (thing.vertices.min(axis=0) + thing.vertices.max(axis=0))
+    edge = min(_ROUNDED, 0.2 * float(thing.size.min()))
+    if thing.origin == "ball":
+        return Sphere(middle, 0.5 * float(thing.size.max()), motion)
+    if thing.origin == "box":
+        return Box(thing.size, middle, edge, motion)
+    if thing.origin == "cylinder":
+        return Cylinder(0.5 * float(thing.size[0]), float(thing.size[1]), middle, edge=edge, motion=motion)
+    return RigidMesh(thing.vertices, thing.faces, motion)

@@ -1,0 +1,277 @@
+"""Contact simulated in Python: ``simulate(specification, animation)`` (B §3.3, §3.4, R91–R130).
+
+Example::
+
+    from warpjld.simulation.recorded import RecordedActor, RecordedAnimation, RecordedObject
+    from warpjld.simulation.simulate import simulate
+    from warpjld.simulation.specification import ContactSpecification, FleshMaterial, SolveSpecification
+
+    hand = RecordedActor("hand", rig, angles=angles)  # (F, J, 4) [rad], one row a frame
+    plate = RecordedObject("plate", trimesh.creation.box((0.04, 0.006, 0.04)), positions=(0.034, -0.0275, -0.165))
+    contact = ContactSpecification(
+        flesh={"hand": FleshMaterial(digits=("index",))}, pressing=SolveSpecification(0, 8, every=2)
+    )
+    found = simulate(contact, RecordedAnimation([hand], [plate]))
+    print(found.verdict.text, found.force("hand")[-1])
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from warpjld.errors import InputError
+from warpjld.simulation.animation import Animation
+from warpjld.simulation.bodies.flesh_body import build_flesh_body
+from warpjld.simulation.bodies.model import ContactModel, assemble_model
+from warpjld.simulation.bodies.object_body import build_object_body
+from warpjld.simulation.display.surfaces import DeformedSurfaces
+from warpjld.simulation.grip.correct_frames import worst_digits
+from warpjld.simulation.grip.find import FoundGrip
+from warpjld.simulation.report.table import ContactRow, ContactTable
+from warpjld.simulation.report.tactile import Tactile
+from warpjld.simulation.report.tactile_readings import tactile_readings
+from warpjld.simulation.report.verdict import Verdict, verdict_of
+from warpjld.simulation.report.visible_overlap import remaining_overlaps, visible_overlap_notes
+from warpjld.simulation.solve.checkpoint import CheckpointFile
+from warpjld.simulation.solve.checks import check_model, check_specification
+from warpjld.simulation.solve.frames import Progress, SolveResult, solve_frames
+from warpjld.simulation.solve.identity import identity_of
+from warpjld.simulation.solve.solved_frame import SolvedFrame
+from warpjld.simulation.solve.start_frame import StartFrame, find_start
+from warpjld.simulation.specification import ContactSpecification, SolveSpecification
+
+__all__ = ["Simulation", "VisiblePressure", "simulate"]
+
+
+@dataclass(frozen=True, eq=False)
+class VisiblePressure:
+    """Contact pressure on a visible surface at a frame.
+
+    Attributes:
+        vertices: Of the surface, split where anything ever presses on it [m], shape (V, 3); the first are its own.
+        triangles: Shape (T, 3).
+        pressure: [Pa], shape (V,); its integral over the surface is the force that presses.
+    """
+
+    vertices: NDArray[np.float64]
+    triangles: NDArray[np.int32]
+    pressure: NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class Simulation:
+    """What came of a simulation of contact: F frames solved, of N nodes of all bodies.
+
+    Attributes:
+        solved: Frames as they were solved, with the model, edits of the animation, grips and corrections.
+        surfaces: Shapes and pressures of visible surfaces, at any frame from the start on.
+        rows: The table: one row for each frame and digit.
+        verdict: In words.
+        notes: What was found on the way.
+    """
+
+    solved: SolveResult
+    surfaces: DeformedSurfaces
+    rows: list[ContactRow]
+    verdict: Verdict
+    notes: list[str]
+
+    @property
+    def model(self) -> ContactModel:
+        """What was solved; ``model.spans[name]`` are the rows of a body's nodes."""
+        return self.solved.model
+
+    @property
+    def grips(self) -> tuple[FoundGrip, ...]:
+        """Grips that were searched for."""
+        return self.solved.grips
+
+    @property
+    def frames(self) -> NDArray[np.float64]:
+        """Numbers of the frames that were solved, shape (F,)."""
+        return np.array([one.frame for one in self.solved.frames])
+
+    @property
+    def displacement(self) -> NDArray[np.float64]:
+        """Displacements of all nodes from rest, ``model.body.mesh.nodes`` [m], shape (F, N, 3)."""
+        nothing = np.zeros((0, *self.model.body.mesh.nodes.shape))
+        return np.concatenate([nothing, *(one.displacement[None] for one in self.solved.frames)])
+
+    @property
+    def contact_force(self) -> NDArray[np.float64]:
+        """Contact forces on all nodes, friction included [N], shape (F, N, 3)."""
+        nothing = np.zeros((0, *self.model.body.mesh.nodes.shape))
+        return np.concatenate([nothing, *(one.nodal.sum(axis=0)[None] for one in self.solved.frames)])
+
+    @property
+    def pressure(self) -> NDArray[np.float64]:
+        """Contact pressure at all nodes [Pa], shape (F, N)."""
+        nothing = np.zeros((0, len(self.model.body.mesh.nodes)))
+        return np.concatenate([nothing, *(one.pressure(self.model)[None] for one in self.solved.frames)])
+
+    def force(self, name: str) -> NDArray[np.float64]:
+        """Sum of the contact forces on a body [N], shape (F, 3).
+
+        Raises:
+            InputError: No such body.
+        """
+        return np.asarray(self.contact_force[:, self._span(name)].sum(axis=1))
+
+    def visible_pressure(self, name: str, frame: float) -> VisiblePressure:
+        """Pressure on an actor's or object's visible surface at a frame.
+
+        Raises:
+            InputError: No such body, or a frame that was not solved.
+        """
+        self._span(name)
+        pressure = self.surfaces.pressure(name, frame)
+        if pressure is None:
+            last = self.frames.max(initial=self.solved.start)
+            raise InputError(f"frame: want one of {self.solved.start:g} to {last:g}, got {frame:g}")
+        body = self.model.named(name)
+        surface = self.surfaces.refined(name, body.triangles, len(body.surface))
+        return VisiblePressure(surface.of(self.surfaces.separated(frame).vertices[name]), surface.faces, pressure)
+
+    def tactile(self, actor: str) -> Tactile:
+        """What the pads of an actor feel at the frames that were solved.
+
+        Raises:
+            InputError: Its flesh was not solved, or no frame was.
+        """
+        hands = [hand for hand in self.model.hands if hand.name == actor]
+        if not hands:
+            raise InputError(f"{actor} has no flesh that feels: FLESH {actor} makes it so")
+        if not self.solved.frames:
+            raise InputError(f"{actor} feels nothing: {self.solved.message}")
+        return tactile_readings(self.model, hands[0], self.solved.frames)
+
+    def _span(self, name: str) -> slice:
+        if name not in self.model.spans:
+            raise InputError(f"name: nothing called {name} deforms here; there are {', '.join(self.model.spans)}")
+        return self.model.spans[name]
+
+
+def simulate(
+    specification: ContactSpecification,
+    animation: Animation,
+    *,
+    folder: Path = Path(),
+    progress: Progress = lambda what, done, total: None,
+) -> Simulation:
+    """Solve contact over the frames of an animation, and report.
+
+    Args:
+        specification: What is asked; its ``pressing`` says which frames.
+        animation: What moves: of a script, of arrays (``RecordedAnimation``), or anything that implements the protocol.
+            Edits that searches and corrections give are laid over it, and are returned (``solved.edits``).
+        folder: Where the file of ``pressing.state`` is kept.
+        progress: Told about the work.
+
+    Returns:
+        All frames that were solved, also where not all could be: see its verdict's status.
+
+    Raises:
+        InputError: What cannot be: bodies that cannot be meshed or driven, names of nothing; where a script asked for
+            it, with the line.
+    """
+    request = specification.pressing
+    if request is None:
+        raise InputError("specification: want its pressing to say which frames are solved")
+    check_specification(animation, specification, request)
+    progress("looking for the first touch", 0, 1)
+    before = find_start(animation, specification, request)
+    progress("meshing", 0, 1)
+    model, notes = _model(specification, animation, before)
+    table = ContactTable(specification.strength)
+
+    def watch(driven: ContactModel, frame: SolvedFrame) -> str | None:
+        reason = table.add(driven, frame)
+        return reason if request.stop else None
+
+    frames = _frames(specification, request, model.start)
+    solved = solve_frames(
+        model,
+        frames,
+        specification,
+        request,
+        watch=watch,
+        checkpoint=_checkpoint(model, specification, request, frames, folder),
+        progress=progress,
+    )
+    return _report(solved, before, table, request, notes)
+
+
+def _model(
+    specification: ContactSpecification, animation: Animation, before: StartFrame
+) -> tuple[ContactModel, list[str]]:
+    """All bodies at the start, and notes on them."""
+    notes, hands, start = before.notes(), [], before.start
+    for name, material in specification.flesh.items():
+        hand, said = build_flesh_body(animation.actors[name], material, start)
+        hands.append(hand)
+        notes += said
+    objects = [
+        build_object_body(animation.objects[name], specification, start, before.place(name))
+        for name in specification.physical
+    ]
+    rigid = [name for name in animation.objects if name not in specification.physical]
+    obstacles = {name: animation.objects[name].obstacle(start) for name in rigid}
+    model = assemble_model(hands, objects, obstacles, specification, start=start, animation=animation)
+    check_model(model, specification)
+    return model, notes
+
+
+def _frames(specification: ContactSpecification, request: SolveSpecification, start: float) -> list[float]:
+    """Frames to solve: every so many, the last, and those at which a grip begins or ends."""
+    frames = {float(f) for f in range(request.first, request.last + 1, request.every)} | {float(request.last)}
+    for wish in specification.grips:
+        frames |= {wish.first, wish.middle, wish.last}
+    return sorted(f for f in frames if f > start)
+
+
+def _checkpoint(
+    model: ContactModel,
+    specification: ContactSpecification,
+    request: SolveSpecification,
+    frames: Sequence[float],
+    folder: Path,
+) -> CheckpointFile | None:
+    if request.state is None:
+        return None
+    return CheckpointFile(folder / request.state, identity_of(model, specification, frames))
+
+
+def _report(
+    solved: SolveResult, before: StartFrame, table: ContactTable, request: SolveSpecification, notes: list[str]
+) -> Simulation:
+    """All that is told of solved frames."""
+    model, animation = solved.model, solved.model.animation
+    assert animation is not None
+    surfaces = DeformedSurfaces(
+        model,
+        solved.frames,
+        lambda actor, frame: animation.actors[actor].skin(frame),
+        {name: (np.array(frames), places) for name, (frames, places) in before.moved.items()},
+        {name: animation.objects[name].thing.vertices for name in before.moved},
+    )
+    verdict = verdict_of(solved, table.rows, table.suggestions(model), remaining_overlaps(surfaces))
+    corrections = [one.text for one in worst_digits(solved.corrections)]
+    corrections += [text for frame in solved.corrections for text in frame.failed]
+    verdict = replace(
+        verdict,
+        text="; ".join([verdict.text, *before.notes()]),
+        grips=tuple(f"{one.wish.actor} at frame {one.wish.first:g}: {one.text}" for one in solved.grips),
+        corrections=tuple(corrections),
+    )
+    notes = [*notes, *table.notes()]
+    if solved.resumed:
+        notes.append(f"{solved.resumed} of {len(solved.frames)} frames were in {request.state} already")
+    notes += [missed.text for missed in solved.missed]
+    if solved.frames:
+        notes += visible_overlap_notes(surfaces, solved.frames[-1].frame)
+    return Simulation(solved, surfaces, table.rows, verdict, notes)
