@@ -272,10 +272,13 @@ def test_what_is_no_gltf_2_is_named(tmp_path: Path, text: str, message: str) -> 
 @pytest.mark.parametrize(
     ("change", "message"),
     [
-        (lambda g: g["bufferViews"][0].update(byteStride=-4096), "below 0"),
-        (lambda g: g["bufferViews"][0].update(byteOffset=-16), "below 0"),
-        (lambda g: g["accessors"][0].update(count=-1), "-1 elements"),
-        (lambda g: (g["accessors"][0].update(count=10**9), g["accessors"][0].pop("bufferView")), "1000000000 elements"),
+        (lambda g: g["bufferViews"][0].update(byteStride=-4096), "byteStride wants a whole number from 0 on"),
+        (lambda g: g["bufferViews"][0].update(byteOffset=-16), "byteOffset wants a whole number from 0 on"),
+        (lambda g: g["accessors"][0].update(count=-1), "count wants a whole number from 0 on"),
+        (
+            lambda g: (g["accessors"][0].update(count=10**9), g["accessors"][0].pop("bufferView")),
+            "1,000,000,000 vertices; the limit is",
+        ),
         (lambda g: g["accessors"][3].update(componentType=5126), "unsigned integers|needs bytes"),
         (lambda g: g["nodes"][-1].update(mesh=7), "mesh 7 does not exist"),
     ],
