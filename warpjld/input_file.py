@@ -26,7 +26,6 @@ def open_input(path: str | Path) -> BinaryIO:
         raise InputError(f"cannot be read: {error.strerror}", path=path) from None
     except ValueError as error:  # a name with a zero byte
         raise InputError(f"is no name of a file: {error}", path=repr(str(path))) from None
-    file = os.fdopen(descriptor, "rb")
     try:
         found = os.fstat(descriptor)
         if stat.S_ISDIR(found.st_mode):
@@ -35,9 +34,9 @@ def open_input(path: str | Path) -> BinaryIO:
             raise InputError("is no regular file (a pipe or a device): save its content in a file", path=path)
         check_limit("file-bytes", found.st_size, path=path)
     except BaseException:
-        file.close()
+        os.close(descriptor)
         raise
-    return file
+    return os.fdopen(descriptor, "rb")
 
 
 def read_bytes(path: str | Path) -> bytes:

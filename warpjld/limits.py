@@ -42,11 +42,11 @@ LIMITS = {
     "joints": Limit(4_096, "joints", "a skeleton"),
     "frames": Limit(2_000_000, "frames", "a motion or a scene"),
     "transforms": Limit(100_000_000, "transforms", "a motion: frames times joints"),
-    "depth": Limit(200, "levels", "JSON, one list or object inside the other"),
+    "depth": Limit(200, "levels", "JSON and arithmetic, one inside the other"),
     "statements": Limit(100_000, "statements", "a script with its macros and include files written out"),
     "text": Limit(10_000, "characters", "a text in a script with its macro parameters put in"),
     "trials": Limit(1_000_000, "trials", "a study"),
-    "combinations": Limit(1_000_000, "combinations", "hands, objects, scales and frictions of a study"),
+    "instants": Limit(100_000, "instants", "a load step"),
     "elements": Limit(2_000_000, "elements", "a finite-element mesh"),
 }
 """By name, as ``--limit`` and, in capitals with underscores, the environment have them."""

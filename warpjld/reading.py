@@ -7,13 +7,12 @@ from contextlib import contextmanager
 from pathlib import Path
 
 from warpjld.errors import InputError, WarpjldError
-from warpjld.limits import LIMITS
 
 __all__ = ["reading"]
 
 
 @contextmanager
-def reading(path: str | Path, kind: str) -> Iterator[None]:
+def reading(path: str | Path, kind: str, *, but: type[Exception] | tuple[()] = ()) -> Iterator[None]:
     """While the statement lasts a file is read: its content may be anything, and libraries raise anything at it.
 
     Only what turns bytes into values belongs inside, so that a fault of the program's own is not taken for the file's.
@@ -21,6 +20,7 @@ def reading(path: str | Path, kind: str) -> Iterator[None]:
     Args:
         path: The file; put into those errors that name none.
         kind: What it is read as, for the message: ``OBJ``, ``a glTF 2.0 file``.
+        but: What is left as it is, since the reader tells it better.
 
     Raises:
         InputError: The file cannot be read as that; the first error is its cause.
@@ -33,9 +33,10 @@ def reading(path: str | Path, kind: str) -> Iterator[None]:
         raise InputError(error.message, path=path, line=error.line, column=error.column) from error
     except WarpjldError:
         raise
+    except but:
+        raise
     except RecursionError as error:
-        most = LIMITS["depth"].most
-        raise InputError(f"cannot be read as {kind}: nested more than {most} levels deep", path=path) from error
+        raise InputError(f"cannot be read as {kind}: nested too deeply", path=path) from error
     except MemoryError as error:
         raise InputError(f"cannot be read as {kind}: not enough memory for what it announces", path=path) from error
     except OSError as error:

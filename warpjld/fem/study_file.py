@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import inspect
+import math
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,6 +21,7 @@ from warpjld.fem.loads import Centrifugal, Loads, external_forces
 from warpjld.fem.materials import Fung, LinearElastic, Material, MooneyRivlin, NeoHooke
 from warpjld.fem.static import FREE
 from warpjld.fem.study import Step, Study, Support
+from warpjld.limits import check_limit
 from warpjld.toml_table import TomlTable, read_toml
 
 __all__ = ["load_study"]
@@ -76,6 +79,7 @@ def _mesh(table: TomlTable) -> tuple[HexMesh, tuple[str, ...]]:
         parameters = inspect.signature(_MESHES[kind]).parameters
         options = {name: table.like(name, parameter.default) for name, parameter in parameters.items()}
         table.finish()
+        check_limit("elements", _most_elements(kind or "", options), of="[mesh]", path=table.file)
         return _MESHES[kind](**options), ()
     table.needed("path")
     file = table.folder / (table.text("path") or "")
@@ -86,14 +90,27 @@ def _mesh(table: TomlTable) -> tuple[HexMesh, tuple[str, ...]]:
         table.finish()
         return read_mesh(file, scale=scale), ()
     from warpjld.fem.fit import mesh_surface_file
+    from warpjld.io.mesh_file import read_mesh as read_surface
 
     table.needed("spacing")
     spacing = table.number("spacing", above=0.0)
     table.finish()
     assert spacing is not None
+    size = np.ptp(read_surface(file).vertices, axis=0) * scale
+    check_limit("elements", float(np.prod(size / spacing)), of=f"[mesh] spacing {spacing:g} m: about", path=table.file)
     fit = mesh_surface_file(file, spacing=spacing, scale=scale)
     fitted = f"fitted to the surface: gap at most {1e3 * fit.gap:.2g} mm, volume {100 * fit.volume:.1f} % of it"
     return fit.mesh, (fitted, *fit.notes)
+
+
+def _most_elements(kind: str, options: dict[str, Any]) -> float:
+    """About how many elements a mesh of these options has, before any is made."""
+    if kind == "box":
+        return math.prod(float(count) for count in options["counts"])
+    n = float(options["n"])
+    layers = float(options["layers"] or n)
+    along = float(options.get("along", 0)) + {"ball": n, "finger": n / 2}.get(kind, 0.0)
+    return n * n * along + (4.0 * n * along + 2.0 * n * n) * layers  # the core, and the layers around it
 
 
 def _material(table: TomlTable) -> Material:
@@ -135,7 +152,7 @@ def _step(number: int, table: TomlTable) -> Step:
             forces=_vectors(table.table("force")),
         ),
         prescribed=tuple(_support(entry) for entry in table.tables("prescribed", least=0)),
-        instants=table.integer("instants", 1, least=1),
+        instants=table.integer("instants", 1, least=1, within="instants"),
         free=table.text("free", "hold", known=FREE) or "hold",
     )
     table.finish()
