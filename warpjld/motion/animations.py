@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
 
 from warpjld.errors import InputError
+from warpjld.input_file import check_input
 from warpjld.lazily import imported
+from warpjld.reading import reading
 from warpjld.suggest import one_of
 
 __all__ = ["animation_names", "choose_animation", "unique_names"]
@@ -20,8 +22,12 @@ def animation_names(path: str | Path) -> tuple[str, ...]:
     """
     path = Path(path)
     lister = _LISTERS.get(path.suffix.lower())
-    names: tuple[str, ...] = () if lister is None else imported(lister)(path)
-    return names
+    if lister is None:
+        return ()
+    check_input(path)
+    read: Callable[[Path], tuple[str, ...]] = imported(lister)
+    with reading(path, f"animations ({path.suffix.lower()})"):
+        return read(path)
 
 
 def choose_animation(wanted: str | None, names: tuple[str, ...], path: Path) -> tuple[str, tuple[str, ...]]:
@@ -51,14 +57,15 @@ def choose_animation(wanted: str | None, names: tuple[str, ...], path: Path) -> 
 
 def unique_names(names: Sequence[str]) -> list[str]:
     """Names of which the second of a kind is called ``name#2``."""
-    out: list[str] = []
+    out: dict[str, None] = {}
+    last: dict[str, int] = {}
     for name in names:
-        chosen, number = name, 1
+        chosen = name
         while chosen in out:
-            number += 1
-            chosen = f"{name}#{number}"
-        out.append(chosen)
-    return out
+            last[name] = last.get(name, 1) + 1
+            chosen = f"{name}#{last[name]}"
+        out[chosen] = None
+    return list(out)
 
 
 _GLTF = ("warpjld.motion.gltf_animation", "gltf_animation_names")

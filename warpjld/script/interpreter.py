@@ -156,7 +156,8 @@ class Interpreter:
     def _call(self, statement: Statement, bound: Mapping[str, Value]) -> None:
         self._made += 1
         if self._made > limit("statements"):  # macros that call macros: ten lines of ten make 10¹⁰
-            check_limit("statements", self._made)
+            with _at(statement.name.position):
+                check_limit("statements", self._made)
         values = [_evaluate(argument, bound) for argument in statement.arguments]
         name = statement.name.text.upper()
         if name in self.macros:
