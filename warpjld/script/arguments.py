@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from warpjld.errors import InputError
+from warpjld.lengths import LARGEST
 from warpjld.script.statements import Number, Position, Text, Value, Word
 from warpjld.suggest import did_you_mean
 
@@ -18,6 +19,7 @@ if TYPE_CHECKING:
 __all__ = ["Arguments"]
 
 _MOST_KEYS = 10_000
+_LARGEST = 1e12
 
 
 class Arguments:
@@ -82,11 +84,14 @@ class Arguments:
         self,
         what: str,
         *,
-        minimum: float = -math.inf,
-        maximum: float = math.inf,
+        minimum: float = -_LARGEST,
+        maximum: float = _LARGEST,
         above: float = -math.inf,
     ) -> float:
-        """A number in [minimum, maximum] and greater than ``above``; ``what`` names it in errors."""
+        """A number in [minimum, maximum] and greater than ``above``; ``what`` names it in errors.
+
+        Nothing is measured in numbers beyond 10¹², the modulus of diamond in pascals.
+        """
         value = self._peek()
         if not isinstance(value, Number):
             raise self.expected(what)
@@ -103,7 +108,7 @@ class Arguments:
 
     def integer(self, what: str, *, minimum: int | None = None, maximum: int | None = None) -> int:
         """A whole number."""
-        low, high = (-math.inf if minimum is None else minimum), (math.inf if maximum is None else maximum)
+        low, high = (-_LARGEST if minimum is None else minimum), (_LARGEST if maximum is None else maximum)
         value = self.number(what, minimum=low, maximum=high)
         if value != round(value):
             raise self.error(f"{what} must be a whole number, got {value:g}")
@@ -111,7 +116,8 @@ class Arguments:
 
     def vector(self, what: str) -> tuple[float, float, float]:
         """Three numbers."""
-        return self.number(f"{what} x"), self.number(f"{what} y"), self.number(f"{what} z")
+        x, y, z = (self.number(f"{what} {axis}", minimum=-LARGEST, maximum=LARGEST) for axis in "xyz")
+        return x, y, z
 
     def has_number(self) -> bool:
         """Whether a number comes next."""
