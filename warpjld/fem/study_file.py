@@ -22,6 +22,7 @@ from warpjld.fem.materials import Fung, LinearElastic, Material, MooneyRivlin, N
 from warpjld.fem.static import FREE
 from warpjld.fem.study import Step, Study, Support
 from warpjld.limits import check_limit
+from warpjld.names import check_name, clash
 from warpjld.toml_table import TomlTable, read_toml
 
 __all__ = ["load_study"]
@@ -54,6 +55,8 @@ def load_study(path: str | Path) -> Study:
         materials = {region: _material(table) for region, table in top.named_tables("material").items()}
         stress = top.numbers("initial_stress", (0.0,) * 6, count=6)
         steps = tuple(_step(k, table) for k, table in enumerate(top.tables("step")))
+        if twice := clash(step.name.replace(" ", "-") for step in steps):
+            top.fail("step", f"two are called '{twice[0]}'; pictures are called by their names: give each its own")
         solver = top.table("solver")
         method = solver.text("method", "auto", known=METHODS) or "auto"
         precision = solver.text("precision", "float64", known=PRECISIONS) or "float64"
@@ -142,8 +145,13 @@ def _nodes(mesh: HexMesh, table: TomlTable) -> NDArray[np.int32]:
 
 
 def _step(number: int, table: TomlTable) -> Step:
+    name = table.text("name") or f"step {number + 1}"
+    try:
+        check_name(name, "the step's name")  # pictures are called by it
+    except InputError as error:
+        table.fail("name", error.message)
     step = Step(
-        name=table.text("name") or f"step {number + 1}",
+        name=name,
         loads=Loads(
             gravity=table.vector("gravity", (0.0, 0.0, 0.0)),
             centrifugal=_centrifugal(table.table("centrifugal")) if "centrifugal" in table else None,

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 
 from warpjld.errors import InputError
 from warpjld.lengths import LARGEST
+from warpjld.names import check_name, expanded
 from warpjld.script.statements import Number, Position, Text, Value, Word
 from warpjld.suggest import did_you_mean
 
@@ -203,6 +204,14 @@ class Arguments:
         self._next += 1
         return value.text
 
+    def new_name(self, what: str) -> str:
+        """As ``name``, for what is to be called so: files carry it too."""
+        name = self.name(what)
+        try:
+            return check_name(name, what)
+        except InputError as error:
+            raise self.error(error.message) from None
+
     def has_text(self) -> bool:
         """Whether a quoted text comes next."""
         return isinstance(self._peek(), Text)
@@ -220,9 +229,11 @@ class Arguments:
     def input_file(self, what: str) -> Path:
         """A quoted name of a file that exists; relative to the script's folder (at a prompt, to the current one)."""
         name = self.text(what)
+        if "\0" in name:
+            raise self.error(f"{name!r}: no file has a zero byte in its name")
         script = Path(self.last.path)
         folder = Path() if self.last.path.startswith("<") else script.parent
-        path = folder / Path(name).expanduser()
+        path = folder / expanded(name)
         if not path.is_file():
             if path.is_dir():
                 raise self.error(f"'{path}' is a folder; want a file")
@@ -237,6 +248,11 @@ class Arguments:
         path = Path(name)
         if path.is_absolute() or ".." in path.parts or not path.name:
             raise self.error(f"'{name}': want a name inside the output folder (choose the folder with --out)")
+        try:
+            for part in path.parts:
+                check_name(part, "the name")
+        except InputError as error:
+            raise self.error(error.message) from None
         if path.suffix.lower() not in suffixes:
             hint = did_you_mean(path.suffix, suffixes) if path.suffix else ""
             raise self.error(f"'{name}': want a name that ends in {', '.join(suffixes)}{hint}")

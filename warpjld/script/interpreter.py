@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 
 from warpjld.errors import InputError, WarpjldError
 from warpjld.limits import check_limit, limit
+from warpjld.names import expanded
 from warpjld.script.arguments import Arguments
 from warpjld.script.parser import parse, parse_file
 from warpjld.script.registry import RESERVED, Command, Registry, all_commands
@@ -246,7 +247,7 @@ def _includes(nodes: Sequence[Node]) -> Iterator[tuple[Path, Position]]:
             name = node.arguments[0]
             if isinstance(name, Text):
                 folder = Path() if name.position.path.startswith("<") else Path(name.position.path).parent
-                path = folder / Path(name.text).expanduser()
+                path = folder / expanded(name.text)
                 if path.is_file():
                     yield path, name.position
 
