@@ -11,7 +11,6 @@ from warpjld.covering.binding import anchor
 from warpjld.covering.covering import Covering
 from warpjld.covering.domains import domains_from_geometry, domains_from_skin
 from warpjld.covering.operators import fans
-from warpjld.covering.paper import PaperCovering
 from warpjld.covering.parameters import Parameters, default_parameters
 from warpjld.covering.rigid import domains_of_rigid, part_of_surface
 from warpjld.errors import InputError
@@ -72,6 +71,8 @@ def bind(
                 weights[flesh] = domains_from_skin(vertices, faces, skeleton, groups, painted)
     anchors = anchor(surface.vertices, skeleton, groups, weights, chosen, rigid=hard)
     if method == "paper":
+        from warpjld.covering.paper import PaperCovering  # SciPy with it, which a kept binding does without
+
         return PaperCovering(skeleton, surface, chosen, groups, weights, anchors)
     return Covering(skeleton, surface, chosen, groups, weights, anchors)
 
