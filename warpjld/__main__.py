@@ -9,12 +9,14 @@ import threading
 from typing import NoReturn
 
 from warpjld.cli import main
+from warpjld.cli.warn import plain_warnings
 
 __all__ = ["run"]
 
 
 def run() -> NoReturn:
     """The command line as a process of its own."""
+    plain_warnings()
     try:
         main()
     except SystemExit as done:
@@ -29,11 +31,12 @@ def _leave(code: int) -> NoReturn:
     """
     threading._shutdown()  # type: ignore[attr-defined]
     atexit._run_exitfuncs()
-    try:
-        sys.stdout.flush()
-        sys.stderr.flush()
-    except OSError:  # whoever read it is gone, or the disk is full
-        code = code or 120  # as Python itself has it
+    for stream in (sys.stdout, sys.stderr):
+        try:
+            if stream is not None:  # as it is where it was closed from the start
+                stream.flush()
+        except (OSError, ValueError):  # whoever read it is gone, or the disk is full
+            code = code or 120  # as Python itself has it
     os._exit(code)
 
 

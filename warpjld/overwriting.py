@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import os
-from collections import Counter
 from collections.abc import Iterable
 from pathlib import Path
 
 from warpjld.errors import InputError
+from warpjld.names import clash
 
 __all__ = ["check_outputs"]
 
@@ -27,9 +27,11 @@ def check_outputs(outputs: Iterable[Path], inputs: Iterable[Path]) -> None:
     for path in outputs:
         if _place(path) in read:
             raise InputError(f"is read ({read[_place(path)]}): it is not written over", path=path)
-    twice = [place for place, count in Counter(map(_place, outputs)).items() if count > 1]
+    twice = clash(_place(path) for path in outputs)
     if twice:
-        raise InputError("would be written twice", path=next(p for p in outputs if _place(p) == twice[0]))
+        told = f"as {Path(twice[0]).name} and {Path(twice[1]).name}"
+        alike = "" if twice[0] == twice[1] else f" ({told}: not every file system tells upper case from lower)"
+        raise InputError(f"would be written twice{alike}", path=next(p for p in outputs if _place(p) == twice[1]))
 
 
 def _place(path: Path) -> str:

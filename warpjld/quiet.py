@@ -14,8 +14,13 @@ def silence_warp() -> None:
     import warp
 
     warp.config.log_level = warp.LOG_ERROR
-    sys.stderr.flush()
-    kept = os.dup(2)
+    if sys.stderr is not None:
+        sys.stderr.flush()
+    try:
+        kept = os.dup(2)
+    except OSError:  # closed: nothing can be heard there
+        warp.init()
+        return
     with open(os.devnull, "w") as nowhere:
         os.dup2(nowhere.fileno(), 2)
     try:

@@ -7,9 +7,13 @@ import json
 from pathlib import Path
 from typing import Any, Literal
 
-from warpjld.errors import InputError
+import numpy as np
 
-__all__ = ["read_json", "read_text"]
+from warpjld.errors import InputError
+from warpjld.input_file import read_bytes
+from warpjld.limits import check_limit
+
+__all__ = ["parse_json", "read_json", "read_text"]
 
 
 def read_text(path: str | Path, *, errors: Literal["strict", "replace"] = "strict") -> str:
@@ -24,12 +28,10 @@ def read_text(path: str | Path, *, errors: Literal["strict", "replace"] = "stric
     Raises:
         InputError: It cannot be read, or is no such text.
     """
+    raw = read_bytes(path)
     try:
-        raw = Path(path).read_bytes()
         wide = raw.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE))
         text = raw.decode("utf-16" if wide else "utf-8-sig", errors)
-    except OSError as error:
-        raise InputError(f"cannot be read: {error.strerror}", path=path) from None
     except UnicodeDecodeError as error:
         kind = "UTF-16" if wide else "UTF-8"
         raise InputError(f"is not {kind} text (byte {error.start})", path=path) from None
@@ -42,12 +44,33 @@ def read_json(path: str | Path) -> Any:
     Raises:
         InputError: It cannot be read, or is not JSON: names line and column.
     """
+    return parse_json(read_text(path), path)
+
+
+def parse_json(text: str, path: str | Path) -> Any:
+    """What a JSON text of a file holds; raises as ``read_json``."""
+    check_limit("depth", _nesting(text.encode("utf-8", "replace")), of="JSON", path=path)
     try:
-        return json.loads(read_text(path), parse_int=_integer)
+        return json.loads(text, parse_int=_integer)
     except json.JSONDecodeError as error:
         raise InputError(f"is not JSON: {error.msg}", path=path, line=error.lineno, column=error.colno) from None
-    except RecursionError:
-        raise InputError("is nested too deeply", path=path) from None
+    except RecursionError:  # where the limit was raised beyond what Python's reader takes
+        raise InputError("is not read: its JSON is nested more deeply than Python takes", path=path) from None
+
+
+def _nesting(raw: bytes) -> int:
+    """How many lists and objects of a JSON text lie inside one another at most."""
+    plain = raw.replace(b"\\\\", b"").replace(b'\\"', b"") if b"\\" in raw else raw  # escaped quotes end no text
+    marks = _STEP[np.frombuffer(plain.translate(None, _OTHERS), dtype=np.uint8)]
+    quotes = marks == _QUOTE
+    step = np.where(quotes | (np.cumsum(quotes) % 2 == 1), 0, marks)
+    return int(np.cumsum(step).max(initial=0))
+
+
+_QUOTE = 2
+_OTHERS = bytes(set(range(256)) - set(b'[]{}"'))
+_STEP = np.zeros(256, dtype=np.int8)
+_STEP[list(b"[{")], _STEP[list(b"]}")], _STEP[ord('"')] = 1, -1, _QUOTE
 
 
 def _integer(digits: str) -> int | float:

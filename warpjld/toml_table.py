@@ -10,6 +10,8 @@ from pathlib import Path
 from typing import Any, NoReturn
 
 from warpjld.errors import InputError
+from warpjld.limits import check_limit
+from warpjld.reading import reading
 from warpjld.suggest import did_you_mean
 from warpjld.text_file import read_text
 
@@ -24,12 +26,36 @@ def read_toml(path: str | Path) -> TomlTable:
     """
     text = read_text(path)
     try:
-        return TomlTable(tomllib.loads(text), "", Path(path), text.splitlines())
+        with reading(path, "TOML", but=tomllib.TOMLDecodeError):
+            content = _loaded(text)
     except tomllib.TOMLDecodeError as error:
         found = re.search(r"\(at line (\d+), column (\d+)\)", str(error))
         line, column = (int(found[1]), int(found[2])) if found else (None, None)
         message = re.sub(r" \(at .*\)$", "", str(error))
         raise InputError(f"not TOML: {message}", path=path, line=line, column=column) from error
+    return TomlTable(content, "", Path(path), text.splitlines())
+
+
+def _loaded(text: str) -> dict[str, Any]:
+    """What a TOML text holds; whole numbers beyond 64 bits are floats, infinite ones where they have endless digits."""
+    content: dict[str, Any] = _plain(tomllib.loads(text))
+    return content
+
+
+def _plain(value: Any) -> Any:
+    if isinstance(value, dict):
+        return {key: _plain(inner) for key, inner in value.items()}
+    if isinstance(value, list):
+        return [_plain(inner) for inner in value]
+    if isinstance(value, int) and abs(value) >= 2**63:
+        return float(value) if abs(value) < 2**1000 else math.copysign(math.inf, value)
+    return value
+
+
+def _short(value: Any) -> str:
+    """A value as a message may show it."""
+    text = repr(value)
+    return text if len(text) <= 60 else f"{text[:60]}…"
 
 
 class TomlTable:
@@ -56,6 +82,11 @@ class TomlTable:
         return self._name
 
     @property
+    def file(self) -> Path:
+        """The file."""
+        return self._path
+
+    @property
     def folder(self) -> Path:
         """Folder of the file, which its relative paths start from."""
         return self._path.parent
@@ -79,7 +110,7 @@ class TomlTable:
         if value is None:
             return None
         if not isinstance(value, str):
-            self.fail(key, f"want text, got {value!r}")
+            self.fail(key, f"want text, got {_short(value)}")
         if known and value not in known:
             self.fail(key, f"want one of {', '.join(known)}, got '{value}'{did_you_mean(value, known)}")
         return value
@@ -88,16 +119,21 @@ class TomlTable:
         """true or false."""
         value = self._take(key, default)
         if not isinstance(value, bool):
-            self.fail(key, f"want true or false, got {value!r}")
+            self.fail(key, f"want true or false, got {_short(value)}")
         return value
 
-    def integer(self, key: str, default: int | None = None, *, least: int = 0) -> int:
-        """A whole number; required where there is no default."""
+    def integer(self, key: str, default: int | None = None, *, least: int = 0, within: str | None = None) -> int:
+        """A whole number; required where there is no default. ``within`` names the limit that it must keep to."""
         if default is None:
             self.needed(key)
         value = self._take(key, default)
         if not isinstance(value, int) or isinstance(value, bool) or value < least:
-            self.fail(key, f"want a whole number from {least} on, got {value!r}")
+            self.fail(key, f"want a whole number from {least} on, got {_short(value)}")
+        if within is not None:
+            try:
+                check_limit(within, value)
+            except InputError as error:
+                self.fail(key, error.message)
         return value
 
     def number(
@@ -116,7 +152,7 @@ class TomlTable:
         value = self._take(key, list(default))
         items = value if isinstance(value, list) else [value]
         if not items or (count is not None and len(items) != count):
-            self.fail(key, f"want {count or 'one or more'} numbers, got {value!r}")
+            self.fail(key, f"want {count or 'one or more'} numbers, got {_short(value)}")
         return tuple(self._number(key, item, above, least, most) for item in items)
 
     def vector(self, key: str, default: Sequence[float] = ()) -> tuple[float, float, float]:
@@ -138,25 +174,26 @@ class TomlTable:
         if isinstance(default, str):
             return self.text(key)
         self.numbers(key, ())
-        return tuple(self._content[key])
+        value = self._content[key]
+        return tuple(value) if isinstance(value, list) else (value,)
 
     def texts(self, key: str, default: Sequence[str], *, known: Sequence[str]) -> tuple[str, ...]:
         """Different strings out of ``known``, one or more."""
         value = self._take(key, list(default))
         if not isinstance(value, list) or not value or not all(isinstance(item, str) for item in value):
-            self.fail(key, f"want a list of names, got {value!r}")
+            self.fail(key, f"want a list of names, got {_short(value)}")
         for item in value:
             if item not in known:
                 self.fail(key, f"want some of {', '.join(known)}, got '{item}'{did_you_mean(item, known)}")
         if len(set(value)) != len(value):
-            self.fail(key, f"names one twice: {value!r}")
+            self.fail(key, f"names one twice: {_short(value)}")
         return tuple(value)
 
     def table(self, key: str) -> TomlTable:
         """A table, empty where it is missing."""
         value = self._take(key, {})
         if not isinstance(value, dict):
-            self.fail(key, f"want a table [{self._called(key)}], got {value!r}")
+            self.fail(key, f"want a table [{self._called(key)}], got {_short(value)}")
         return TomlTable(value, self._called(key), self._path, self._lines)
 
     def named_tables(self, key: str) -> dict[str, TomlTable]:
@@ -189,11 +226,11 @@ class TomlTable:
 
     def _number(self, key: str, value: Any, above: float, least: float, most: float) -> float:
         if not isinstance(value, int | float) or isinstance(value, bool) or not math.isfinite(value):
-            self.fail(key, f"want a finite number, got {value!r}")
+            self.fail(key, f"want a finite number, got {_short(value)}")
         if value <= above or not least <= value <= most:
             wanted = [f"above {above:g}"] * (above > -math.inf) + [f"from {least:g} on"] * (least > -math.inf)
             wanted += [f"up to {most:g}"] * (most < math.inf)
-            self.fail(key, f"want a number {' and '.join(wanted)}, got {value!r}")
+            self.fail(key, f"want a number {' and '.join(wanted)}, got {_short(value)}")
         return float(value)
 
     def _called(self, key: str) -> str:

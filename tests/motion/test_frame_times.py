@@ -61,5 +61,5 @@ def test_poses_seconds_apart_are_no_frames() -> None:
 
 
 def test_a_million_frames_are_the_most() -> None:
-    with pytest.raises(InputError, match="at most 1000000"):
+    with pytest.raises(InputError, match="the limit is 2,000,000"):
         frame_times(0.0, 1e6, 30.0)

@@ -239,7 +239,7 @@ def test_impossible_values_are_refused(tmp_path: Path) -> None:
         load_motion(file.save(tmp_path / "a.glb"), driven)
     file, driven = chain()
     file.animate(2, "translation", [0, 1e9], np.zeros((2, 3)))
-    with pytest.raises(InputError, match="at most 1000000"):
+    with pytest.raises(InputError, match="the limit is 2,000,000"):
         load_motion(file.save(tmp_path / "a.glb"), driven, rate=30)
 
 

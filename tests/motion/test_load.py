@@ -34,7 +34,7 @@ def test_limits_are_checked_or_not(tmp_path: Path) -> None:
 def test_slips_of_the_pen_do_not_fill_the_memory(tmp_path: Path) -> None:
     path = tmp_path / "curl.csv"
     path.write_text("frame,index.base.flexion\n0,0\n1e15,60\n")
-    with pytest.raises(InputError, match=r"curl.csv: 1e\+15 frames"):
+    with pytest.raises(InputError, match=r"curl.csv: .* 1,000,000,000,000,000 frames; the limit is"):
         load_motion(path, rig(hand()))
 
 

@@ -4,17 +4,23 @@ from __future__ import annotations
 
 import importlib
 import io
+import os
 import signal
 import sys
+import traceback
 
 import click
 
 from warpjld import __version__
 from warpjld.cli.warn import one_line
 from warpjld.errors import WarpjldError
+from warpjld.limits import LIMITS, set_limit
 from warpjld.suggest import one_of
 
 __all__ = ["main"]
+
+_FAULT = 70  # EX_SOFTWARE of sysexits.h
+_TRACEBACK = "WARPJLD_TRACEBACK"
 
 _COMMANDS = {
     "run": "Run a script: animation, grasping, contact; pictures, films, exports.",
@@ -55,14 +61,31 @@ class _Lazy(click.Group):
             formatter.write_dl(list(_COMMANDS.items()))
 
 
+def _limits() -> str:
+    return "; ".join(f"{name} {one.most:,}" for name, one in LIMITS.items())
+
+
 @click.group(cls=_Lazy, context_settings={"help_option_names": ["-h", "--help"]}, epilog=_HELP)
 @click.version_option(__version__, prog_name="warpjld")
-def _group() -> None:
+@click.option(
+    "--limit",
+    "limits",
+    multiple=True,
+    metavar="NAME=NUMBER",
+    help=f"Raise or lower a limit on what is read or computed, before the command; repeatable. {_limits()}.",
+)
+def _group(limits: tuple[str, ...]) -> None:
     """Hands and bodies deformed by Joint-dependent Local Deformations, without painted weights."""
+    for one in limits:
+        name, _, value = one.partition("=")
+        set_limit(name.strip(), value)
 
 
 def main(arguments: list[str] | None = None) -> None:
-    """Run the command line. Exit codes: 0 done, 1 bad input or a failed job, 2 wrong usage, 130 interrupted."""
+    """Run the command line.
+
+    Exit codes: 0 done, 1 bad input or a failed job, 2 wrong usage, 70 a fault of the program's own, 130 interrupted.
+    """
     # a polite kill cleans up as Ctrl-C does, and keeps what is finished
     signal.signal(signal.SIGTERM, signal.default_int_handler)
     if isinstance(sys.stdout, io.TextIOWrapper):
@@ -88,4 +111,19 @@ def main(arguments: list[str] | None = None) -> None:
     except MemoryError as error:
         click.echo(f"error: not enough memory{f': {error}' if str(error) else ''}", err=True)
         sys.exit(1)
+    except Exception as error:
+        if os.environ.get(_TRACEBACK):
+            raise
+        click.echo(f"error: {_unexpected(error)}", err=True)
+        sys.exit(_FAULT)
     sys.exit(code if isinstance(code, int) else 0)
+
+
+def _unexpected(error: Exception) -> str:
+    """One line on an error that nobody foresaw: what, and where it came up."""
+    frames = traceback.extract_tb(error.__traceback__)
+    where = f" at {os.path.basename(frames[-1].filename)}:{frames[-1].lineno}" if frames else ""
+    return one_line(
+        f"unexpected {type(error).__name__}{where}: {error} (a fault of warpjld: please report it; with "
+        f"{_TRACEBACK}=1 set the same command shows where it came from)"
+    )

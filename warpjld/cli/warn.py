@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import sys
+import warnings
 from collections.abc import Iterable
 
 import click
 
-__all__ = ["one_line", "warn"]
+__all__ = ["one_line", "plain_warnings", "warn"]
 
 _LONGEST = 2000  # characters of a line
 
@@ -22,3 +24,16 @@ def one_line(text: str) -> str:
     if len(text) > _LONGEST:
         text = f"{text[: _LONGEST // 2]} … {text[-_LONGEST // 2 :]}"
     return "".join(letter if letter.isprintable() else repr(letter)[1:-1] for letter in text)
+
+
+def plain_warnings() -> None:
+    """Warnings of libraries: one line each where they are meant for users, none where NumPy speaks of rounding."""
+    if sys.warnoptions:  # whoever asks Python for warnings gets them
+        return
+
+    def show(message: Warning | str, category: type[Warning], *place: object, **rest: object) -> None:
+        warn([str(message)])
+
+    warnings.showwarning = show
+    for unheard in (RuntimeWarning, DeprecationWarning, FutureWarning, ResourceWarning, SyntaxWarning):
+        warnings.simplefilter("ignore", unheard)

@@ -12,27 +12,25 @@ from numpy.typing import ArrayLike, NDArray
 from warpjld.covering.binding import Anchors, anchor
 from warpjld.covering.device import checked_device
 from warpjld.covering.diffusion import Diffusion
-from warpjld.covering.domains import domains_from_geometry, domains_from_skin
 from warpjld.covering.drivers import drive
 from warpjld.covering.fields import Fields, joint_of_column, operator_fields
 from warpjld.covering.following import Following, following
 from warpjld.covering.launch import lane_of, launch_gathered, launch_runs
-from warpjld.covering.operators import Fan, fans
-from warpjld.covering.parameters import Parameters, default_parameters
-from warpjld.covering.rigid import domains_of_rigid, flesh_of, part_of_surface
+from warpjld.covering.operators import Fan
+from warpjld.covering.parameters import Parameters
+from warpjld.covering.rigid import flesh_of, part_of_surface
 from warpjld.covering.rows import Rows, pose_on, rows_of, rows_on
 from warpjld.covering.runs import Columns, Runs, pack_runs, palette
 from warpjld.covering.swelling import volume_keeping
 from warpjld.covering.thickness import thickness
 from warpjld.covering.thinning import thinned
 from warpjld.errors import InputError
-from warpjld.rig import Rig, Skin
 from warpjld.skeleton.kinematics import Poses
 from warpjld.skeleton.tree import Skeleton
 from warpjld.surface import Surface
 from warpjld.threads import threads_for
 
-__all__ = ["Covering", "bind", "bind_rig"]
+__all__ = ["Covering"]
 
 _STIFF = 0.75  # how much less far fields reach inside a skull
 _SPLIT_BELOW = 200_000  # vertex-frames a thread must have before splitting pays
@@ -278,94 +276,3 @@ class Covering:
         lane = lane_of(r.order, len(self.surface.vertices))
         kinds = ((tiles, wp.int32), (r.runs, wp.int32), (r.slots, wp.int32), (r.coefficients, float))
         return [wp.array(a, dtype=k, device=device) for a, k in (*kinds, (r.order, wp.int32), (lane, wp.int32))]
-
-
-def bind(
-    skeleton: Skeleton,
-    surface: Surface,
-    *,
-    parameters: Parameters | None = None,
-    skin: Skin | None = None,
-    rigid: NDArray[np.int32] | None = None,
-    domains: Literal["geometry", "skin"] | NDArray[np.float64] = "geometry",
-    method: Literal["smooth", "paper"] = "smooth",
-) -> Covering:
-    """Bind a surface to a skeleton (A §4): find domains and place every vertex on its segments.
-
-    Args:
-        skeleton: The rest skeleton.
-        surface: The rest surface, in the skeleton's frame.
-        parameters: The animator's parameters; by default those that keep volume.
-        skin: Painted weights, wanted by ``domains="skin"``.
-        rigid: Joint that a vertex without flesh follows with its bone, -1 for flesh, shape (V,). What is rigid takes no
-            part in domains: eyes in a head neither hide bones from its skin nor heat it.
-        domains: "geometry" (bone heat), "skin" (painted weights), or weights of every operator, shape (V, fans).
-        method: "smooth" (soft borders, rotations) or "paper" (its own hard-edged operators, to compare).
-
-    Raises:
-        InputError: A skeleton without segments, missing painted weights, or parameters out of range.
-    """
-    if method not in ("smooth", "paper"):
-        raise InputError(f"method: want 'smooth' or 'paper', got {method!r}")
-    groups = fans(skeleton)
-    if not groups:
-        raise InputError("skeleton: it has no segment to cover")
-    chosen = default_parameters(skeleton) if parameters is None else parameters
-    chosen.check(skeleton)
-    hard = _checked_rigid(rigid, len(surface.vertices), len(skeleton))
-    if isinstance(domains, np.ndarray):
-        weights = domains
-    elif domains not in ("geometry", "skin"):
-        raise InputError(f"domains: want 'geometry' or 'skin', got {domains!r}")
-    elif domains == "skin" and skin is None:
-        raise InputError("domains 'skin': this rig has no painted weights")
-    else:
-        weights = domains_of_rigid(hard, skeleton, groups)
-        if (flesh := np.flatnonzero(hard < 0)).size:
-            vertices, faces = part_of_surface(surface.vertices, surface.faces, flesh)
-            if domains == "geometry" or skin is None:
-                weights[flesh] = domains_from_geometry(vertices, faces, skeleton, groups)
-            else:
-                painted = Skin(skin.joints[flesh], skin.weights[flesh])
-                weights[flesh] = domains_from_skin(vertices, faces, skeleton, groups, painted)
-    anchors = anchor(surface.vertices, skeleton, groups, weights, chosen, rigid=hard)
-    if method == "paper":
-        from warpjld.covering.paper import PaperCovering
-
-        return PaperCovering(skeleton, surface, chosen, groups, weights, anchors)
-    return Covering(skeleton, surface, chosen, groups, weights, anchors)
-
-
-def bind_rig(
-    rig: Rig,
-    *,
-    skeleton: Skeleton | None = None,
-    parameters: Parameters | None = None,
-    domains: Literal["geometry", "skin"] = "geometry",
-    method: Literal["smooth", "paper"] = "smooth",
-) -> Covering:
-    """Bind a rig with all that it knows: its painted weights, and what of it is rigid. Arguments as of :func:`bind`.
-
-    Args:
-        rig: The rig.
-        skeleton: In place of the rig's own, where limits were changed.
-    """
-    return bind(
-        rig.skeleton if skeleton is None else skeleton,
-        rig.surface,
-        parameters=parameters,
-        skin=rig.skin,
-        rigid=rig.rigid,
-        domains=domains,
-        method=method,
-    )
-
-
-def _checked_rigid(rigid: NDArray[np.int32] | None, vertices: int, joints: int) -> NDArray[np.int32]:
-    if rigid is None:
-        return np.full(vertices, -1, dtype=np.int32)
-    if rigid.shape != (vertices,):
-        raise InputError(f"rigid: want a joint for each of {vertices} vertices, got shape {rigid.shape}")
-    if rigid.min(initial=-1) < -1 or rigid.max(initial=-1) >= joints:
-        raise InputError(f"rigid: joints must lie in -1…{joints - 1}")
-    return np.asarray(rigid, dtype=np.int32)

@@ -14,8 +14,9 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from warpjld.covering.bind import bind_rig
 from warpjld.covering.binding import Anchors
-from warpjld.covering.covering import Covering, bind_rig
+from warpjld.covering.covering import Covering
 from warpjld.covering.fields import Fields
 from warpjld.covering.kept_key import binding_key
 from warpjld.covering.operators import fans

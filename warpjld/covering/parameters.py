@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from warpjld.errors import InputError
+from warpjld.reading import reading
 from warpjld.skeleton.tree import CHANNELS, Skeleton
 from warpjld.suggest import one_of
 from warpjld.text_file import read_json
@@ -23,6 +24,9 @@ _SHAPES = ("proximity", "peak", "exponents")  # what shapes fields on the surfac
 _INFLATION = 0.1  # of a 90° joint: knuckles are rounded, and half of the volume that a tube loses there is put back
 _PALM = 3.0
 _WIDEST = np.radians(135.0)  # wider limits say what a joint never does alone
+
+
+_MOST = 1e3  # of any parameter: defaults are about one
 
 
 @dataclass(frozen=True, eq=False)
@@ -57,9 +61,10 @@ class Parameters:
             array = getattr(self, field.name)
             if array.shape[0] != count:
                 raise InputError(f"parameters.{field.name}: want {count} rows, got {array.shape[0]}")
-            bad = np.argwhere(~np.isfinite(array) | (array < 0.0))
+            bad = np.argwhere(~((array >= 0.0) & (array <= _MOST)))
             if len(bad):
-                raise InputError(f"parameters.{field.name} of '{skeleton.names[bad[0][0]]}' must be finite and ≥ 0")
+                name = skeleton.names[bad[0][0]]
+                raise InputError(f"parameters.{field.name} of '{name}' must be finite and ≥ 0, and {_MOST:g} at most")
         outside = np.flatnonzero((self.peak <= 0.0) | (self.peak >= 1.0))
         if outside.size:
             raise InputError(f"peak of '{skeleton.names[outside[0]]}' must lie between 0 and 1")
@@ -131,10 +136,8 @@ def load_parameters(path: str | Path, skeleton: Skeleton) -> Parameters:
         InputError: Unreadable file, unknown joint or field, or a value of the wrong shape or range.
     """
     content = read_json(path)
-    try:
+    with reading(path, "a parameter file"):
         return _parameters(content, skeleton)
-    except InputError as error:
-        raise InputError(error.message, path=path) from None
 
 
 def _parameters(content: Any, skeleton: Skeleton) -> Parameters:

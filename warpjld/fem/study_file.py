@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import inspect
+import math
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,6 +21,8 @@ from warpjld.fem.mesh.hexmesh import HexMesh
 from warpjld.fem.solver.linear import METHODS, PRECISIONS
 from warpjld.fem.solver.static import FREE
 from warpjld.fem.study import Step, Study, Support
+from warpjld.limits import check_limit
+from warpjld.names import check_name, clash
 from warpjld.toml_table import TomlTable, read_toml
 
 __all__ = ["load_study"]
@@ -51,6 +55,8 @@ def load_study(path: str | Path) -> Study:
         materials = {region: _material(table) for region, table in top.named_tables("material").items()}
         stress = top.numbers("initial_stress", (0.0,) * 6, count=6)
         steps = tuple(_step(k, table) for k, table in enumerate(top.tables("step")))
+        if twice := clash(step.name.replace(" ", "-") for step in steps):
+            top.fail("step", f"two are called '{twice[0]}'; pictures are called by their names: give each its own")
         solver = top.table("solver")
         method = solver.text("method", "auto", known=METHODS) or "auto"
         precision = solver.text("precision", "float64", known=PRECISIONS) or "float64"
@@ -76,6 +82,7 @@ def _mesh(table: TomlTable) -> tuple[HexMesh, tuple[str, ...]]:
         parameters = inspect.signature(_MESHES[kind]).parameters
         options = {name: table.like(name, parameter.default) for name, parameter in parameters.items()}
         table.finish()
+        check_limit("elements", _most_elements(kind or "", options), of="[mesh]", path=table.file)
         return _MESHES[kind](**options), ()
     table.needed("path")
     file = table.folder / (table.text("path") or "")
@@ -86,14 +93,27 @@ def _mesh(table: TomlTable) -> tuple[HexMesh, tuple[str, ...]]:
         table.finish()
         return read_mesh(file, scale=scale), ()
     from warpjld.fem.mesh.fit import mesh_surface_file
+    from warpjld.io.mesh_file import read_mesh as read_surface
 
     table.needed("spacing")
     spacing = table.number("spacing", above=0.0)
     table.finish()
     assert spacing is not None
+    size = np.ptp(read_surface(file).vertices, axis=0) * scale
+    check_limit("elements", float(np.prod(size / spacing)), of=f"[mesh] spacing {spacing:g} m: about", path=table.file)
     fit = mesh_surface_file(file, spacing=spacing, scale=scale)
     fitted = f"fitted to the surface: gap at most {1e3 * fit.gap:.2g} mm, volume {100 * fit.volume:.1f} % of it"
     return fit.mesh, (fitted, *fit.notes)
+
+
+def _most_elements(kind: str, options: dict[str, Any]) -> float:
+    """About how many elements a mesh of these options has, before any is made."""
+    if kind == "box":
+        return math.prod(float(count) for count in options["counts"])
+    n = float(options["n"])
+    layers = float(options["layers"] or n)
+    along = float(options.get("along", 0)) + {"ball": n, "finger": n / 2}.get(kind, 0.0)
+    return n * n * along + (4.0 * n * along + 2.0 * n * n) * layers  # the core, and the layers around it
 
 
 def _material(table: TomlTable) -> Material:
@@ -125,8 +145,13 @@ def _nodes(mesh: HexMesh, table: TomlTable) -> NDArray[np.int32]:
 
 
 def _step(number: int, table: TomlTable) -> Step:
+    name = table.text("name") or f"step {number + 1}"
+    try:
+        check_name(name, "the step's name")  # pictures are called by it
+    except InputError as error:
+        table.fail("name", error.message)
     step = Step(
-        name=table.text("name") or f"step {number + 1}",
+        name=name,
         loads=Loads(
             gravity=table.vector("gravity", (0.0, 0.0, 0.0)),
             centrifugal=_centrifugal(table.table("centrifugal")) if "centrifugal" in table else None,
@@ -135,7 +160,7 @@ def _step(number: int, table: TomlTable) -> Step:
             forces=_vectors(table.table("force")),
         ),
         prescribed=tuple(_support(entry) for entry in table.tables("prescribed", least=0)),
-        instants=table.integer("instants", 1, least=1),
+        instants=table.integer("instants", 1, least=1, within="instants"),
         free=table.text("free", "hold", known=FREE) or "hold",
     )
     table.finish()

@@ -5,13 +5,14 @@ from __future__ import annotations
 import re
 from dataclasses import dataclass
 from pathlib import Path
-from zipfile import BadZipFile
 
 import numpy as np
 from numpy.typing import NDArray
 
 from warpjld.errors import InputError
 from warpjld.grasp.objects import GraspObject, make_object
+from warpjld.motion.array_file import read_arrays
+from warpjld.reading import reading
 
 __all__ = ["KeyframedShape", "load_keyframes"]
 
@@ -67,15 +68,17 @@ def load_keyframes(path: str | Path, *, name: str | None = None, scale: float = 
     return KeyframedShape(thing, frames, np.ascontiguousarray(vertices[:, kept]))
 
 
-def _archive(path: Path) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.int32]]:
-    try:
-        with np.load(path, allow_pickle=False) as file:
-            missing = {"vertices", "faces", "frames"} - set(file.files)
-            if missing:
-                raise InputError(f"no animated surface: '{sorted(missing)[0]}' is missing", path=path)
-            found = file["frames"].astype(float), file["vertices"].astype(float), file["faces"].astype(np.int32)
-    except (OSError, EOFError, ValueError, BadZipFile) as error:
-        raise InputError("is no archive of NumPy arrays (.npz), or a damaged one", path=path) from error
+def _archive(path: Path) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.int64]]:
+    arrays = read_arrays(path)
+    missing = {"vertices", "faces", "frames"} - set(arrays)
+    if missing:
+        raise InputError(f"no animated surface: '{sorted(missing)[0]}' is missing", path=path)
+    with reading(path, "an animated surface"):
+        found = (
+            arrays["frames"].astype(float),
+            arrays["vertices"].astype(float),
+            arrays["faces"].astype(np.int64, casting="same_kind"),
+        )
     frames, vertices, _ = found
     if vertices.ndim != 3 or vertices.shape[2] != 3 or frames.shape != vertices.shape[:1] or not len(frames):
         raise InputError(f"vertices: want shape (frames, n, 3), got {vertices.shape}", path=path)
@@ -84,7 +87,7 @@ def _archive(path: Path) -> tuple[NDArray[np.float64], NDArray[np.float64], NDAr
     return found
 
 
-def _numbered(path: Path) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.int32]]:
+def _numbered(path: Path) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.int64]]:
     from warpjld.io.mesh_file import read_mesh
 
     match = _NUMBER.search(path.stem)
@@ -101,4 +104,4 @@ def _numbered(path: Path) -> tuple[NDArray[np.float64], NDArray[np.float64], NDA
         frames.append(float(number))
         shapes.append(shape)
         number += 1
-    return np.array(frames), np.stack(shapes), np.asarray(faces, dtype=np.int32)
+    return np.array(frames), np.stack(shapes), faces

@@ -12,6 +12,8 @@ from warpjld.errors import InputError
 from warpjld.io.placement import place
 from warpjld.io.rigid_parts import rigid_parts
 from warpjld.io.source import SourceRig
+from warpjld.lengths import check_reach, check_size
+from warpjld.limits import check_limit
 from warpjld.rig import Rig, Skin
 from warpjld.skeleton.recognise.canonical import Canonical, canonical_skeleton
 from warpjld.skeleton.recognise.flesh import flesh_shares
@@ -22,7 +24,6 @@ from warpjld.surface import Surface, weld_surface
 
 __all__ = ["assemble_rig"]
 
-_FURTHEST = 1e12
 _SAME_PLACE = 1e-3  # of the skeleton's size
 _NO_WEIGHT = 1e-6  # sum of painted weights below which a vertex has none
 
@@ -59,13 +60,17 @@ def _assemble(
     up: str | None,
     joint_map: Mapping[str, Any] | None,
 ) -> Rig:
-    reach = max(np.abs(source.vertices).max(initial=0.0), np.abs(source.tree.frames).max(initial=0.0))
-    if not reach < _FURTHEST:
-        raise InputError(f"vertices or joints lie at {reach:.3g}: beyond anything that can be computed with")
+    check_limit("vertices", len(source.vertices))
+    check_limit("faces", len(source.faces))
+    check_limit("joints", len(source.tree))
+    check_reach(source.vertices, "vertices")
+    check_reach(source.tree.frames, "joints")
     file_tree = source.tree
     shares = flesh_shares(len(source.tree), source.joints, source.weights, source.rigid)
     roles = recognise(source.tree, shares, _stated(source, joint_map or {}), by_shape=not source.stated)
     source = place(source, roles, unit=unit, scale=scale, up=up)
+    check_size(source.vertices[source.faces.ravel()], "the surface", "--unit or --scale")
+    check_size(source.tree.positions, "the skeleton", "--unit or --scale", least=0.0)
     surface = weld_surface(source.vertices, source.faces, uv=source.uv, corner_uv=source.corner_uv, parts=source.parts)
     painted = None
     if source.joints is not None and source.weights is not None:

@@ -1,18 +1,24 @@
-"""Surfaces without joints: OBJ, PLY and OFF, and STL, glTF and whatever else trimesh reads."""
+"""Surfaces without joints: OBJ, PLY, OFF and glTF, and STL and other kinds that trimesh reads."""
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
+from warpjld.archive import check_archive
 from warpjld.errors import InputError
+from warpjld.input_file import check_input
 from warpjld.io.obj_file import read_obj
 from warpjld.io.off_file import read_off
 from warpjld.io.ply_file import PlyFile, read_ply
 from warpjld.io.polygons import triangulate_polygons
+from warpjld.io.rig_meshes import joined
+from warpjld.limits import check_limit
+from warpjld.reading import reading
 from warpjld.surface import Part, one_uv_a_vertex
 
 __all__ = ["MeshFile", "read_mesh"]
@@ -48,25 +54,44 @@ def read_mesh(path: str | Path) -> MeshFile:
     Raises:
         InputError: Unreadable, of an unknown kind, without triangles, or not finite.
     """
+    path = Path(path)
+    kind = path.suffix.lower()
+    if kind not in (*_READERS, *_BY_TRIMESH):
+        known = ", ".join((*_READERS, *_BY_TRIMESH))
+        raise InputError(f"'{path.suffix}' is not a kind of surface file that can be read; known: {known}", path=path)
+    check_input(path)
+    with reading(path, kind.lstrip(".").upper()):
+        file = _READERS.get(kind, _by_trimesh)(path)
+        check_limit("vertices", len(file.vertices))
+        check_limit("faces", len(file.faces))
+        _check_finite(file.vertices, path)
+    return file
+
+
+def _obj(path: Path) -> MeshFile:
+    file = read_obj(path)
+    uv, corner_uv = one_uv_a_vertex(len(file.vertices), file.faces, file.corner_uv)
+    return MeshFile(path, file.vertices, file.faces, uv, corner_uv, file.parts, file.notes)
+
+
+def _gltf(path: Path) -> MeshFile:
+    from warpjld.io.gltf.surface import read_gltf_surface
+
+    found = joined(read_gltf_surface(path))
+    return MeshFile(path, found["vertices"], found["faces"], found["uv"], found["corner_uv"], found["parts"])
+
+
+def _by_trimesh(path: Path) -> MeshFile:
     import trimesh
 
-    path = Path(path)
-    if not path.is_file():
-        raise InputError("no such file", path=path)
-    if path.suffix.lower() == ".obj":
-        file = read_obj(path)
-        uv, corner_uv = one_uv_a_vertex(len(file.vertices), file.faces, file.corner_uv)
-        return MeshFile(path, file.vertices, file.faces, uv, corner_uv, file.parts, file.notes)
-    if path.suffix.lower() == ".ply":
-        return _of_polygons(path, read_ply(path))
-    if path.suffix.lower() == ".off":
-        return _of_polygons(path, PlyFile(*read_off(path), None, None))
-    if path.suffix.lower().lstrip(".") not in trimesh.available_formats():
-        raise InputError(f"'{path.suffix}' is not a kind of surface file that can be read", path=path)
-    try:
-        scene = trimesh.load_scene(path, process=False)
-    except Exception as error:  # trimesh raises whatever its many readers raise
-        raise InputError(f"cannot be read as {path.suffix.lstrip('.').upper()}: {error}", path=path) from None
+    kind = path.suffix.lower().lstrip(".")
+    if kind not in trimesh.available_formats():
+        raise InputError(f"{kind.upper()} files need packages that trimesh reads them with: save as STL, OBJ or PLY")
+    if kind == "3mf":
+        check_archive(path)
+    # not load_scene, which trimesh 4.5 has not yet
+    loaded = trimesh.load(path, process=False, force="scene")
+    scene = loaded if isinstance(loaded, trimesh.Scene) else trimesh.Scene(loaded)
     vertices, faces, uvs, parts = [], [], [], []
     points = triangles = 0
     for node in scene.graph.nodes_geometry:
@@ -74,6 +99,7 @@ def read_mesh(path: str | Path) -> MeshFile:
         mesh = scene.geometry[key]
         if not isinstance(mesh, trimesh.Trimesh) or not len(mesh.faces):
             continue
+        check_limit("vertices", points + len(mesh.vertices), path=path)
         vertices.append(mesh.vertices @ transform[:3, :3].T + transform[:3, 3])
         turned = np.linalg.det(transform[:3, :3]) < 0  # a mirrored node turns its triangles inside out
         faces.append((mesh.faces[:, ::-1] if turned else mesh.faces) + points)
@@ -84,7 +110,6 @@ def read_mesh(path: str | Path) -> MeshFile:
     if not parts:
         raise InputError("has no triangles", path=path)
     everything = np.concatenate(vertices).astype(np.float64)
-    _check_finite(everything, path)
     return MeshFile(path, everything, np.concatenate(faces).astype(np.int64), _uv(uvs, parts), None, tuple(parts))
 
 
@@ -97,7 +122,6 @@ def _uv(uvs: list[NDArray[np.float64] | None], parts: list[Part]) -> NDArray[np.
 
 
 def _of_polygons(path: Path, file: PlyFile) -> MeshFile:
-    _check_finite(file.vertices, path)
     triangles, _ = triangulate_polygons(file.vertices[file.corners], file.counts)
     if not len(triangles):
         raise InputError("has no triangles", path=path)
@@ -114,6 +138,18 @@ def _of_polygons(path: Path, file: PlyFile) -> MeshFile:
         notes.append(f"{few} faces with fewer than three corners left out")
     whole = (Part(path.stem, slice(0, len(file.vertices)), slice(0, len(faces))),)
     return MeshFile(path, file.vertices, faces, uv, corner_uv, whole, tuple(notes))
+
+
+_READERS: dict[str, Callable[[Path], MeshFile]] = {
+    ".obj": _obj,
+    ".ply": lambda path: _of_polygons(path, read_ply(path)),
+    ".off": lambda path: _of_polygons(path, PlyFile(*read_off(path), None, None)),
+    ".glb": _gltf,
+    ".gltf": _gltf,
+    ".vrm": _gltf,
+}
+_BY_TRIMESH = (".stl", ".stl_ascii", ".3mf", ".dae", ".vtk", ".vtu", ".msh", ".mesh", ".inp", ".nas", ".bdf")
+"""Of trimesh's kinds those that hold surfaces: its readers of archives and drawings open whatever these name."""
 
 
 def _check_finite(vertices: NDArray[np.float64], path: Path) -> None:

@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
 
 from warpjld.errors import InputError
+from warpjld.input_file import check_input
 from warpjld.io.placement import METRES
 from warpjld.io.source import SourceRig
 from warpjld.lazily import imported
+from warpjld.reading import reading
 from warpjld.rig import Rig
 
 __all__ = ["load_rig"]
@@ -73,18 +75,22 @@ def load_rig(
 
 
 def _read(path: Path, skeleton: str | Path | None) -> SourceRig:
-    if not path.is_file():
-        raise InputError("is a folder" if path.is_dir() else "no such file", path=path)
+    if not path.exists():
+        raise InputError("no such file", path=path)
+    check_input(path)
     if skeleton is not None:
         from warpjld.io.mesh_file import read_mesh
         from warpjld.io.skeleton_file import read_skeleton_file
 
-        return read_skeleton_file(skeleton, read_mesh(path))
+        mesh = read_mesh(path)
+        with reading(skeleton, "a skeleton file"):
+            return read_skeleton_file(skeleton, mesh)
     reader = _READERS.get(path.suffix.lower())
     if reader is None:
         raise InputError("has no joints: give a skeleton file for this surface", path=path)
-    source: SourceRig = imported(reader)(path)
-    return source
+    read: Callable[[Path], SourceRig] = imported(reader)
+    with reading(path, f"a rig ({path.suffix.lower()})"):
+        return read(path)
 
 
 _USD = ("warpjld.io.usd.skin", "read_usd_rig")

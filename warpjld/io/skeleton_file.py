@@ -27,6 +27,7 @@ from numpy.typing import NDArray
 from warpjld.errors import InputError
 from warpjld.io.mesh_file import MeshFile
 from warpjld.io.source import SourceRig
+from warpjld.limits import check_limit
 from warpjld.skeleton.recognise.tree import SourceTree
 from warpjld.skeleton.tree import CHANNELS, Skeleton
 from warpjld.suggest import did_you_mean
@@ -56,16 +57,18 @@ def _rig(path: Path, content: Any, mesh: MeshFile) -> SourceRig:
     entries = content.get("joints") if isinstance(content, dict) else None
     if not isinstance(entries, list) or not entries:
         raise InputError('want {"joints": [{"name": …, "parent": …, "position": [x, y, z]}, …]}')
-    names: list[str] = []
+    check_limit("joints", len(entries))
+    number: dict[str, int] = {}
     for i, entry in enumerate(entries):
         if not isinstance(entry, dict) or not isinstance(entry.get("name"), str) or not entry["name"]:
             raise InputError(f"joint {i} has no name")
         unknown = next((key for key in entry if key not in _KEYS), None)
         if unknown is not None:
             raise InputError(f"joint '{entry['name']}': no key '{unknown}'{did_you_mean(unknown, _KEYS)}")
-        if entry["name"] in names:
+        if entry["name"] in number:
             raise InputError(f"two joints are called '{entry['name']}'")
-        names.append(entry["name"])
+        number[entry["name"]] = i
+    names = list(number)
     frames = np.tile(np.eye(4), (len(names), 1, 1))
     parents = np.full(len(names), -1)
     axes: dict[int, NDArray[np.float64]] = {}
@@ -74,11 +77,11 @@ def _rig(path: Path, content: Any, mesh: MeshFile) -> SourceRig:
         frames[j, :3, 3] = _vector(entry.get("position"), names[j], "position")
         above = entry.get("parent")
         if above is not None:
-            if above not in names:
+            if not isinstance(above, str) or above not in number:
                 raise InputError(
                     f"joint '{names[j]}': no joint '{above}' to be its parent{did_you_mean(str(above), names)}"
                 )
-            parents[j] = names.index(above)
+            parents[j] = number[above]
         if entry.get("axis") is not None:
             axes[j] = _vector(entry["axis"], names[j], "axis")
             if not np.linalg.norm(axes[j]) > 0:
@@ -105,7 +108,7 @@ def _vector(value: Any, name: str, key: str) -> NDArray[np.float64]:
         vector = np.array(value, dtype=np.float64)
         if np.isfinite(vector).all():
             return vector
-    raise InputError(f"joint '{name}': {key} wants three finite numbers, got {value!r}")
+    raise InputError(f"joint '{name}': {key} wants three finite numbers, got {value!r:.60}")
 
 
 def _limits(value: Any, name: str) -> dict[str, tuple[float, float]]:
@@ -118,21 +121,24 @@ def _limits(value: Any, name: str) -> dict[str, tuple[float, float]]:
         good = isinstance(pair, list) and len(pair) == 2 and all(isinstance(x, int | float) for x in pair)
         if not good or not -360 <= pair[0] <= pair[1] <= 360:
             raise InputError(
-                f"joint '{name}': limits of {channel} want [smallest, largest] in degrees, −360 to 360, got {pair!r}"
+                f"joint '{name}': limits of {channel} want [smallest, largest] in degrees, −360 to 360, "
+                f"got {pair!r:.40}"
             )
         out[channel] = (float(np.radians(pair[0])), float(np.radians(pair[1])))
     return out
 
 
 def _check_loops(names: list[str], parents: NDArray[np.int64]) -> None:
+    rooted: set[int] = set()
     for j in range(len(names)):
+        path: dict[int, None] = {}
         above = j
-        for _ in names:
+        while above >= 0 and above not in rooted:
+            if above in path:
+                raise InputError(f"joint '{names[j]}' is its own ancestor")
+            path[above] = None
             above = int(parents[above])
-            if above < 0:
-                break
-        else:
-            raise InputError(f"joint '{names[j]}' is its own ancestor")
+        rooted.update(path)
 
 
 def write_skeleton_file(path: str | Path, skeleton: Skeleton) -> None:

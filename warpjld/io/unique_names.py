@@ -9,11 +9,12 @@ __all__ = ["unique_names"]
 
 def unique_names(names: Sequence[str]) -> list[str]:
     """Names of which the second of a kind is called ``name#2``."""
-    out: list[str] = []
+    out: dict[str, None] = {}
+    last: dict[str, int] = {}
     for name in names:
-        chosen, number = name, 1
+        chosen = name
         while chosen in out:
-            number += 1
-            chosen = f"{name}#{number}"
-        out.append(chosen)
-    return out
+            last[name] = last.get(name, 1) + 1
+            chosen = f"{name}#{last[name]}"
+        out[chosen] = None
+    return list(out)

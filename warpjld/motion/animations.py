@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from pathlib import Path
 
 from warpjld.errors import InputError
+from warpjld.input_file import check_input
 from warpjld.lazily import imported
+from warpjld.reading import reading
 from warpjld.suggest import one_of
 
 __all__ = ["animation_names", "choose_animation"]
@@ -19,8 +22,12 @@ def animation_names(path: str | Path) -> tuple[str, ...]:
     """
     path = Path(path)
     lister = _LISTERS.get(path.suffix.lower())
-    names: tuple[str, ...] = () if lister is None else imported(lister)(path)
-    return names
+    if lister is None:
+        return ()
+    check_input(path)
+    read: Callable[[Path], tuple[str, ...]] = imported(lister)
+    with reading(path, f"animations ({path.suffix.lower()})"):
+        return read(path)
 
 
 def choose_animation(wanted: str | None, names: tuple[str, ...], path: Path) -> tuple[str, tuple[str, ...]]:

@@ -9,31 +9,30 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from warpjld.archive import check_archive
 from warpjld.errors import InputError
+from warpjld.input_file import check_input
+from warpjld.limits import check_limit
 
 __all__ = ["read_arrays"]
-
-_MOST_BYTES = 1 << 30
-"""A million frames of a hand are half of it: more is a mistake, or made to fill the memory."""
 
 
 def read_arrays(path: str | Path) -> dict[str, NDArray[Any]]:
     """Arrays of an ``.npz`` file by name; the array of an ``.npy`` file is called "".
 
     Raises:
-        InputError: It cannot be read, is no such file, holds pickled objects, or more than 1 GiB.
+        InputError: It cannot be read, is no such file, holds pickled objects, or more than ``unpacked-bytes`` allows.
     """
     path = Path(path)
+    check_input(path)
     try:
         if path.suffix.lower() == ".npy":
-            if path.stat().st_size > _MOST_BYTES:
-                raise InputError("larger than 1 GiB", path=path)
+            check_limit("unpacked-bytes", path.stat().st_size, path=path)
             # mapped, so that a header that announces more than there is allocates nothing
             return {"": np.array(np.load(path, mmap_mode="r", allow_pickle=False))}
         arrays = {}
+        check_archive(path, "archive of NumPy arrays (.npz)")
         with zipfile.ZipFile(path) as file:
-            if sum(member.file_size for member in file.infolist()) > _MOST_BYTES:
-                raise InputError("its arrays take more than 1 GiB", path=path)
             for member in file.infolist():
                 if member.filename.endswith(".npy"):
                     arrays[member.filename[:-4]] = _member(file, member)

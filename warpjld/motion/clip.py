@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from warpjld.limits import check_limit
 from warpjld.motion.frame_times import frame_times
 from warpjld.rotations import conjugate, multiply, rotate, slerp
 
@@ -46,6 +47,7 @@ class Clip:
             return replace(self, rate=rate)
         times = np.arange(len(self)) / self.rate
         at = frame_times(0.0, times[-1], rate)
+        check_limit("transforms", len(at) * len(self.names))
         flat = self.positions.reshape(len(self), -1)
         positions = np.stack([np.interp(at, times, column) for column in flat.T], axis=-1)
         return replace(

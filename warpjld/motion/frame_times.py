@@ -5,12 +5,9 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from warpjld.errors import InputError
+from warpjld.limits import check_limit
 
 __all__ = ["frame_rate", "frame_times", "merged_times"]
-
-_MOST = 1_000_000
-"""Hours of motion: more is a slip of the pen in a rate or a frame number, and would fill the memory."""
 
 _DEFAULT_RATE = 30.0
 _NTSC = 1000.0 / 1001.0
@@ -34,11 +31,10 @@ def frame_times(first: float, last: float, rate: float) -> NDArray[np.float64]:
         rate: Frames a second.
 
     Raises:
-        InputError: More than a million frames.
+        InputError: More frames than the limit allows: a slip of the pen in a rate or a frame number.
     """
     count = (last - first) * rate
-    if not count < _MOST:
-        raise InputError(f"{count:.3g} frames from {first:g} to {last:g} at {rate:g} a second: at most {_MOST}")
+    check_limit("frames", count, of=f"{first:g} to {last:g} s at {rate:g} frames a second")
     # 2e-5 a frame: 29.97 for 30000/1001, in a hundred seconds, is the most that rounding a rate may cost
     slack = min(_ON_FRAME + 1e-6 * count + 2.0 * _SINGLE * max(abs(first), abs(last)) * rate, 0.4)
     return np.asarray(first + np.arange(int(np.floor(count + slack)) + 1) / rate)

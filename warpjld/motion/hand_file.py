@@ -11,6 +11,7 @@ from warpjld.motion.leap import is_leap, leap_hands
 from warpjld.motion.mano import is_mano, mano_hands
 from warpjld.motion.mediapipe import is_mediapipe, mediapipe_arrays, mediapipe_hands
 from warpjld.motion.webxr import is_webxr, webxr_hands
+from warpjld.reading import reading
 from warpjld.text_file import read_json
 
 __all__ = ["read_hands"]
@@ -29,7 +30,7 @@ def read_hands(path: str | Path, *, rate: float | None = None, flat_hand_mean: b
     """
     path = Path(path)
     content = read_json(path) if path.suffix.lower() == ".json" else read_arrays(path)
-    try:
+    with reading(path, "a recording of hands"):
         if path.suffix.lower() != ".json":
             if is_mediapipe(content) or ("" in content and content[""].shape[-2:] == (21, 3)):
                 return mediapipe_arrays(content, rate)
@@ -45,8 +46,6 @@ def read_hands(path: str | Path, *, rate: float | None = None, flat_hand_mean: b
             return mediapipe_hands(content, rate)
         if is_mano(content):
             return mano_hands(content, rate, flat_hand_mean)
-    except InputError as error:
-        raise InputError(error.message, path=path) from error
     raise InputError(
         "no hand recording: neither WebXR poses (a 'wrist'), Leap Motion frames ('pointables'), 21 MediaPipe landmarks "
         "nor MANO parameters ('hand_pose')",

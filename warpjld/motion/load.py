@@ -9,10 +9,13 @@ from pathlib import Path
 import numpy as np
 
 from warpjld.errors import InputError
+from warpjld.input_file import check_input
 from warpjld.lazily import imported
+from warpjld.lengths import check_size
 from warpjld.motion.clip import Clip
 from warpjld.motion.joint_animation import JointAnimation
 from warpjld.motion.tracks import Limits
+from warpjld.reading import reading
 from warpjld.rig import Rig
 from warpjld.skeleton import Poses
 
@@ -104,18 +107,28 @@ def open_motion(
         raise InputError(f"unknown kind of motion '{path.suffix}'; known: {known}", path=path)
     if animation is not None and suffix not in _ANIMATIONS:
         raise InputError(f"no animation '{animation}': a {suffix} file holds one motion without a name", path=path)
-    try:
+    if not path.exists():
+        raise InputError("no such file", path=path)
+    check_input(path)
+    with reading(path, f"a motion ({suffix})"):
         if suffix == ".csv":
-            return _table(path, rig, rate, limits)
-        if suffix == ".bvh":
-            return _capture(path, rig, rate)
-        if suffix in (".json", ".npz", ".npy"):
-            return _tracked_hands(path, rig, rate, side, flat_hand_mean)
-        return _animation(path, rig, rate, animation)
-    except InputError as error:
-        if error.path is not None:
-            raise
-        raise InputError(error.message, path=path) from error
+            moved = _table(path, rig, rate, limits)
+        elif suffix == ".bvh":
+            moved = _capture(path, rig, rate)
+        elif suffix in (".json", ".npz", ".npy"):
+            moved = _tracked_hands(path, rig, rate, side, flat_hand_mean)
+        else:
+            moved = _animation(path, rig, rate, animation)
+        _check_poses(moved.poses)
+    return moved
+
+
+def _check_poses(poses: Poses) -> None:
+    """Make sure that poses lie where surfaces can be computed."""
+    check_size(poses.positions, "the motion", "its unit", least=0.0)
+    if not np.isfinite(poses.rotations).all():
+        frame, joint = np.argwhere(~np.isfinite(poses.rotations))[0][:2]
+        raise InputError(f"the rotation of joint {joint} is not finite at frame {frame}")
 
 
 def _animation(path: Path, rig: Rig, rate: float | None, name: str | None) -> LoadedMotion:

@@ -15,6 +15,7 @@ from scipy.spatial.transform import Rotation
 
 from warpjld.errors import InputError
 from warpjld.io.unique_names import unique_names
+from warpjld.limits import check_limit
 from warpjld.motion.animations import choose_animation
 from warpjld.motion.frame_times import frame_times
 from warpjld.motion.joint_animation import JointAnimation
@@ -162,6 +163,7 @@ def _time_codes(
     if not np.isfinite([first, last]).all():
         raise InputError(f"time codes: want finite ones, got {first:g} to {last:g}", path=file.path)
     times = frame_times(0.0, (last - first) / per_second, rate)
+    check_limit("transforms", len(times) * sum(len(one.tokens) for one in skeletons), path=file.path)
     return first + np.round(times * per_second, 9), rate, warnings  # a held sample must not be missed by rounding
 
 

@@ -8,6 +8,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from warpjld.errors import InputError
+from warpjld.lengths import LARGEST
+from warpjld.names import check_name, expanded
 from warpjld.script.statements import Number, Position, Text, Value, Word
 from warpjld.suggest import did_you_mean
 
@@ -18,6 +20,7 @@ if TYPE_CHECKING:
 __all__ = ["Arguments"]
 
 _MOST_KEYS = 10_000
+_LARGEST = 1e12
 
 
 class Arguments:
@@ -82,11 +85,14 @@ class Arguments:
         self,
         what: str,
         *,
-        minimum: float = -math.inf,
-        maximum: float = math.inf,
+        minimum: float = -_LARGEST,
+        maximum: float = _LARGEST,
         above: float = -math.inf,
     ) -> float:
-        """A number in [minimum, maximum] and greater than ``above``; ``what`` names it in errors."""
+        """A number in [minimum, maximum] and greater than ``above``; ``what`` names it in errors.
+
+        Nothing is measured in numbers beyond 10¹², the modulus of diamond in pascals.
+        """
         value = self._peek()
         if not isinstance(value, Number):
             raise self.expected(what)
@@ -103,7 +109,7 @@ class Arguments:
 
     def integer(self, what: str, *, minimum: int | None = None, maximum: int | None = None) -> int:
         """A whole number."""
-        low, high = (-math.inf if minimum is None else minimum), (math.inf if maximum is None else maximum)
+        low, high = (-_LARGEST if minimum is None else minimum), (_LARGEST if maximum is None else maximum)
         value = self.number(what, minimum=low, maximum=high)
         if value != round(value):
             raise self.error(f"{what} must be a whole number, got {value:g}")
@@ -111,7 +117,8 @@ class Arguments:
 
     def vector(self, what: str) -> tuple[float, float, float]:
         """Three numbers."""
-        return self.number(f"{what} x"), self.number(f"{what} y"), self.number(f"{what} z")
+        x, y, z = (self.number(f"{what} {axis}", minimum=-LARGEST, maximum=LARGEST) for axis in "xyz")
+        return x, y, z
 
     def has_number(self) -> bool:
         """Whether a number comes next."""
@@ -197,6 +204,14 @@ class Arguments:
         self._next += 1
         return value.text
 
+    def new_name(self, what: str) -> str:
+        """As ``name``, for what is to be called so: files carry it too."""
+        name = self.name(what)
+        try:
+            return check_name(name, what)
+        except InputError as error:
+            raise self.error(error.message) from None
+
     def has_text(self) -> bool:
         """Whether a quoted text comes next."""
         return isinstance(self._peek(), Text)
@@ -214,9 +229,11 @@ class Arguments:
     def input_file(self, what: str) -> Path:
         """A quoted name of a file that exists; relative to the script's folder (at a prompt, to the current one)."""
         name = self.text(what)
+        if "\0" in name:
+            raise self.error(f"{name!r}: no file has a zero byte in its name")
         script = Path(self.last.path)
         folder = Path() if self.last.path.startswith("<") else script.parent
-        path = folder / Path(name).expanduser()
+        path = folder / expanded(name)
         if not path.is_file():
             if path.is_dir():
                 raise self.error(f"'{path}' is a folder; want a file")
@@ -231,6 +248,11 @@ class Arguments:
         path = Path(name)
         if path.is_absolute() or ".." in path.parts or not path.name:
             raise self.error(f"'{name}': want a name inside the output folder (choose the folder with --out)")
+        try:
+            for part in path.parts:
+                check_name(part, "the name")
+        except InputError as error:
+            raise self.error(error.message) from None
         if path.suffix.lower() not in suffixes:
             hint = did_you_mean(path.suffix, suffixes) if path.suffix else ""
             raise self.error(f"'{name}': want a name that ends in {', '.join(suffixes)}{hint}")

@@ -9,6 +9,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from warpjld.errors import InputError, WarpjldError
+from warpjld.limits import check_limit, limit
+from warpjld.names import expanded
 from warpjld.script.arguments import Arguments
 from warpjld.script.parser import parse, parse_file
 from warpjld.script.registry import RESERVED, Command, Registry, all_commands
@@ -50,6 +52,8 @@ class Interpreter:
         self._registry = all_commands() if registry is None else registry
         self._including: list[Path] = []
         self._depth = 0
+        self._made = 0
+        self._parsed: dict[Path, tuple[Node, ...]] = {}
 
     @property
     def registry(self) -> Registry:
@@ -63,7 +67,7 @@ class Interpreter:
         Raises:
             InputError: With file, line and column.
         """
-        self.execute(parse_file(path), Path(path))
+        self.execute(self._read(Path(path)), Path(path))
 
     def run_text(self, text: str, path: str = "<script>") -> None:
         """Run a text; ``path`` is what errors call it. Files it names are relative to the current folder."""
@@ -73,7 +77,10 @@ class Interpreter:
         """Run statements that were read from ``path``."""
         with self._inside(path):
             if self._depth == 0 and len(self._including) <= 1:
-                self._check(nodes, set(self.macros) | self._macro_names(nodes))
+                self._made = 0
+                if path is None:
+                    self._parsed.clear()  # files may have been edited since the line before
+                self._check(nodes, set(self.macros) | self._macro_names(nodes, set()), set())
             for node in nodes:
                 if isinstance(node, MacroDefinition):
                     self._define(node)
@@ -83,27 +90,40 @@ class Interpreter:
     def include(self, path: Path, position: Position) -> None:
         """Run an include file; ``position`` is where it is asked for."""
         self._refuse_cycle(path, position)
-        self.execute(parse_file(path), path)
+        self.execute(self._read(path), path)
+
+    def _read(self, path: Path) -> tuple[Node, ...]:
+        """Statements of a file, parsed once however often it is included."""
+        key = path.resolve()
+        if key not in self._parsed:
+            self._parsed[key] = parse_file(path)
+        return self._parsed[key]
 
     # ---- before anything runs ------------------------------------------------------------------------------------
 
-    def _macro_names(self, nodes: Sequence[Node]) -> set[str]:
+    def _macro_names(self, nodes: Sequence[Node], seen: set[Path]) -> set[str]:
         """Macros that these statements and the files they include define."""
         names = {node.name.text.upper() for node in nodes if isinstance(node, MacroDefinition)}
         for path, position in _includes(nodes):
             self._refuse_cycle(path, position)
+            if path.resolve() in seen:
+                continue
             with self._inside(path):
-                names |= self._macro_names(parse_file(path))
+                names |= self._macro_names(self._read(path), seen)
+            seen.add(path.resolve())
         return names
 
-    def _check(self, nodes: Sequence[Node], macros: set[str]) -> None:
+    def _check(self, nodes: Sequence[Node], macros: set[str], seen: set[Path]) -> None:
         """Every command named anywhere must exist."""
         for node in nodes:
             for statement in node.body if isinstance(node, MacroDefinition) else (node,):
                 self._check_name(statement.name, macros)
         for path, _ in _includes(nodes):
+            if path.resolve() in seen:
+                continue
+            seen.add(path.resolve())
             with self._inside(path):
-                self._check(parse_file(path), macros)
+                self._check(self._read(path), macros, seen)
 
     def _check_name(self, word: Word, macros: set[str]) -> None:
         name = word.text.upper()
@@ -135,6 +155,10 @@ class Interpreter:
         self.macros[name] = macro
 
     def _call(self, statement: Statement, bound: Mapping[str, Value]) -> None:
+        self._made += 1
+        if self._made > limit("statements"):  # macros that call macros: ten lines of ten make 10¹⁰
+            with _at(statement.name.position):
+                check_limit("statements", self._made)
         values = [_evaluate(argument, bound) for argument in statement.arguments]
         name = statement.name.text.upper()
         if name in self.macros:
@@ -207,6 +231,15 @@ def _placed(command: Command, position: Position) -> Iterator[None]:
         raise position.error(f"{command.name} failed: {type(error).__name__}: {error}") from error
 
 
+@contextmanager
+def _at(position: Position) -> Iterator[None]:
+    """Errors without a place get this one."""
+    try:
+        yield
+    except InputError as error:
+        raise position.error(error.message) from error
+
+
 def _includes(nodes: Sequence[Node]) -> Iterator[tuple[Path, Position]]:
     """Include files that are named outright and exist; others are reported when their turn comes."""
     for node in nodes:
@@ -214,7 +247,7 @@ def _includes(nodes: Sequence[Node]) -> Iterator[tuple[Path, Position]]:
             name = node.arguments[0]
             if isinstance(name, Text):
                 folder = Path() if name.position.path.startswith("<") else Path(name.position.path).parent
-                path = folder / Path(name.text).expanduser()
+                path = folder / expanded(name.text)
                 if path.is_file():
                     yield path, name.position
 
@@ -237,7 +270,10 @@ def _evaluate(argument: Argument, bound: Mapping[str, Value]) -> Value:
             raise argument.position.error(f"${argument.name} has a meaning only inside a macro that has this parameter")
         return bound[argument.name]
     if isinstance(argument, Text) and bound:
-        return Text(_IN_TEXT.sub(lambda m: _plain(bound[(m[1] or m[2]).upper()]), argument.text), argument.position)
+        text = _IN_TEXT.sub(lambda m: _plain(bound[(m[1] or m[2]).upper()]), argument.text)
+        with _at(argument.position):
+            check_limit("text", len(text))
+        return Text(text, argument.position)
     if not isinstance(argument, Operation):
         return argument
     left, right = (_evaluate(side, bound) for side in (argument.left, argument.right))

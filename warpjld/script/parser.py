@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, cast
 
 from warpjld.errors import InputError
+from warpjld.limits import check_limit, limit
 from warpjld.script.statements import (
     Argument,
     Expression,
@@ -81,6 +82,8 @@ class _Builder:
 
     def __init__(self, path: str) -> None:
         self.path = path
+        self._depth = 0
+        self._deepest = limit("depth")
 
     def node(self, tree: Any) -> Node:
         if tree.data == "statement":
@@ -112,7 +115,12 @@ class _Builder:
         return Operation(str(operator), self._operand(left), self._operand(right), position)
 
     def _operand(self, tree: Any) -> Expression:
-        return cast("Expression", self._argument(tree))
+        self._depth += 1
+        if self._depth > self._deepest:
+            check_limit("depth", self._depth, of="arithmetic", path=f"{self.path}:{tree.meta.line}:{tree.meta.column}")
+        found = cast("Expression", self._argument(tree))
+        self._depth -= 1
+        return found
 
     def _word(self, token: Any) -> Word:
         return Word(str(token), Position(self.path, token.line, token.column))

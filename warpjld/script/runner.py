@@ -11,6 +11,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from warpjld.errors import InputError
+from warpjld.names import folded
 from warpjld.overwriting import check_outputs
 from warpjld.script.contact import check_contact, run_contact, write_contact
 from warpjld.script.crowd import Crowd, role_of
@@ -78,7 +80,10 @@ def run_scene(
         outputs.append(Grips("grips.csv"))
     check_available([output.name for output in outputs])
     read = scene.read if script is None else [*scene.read, script]
-    check_outputs(dict.fromkeys(folder / name for name in _names(scene, outputs)), read)
+    names = _names(scene, outputs)
+    if "summary.json" in map(folded, names):
+        raise InputError("'summary.json' is the name of the summary that every run writes")
+    check_outputs([folder / name for name in names], read)
     summary.notes += check_contact(scene, outputs, frames)
     for actor in scene.actors.values():
         stage(actor, frames[:1], scene.rate)  # keys beyond limits are found here

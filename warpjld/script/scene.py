@@ -97,7 +97,8 @@ class Actor:
 
 
 def _to_stderr(line: str) -> None:
-    print(f"warning: {line}", file=sys.stderr)
+    if sys.stderr is not None:  # else print would write to stdout
+        print(f"warning: {line}", file=sys.stderr)
 
 
 @dataclass(eq=False)

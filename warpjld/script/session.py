@@ -6,6 +6,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 from warpjld.errors import InputError
+from warpjld.names import expanded
 from warpjld.script.interpreter import Interpreter
 from warpjld.script.parser import UnfinishedError, parse, parse_file
 from warpjld.script.scene import Scene
@@ -137,7 +138,7 @@ class Session:
         table(content, self._say)
 
     def _save(self, name: Text) -> None:
-        path = Path(name.text).expanduser()
+        path = expanded(name.text)
         lines = [] if self._script is None else [f'INCLUDE "{self._script.resolve().as_posix()}"']
         try:
             with whole_file(path) as part:

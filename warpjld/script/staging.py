@@ -5,21 +5,19 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from warpjld.errors import InputError
+from warpjld.limits import check_limit
 from warpjld.script.scene import Actor, Scene
 from warpjld.skeleton import Poses
 from warpjld.skeleton.between import poses_between
 
 __all__ = ["frame_numbers", "held", "notes", "stage"]
 
-_MOST_FRAMES = 1_000_000
-
 
 def frame_numbers(scene: Scene) -> NDArray[np.float64]:
     """The frames to make: FRAMES, or from the first to the last key of all actors and objects; shape (F,).
 
     Raises:
-        InputError: More than a million.
+        InputError: More than the limit ``frames`` allows.
     """
     if scene.first is not None and scene.last is not None:
         return _range(scene.first, scene.last)
@@ -38,11 +36,9 @@ def frame_numbers(scene: Scene) -> NDArray[np.float64]:
 
 
 def _range(first: float, last: float) -> NDArray[np.float64]:
-    if last - first >= _MOST_FRAMES:
-        raise InputError(
-            f"frames {first:.0f} to {last:.0f} are {last - first + 1:,.0f}; at most {_MOST_FRAMES:,} can be made at "
-            "once: FRAMES <first> <last> chooses which"
-        )
+    check_limit(
+        "frames", last - first + 1, of=f"frames {first:.0f} to {last:.0f} (FRAMES <first> <last> chooses which)"
+    )
     return np.arange(first, last + 1, dtype=np.float64)
 
 

@@ -50,6 +50,7 @@ def _draw(
 ) -> None:
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
+    from matplotlib.text import Text
 
     measured = [column for column in shown if _spread(rows, column.name)]
     statuses = rates[0].statuses
@@ -68,6 +69,8 @@ def _draw(
             _histogram(axis, rows, column)
         for axis in axes[len(measured) :]:
             axis.set_axis_off()
+    for label in figure.findobj(Text):
+        label.set_parse_math(False)  # a title may cost $5
     with whole_file(path) as part:
         figure.savefig(part, metadata={"Software": None})
 

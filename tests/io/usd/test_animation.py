@@ -278,7 +278,7 @@ def test_no_animation_is_told_why(hand: Stage, tmp_path: Path) -> None:
         (lambda k: k.rotations.__setitem__((1, 1), 0.0), "joint 'root/end' has no rotation at frame 1"),
         (lambda k: k.translations.__setitem__((1, 1), np.nan), "joint 'end' is not finite at frame 1"),
         (lambda k: setattr(k, "translations", np.zeros((2, 1, 3))), "want 2 translations, one for each of its joints"),
-        (lambda k: k.times.__setitem__(1, 1e12), "at most 1000000"),
+        (lambda k: k.times.__setitem__(1, 1e12), "the limit is 2,000,000"),
     ],
 )
 def test_broken_samples_are_named(tmp_path: Path, broken: Callable, message: str) -> None:

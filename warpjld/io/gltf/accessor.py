@@ -8,12 +8,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from warpjld.errors import InputError
+from warpjld.limits import check_limit
 
 __all__ = ["read_accessor"]
 
 _COMPONENTS = {5120: np.int8, 5121: np.uint8, 5122: np.int16, 5123: np.uint16, 5125: np.uint32, 5126: np.float32}
-_MOST = 100_000_000
-"""Elements of an accessor: ten times more vertices than anything here can take."""
 _SHAPES: dict[str, tuple[int, ...]] = {
     "SCALAR": (),
     "VEC2": (2,),
@@ -39,9 +38,10 @@ def read_accessor(gltf: Any, buffers: list[bytes], index: int) -> NDArray[Any]:
         raise InputError(f"{what}: unknown type {accessor.type} of {accessor.componentType}")
     dtype: np.dtype[Any] = np.dtype(_COMPONENTS[accessor.componentType]).newbyteorder("<")
     shape = _SHAPES[accessor.type]
-    if not 0 <= accessor.count <= _MOST:
-        raise InputError(f"{what}: {accessor.count} elements; want 0 to {_MOST}")
+    if not accessor.count >= 0:
+        raise InputError(f"{what}: {accessor.count} elements; want 0 or more")
     if accessor.bufferView is None:
+        check_limit("vertices", accessor.count, of=what)  # others are as large as their bytes
         out = np.zeros((accessor.count, *shape), dtype)
     else:
         out = _strided(gltf, buffers, what, accessor.bufferView, accessor.byteOffset or 0, accessor.count, dtype, shape)
@@ -53,6 +53,8 @@ def read_accessor(gltf: Any, buffers: list[bytes], index: int) -> NDArray[Any]:
         at = _strided(
             gltf, buffers, what, sparse.indices.bufferView, sparse.indices.byteOffset or 0, sparse.count, at_dtype, ()
         )
+        if len(at) > accessor.count:
+            raise InputError(f"{what}: {len(at)} sparse values for {accessor.count} elements")
         if at.size and at.max() >= accessor.count:
             raise InputError(f"{what}: sparse index {at.max()} is beyond its {accessor.count} elements")
         out[at] = _strided(
@@ -84,6 +86,8 @@ def _strided(
     if len(shape) == 2 and (shape[0] * dtype.itemsize) % 4:
         raise InputError(f"{what}: matrices of components smaller than 4 bytes are not read")
     stride = view.byteStride or size
+    if stride < size:
+        raise InputError(f"{what}: elements of {size} bytes {stride} bytes apart")
     start = (view.byteOffset or 0) + offset
     if min(stride, offset, view.byteOffset or 0, view.byteLength, count) < 0:
         raise InputError(f"{what}: a count, offset, length or stride below 0")

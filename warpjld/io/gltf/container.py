@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-import json
 import struct
 from pathlib import Path
 from typing import Any
 
 from warpjld.errors import InputError
+from warpjld.input_file import read_bytes
+from warpjld.text_file import parse_json
 
 __all__ = ["read_container"]
 
@@ -21,10 +22,7 @@ def read_container(path: Path) -> tuple[str, dict[str, Any], bytes | None]:
     Raises:
         InputError: It cannot be read, is truncated, is glTF 1.0, or none at all.
     """
-    try:
-        data = path.read_bytes()
-    except OSError as error:
-        raise InputError(f"cannot be read: {error.strerror}", path=path) from None
+    data = read_bytes(path)
     if data[:4] == b"glTF":
         raw, blob = _chunks(path, data)
     elif data.removeprefix(_BOM).lstrip()[:1] == b"{":
@@ -33,15 +31,11 @@ def read_container(path: Path) -> tuple[str, dict[str, Any], bytes | None]:
         raise InputError("is not a glTF 2.0 file: neither binary nor JSON", path=path)
     try:
         text = raw.decode("utf-8-sig")
-        content = json.loads(text)
+        content = parse_json(text, path)
     except UnicodeDecodeError as error:
         raise InputError(f"is not a glTF 2.0 file: no UTF-8 text (byte {error.start})", path=path) from None
-    except json.JSONDecodeError as error:
-        raise InputError(f"is not a glTF 2.0 file: its JSON has {error}", path=path) from None
-    except (RecursionError, ValueError):  # ValueError: integers of thousands of digits
-        raise InputError(
-            "is not a glTF 2.0 file: its JSON is nested too deeply, or has endless numbers", path=path
-        ) from None
+    except InputError as error:
+        raise InputError(f"is not a glTF 2.0 file: {error.message}", path=path) from None
     content = content if isinstance(content, dict) else {}
     asset = content.get("asset")
     version = str(asset.get("version", "")) if isinstance(asset, dict) else ""

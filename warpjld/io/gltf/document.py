@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import base64
 import binascii
+from contextlib import AbstractContextManager
 from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -13,10 +14,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from warpjld.errors import InputError
+from warpjld.input_file import read_bytes
 from warpjld.io.gltf.accessor import read_accessor
 from warpjld.io.gltf.container import read_container
 from warpjld.io.gltf.extensions import check_extensions, packed_view
+from warpjld.io.gltf.schema import check_schema, inside_folder
 from warpjld.lazily import lazy_module
+from warpjld.reading import reading
 from warpjld.rotations import matrices
 from warpjld.scales import never_zero, regular_linear
 
@@ -28,6 +32,7 @@ else:
 __all__ = ["Document", "open_document"]
 
 _FURTHEST = 1e12
+_KIND = "a glTF 2.0 file"
 _UNPACK = "export it without compression"
 
 
@@ -58,6 +63,11 @@ class Document:
         except InputError as error:
             raise InputError(error.message, path=self.path) from None
 
+    def reading(self) -> AbstractContextManager[None]:
+        """While the statement lasts the file is read: pygltflib takes any JSON, so that a text where the schema wants
+        a number shows only where it is used."""
+        return reading(self.path, _KIND)
+
     def name(self, node: int) -> str:
         """A node's name, or ``node 7`` where the file gives none."""
         return self.gltf.nodes[node].name or f"node {node}"
@@ -78,14 +88,15 @@ class Document:
                 if parents[child] >= 0:
                     raise InputError(f"node '{self.name(child)}' has two parents", path=self.path)
                 parents[child] = i
-        for i in range(count):
-            above = int(parents[i])
-            for _ in range(count):
-                if above < 0:
-                    break
-                above = int(parents[above])
-            else:
-                raise InputError(f"node '{self.name(i)}' is its own ancestor", path=self.path)
+        # every node is reached from a root, but for those that lead in a circle
+        reached = np.zeros(count, dtype=bool)
+        todo = np.flatnonzero(parents < 0).tolist()
+        while todo:
+            node = todo.pop()
+            reached[node] = True
+            todo.extend(self.gltf.nodes[node].children or ())
+        if not reached.all():
+            raise InputError(f"node '{self.name(int(np.argmin(reached)))}' is its own ancestor", path=self.path)
         return parents
 
     @cached_property
@@ -196,12 +207,11 @@ class Document:
         elif uri.startswith("data:"):
             data = _data_uri(uri, f"buffer {index}", self.path)
         else:
-            file = self.path.parent / unquote(uri)
             try:
-                data = file.read_bytes()
-            except OSError as error:
+                data = read_bytes(self.path.parent / inside_folder(uri))
+            except InputError as error:
                 raise InputError(
-                    f"buffer {index} is in '{unquote(uri)}', which cannot be read: {error.strerror}", path=self.path
+                    f"buffer {index} is in '{unquote(uri)}', which cannot be read: {error.message}", path=self.path
                 ) from None
         if len(data) < buffer.byteLength:
             raise InputError(
@@ -220,13 +230,10 @@ def open_document(path: str | Path) -> Document:
     text, content, blob = read_container(path)
     from pygltflib import GLTF2
 
-    try:
+    with reading(path, _KIND):
+        check_schema(content)
         gltf = GLTF2.gltf_from_json(text)
         check_extensions(gltf)
-    except InputError as error:
-        raise InputError(error.message, path=path) from None
-    except Exception as error:  # pygltflib raises whatever its JSON layers raise
-        raise InputError(f"is not a glTF 2.0 file: {error}", path=path) from None
     if blob is not None:
         gltf.set_binary_blob(blob)
     return Document(path, gltf, content)

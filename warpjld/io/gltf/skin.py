@@ -11,15 +11,14 @@ from numpy.typing import NDArray
 from warpjld.errors import InputError
 from warpjld.io.gltf.document import Document, open_document
 from warpjld.io.gltf.influences import read_influences
-from warpjld.io.gltf.morph import morphed
 from warpjld.io.gltf.texture import texture_coordinates
+from warpjld.io.gltf.triangles import is_surface, primitive_points, primitive_triangles
 from warpjld.io.rig_meshes import RigMesh, joined
 from warpjld.io.source import SourceRig
 from warpjld.skeleton.recognise.tree import SourceTree
 
 __all__ = ["joint_nodes", "joint_tree", "read_gltf_rig"]
 
-_TRIANGLES, _STRIP, _FAN = 4, 5, 6
 _BIND_TOLERANCE = 1e-4  # of the surface's size: where bind and shown pose count as one
 
 
@@ -35,11 +34,8 @@ def read_gltf_rig(path: str | Path) -> SourceRig:
         InputError: Not glTF, no skin, or broken skin data.
     """
     document = open_document(path)
-    try:
+    with document.reading():
         return _read(document)
-    except (TypeError, AttributeError, KeyError, IndexError, ValueError, OverflowError) as error:
-        # pygltflib takes any JSON: a string where the schema wants a number shows only here
-        raise InputError(f"breaks the glTF schema: {error}", path=document.path) from error
 
 
 def _read(document: Document) -> SourceRig:
@@ -153,11 +149,10 @@ def _mesh(
         joints, transforms = np.array([number[above]]), document.worlds[[node]]
     out = []
     for primitive in gltf.meshes[record.mesh].primitives:
-        mode = _TRIANGLES if primitive.mode is None else primitive.mode
-        if mode not in (_TRIANGLES, _STRIP, _FAN):
+        if not is_surface(primitive):
             notes.append(f"mesh '{name}': points or lines left out")
             continue
-        read = _primitive(document, primitive, mode, joints, transforms, name, node, notes)
+        read = _primitive(document, primitive, joints, transforms, name, node, notes)
         if len(read[0].faces):
             out.append(read)
     return out
@@ -166,27 +161,19 @@ def _mesh(
 def _primitive(
     document: Document,
     primitive: Any,
-    mode: int,
     joints: NDArray[np.int64],
     transforms: NDArray[np.float64],
     name: str,
     node: int,
     notes: list[str],
 ) -> tuple[RigMesh, float]:
-    attributes = vars(primitive.attributes)
-    if attributes.get("POSITION") is None:
-        raise InputError(f"mesh '{name}' has no positions", path=document.path)
-    points = document.accessor(attributes["POSITION"]).astype(np.float64)
-    if points.ndim != 2 or points.shape[1] != 3:
-        raise InputError(f"mesh '{name}': positions are no VEC3", path=document.path)
-    points = morphed(document, primitive, node, points, name)
-    if not np.isfinite(points).all():
-        bad = int(np.argwhere(~np.isfinite(points))[0][0])
-        raise InputError(f"mesh '{name}': vertex {bad} is not finite", path=document.path)
-    faces = _triangles(document, primitive, mode, len(points), name)
+    points = primitive_points(document, primitive, node, name)
+    faces = primitive_triangles(document, primitive, len(points), name)
     skinned = document.gltf.nodes[node].skin is not None
     if skinned:
-        indices, weights = read_influences(document, attributes, points, faces, len(joints), name, notes)
+        indices, weights = read_influences(
+            document, vars(primitive.attributes), points, faces, len(joints), name, notes
+        )
     else:
         indices, weights = np.zeros((len(points), 1), dtype=np.int64), np.ones((len(points), 1))
     blended = np.einsum("vk,vkij->vij", weights, transforms[indices])
@@ -200,29 +187,6 @@ def _primitive(
     uv = texture_coordinates(document, primitive, len(points), name)
     follows = -1 if skinned else int(joints[0])
     return RigMesh(name, placed, faces, joints[indices], weights, follows, uv=uv), moved
-
-
-def _triangles(document: Document, primitive: Any, mode: int, count: int, name: str) -> NDArray[np.int64]:
-    if primitive.indices is None:
-        corners = np.arange(count)
-    else:
-        indices = document.accessor(primitive.indices)
-        if indices.dtype.kind != "u" or indices.ndim != 1:
-            raise InputError(f"mesh '{name}': its face indices are no unsigned integers", path=document.path)
-        corners = indices.astype(np.int64)
-    if corners.size and corners.max() >= count:
-        raise InputError(
-            f"mesh '{name}': face index {corners.max()} is beyond its {count} vertices", path=document.path
-        )
-    if mode == _TRIANGLES:
-        if len(corners) % 3:
-            raise InputError(f"mesh '{name}': {len(corners)} indices are not whole triangles", path=document.path)
-        return corners.reshape(-1, 3)
-    steps = np.arange(max(len(corners) - 2, 0))
-    if mode == _FAN:
-        return np.stack([np.full_like(steps, corners[0]), corners[steps + 1], corners[steps + 2]], axis=1)
-    odd = steps % 2
-    return np.stack([corners[steps], corners[steps + 1 + odd], corners[steps + 2 - odd]], axis=1)
 
 
 def _inverse_binds(document: Document, index: int) -> NDArray[np.float64]:

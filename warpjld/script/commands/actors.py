@@ -40,7 +40,7 @@ def hand(scene: Scene, arguments: Arguments) -> None:
             length=lambda: arguments.number("the hand's length in metres"),
             breadth=lambda: arguments.number("the hand's breadth in metres"),
             resolution=lambda: arguments.integer("the number of vertices, about"),
-            name=lambda: arguments.name("the actor's name"),
+            name=lambda: arguments.new_name("the actor's name"),
         )
         name = options.pop("name", side)
         rig = kept_hand(side, **options)
@@ -165,7 +165,7 @@ def _options(arguments: Arguments) -> dict[str, object]:
         unit=lambda: _unit(arguments),
         scale=lambda: arguments.number("the scale", above=0.0),
         map=lambda: arguments.input_file("a joint map"),
-        name=lambda: arguments.name("the actor's name"),
+        name=lambda: arguments.new_name("the actor's name"),
     )
     if "map" in options:
         options["joint_map"] = options.pop("map")

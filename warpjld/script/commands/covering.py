@@ -53,7 +53,8 @@ def parameters(scene: Scene, arguments: Arguments) -> None:
     from warpjld.covering.parameters import load_parameters
 
     actor = scene.actor()
-    actor.parameters = load_parameters(arguments.input_file("a parameter file"), actor.skeleton)
+    path = arguments.input_file("a parameter file")
+    actor.parameters = load_parameters(path, actor.skeleton)
 
 
 @command(

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Literal, cast
 import numpy as np
 
 from warpjld.errors import InputError
+from warpjld.lengths import check_size
 from warpjld.script.arguments import Arguments
 from warpjld.script.commands.animation import FINGERS, SIDES
 from warpjld.script.commands.physical import read_object
@@ -39,7 +40,7 @@ def object_(scene: Scene, arguments: Arguments) -> None:
     from warpjld.grasp.object_file import UNITS
     from warpjld.script.props import COLORS, Prop
 
-    name = arguments.name("the object's name").upper()
+    name = arguments.new_name("the object's name").upper()
     if name in scene.props or name in scene.actors:
         raise arguments.error(f"there is an object or actor {name} already")
     shape, sizes, path = None, [], None
@@ -74,6 +75,10 @@ def object_(scene: Scene, arguments: Arguments) -> None:
         raise arguments.error(f"too many sizes for a {str(shape).upper()}", where) from None
     except InputError as error:
         raise arguments.error(str(error), where) from None
+    try:
+        check_size(thing.vertices, f"object {name}", "SCALE or UNIT")
+    except InputError as error:
+        raise arguments.error(error.message, where) from None
     turn = Rotation.from_euler("xyz", np.radians(cast(tuple, options.get("turn", (0.0, 0.0, 0.0)))))
     thing = thing.placed(cast(tuple, options.get("at", (0.0, 0.0, 0.0))), turn.as_quat())
     color = str(options.get("color", COLORS[len(scene.props) % len(COLORS)]))

@@ -36,7 +36,16 @@ class SourceTree:
     @cached_property
     def children(self) -> tuple[tuple[int, ...], ...]:
         """Children of every joint."""
-        return tuple(tuple(int(c) for c in np.flatnonzero(self.parents == j)) for j in range(len(self)))
+        found: list[list[int]] = [[] for _ in range(len(self))]
+        for joint, above in enumerate(self._above):
+            if above >= 0:
+                found[above].append(joint)
+        return tuple(map(tuple, found))
+
+    @cached_property
+    def _above(self) -> list[int]:
+        """Parents as plain numbers: trees are climbed joint by joint."""
+        return [int(above) for above in self.parents]
 
     @property
     def flat(self) -> bool:
@@ -55,8 +64,8 @@ class SourceTree:
 
     def ancestors(self, joint: int) -> list[int]:
         """Parent, grandparent, … of a joint."""
-        out = []
-        while (joint := int(self.parents[joint])) >= 0:
+        above, out = self._above, []
+        while (joint := above[joint]) >= 0:
             out.append(joint)
         return out
 

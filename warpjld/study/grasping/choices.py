@@ -8,6 +8,8 @@ from typing import TYPE_CHECKING, Any
 
 from warpjld.errors import InputError
 from warpjld.io.identity import content_hash
+from warpjld.lengths import check_size
+from warpjld.names import check_name
 from warpjld.toml_table import TomlTable
 
 if TYPE_CHECKING:
@@ -100,7 +102,9 @@ class ObjectChoice:
         from warpjld.grasp import load_object
 
         assert self.file is not None
-        return load_object(self.file, name=self.name, unit=self.unit, up=self.up, scale=scale, centre=True)  # type: ignore[arg-type]
+        found = load_object(self.file, name=self.name, unit=self.unit, up=self.up, scale=scale, centre=True)  # type: ignore[arg-type]
+        check_size(found.vertices, f"object {self.name} at scale {scale:g}", path=self.file)
+        return found
 
     def identity(self) -> dict[str, Any]:
         """Settings, and hashes in place of paths."""
@@ -182,9 +186,12 @@ def _size_names(build: Any) -> list[str]:
 
 def _name(table: TomlTable) -> str | None:
     name = table.text("name")
-    if name is not None and (not name.strip() or "/" in name):
-        table.fail("name", f"want a word or two without '/', got '{name}'")
-    return name
+    if name is None:
+        return None
+    try:
+        return check_name(name, "the name")
+    except InputError as error:
+        table.fail("name", error.message)
 
 
 def _path(table: TomlTable, key: str) -> Path:

@@ -120,7 +120,7 @@ def load_plan(path: str | Path) -> GraspPlan:
     title = top.text("title", Path(path).stem)
     plan = GraspPlan(
         title=title or Path(path).stem,
-        trials=top.integer("trials", least=1),
+        trials=top.integer("trials", least=1, within="trials"),
         seed=top.integer("seed", least=0),
         hands=tuple(read_hand(table) for table in top.tables("hands")),
         objects=tuple(read_object(table) for table in top.tables("objects")),

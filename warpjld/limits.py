@@ -1,0 +1,110 @@
+"""The most of everything that is read or computed: one table, what it says is refused, and how it is raised.
+
+Each limit is raised, or lowered, by ``warpjld --limit NAME=NUMBER …`` or the environment variable that carries its
+name: ``WARPJLD_LIMIT_VERTICES`` for ``vertices``. A refusal names both. Limits keep a damaged file, or one made for
+it, from filling the machine; they are far above what people work with.
+"""
+
+from __future__ import annotations
+
+import os
+from dataclasses import dataclass
+from pathlib import Path
+
+from warpjld.errors import InputError
+from warpjld.suggest import did_you_mean
+
+__all__ = ["LIMITS", "Limit", "check_limit", "limit", "set_limit", "variable"]
+
+
+@dataclass(frozen=True)
+class Limit:
+    """The most of one thing.
+
+    Attributes:
+        most: The limit where nothing else is said.
+        unit: What is counted, in the plural.
+        about: Of what.
+    """
+
+    most: int
+    unit: str
+    about: str
+
+
+LIMITS = {
+    "file-bytes": Limit(2 << 30, "bytes", "a file that is read"),
+    "unpacked-bytes": Limit(1 << 30, "bytes", "what the members of an archive (.npz, .3mf, .usdz) unpack to"),
+    "members": Limit(10_000, "members", "an archive"),
+    "vertices": Limit(5_000_000, "vertices", "a surface"),
+    "faces": Limit(10_000_000, "triangles", "a surface"),
+    "nodes": Limit(100_000, "nodes", "a scene"),
+    "joints": Limit(2_048, "joints", "a skeleton"),
+    "frames": Limit(2_000_000, "frames", "a motion or a scene"),
+    "transforms": Limit(50_000_000, "transforms", "a motion: frames times joints"),
+    "depth": Limit(200, "levels", "JSON and arithmetic, one inside the other"),
+    "statements": Limit(100_000, "statements", "a script with its macros and include files written out"),
+    "text": Limit(10_000, "characters", "a text in a script with its macro parameters put in"),
+    "trials": Limit(1_000_000, "trials", "a study"),
+    "instants": Limit(100_000, "instants", "a load step"),
+    "elements": Limit(2_000_000, "elements", "a finite-element mesh"),
+}
+"""By name, as ``--limit`` and, in capitals with underscores, the environment have them."""
+
+
+def variable(name: str) -> str:
+    """Environment variable of a limit."""
+    return f"WARPJLD_LIMIT_{name.replace('-', '_').upper()}"
+
+
+def limit(name: str) -> int:
+    """The most of what ``name`` says, as the environment has it, or else the default.
+
+    Raises:
+        InputError: The environment variable is no whole number above 0.
+    """
+    stated = os.environ.get(variable(name))
+    return LIMITS[name].most if stated is None else _number(stated, variable(name))
+
+
+def set_limit(name: str, value: str) -> None:
+    """Set a limit for this process and those that it starts.
+
+    Raises:
+        InputError: There is no such limit, or the value is no whole number above 0.
+    """
+    if name not in LIMITS:
+        raise InputError(f"--limit: there is no limit '{name}'{did_you_mean(name, LIMITS)}; known: {', '.join(LIMITS)}")
+    os.environ[variable(name)] = str(_number(value, f"--limit {name}"))
+
+
+def check_limit(name: str, count: float, *, of: str = "", path: str | Path | None = None) -> None:
+    """Make sure that there are no more than the limit allows, before anything is allocated for them.
+
+    Args:
+        name: Of ``LIMITS``.
+        count: How many there are.
+        of: What has so many, for the message.
+        path: The file concerned.
+
+    Raises:
+        InputError: There are more.
+    """
+    most = limit(name)
+    if not count <= most:
+        of = f"{of}: " if of else ""
+        raise InputError(
+            f"{of}{count:,.0f} {LIMITS[name].unit}; the limit is {most:,} "
+            f"(raise it by warpjld --limit {name}=… or {variable(name)})",
+            path=path,
+        )
+
+
+def _number(text: str, what: str) -> int:
+    try:
+        value = int(float(text))
+    except (ValueError, OverflowError):
+        value = 0
+    if value < 1:
+        raise InputError(f"{what}: want a whole number above 0, got '{text[:40]}'")
+    return value
