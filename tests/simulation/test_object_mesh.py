@@ -11,7 +11,7 @@ from warpjld.fem import Body, Loads, Prescribed, solve
 from warpjld.fem.load.loads import volumes
 from warpjld.grasp import GraspObject, Places, make_object
 from warpjld.grasp.shapes import ball, box, cylinder, glass
-from warpjld.simulation.bodies.object_body import ObjectBody
+from warpjld.simulation.bodies.object_body import object_body
 from warpjld.simulation.bodies.object_mesh import ObjectMesh, mesh_object
 from warpjld.simulation.specification import ObjectMaterial
 
@@ -30,7 +30,7 @@ def made(thing: GraspObject, **options: float) -> ObjectMesh:
 
 
 def deformed(found: ObjectMesh, displacement: np.ndarray) -> np.ndarray:
-    return ObjectBody(found, lambda time: PLACE, [], 0.0).deformed(displacement)
+    return object_body(found, lambda time: PLACE, [], 0.0).deformed(displacement)
 
 
 @pytest.mark.parametrize("thing", [ball(0.06), box(), cylinder(), capsule()], ids=lambda thing: thing.name)

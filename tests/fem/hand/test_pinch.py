@@ -14,9 +14,10 @@ from warpjld.fem import Body
 from warpjld.fem.contact import ContactSolution, Pair, press
 from warpjld.fem.hand import FleshHand, hand_laws
 from warpjld.hand import build_hand
-from warpjld.simulation.bodies.flesh_body import BoneMotion, FleshBody
+from warpjld.simulation.bodies.flesh_body import BoneMotion, flesh_body
 from warpjld.simulation.bodies.rest_shape import cut_to_digits, rest_in_pose
 from warpjld.simulation.bodies.skin_parts import skin_parts
+from warpjld.simulation.specification import FleshMaterial
 from warpjld.skeleton import CHANNELS, Poses, Skeleton, poses_from_angles
 
 pytestmark = pytest.mark.slow
@@ -59,7 +60,7 @@ class Hand:
         self.hand = part.hand
         self.laws = hand_laws(self.hand.mesh.region_names)
         bones = BoneMotion(hand, SimpleNamespace(pose=poses), 0.0)  # type: ignore[arg-type]
-        self.driven = FleshBody("hand", part, self.laws, 80e3, True, bones, skin_parts(whole))
+        self.driven = flesh_body("hand", part, self.laws, FleshMaterial(), bones, skin_parts(whole))
 
     def pressed(self, times: Sequence[float], friction: float = 0.0) -> ContactSolution:
         pair = Pair("hand", "hand", friction, exclusion=self.hand.self_contact(), name="itself")

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Protocol, Self
+from typing import Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -65,102 +66,64 @@ class Surroundings:
     history: History
 
 
-class DeformableBody(Protocol):
-    """A volume mesh that carries a visible surface, with what is prescribed of it.
+@dataclass(frozen=True, eq=False, kw_only=True)
+class DeformableBody(ABC):
+    """A volume mesh of N nodes and E elements that carries a visible surface, with what is prescribed of it.
 
     Times are in frames from the moment at which the body rests; displacements count from there.
+
+    Attributes:
+        name: Of the actor or object.
+        mesh: As it rests.
+        faces: Face set of its outside, which may touch others.
+        laws: Constitutive laws by region of the mesh.
+        modulus: Young's modulus under its surface [Pa]: the softer of two gives way more.
+        stress: At rest [Pa], shape (E, 6).
+        surface: Its visible surface at rest [m], shape (V, 3).
+        triangles: Of that surface, shape (T, 3).
+        embedding: How the mesh carries its vertices.
+        embedded: Those that it carries, shape (V,): where flesh is cut off, the others are not.
+        pressure_inside: Face set of its inside, and the pressure there above that outside [Pa].
+        self_contact: What of its surface never meets, where it may touch itself.
+        parts: Of its surface, that may overlap one another.
+        pressing: Vertices whose overlap with other parts contact knows of, shape (V,); None: all.
     """
 
-    @property
-    def name(self) -> str:
-        """Of the actor or object."""
-        ...
+    name: str
+    mesh: HexMesh
+    faces: str
+    laws: Mapping[str, Material]
+    modulus: float
+    stress: NDArray[np.float64]
+    surface: NDArray[np.float64]
+    triangles: NDArray[np.int32]
+    embedding: Embedding
+    embedded: NDArray[np.bool_]
+    pressure_inside: tuple[str, float] | None = None
+    self_contact: Exclusion | None = None
+    parts: SkinParts | None = None
+    pressing: NDArray[np.bool_] | None = None
 
-    @property
-    def mesh(self) -> HexMesh:
-        """Its own nodes and elements, N and E of them."""
-        ...
-
-    @property
-    def faces(self) -> str:
-        """Face set of its outside, which may touch others."""
-        ...
-
-    @property
-    def laws(self) -> Mapping[str, Material]:
-        """Constitutive laws by region of the mesh."""
-        ...
-
-    @property
-    def modulus(self) -> float:
-        """Young's modulus under its surface [Pa]: the softer of two gives way more."""
-        ...
-
-    @property
-    def stress(self) -> NDArray[np.float64]:
-        """Stress at rest [Pa], shape (E, 6)."""
-        ...
-
-    @property
-    def surface(self) -> NDArray[np.float64]:
-        """Its visible surface at rest [m], shape (V, 3)."""
-        ...
-
-    @property
-    def triangles(self) -> NDArray[np.int32]:
-        """Of the visible surface, shape (T, 3)."""
-        ...
-
-    @property
-    def embedding(self) -> Embedding:
-        """How the mesh carries the vertices of the surface."""
-        ...
-
-    @property
-    def embedded(self) -> NDArray[np.bool_]:
-        """Vertices that it carries, shape (V,): where flesh is cut off, the others are not."""
-        ...
-
-    @property
-    def pressure_inside(self) -> tuple[str, float] | None:
-        """Face set of its inside, and the pressure there above that outside [Pa]."""
-        ...
-
-    @property
-    def self_contact(self) -> Exclusion | None:
-        """What of its surface never meets, where it may touch itself."""
-        ...
-
-    @property
-    def parts(self) -> SkinParts | None:
-        """Parts of its surface that may overlap one another."""
-        ...
-
-    @property
-    def pressing(self) -> NDArray[np.bool_] | None:
-        """Vertices whose overlap with other parts contact knows of, shape (V,); None: all."""
-        ...
-
+    @abstractmethod
     def deformed(self, displacement: NDArray[np.float64], covered: NDArray[np.floating] | None) -> NDArray[np.float64]:
         """Its visible surface [m], shape (V, 3), under a displacement (N, 3); ``covered`` is a skin without contact."""
-        ...
 
+    @abstractmethod
     def prescribed(self, time: float, history: History) -> Prescribed:
         """Known displacements at a time."""
-        ...
 
+    @abstractmethod
     def guess(
         self, before: float, time: float, displacement: NDArray[np.float64], around: Surroundings
     ) -> NDArray[np.float64]:
         """First guess of its displacement at a time from that at an earlier one [m], shape (N, 3)."""
-        ...
 
+    @abstractmethod
     def way(
         self, times: Sequence[float], displacement: NDArray[np.float64], nodes: NDArray[np.integer]
     ) -> list[NDArray[np.float64]]:
         """Where some of its nodes (n,) are at the first of some times, and are expected at the others [m]."""
-        ...
 
+    @abstractmethod
     def timed(self, clock: Callable[[float], float]) -> Self:
         """The same body, driven as it is at ``clock(time)``."""
-        ...

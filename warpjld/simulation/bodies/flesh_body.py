@@ -11,22 +11,20 @@ import numpy as np
 from numpy.typing import NDArray
 
 from warpjld.errors import InputError
-from warpjld.fem import Body, HexMesh, Material, Prescribed
-from warpjld.fem.contact.interface.pairs import Exclusion
+from warpjld.fem import Body, Material, Prescribed
 from warpjld.fem.hand.alone import FleshAlone
 from warpjld.fem.hand.blend import Moves
 from warpjld.fem.hand.cushion import coarse_note
 from warpjld.fem.hand.flesh_hand import FleshHand, build_flesh_hand
 from warpjld.fem.hand.laws import hand_laws
-from warpjld.fem.mesh.embedding import Embedding
 from warpjld.simulation.animation import ActorAnimation
-from warpjld.simulation.bodies.deformable_body import History, Surroundings
+from warpjld.simulation.bodies.deformable_body import DeformableBody, History, Surroundings
 from warpjld.simulation.bodies.rest_shape import RestShape, cut_to_digits, rest_in_pose
 from warpjld.simulation.bodies.skin_parts import SkinParts, skin_parts
 from warpjld.simulation.specification import FleshMaterial, located
 from warpjld.skeleton import Poses, Skeleton
 
-__all__ = ["FLESHED", "BoneMotion", "FleshBody", "build_flesh_body"]
+__all__ = ["FLESHED", "BoneMotion", "FleshBody", "build_flesh_body", "flesh_body"]
 
 FLESHED = 0.5
 """Share of the flesh in skin from which on it has flesh to give way with."""
@@ -84,38 +82,23 @@ class BoneMotion:
         return max(1, int(np.ceil(float(np.linalg.norm(other - one, axis=1).max()) / length)))
 
 
-@dataclass(frozen=True, eq=False)
-class FleshBody:
-    """A hand that is driven by its bones (see ``DeformableBody``).
+@dataclass(frozen=True, eq=False, kw_only=True)
+class FleshBody(DeformableBody):
+    """A hand that is driven by its bones.
 
     Attributes:
-        name: Of the actor.
         shape: Its flesh at time 0.
-        laws: By region.
-        modulus: Young's modulus of its skin [Pa].
-        touches_itself: Whether its skin may touch itself.
         bones: What moves them.
-        parts: Of its visible skin.
+        parts: Digits and palm of its skin.
         alone: Its flesh without what touches it; one for all copies of the body, since it knows the poses it was in.
-        moves: Motions of its bones from the rig's rest at a time, where not as ``bones`` has them.
+        moves: Motions of its bones from the rig's rest at a time.
     """
 
-    name: str
     shape: RestShape
-    laws: Mapping[str, Material]
-    modulus: float
-    touches_itself: bool
     bones: BoneMotion
     parts: SkinParts
-    alone: FleshAlone = None  # type: ignore[assignment]
-    moves: Callable[[float], Moves] = None  # type: ignore[assignment]
-
-    def __post_init__(self) -> None:
-        if self.moves is None:
-            object.__setattr__(self, "moves", self.bones.moves)
-        if self.alone is None:
-            body, degrees = Body(self.mesh, self.laws), self.prescribed(0.0).degrees
-            object.__setattr__(self, "alone", FleshAlone(self.hand, body, degrees, self.bones.pose(0.0)))
+    alone: FleshAlone
+    moves: Callable[[float], Moves]
 
     @property
     def hand(self) -> FleshHand:
@@ -123,49 +106,14 @@ class FleshBody:
         return self.shape.hand
 
     @property
-    def mesh(self) -> HexMesh:
-        return self.hand.mesh
-
-    @property
-    def faces(self) -> str:
-        return self.hand.name
-
-    @property
-    def stress(self) -> NDArray[np.float64]:
-        return np.zeros((len(self.mesh.elements), 6))
-
-    @property
-    def surface(self) -> NDArray[np.float64]:
-        return self.shape.skin
-
-    @property
-    def triangles(self) -> NDArray[np.int32]:
-        return self.hand.surface.faces
-
-    @property
-    def embedding(self) -> Embedding:
-        return self.hand.flesh.skin
-
-    @property
-    def embedded(self) -> NDArray[np.bool_]:
-        return np.asarray(self.shape.blend > 0.0)
-
-    @property
-    def pressure_inside(self) -> None:
-        return None
-
-    @property
-    def self_contact(self) -> Exclusion | None:
-        return self.hand.self_contact() if self.touches_itself else None
+    def touches_itself(self) -> bool:
+        """Whether its skin may touch itself."""
+        return self.self_contact is not None
 
     @property
     def fleshed(self) -> NDArray[np.bool_]:
         """Vertices with flesh to give way with, shape (V,)."""
         return np.asarray(self.shape.blend > FLESHED)
-
-    @property
-    def pressing(self) -> NDArray[np.bool_]:
-        return self.fleshed & self.touches_itself
 
     def has_flesh(self, part: str) -> bool:
         """Whether most of a digit's skin, or the palm's, has flesh to give way with."""
@@ -178,14 +126,7 @@ class FleshBody:
 
     def prescribed(self, time: float, history: History | None = None) -> Prescribed:
         """Displacements of the bones' nodes and of those where the flesh was cut off."""
-        hand, cut = self.hand, self.shape.cut
-        moves = self.shape.start.to(self.moves(time))
-        known = hand.prescribed_by(moves)
-        cut = np.setdiff1d(cut, known.degrees[::3] // 3)
-        if not len(cut):
-            return known
-        x = hand.mesh.nodes[cut]
-        return known + _whole(cut, moves.blended(hand.weights[cut], x) - x)
+        return _held_by_bones(self.shape, self.moves(time))
 
     def guess(
         self, before: float, time: float, displacement: NDArray[np.float64], around: Surroundings | None = None
@@ -247,7 +188,49 @@ def build_flesh_body(actor: ActorAnimation, material: FleshMaterial, start: floa
         stiffening=material.stiffening,
     )
     bones = BoneMotion(shape.hand, actor, start)
-    return FleshBody(actor.name, shape, laws, material.skin, material.itself, bones, skin_parts(built)), notes
+    return flesh_body(actor.name, shape, laws, material, bones, skin_parts(built)), notes
+
+
+def flesh_body(
+    name: str,
+    shape: RestShape,
+    laws: Mapping[str, Material],
+    material: FleshMaterial,
+    bones: BoneMotion,
+    parts: SkinParts,
+) -> FleshBody:
+    """A hand of that shape at rest, with its laws, what moves its bones, and the parts of its whole skin."""
+    hand, degrees = shape.hand, _held_by_bones(shape, bones.moves(0.0)).degrees
+    return FleshBody(
+        name=name,
+        mesh=hand.mesh,
+        faces=hand.name,
+        laws=laws,
+        modulus=material.skin,
+        stress=np.zeros((len(hand.mesh.elements), 6)),
+        surface=shape.skin,
+        triangles=hand.surface.faces,
+        embedding=hand.flesh.skin,
+        embedded=np.asarray(shape.blend > 0.0),
+        self_contact=hand.self_contact() if material.itself else None,
+        parts=parts,
+        pressing=(shape.blend > FLESHED) & material.itself,
+        shape=shape,
+        bones=bones,
+        alone=FleshAlone(hand, Body(hand.mesh, laws), degrees, bones.pose(0.0)),
+        moves=bones.moves,
+    )
+
+
+def _held_by_bones(shape: RestShape, motion: Moves) -> Prescribed:
+    """Displacements of the bones' nodes and of those where the flesh was cut off, under motions from the rig's rest."""
+    moves = shape.start.to(motion)
+    known = shape.hand.prescribed_by(moves)
+    cut = np.setdiff1d(shape.cut, known.degrees[::3] // 3)
+    if not len(cut):
+        return known
+    x = shape.hand.mesh.nodes[cut]
+    return known + _whole(cut, moves.blended(shape.hand.weights[cut], x) - x)
 
 
 def _whole(nodes: NDArray[np.int64], moved: NDArray[np.float64]) -> Prescribed:

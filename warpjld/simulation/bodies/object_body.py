@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
 from typing import Self
@@ -12,19 +12,18 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from warpjld.errors import InputError
-from warpjld.fem import HexMesh, Material, Prescribed
+from warpjld.fem import Prescribed
 from warpjld.fem.load.loads import volumes
-from warpjld.fem.mesh.embedding import Embedding
 from warpjld.grasp import Places
 from warpjld.simulation.animation import ObjectAnimation
-from warpjld.simulation.bodies.deformable_body import History, Surroundings
+from warpjld.simulation.bodies.deformable_body import DeformableBody, History, Surroundings
 from warpjld.simulation.bodies.free_object import settle_free_object
 from warpjld.simulation.bodies.object_mesh import ObjectMesh, mesh_object
 from warpjld.simulation.bodies.support import Support, handle_of
 from warpjld.simulation.specification import ContactSpecification, GripSpecification, located
 from warpjld.simulation.state_variables import Points, PrescribedPoints
 
-__all__ = ["ObjectBody", "build_object_body"]
+__all__ = ["ObjectBody", "build_object_body", "object_body"]
 
 _ON = 2e-4
 """An object nearer to an obstacle than this lies on it [m]."""
@@ -32,12 +31,12 @@ _FOOT = 0.05
 """Share of a lifted object's height, from below, whose points hold it until then."""
 
 
-@dataclass(frozen=True, eq=False)
-class ObjectBody:
-    """An object that deforms (see ``DeformableBody``).
+@dataclass(frozen=True, eq=False, kw_only=True)
+class ObjectBody(DeformableBody):
+    """An object that deforms.
 
     Attributes:
-        volume: Its mesh at time 0.
+        local: Its nodes in the object's own frame [m], shape (N, 3).
         place: Where the animation puts it at a time: one placement.
         states: What is prescribed, and the nodes it is prescribed for.
         start: Frame of time 0.
@@ -45,59 +44,12 @@ class ObjectBody:
         other: What is prescribed instead of all this, at a time.
     """
 
-    volume: ObjectMesh
+    local: NDArray[np.float64]
     place: Callable[[float], Places]
     states: Sequence[tuple[PrescribedPoints, NDArray[np.int64]]]
     start: float
     support: Support | None = None
     other: Callable[[float], Prescribed] | None = None
-
-    parts = pressing = self_contact = None
-
-    @property
-    def name(self) -> str:
-        return self.volume.name
-
-    @property
-    def mesh(self) -> HexMesh:
-        return self.volume.mesh
-
-    @property
-    def faces(self) -> str:
-        return self.volume.name
-
-    @property
-    def laws(self) -> Mapping[str, Material]:
-        return {self.name: self.volume.physical.material()}
-
-    @property
-    def modulus(self) -> float:
-        return self.volume.physical.young
-
-    @property
-    def stress(self) -> NDArray[np.float64]:
-        return self.volume.stress
-
-    @property
-    def surface(self) -> NDArray[np.float64]:
-        return self.volume.surface
-
-    @property
-    def triangles(self) -> NDArray[np.int32]:
-        return self.volume.faces
-
-    @property
-    def embedding(self) -> Embedding:
-        return self.volume.visible
-
-    @property
-    def embedded(self) -> NDArray[np.bool_]:
-        return np.ones(len(self.surface), dtype=bool)
-
-    @property
-    def pressure_inside(self) -> tuple[str, float] | None:
-        pressure = self.volume.physical.pressure
-        return (self.volume.inside, pressure) if pressure else None
 
     def deformed(
         self, displacement: NDArray[np.float64], covered: NDArray[np.floating] | None = None
@@ -137,7 +89,7 @@ class ObjectBody:
             held = self.holds(state, time)
             if held:
                 axes = [0, 1, 2]
-                moved = self.place(time).apply(self.volume.local[nodes])[0] - self.mesh.nodes[nodes]
+                moved = self.place(time).apply(self.local[nodes])[0] - self.mesh.nodes[nodes]
             begun = held
             for axis, track in state.tracks.items():
                 begun = begun or frame >= track.keys[0].frame
@@ -214,7 +166,36 @@ def build_object_body(
                 states.append((PrescribedPoints(foot, held=True), foot.choose(volume.mesh.nodes, volume.mesh.nodes)))
     except InputError as error:
         raise located(InputError(f"{name}: {error.message}"), physical.where) from error
-    return ObjectBody(volume, at, states, start, support)
+    return object_body(volume, at, states, start, support)
+
+
+def object_body(
+    volume: ObjectMesh,
+    place: Callable[[float], Places],
+    states: Sequence[tuple[PrescribedPoints, NDArray[np.int64]]],
+    start: float,
+    support: Support | None = None,
+) -> ObjectBody:
+    """A meshed object with what leads it."""
+    physical = volume.physical
+    return ObjectBody(
+        name=volume.name,
+        mesh=volume.mesh,
+        faces=volume.name,
+        laws={volume.name: physical.material()},
+        modulus=physical.young,
+        stress=volume.stress,
+        surface=volume.surface,
+        triangles=volume.faces,
+        embedding=volume.visible,
+        embedded=np.ones(len(volume.surface), dtype=bool),
+        pressure_inside=(volume.inside, physical.pressure) if physical.pressure else None,
+        local=volume.local,
+        place=place,
+        states=states,
+        start=start,
+        support=support,
+    )
 
 
 def _place_at(animation: ObjectAnimation, start: float) -> Callable[[float], Places]:
