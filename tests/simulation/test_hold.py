@@ -22,7 +22,7 @@ from warpjld.simulation.bodies.deformable_body import History
 from warpjld.simulation.bodies.model import ContactModel, PairOwners
 from warpjld.simulation.bodies.object_body import build_object_body
 from warpjld.simulation.grip.hold import HandTrials
-from warpjld.simulation.grip.search import GripStatus, Outcome, gentlest_grip
+from warpjld.simulation.grip.search import GripStatus, TrialOutcome, gentlest_grip
 from warpjld.simulation.specification import GripSpecification
 
 WEIGHT, FRICTION = 0.6, 0.5
@@ -115,7 +115,7 @@ def test_the_gentlest_grip_takes_the_block_from_its_foot(lift: HandTrials) -> No
     assert 0.98 * WEIGHT / (2.0 * FRICTION) <= 0.5 * found.trial.force <= 1.08 * WEIGHT / (2.0 * FRICTION)
     gentler = [trial for grip, trial in found.trials if grip < found.grip]
     assert gentler
-    assert all(trial.outcome in (Outcome.WEAK, Outcome.SLIDES) for trial in gentler)
+    assert all(trial.outcome in (TrialOutcome.WEAK, TrialOutcome.SLIDES) for trial in gentler)
     taken = lift.taken(found.grip)
     assert taken is not None
     lowered, instant = taken
@@ -135,7 +135,7 @@ def test_a_block_with_a_floor_below_stands_on_it(lift: HandTrials) -> None:
     )
     standing = HandTrials(squeeze, model.objects[0])
     trial = standing(1.5e-4)
-    assert trial.outcome is Outcome.STANDS
+    assert trial.outcome is TrialOutcome.STANDS
     assert trial.note.startswith("FLOOR bears ")
     assert standing.taken(1.5e-4) is None
     assert not math.isnan(trial.sliding)

@@ -12,7 +12,7 @@ from warpjld.errors import InputError
 from warpjld.fem.contact import Pair
 from warpjld.fem.contact.obstacles.solids import Plane
 from warpjld.simulation.grip.hold import PrescribedTrials
-from warpjld.simulation.grip.search import GripStatus, Outcome, gentlest_grip
+from warpjld.simulation.grip.search import GripStatus, TrialOutcome, gentlest_grip
 from warpjld.simulation.report.tactile import tactile_of_pairs
 
 EXAMPLE = Path(__file__).resolve().parents[2] / "examples" / "hold_block.py"
@@ -43,7 +43,7 @@ def test_a_firmer_grip_holds_without_much_sliding(holding: PrescribedTrials) -> 
 def test_a_gentler_grip_slides_at_every_point(holding: PrescribedTrials) -> None:
     """Friction bears what Coulomb says it can, however deep the block sinks: found, not concluded from a solver."""
     trial = holding(1.06e-4)
-    assert trial.outcome is Outcome.SLIDES
+    assert trial.outcome is TrialOutcome.SLIDES
     assert trial.sliding == 1.0
     instants = holding.found[1.06e-4].instants
     slid = [instant for instant in instants if holding.weight.sliding(instant) == 1.0]
@@ -58,7 +58,7 @@ def test_a_gentler_grip_slides_at_every_point(holding: PrescribedTrials) -> None
 
 def test_a_grip_too_weak_is_known_before_the_weight_comes_on(holding: PrescribedTrials) -> None:
     trial = holding(5e-5)
-    assert trial.outcome is Outcome.WEAK
+    assert trial.outcome is TrialOutcome.WEAK
     assert trial.borne == pytest.approx(FRICTION * trial.force / WEIGHT, rel=1e-3)
     assert len(holding.found[5e-5].instants) == 1
 
@@ -70,7 +70,7 @@ def test_a_block_that_stands_is_not_held(holding: PrescribedTrials) -> None:
         holding.body, holding.prescribed, holding.pairs, "block", others=[Pair("block.z-", floor, friction=0.5)]
     )
     trial = standing(1.5e-4)
-    assert trial.outcome is Outcome.STANDS
+    assert trial.outcome is TrialOutcome.STANDS
     assert standing.weight.elsewhere(standing.found[1.5e-4].last) > 0.01
 
 
@@ -86,7 +86,7 @@ def test_pads_press_with_half_the_weight_over_friction(holding: PrescribedTrials
         assert touch.force[2] == pytest.approx(-0.5 * WEIGHT, rel=5e-3)
         np.testing.assert_allclose(touch.nodal.sum(axis=0), 0.0, atol=1e-9)
     gentler = {trial.outcome for _, trial in found.trials if not trial.held}
-    assert gentler == {Outcome.WEAK, Outcome.SLIDES}
+    assert gentler == {TrialOutcome.WEAK, TrialOutcome.SLIDES}
     assert "slid at every point" in found.ended
 
     felt = tactile_of_pairs(solution.instants)

@@ -7,11 +7,11 @@ import math
 import pytest
 
 from warpjld.errors import InputError
-from warpjld.simulation.grip.search import GripStatus, Outcome, Trial, gentlest_grip
+from warpjld.simulation.grip.search import GripStatus, Trial, TrialOutcome, gentlest_grip
 
 
-def ended(held: bool) -> Outcome:
-    return Outcome.HELD if held else Outcome.SLIDES
+def ended(held: bool) -> TrialOutcome:
+    return TrialOutcome.HELD if held else TrialOutcome.SLIDES
 
 
 def squeezed(weight: float, friction: float, stiffness: float = 4e3, touch: float = 1e-3, limit: float = math.inf):  # type: ignore[no-untyped-def]
@@ -73,24 +73,24 @@ def test_trials_that_cannot_be_solved_say_nothing() -> None:
     block = squeezed(1.0, 0.5)
 
     def hold(grip: float) -> Trial:
-        lost = Trial(Outcome.UNSOLVED, math.nan, 1.0)
+        lost = Trial(TrialOutcome.UNSOLVED, math.nan, 1.0)
         return lost if grip < 0.001 or 0.0018 < grip < 0.0032 else block(grip)
 
     found = gentlest_grip(hold, 0.0, 0.05, weight=1.0, friction=0.5)
     assert found.status is GripStatus.HELD
     assert found.grip == pytest.approx(0.0032, rel=0.02)
-    lost = sum(trial.outcome is Outcome.UNSOLVED for _, trial in found.trials)
+    lost = sum(trial.outcome is TrialOutcome.UNSOLVED for _, trial in found.trials)
     assert lost >= 2
     assert f"{lost} could not be solved" in found.ended
     assert found.ended.startswith(f"{len(found.trials)} grips were tried: ")
-    never = gentlest_grip(lambda grip: Trial(Outcome.UNSOLVED, math.nan, 1.0), 0.0, 0.1, weight=9.0, friction=0.5)
+    never = gentlest_grip(lambda grip: Trial(TrialOutcome.UNSOLVED, math.nan, 1.0), 0.0, 0.1, weight=9.0, friction=0.5)
     assert never.status is GripStatus.NO_SOLUTION
 
 
 def test_what_stands_on_something_else_is_not_held() -> None:
     note = "TABLE bears 0.9 N of it"
     found = gentlest_grip(
-        lambda grip: Trial(Outcome.STANDS, 0.0, 50.0 * grip, note=note), 0.0, 1.0, weight=1.0, friction=0.5
+        lambda grip: Trial(TrialOutcome.STANDS, 0.0, 50.0 * grip, note=note), 0.0, 1.0, weight=1.0, friction=0.5
     )
     assert found.status is GripStatus.STANDS
     assert note in found.text

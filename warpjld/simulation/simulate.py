@@ -35,7 +35,7 @@ from warpjld.simulation.grip.find import FoundGrip
 from warpjld.simulation.report.table import ContactRow, ContactTable
 from warpjld.simulation.report.tactile import Tactile
 from warpjld.simulation.report.tactile_readings import tactile_readings
-from warpjld.simulation.report.verdict import Verdict, verdict_of
+from warpjld.simulation.report.verdict import ContactVerdict, verdict_of
 from warpjld.simulation.report.visible_overlap import remaining_overlaps, visible_overlap_notes
 from warpjld.simulation.solve.checkpoint import CheckpointFile
 from warpjld.simulation.solve.checks import check_model, check_specification
@@ -78,7 +78,7 @@ class Simulation:
     solved: SolveResult
     surfaces: DeformedSurfaces
     rows: list[ContactRow]
-    verdict: Verdict
+    verdict: ContactVerdict
     notes: list[str]
 
     @property

@@ -1,6 +1,6 @@
 """Contact of the skin with itself, displayed: what crosses is parted, and what is displaced bulges beside it.
 
-No forces and no equilibrium: contact that is solved is PRESS (:mod:`warpjld.simulation`). First both sides of every bent
+No forces and no equilibrium: contact that is solved is PRESS (:mod:`warpjld.simulation`). Both sides of every bent
 joint are parted at the plane that halves its angle. Then vertices that lie inside another part are found; each gives a
 plane in which it and that part are to meet, and both sides are moved to theirs by a least squares fit to the planes
 around, which is smooth over the surface. The volume that this takes is given back around it.

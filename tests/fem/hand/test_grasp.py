@@ -12,7 +12,7 @@ from warpjld.fem import Body, NeoHooke, Status, merge, prescribe
 from warpjld.fem import ball as ball_mesh
 from warpjld.fem.contact import ContactInstant, Pair, press
 from warpjld.fem.contact.obstacles.solids import Sphere
-from warpjld.fem.hand import FleshHand, HandMotion, build_flesh_hand, hand_laws, motion_of
+from warpjld.fem.hand import FleshHand, FleshMotion, build_flesh_hand, hand_laws, motion_of
 from warpjld.fem.hand.alone import FleshAlone
 from warpjld.fem.hand.bone_loads import BoneLoads, loads_from_contact, loads_from_reactions
 from warpjld.fem.hand.muscles import Effort, effort_of
@@ -32,7 +32,7 @@ RADIUS = 0.0325
 
 
 @pytest.fixture(scope="module")
-def closing() -> HandMotion:
+def closing() -> FleshMotion:
     """The hand closes until its skin touches at time 3, and on by 5° in every joint until time 4."""
     rig = build_hand("left")
     hand = build_flesh_hand(rig)
@@ -53,7 +53,7 @@ def closing() -> HandMotion:
     return motion_of(hand, poses_from_angles(skeleton, angles))
 
 
-def loads_at(motion: HandMotion, alone: FleshAlone, instant: ContactInstant) -> BoneLoads:
+def loads_at(motion: FleshMotion, alone: FleshAlone, instant: ContactInstant) -> BoneLoads:
     hand, count = motion.hand, len(motion.hand.mesh.nodes)
     nodal = np.sum([t.nodal for t in instant.touches], axis=0)[:count]
     u, reactions = instant.displacement[:count], instant.reactions[:count]
@@ -63,7 +63,7 @@ def loads_at(motion: HandMotion, alone: FleshAlone, instant: ContactInstant) -> 
     return loads_from_reactions(hand, u, reactions) - own
 
 
-def effort(motion: HandMotion, loads: BoneLoads, time: float) -> Effort:
+def effort(motion: FleshMotion, loads: BoneLoads, time: float) -> Effort:
     return effort_of(motion.hand.skeleton, motion.pose(time), loads)
 
 
@@ -75,7 +75,7 @@ def balanced(hand: FleshHand, instant: ContactInstant) -> None:
     np.testing.assert_allclose(touch, bones, atol=1e-3 * instant.touches[0].normal_force + 1e-7 * held)
 
 
-def test_rigid_ball(closing: HandMotion) -> None:
+def test_rigid_ball(closing: FleshMotion) -> None:
     """Flesh at rest in the open hand is strained when it closes, by newtons at the thumb: they do not count."""
     hand = closing.hand
     body = Body(hand.mesh, hand_laws(hand.mesh.region_names))
@@ -114,7 +114,7 @@ def test_rigid_ball(closing: HandMotion) -> None:
     assert read.normal_force[-1].sum() == pytest.approx(found.last.touches[0].normal_force, rel=1e-9)
 
 
-def test_deformable_ball(closing: HandMotion) -> None:
+def test_deformable_ball(closing: FleshMotion) -> None:
     """Held inside: without friction nothing else would keep it between the fingers."""
     hand = closing.hand
     thing = ball_mesh(RADIUS, n=6)

@@ -2,6 +2,6 @@
 
 from warpjld.fem.hand.flesh_hand import FleshHand, build_flesh_hand
 from warpjld.fem.hand.laws import hand_laws
-from warpjld.fem.hand.motion import HandMotion, motion_of
+from warpjld.fem.hand.motion import FleshMotion, motion_of
 
-__all__ = ["FleshHand", "HandMotion", "build_flesh_hand", "hand_laws", "motion_of"]
+__all__ = ["FleshHand", "FleshMotion", "build_flesh_hand", "hand_laws", "motion_of"]

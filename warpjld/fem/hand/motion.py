@@ -15,11 +15,11 @@ from warpjld.fem.hand.flesh_hand import FleshHand
 from warpjld.fem.load.prescribed import Prescribed
 from warpjld.skeleton.kinematics import Poses
 
-__all__ = ["HandMotion", "halfway", "motion_of"]
+__all__ = ["FleshMotion", "halfway", "motion_of"]
 
 
 @dataclass(frozen=True, eq=False)
-class HandMotion:
+class FleshMotion:
     """What drives a flesh hand: ``prescribed`` and ``guess`` are what the contact solver asks for.
 
     Attributes:
@@ -87,7 +87,7 @@ class HandMotion:
         return turns, offsets
 
 
-def motion_of(hand: FleshHand, poses: Poses, times: Sequence[float] | None = None) -> HandMotion:
+def motion_of(hand: FleshHand, poses: Poses, times: Sequence[float] | None = None) -> FleshMotion:
     """Drive a hand from rest through poses.
 
     Args:
@@ -102,7 +102,7 @@ def motion_of(hand: FleshHand, poses: Poses, times: Sequence[float] | None = Non
     if at.shape != (len(poses),) or len(at) == 0 or not (np.diff(np.concatenate([[0.0], at])) > 0.0).all():
         raise InputError(f"times: want {len(poses)} rising times above 0, got {at.tolist()}")
     rest = hand.rest_pose()
-    return HandMotion(
+    return FleshMotion(
         hand,
         Poses(
             np.concatenate([rest.positions, poses.positions]),
@@ -120,4 +120,4 @@ def halfway(hand: FleshHand, before: Poses, after: Poses) -> Poses:
         np.concatenate([before.rotations, after.rotations]),
         np.concatenate([before.flexion, after.flexion]),
     )
-    return HandMotion(hand, both, np.array([0.0, 1.0])).pose(0.5)
+    return FleshMotion(hand, both, np.array([0.0, 1.0])).pose(0.5)

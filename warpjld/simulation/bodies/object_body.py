@@ -19,7 +19,7 @@ from warpjld.simulation.animation import ObjectAnimation
 from warpjld.simulation.bodies.deformable_body import DeformableBody, History, Surroundings
 from warpjld.simulation.bodies.free_object import settle_free_object
 from warpjld.simulation.bodies.object_mesh import ObjectMesh, mesh_object
-from warpjld.simulation.bodies.support import Support, handle_of
+from warpjld.simulation.bodies.support import ObjectSupport, handle_of
 from warpjld.simulation.specification import ContactSpecification, GripSpecification, located
 from warpjld.simulation.state_variables import Points, PrescribedPoints
 
@@ -48,7 +48,7 @@ class ObjectBody(DeformableBody):
     place: Callable[[float], Places]
     states: Sequence[tuple[PrescribedPoints, NDArray[np.int64]]]
     start: float
-    support: Support | None = None
+    support: ObjectSupport | None = None
     other: Callable[[float], Prescribed] | None = None
 
     def deformed(
@@ -174,7 +174,7 @@ def object_body(
     place: Callable[[float], Places],
     states: Sequence[tuple[PrescribedPoints, NDArray[np.int64]]],
     start: float,
-    support: Support | None = None,
+    support: ObjectSupport | None = None,
 ) -> ObjectBody:
     """A meshed object with what leads it."""
     physical = volume.physical
@@ -217,14 +217,16 @@ def _states(
     return states
 
 
-def _lifted(contact: ContactSpecification, wish: GripSpecification, volume: ObjectMesh) -> tuple[ObjectMesh, Support]:
+def _lifted(
+    contact: ContactSpecification, wish: GripSpecification, volume: ObjectMesh
+) -> tuple[ObjectMesh, ObjectSupport]:
     """The object with its weight, and what it stands on."""
     pull = np.array(contact.pull)
     axis = int(np.argmax(np.abs(pull)))
     if wish.weight is not None:
         density = wish.weight / (float(np.abs(pull).max()) * float(volumes(volume.mesh).sum()))
         volume = replace(volume, physical=replace(volume.physical, density=density))
-    return volume, Support(handle_of(volume.mesh.nodes), axis)
+    return volume, ObjectSupport(handle_of(volume.mesh.nodes), axis)
 
 
 def _along_with(known: Prescribed, displacement: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -16,13 +16,13 @@ from numpy.typing import NDArray
 from warpjld.fem.load.prescribed import Prescribed
 from warpjld.simulation.bodies.deformable_body import Bearing
 
-__all__ = ["Support", "handle_of"]
+__all__ = ["ObjectSupport", "handle_of"]
 
 _NOTHING = Prescribed(np.empty(0, np.int64), np.empty(0))
 
 
 @dataclass(frozen=True, eq=False)
-class Support:
+class ObjectSupport:
     """An object's support over time.
 
     Attributes:
@@ -59,7 +59,7 @@ class Support:
             return None
         return (self.bare - time) / (self.bare - self.begins) * bearing.forces
 
-    def released(self, begins: float, free: float, lowered: float) -> Support:
+    def released(self, begins: float, free: float, lowered: float) -> ObjectSupport:
         """The same, letting go from one time to another, while the object's middle sinks so far [m]."""
         return replace(self, begins=begins, free=free, lowered=lowered, bare=0.5 * (begins + free))
 

@@ -20,7 +20,7 @@ from warpjld.fem.load.loads import Loads
 from warpjld.fem.load.prescribed import Prescribed
 from warpjld.simulation.bodies.object_body import ObjectBody
 from warpjld.simulation.grip.lower import Lowering, lower_object
-from warpjld.simulation.grip.search import Outcome, Trial
+from warpjld.simulation.grip.search import Trial, TrialOutcome
 from warpjld.simulation.grip.shared_weight import SharedWeight
 from warpjld.simulation.grip.squeeze import Squeeze
 from warpjld.simulation.solve.branch import solve_branch
@@ -58,15 +58,15 @@ class WeightTrials(ABC):
         closed = self.closed(grip)
         self.found[grip] = closed
         if not closed.converged:
-            return self._trial(grip, Outcome.UNSOLVED, closed.last, float("nan"))
+            return self._trial(grip, TrialOutcome.UNSOLVED, closed.last, float("nan"))
         if not self.weight.force(closed.last) > 0.0:
-            return self._trial(grip, Outcome.APART, closed.last, 0.0)
+            return self._trial(grip, TrialOutcome.APART, closed.last, 0.0)
         most = self.weight.most(closed.last)
         if most < self._hopeless:
-            return self._trial(grip, Outcome.WEAK, closed.last, most)
+            return self._trial(grip, TrialOutcome.WEAK, closed.last, most)
         bare = self.bared(grip, closed)
         if not bare.converged:
-            return self._trial(grip, Outcome.UNSOLVED, closed.last, float("nan"))
+            return self._trial(grip, TrialOutcome.UNSOLVED, closed.last, float("nan"))
         self._begun[grip] = self.weight.height(closed.last)
         lowered = lower_object(
             self.weight,
@@ -108,20 +108,20 @@ class WeightTrials(ABC):
         """Displacement of the object's middle along the weight's axis when the hand takes it [m], and the equilibrium
         then; None where it does not."""
         lowered = self.lowered.get(grip)
-        if lowered is None or lowered.outcome is not Outcome.HELD:
+        if lowered is None or lowered.outcome is not TrialOutcome.HELD:
             return None
         last = lowered.solution.last
         return self.weight.height(last) - self._begun[grip], last
 
-    def _trial(self, grip: float, outcome: Outcome, instant: ContactInstant, borne: float) -> Trial:
+    def _trial(self, grip: float, outcome: TrialOutcome, instant: ContactInstant, borne: float) -> Trial:
         force, sliding = self.weight.force(instant), self.weight.sliding(instant)
         share, who = self.strain(grip, instant)
-        note = self.beneath(instant) if outcome is Outcome.STANDS else ""
+        note = self.beneath(instant) if outcome is TrialOutcome.STANDS else ""
         return Trial(outcome, sliding, force, borne, share, who, note)
 
     def _predicted(self, grip: float) -> float | None:
         """How far the object sank at the nearest grip that held it."""
-        held = [one for one, lowered in self.lowered.items() if lowered.outcome is Outcome.HELD]
+        held = [one for one, lowered in self.lowered.items() if lowered.outcome is TrialOutcome.HELD]
         near = min(held, key=lambda one: abs(one - grip), default=None)
         return None if near is None else self.lowered[near].sunk
 

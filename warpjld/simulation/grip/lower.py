@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from warpjld.fem.contact import ContactInstant, ContactSolution
-from warpjld.simulation.grip.search import Outcome
+from warpjld.simulation.grip.search import TrialOutcome
 from warpjld.simulation.grip.shared_weight import SharedWeight
 
 __all__ = ["Lowering", "lower_object"]
@@ -56,7 +56,7 @@ class Lowering:
         path: How far it had sunk [m] and which share the hand bore, at every equilibrium with the handle.
     """
 
-    outcome: Outcome
+    outcome: TrialOutcome
     solution: ContactSolution
     instants: tuple[ContactInstant, ...]
     borne: float
@@ -108,7 +108,7 @@ def lower_object(
         if here.left <= (0.0 if here.slides else enough):
             free = released(here.solution)
             if free.converged:
-                return way.ended(Outcome.HELD, free)
+                return way.ended(TrialOutcome.HELD, free)
             if here.left <= _LITTLE:
                 break
             enough = _LITTLE
@@ -117,7 +117,7 @@ def lower_object(
             break
         step = ahead.sunk - here.sunk
         way.places.append(ahead)
-    return way.ended(Outcome.UNSOLVED)
+    return way.ended(TrialOutcome.UNSOLVED)
 
 
 class _Way:
@@ -154,7 +154,7 @@ class _Way:
             step *= here.left / (here.left - ahead.left)
         return ahead
 
-    def ended(self, outcome: Outcome, free: ContactSolution | None = None) -> Lowering:
+    def ended(self, outcome: TrialOutcome, free: ContactSolution | None = None) -> Lowering:
         """How it went; ``free`` is the equilibrium without the handle."""
         last = free or self.places[-1].solution
         borne = max(one.borne for one in self.places)
@@ -166,20 +166,20 @@ class _Way:
         return Lowering(outcome, last, (*instants, *(free.instants if free else ())), borne, sunk, path)
 
 
-def _outcome(weight: SharedWeight, places: list[_Place], far: float) -> Outcome | None:
+def _outcome(weight: SharedWeight, places: list[_Place], far: float) -> TrialOutcome | None:
     """Whether it can be seen that the hand does not hold the object."""
     here = places[-1]
     if here.elsewhere > _LEFT:
-        return Outcome.STANDS
+        return TrialOutcome.STANDS
     if here.left <= (0.0 if here.slides else _LEFT):
         return None
     if not weight.force(here.solution.last) > 0.0:
-        return Outcome.APART
+        return TrialOutcome.APART
     if len(places) > 1 and here.slides and places[-2].slides:
-        return Outcome.SLIDES if max(_slope(places), 0.0) * (far - here.sunk) < here.left else None
+        return TrialOutcome.SLIDES if max(_slope(places), 0.0) * (far - here.sunk) < here.left else None
     if here.borne < max(one.borne for one in places) - _LESS:
-        return Outcome.GIVES
-    return Outcome.SANK if here.sunk > far else None
+        return TrialOutcome.GIVES
+    return TrialOutcome.SANK if here.sunk > far else None
 
 
 def _step(places: list[_Place], step: float, far: float) -> float:

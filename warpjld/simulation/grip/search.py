@@ -19,7 +19,7 @@ import numpy as np
 from warpjld.errors import InputError
 from warpjld.simulation.grip.bracket import checked_step, clipped_inside, outward
 
-__all__ = ["Grip", "GripStatus", "Outcome", "Trial", "gentlest_grip"]
+__all__ = ["Grip", "GripStatus", "Trial", "TrialOutcome", "gentlest_grip"]
 
 _SAME = 0.02
 _AMPLE = 4.0
@@ -28,7 +28,7 @@ _INNER = 0.1
 """Part of a bracket, at either end, within which no grip is tried."""
 
 
-class Outcome(Enum):
+class TrialOutcome(Enum):
     """How a trial ended; the value is what is said of one or several."""
 
     HELD = "held"
@@ -41,7 +41,7 @@ class Outcome(Enum):
     UNSOLVED = "could not be solved"
 
 
-_NO_MATTER_OF_FORCE = (Outcome.STANDS, Outcome.UNSOLVED)
+_NO_MATTER_OF_FORCE = (TrialOutcome.STANDS, TrialOutcome.UNSOLVED)
 
 
 class GripStatus(Enum):
@@ -71,7 +71,7 @@ class Trial:
         note: More for people, as what the object stands on.
     """
 
-    outcome: Outcome
+    outcome: TrialOutcome
     sliding: float
     force: float
     borne: float = float("nan")
@@ -82,7 +82,7 @@ class Trial:
     @property
     def held(self) -> bool:
         """Whether the hand, and nothing else, holds the weight."""
-        return self.outcome is Outcome.HELD
+        return self.outcome is TrialOutcome.HELD
 
 
 @dataclass(frozen=True)
@@ -107,7 +107,7 @@ class Grip:
     def ended(self) -> str:
         """How the trials ended, with the number of each: "5 grips were tried: 2 held, 3 slid at every point"."""
         count = Counter(trial.outcome for _, trial in self.trials)
-        parts = ", ".join(f"{count[outcome]} {outcome.value}" for outcome in Outcome if count[outcome])
+        parts = ", ".join(f"{count[outcome]} {outcome.value}" for outcome in TrialOutcome if count[outcome])
         return f"{len(self.trials)} grip{'s were' if len(self.trials) > 1 else ' was'} tried: {parts}"
 
 
@@ -208,7 +208,7 @@ def _between(failed: tuple[float, Trial], held: tuple[float, Trial], width: floa
 
 def _at_last(trial: Trial) -> GripStatus:
     """Why the firmest grip does not hold."""
-    known = {Outcome.UNSOLVED: GripStatus.NO_SOLUTION, Outcome.STANDS: GripStatus.STANDS}
+    known = {TrialOutcome.UNSOLVED: GripStatus.NO_SOLUTION, TrialOutcome.STANDS: GripStatus.STANDS}
     if trial.outcome in known:
         return known[trial.outcome]
     return GripStatus.LIMIT if trial.force > 0.0 else GripStatus.NO_CONTACT

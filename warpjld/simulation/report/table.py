@@ -17,7 +17,7 @@ from warpjld.simulation.bodies.skin_parts import digit_of_label
 from warpjld.simulation.report.efforts import effort_at
 from warpjld.simulation.solve.solved_frame import SolvedFrame
 
-__all__ = ["ContactRow", "ContactTable", "rows_of", "write_table"]
+__all__ = ["ContactRow", "ContactTable", "digit_rows", "write_table"]
 
 
 @dataclass(frozen=True)
@@ -86,7 +86,7 @@ class ContactTable:
             poses = hand.bones.animation.pose(solved.frame)
             effort = effort_at(model, hand, poses, solved, self._strength.get(hand.name))
             self._efforts.setdefault(hand.name, []).append((solved.frame, effort))
-            self.rows += rows_of(model, hand, solved, effort)
+            self.rows += digit_rows(model, hand, solved, effort)
             reason = reason or effort.stop()
         return None if reason is None else f"stopped at frame {solved.frame:g}: {reason}"
 
@@ -120,7 +120,7 @@ class ContactTable:
         return out
 
 
-def rows_of(model: ContactModel, hand: FleshBody, solved: SolvedFrame, effort: Effort) -> list[ContactRow]:
+def digit_rows(model: ContactModel, hand: FleshBody, solved: SolvedFrame, effort: Effort) -> list[ContactRow]:
     """Rows of a hand at a frame: its digits and its palm."""
     digits = [*(d.digit.rpartition(".")[2] for d in effort.digits), "palm"]
     labels = [digit_of_label(name) for name in hand.hand.label_names]

@@ -13,11 +13,11 @@ from warpjld.simulation.report.table import ContactRow
 from warpjld.simulation.report.visible_overlap import RemainingOverlap
 from warpjld.simulation.solve.frames import SolveResult
 
-__all__ = ["Verdict", "verdict_of"]
+__all__ = ["ContactVerdict", "verdict_of"]
 
 
 @dataclass(frozen=True)
-class Verdict:
+class ContactVerdict:
     """How a contact solve ended.
 
     Attributes:
@@ -56,7 +56,7 @@ def verdict_of(
     rows: Sequence[ContactRow],
     suggestions: Sequence[str],
     overlaps: Sequence[RemainingOverlap] = (),
-) -> Verdict:
+) -> ContactVerdict:
     """Judge what was solved.
 
     Args:
@@ -105,4 +105,4 @@ def verdict_of(
         text = f"nothing touches at any frame, but between them: {solved.missed[0].text}"
     else:
         text = "nothing touches at any frame"
-    return Verdict(status, text, tuple(lines), tuple(suggestions), frames)
+    return ContactVerdict(status, text, tuple(lines), tuple(suggestions), frames)

@@ -1,0 +1,61 @@
+"""The simulation in Python, without a script: arrays in, arrays out."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+import trimesh
+
+from warpjld.errors import InputError
+from warpjld.simulation.recorded import RecordedAnimation, RecordedObject
+from warpjld.simulation.simulate import Simulation, simulate
+from warpjld.simulation.specification import ContactSpecification, ObjectMaterial, SolveSpecification
+from warpjld.simulation.state_variables import Points, PrescribedPoints
+
+EDGE, YOUNG, DEPTH = 0.02, 1e5, 5e-4
+
+
+@pytest.fixture(scope="module")
+def pressed() -> Simulation:
+    """A block whose top is held, and a plate that rises against it by half a millimetre from frame 1 to frame 2."""
+    block = RecordedObject("block", trimesh.creation.box((EDGE, EDGE, EDGE)), positions=(0.0, 0.5 * EDGE + 1e-4, 0.0))
+    rises = np.array([[0.0, -0.01, 0.0], [0.0, -0.01 + 1e-4, 0.0], [0.0, -0.01 + 1e-4 + DEPTH, 0.0]])
+    plate = RecordedObject("plate", trimesh.creation.box((0.1, 0.02, 0.1)), positions=rises)
+    contact = ContactSpecification(
+        physical={"block": ObjectMaterial("linear", YOUNG, 0.0, element=0.01)},
+        prescribed={("block", "top"): PrescribedPoints(Points("upper", 1, 0.0), held=True)},
+        everywhere=0.0,
+        pressing=SolveSpecification(0, 2),
+    )
+    return simulate(contact, RecordedAnimation(objects=[block, plate]))
+
+
+def test_a_block_answers_as_a_spring(pressed: Simulation) -> None:
+    assert pressed.verdict.status == "CONVERGED"
+    assert pressed.frames[-1] == 2.0
+    count = len(pressed.model.body.mesh.nodes)
+    assert pressed.displacement.shape == (len(pressed.frames), count, 3)
+    assert pressed.pressure.shape == (len(pressed.frames), count)
+    force = pressed.force("block")[-1]
+    np.testing.assert_allclose(force, [0.0, YOUNG * EDGE**2 * DEPTH / EDGE, 0.0], rtol=0.02, atol=1e-6)
+
+
+def test_pressure_on_the_visible_surface_sums_to_the_force(pressed: Simulation) -> None:
+    found = pressed.visible_pressure("block", 2.0)
+    x = found.vertices[found.triangles]
+    area = 0.5 * np.linalg.norm(np.cross(x[:, 1] - x[:, 0], x[:, 2] - x[:, 0]), axis=1)
+    total = float(area @ found.pressure[found.triangles].mean(axis=1))
+    assert total == pytest.approx(pressed.force("block")[-1, 1], rel=1e-3)
+
+
+def test_what_cannot_be_is_refused_by_name(pressed: Simulation) -> None:
+    with pytest.raises(InputError, match="name: nothing called plate deforms here; there are block"):
+        pressed.force("plate")
+    with pytest.raises(InputError, match="frame: want one of"):
+        pressed.visible_pressure("block", 7.0)
+    nothing = RecordedAnimation()
+    with pytest.raises(InputError, match="specification: want its pressing"):
+        simulate(ContactSpecification(), nothing)
+    asked = ContactSpecification(physical={"ball": ObjectMaterial()}, pressing=SolveSpecification(0, 1))
+    with pytest.raises(InputError, match="there is no object ball; there are none"):
+        simulate(asked, nothing)
