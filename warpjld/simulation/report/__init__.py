@@ -1,0 +1,1 @@
+"""What is told: the table, efforts of muscles, the verdict, tactile readings, volumes."""

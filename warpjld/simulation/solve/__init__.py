@@ -1,0 +1,1 @@
+"""Frames solved one after another: the start, sub-steps, branches, checks before and after, checkpoints."""
