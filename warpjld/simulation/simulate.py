@@ -33,8 +33,7 @@ from warpjld.simulation.display.surfaces import DeformedSurfaces
 from warpjld.simulation.grip.correct_frames import worst_digits
 from warpjld.simulation.grip.find import FoundGrip
 from warpjld.simulation.report.table import ContactRow, ContactTable
-from warpjld.simulation.report.tactile import Tactile
-from warpjld.simulation.report.tactile_readings import tactile_readings
+from warpjld.simulation.report.tactile import Tactile, tactile_readings
 from warpjld.simulation.report.verdict import ContactVerdict, verdict_of
 from warpjld.simulation.report.visible_overlap import remaining_overlaps, visible_overlap_notes
 from warpjld.simulation.solve.checkpoint import CheckpointFile

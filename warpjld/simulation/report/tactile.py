@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,30 +13,11 @@ from warpjld.fem.contact import ContactInstant
 from warpjld.fem.contact.results.nodal_contact import Imprint, skin_around
 from warpjld.fem.hand.flesh_hand import FleshHand
 from warpjld.fem.hand.labels import WEB
+from warpjld.simulation.bodies.flesh_body import FleshBody
+from warpjld.simulation.bodies.model import ContactModel
+from warpjld.simulation.solve.solved_frame import SolvedFrame
 
-__all__ = ["Tactile", "tactile_of", "tactile_of_pairs"]
-
-
-class _Touch(Protocol):
-    """What is read of one pair at one instant (``warpjld.fem.contact.Touch``)."""
-
-    @property
-    def name(self) -> str: ...
-    @property
-    def nodal(self) -> NDArray[np.float64]: ...
-    @property
-    def imprint(self) -> Imprint: ...
-
-
-class _Instant(Protocol):
-    """What is read of one instant (``warpjld.fem.contact.ContactInstant``)."""
-
-    @property
-    def time(self) -> float: ...
-    @property
-    def displacement(self) -> NDArray[np.float64]: ...
-    @property
-    def touches(self) -> tuple[_Touch, ...]: ...
+__all__ = ["Tactile", "tactile_of", "tactile_of_pairs", "tactile_readings"]
 
 
 @dataclass(frozen=True, eq=False)
@@ -72,7 +52,7 @@ class Tactile:
         return np.asarray(self.normal_force > 0.0)
 
 
-def tactile_of(hand: FleshHand, instants: Sequence[_Instant], *, only: str | None = None) -> Tactile:
+def tactile_of(hand: FleshHand, instants: Sequence[ContactInstant], *, only: str | None = None) -> Tactile:
     """Read the pads of a hand, on whichever side of a pair it is: sums over the nodes of each pad.
 
     Args:
@@ -83,18 +63,50 @@ def tactile_of(hand: FleshHand, instants: Sequence[_Instant], *, only: str | Non
     Raises:
         InputError: No instant, or no pair of that name.
     """
-    if not instants:
-        raise InputError("tactile: want at least one instant")
     if only is not None:
         known = sorted({touch.name for instant in instants for touch in instant.touches})
         if only not in known:
             raise InputError(f"tactile: there is no pair '{only}'; there are {', '.join(known) or 'none'}")
+    count = len(hand.mesh.nodes)
+    read = [
+        (
+            instant.time,
+            instant.displacement[:count],
+            [(one.nodal[:count], one.imprint) for one in instant.touches if only in (None, one.name)],
+        )
+        for instant in instants
+    ]
+    return _read_all(hand, read)
+
+
+def tactile_readings(model: ContactModel, hand: FleshBody, frames: Sequence[SolvedFrame]) -> Tactile:
+    """Force, centre, area and slip of every pad of a hand of a simulation; times are frame numbers.
+
+    Raises:
+        InputError: No frame.
+    """
+    span = model.spans[hand.name]
+    mine = [k for k, owner in enumerate(model.owners) if owner.other(hand.name) is not None]
+    read = [
+        (one.frame, one.displacement[span], [(one.nodal[k, span], one.imprint.of((k, span))) for k in mine])
+        for one in frames
+    ]
+    return _read_all(hand.hand, read)
+
+
+_Reading = tuple[float, NDArray[np.float64], list[tuple[NDArray[np.float64], Imprint]]]
+"""Time, displacement of the hand's nodes, and of each pair forces and what presses on them."""
+
+
+def _read_all(hand: FleshHand, read: Sequence[_Reading]) -> Tactile:
+    if not read:
+        raise InputError("tactile: want at least one instant")
     pads = tuple(name for name in hand.label_names if not name.endswith(WEB))
     place = np.array([pads.index(n) if n in pads else -1 for n in hand.label_names])
     pad_of = np.where(hand.node_labels >= 0, place[hand.node_labels], -1)
-    out = _nothing([instant.time for instant in instants], pads)
-    for frame, instant in enumerate(instants):
-        _read(hand, pad_of, instant, out, frame, only)
+    out = _nothing([time for time, _, _ in read], pads)
+    for frame, one in enumerate(read):
+        _read(hand, pad_of, one, out, frame)
     return out
 
 
@@ -114,24 +126,16 @@ def _nothing(times: Sequence[float], pads: tuple[str, ...]) -> Tactile:
     )
 
 
-def _read(
-    hand: FleshHand,
-    pad_of: NDArray[np.int64],
-    instant: _Instant,
-    out: Tactile,
-    frame: int,
-    only: str | None,
-) -> None:
+def _read(hand: FleshHand, pad_of: NDArray[np.int64], read: _Reading, out: Tactile, frame: int) -> None:
     count, pads = len(hand.mesh.nodes), len(out.pads)
-    x = hand.mesh.nodes + instant.displacement[:count]
+    x = hand.mesh.nodes + read[1]
     skin = np.flatnonzero(pad_of >= 0)
     pad = pad_of[skin]
     summed = {name: np.zeros(count) for name in ("force", "area", "held", "slid")}
-    for touch in instant.touches:
-        if only is None or touch.name == only:
-            np.add.at(out.force[frame], pad, touch.nodal[skin])
-            for name, values in summed.items():
-                values += getattr(touch.imprint, name)[:count]
+    for nodal, imprint in read[2]:
+        np.add.at(out.force[frame], pad, nodal[skin])
+        for name, values in summed.items():
+            values += getattr(imprint, name)[:count]
     force, area, held, slid = (np.bincount(pad, values[skin], pads) for values in summed.values())
     around = skin_around(hand.mesh, hand.skin_faces, x)[skin]
     weighted = np.stack([np.bincount(pad, summed["force"][skin] * x[skin, k], pads) for k in range(3)], axis=1)
