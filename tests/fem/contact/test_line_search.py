@@ -7,7 +7,7 @@ from typing import Any, cast
 import numpy as np
 import pytest
 
-from warpjld.fem import Body, Loads, NeoHooke, Prescribed, box
+from warpjld.fem import Body, Loads, NeoHooke, Prescribed, box_hexes
 from warpjld.fem.contact.solver.elastic import Elastic
 from warpjld.fem.contact.solver.line_search import LineSearch
 from warpjld.fem.contact.solver.load_step import Step
@@ -19,7 +19,7 @@ from warpjld.fem.contact.solver.load_step import Step
 )
 def test_no_step_flattens_elements_to_less_than_a_fifth(squeezed: float, length: float) -> None:
     """A block of height 1 whose upper side comes down by so much."""
-    body = Body(box((1.0, 1.0, 1.0), (2, 2, 1)), NeoHooke(1e5, 0.4))
+    body = Body(box_hexes((1.0, 1.0, 1.0), (2, 2, 1)), NeoHooke(1e5, 0.4))
     elastic = Elastic(body)
     step = Step(0.0, 1.0, Prescribed(np.empty(0, np.int64), np.empty(0)), Loads(), 0.0)
     start = np.zeros(body.degrees)

@@ -9,23 +9,23 @@ import pytest
 from numpy.typing import NDArray
 
 from tests.fem.contact.bodies import named
-from warpjld.fem import box, merge
+from warpjld.fem import box_hexes, merge
 from warpjld.fem.contact import Pair
 from warpjld.fem.contact.interface.contact_points import ContactPoints, Interface
-from warpjld.fem.contact.law.law import Memory, Response, respond, start_memory
+from warpjld.fem.contact.law.law import ContactState, Response, initial_state, respond
 from warpjld.fem.contact.solver.tangent import Slopes, slopes_of
 
 EXACT = 1e-5
 """Differences of one in a million of an edge, of polygons with corners that come and go."""
 
 
-class Touching:
+class ClosestPoints:
     """Two wavy blocks on each other, of different meshes, one turned, with pressures on some of what they share."""
 
     def __init__(self, seed: int, offset: float = 0.0) -> None:
         rng = np.random.default_rng(seed)
-        low = named(box((1.0, 1.0, 0.4), (5, 5, 2)), "a", (-0.5, -0.5, -0.4))
-        high = named(box((1.0, 1.0, 0.4), (4, 4, 2)), "b", (-0.45, -0.52, 0.0))
+        low = named(box_hexes((1.0, 1.0, 0.4), (5, 5, 2)), "a", (-0.5, -0.5, -0.4))
+        high = named(box_hexes((1.0, 1.0, 0.4), (4, 4, 2)), "b", (-0.45, -0.52, 0.0))
         c, s = np.cos(0.2), np.sin(0.2)
         high = replace(high, nodes=high.nodes @ np.array([[c, s, 0.0], [-s, c, 0.0], [0.0, 0.0, 1.0]]))
         self.mesh = merge(low, high)
@@ -40,7 +40,7 @@ class Touching:
         pressure[found.sites] = np.where(
             np.abs(found.gap) < 4e-3, rng.uniform(0.5, 1.0, len(found.sites)), -9.0
         )  # stays out
-        self.memory: Memory = replace(start_memory(len(self.interface.edge), self.pair), pressure=pressure)
+        self.memory: ContactState = replace(initial_state(len(self.interface.edge), self.pair), pressure=pressure)
 
     def at(self, x: NDArray[np.float64]) -> tuple[ContactPoints, Response, NDArray[np.float64]]:
         points = self.interface.points(x, 0.0, 0.0)
@@ -63,7 +63,7 @@ class Touching:
 
 @pytest.mark.parametrize(("seed", "offset"), [(0, 0.0), (1, 0.0), (2, 0.0), (3, 0.005)])
 def test_against_differences(seed: int, offset: float) -> None:
-    touching = Touching(seed, offset)
+    touching = ClosestPoints(seed, offset)
     points, response, slopes = touching.slopes()
     active = response.active
     assert 3 < active.sum() < len(active)
@@ -85,7 +85,7 @@ def test_against_differences(seed: int, offset: float) -> None:
 
 
 def test_moved_as_a_whole_nothing_changes() -> None:
-    touching = Touching(3)
+    touching = ClosestPoints(3)
     points, _, slopes = touching.slopes()
     for axis in np.eye(3):
         shift = np.broadcast_to(axis, touching.x.shape).ravel()
@@ -98,7 +98,7 @@ def test_moved_as_a_whole_nothing_changes() -> None:
 
 
 def test_nothing_where_nothing_touches() -> None:
-    touching = Touching(0)
+    touching = ClosestPoints(0)
     points, response, penalty = touching.at(touching.x)
     mortar = touching.interface.mortar
     assert mortar is not None
@@ -108,7 +108,7 @@ def test_nothing_where_nothing_touches() -> None:
 
 def test_gaps_do_not_jump() -> None:
     """Facets that turn away, or slide off, fade: gaps are continuous where they come and go."""
-    touching = Touching(0)
+    touching = ClosestPoints(0)
     count = len(touching.mesh.node_set("a"))
     worst = 0.0
     before: NDArray[np.float64] | None = None

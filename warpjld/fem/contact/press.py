@@ -78,8 +78,8 @@ def press(
     for name, value in (("tolerance", tolerance), ("penetration", penetration)):
         if not 0.0 < value < 1.0:
             raise InputError(f"{name}: want a share between 0 and 1, got {value}")
-    if after is not None and len(after.memory) != len(pairs):
-        raise InputError(f"after: was found with {len(after.memory)} pairs, not {len(pairs)}")
+    if after is not None and len(after.states) != len(pairs):
+        raise InputError(f"after: was found with {len(after.states)} pairs, not {len(pairs)}")
     if method not in _METHODS:
         raise InputError(f"method: want {' or '.join(_METHODS)}, got '{method}'")
     if halvings is not None and halvings < 0:

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from warpjld.errors import InputError
 from warpjld.fem.mesh.hexmesh import elements_of
 
-__all__ = ["Ogrid", "ogrid"]
+__all__ = ["Ogrid", "ogrid_hexes"]
 
 _SIDES = {  # axis, end, and the two axes that make a right-handed triple with the outward direction
     "x-": (0, 0, 2, 1),
@@ -47,7 +47,7 @@ class Ogrid:
     blocks: tuple[NDArray[np.int32], ...]
 
 
-def ogrid(counts: tuple[int, int, int], layers: int, sides: tuple[str, ...], *, core: bool) -> Ogrid:
+def ogrid_hexes(counts: tuple[int, int, int], layers: int, sides: tuple[str, ...], *, core: bool) -> Ogrid:
     """Layers of elements around the named sides of a box of elements.
 
     Args:

@@ -5,8 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from warpjld.fem.solver.block_matrix import BlockMatrix
-from warpjld.fem.solver.indefinite import IndefiniteError
+from warpjld.fem.solver.block_matrix import BlockMatrix, IndefiniteError
 
 __all__ = ["block_inverse"]
 

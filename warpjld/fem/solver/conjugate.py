@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from warpjld.fem.solver.dots import dot, norm
+from warpjld.fem.solver.block_matrix import dot, norm
 
 __all__ = ["Iteration", "Status", "conjugate_gradients"]
 

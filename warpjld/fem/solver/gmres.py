@@ -7,8 +7,8 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import NDArray
 
+from warpjld.fem.solver.block_matrix import norm
 from warpjld.fem.solver.conjugate import Iteration, Status
-from warpjld.fem.solver.dots import norm
 
 __all__ = ["minimal_residuals"]
 

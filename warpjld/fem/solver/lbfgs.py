@@ -7,7 +7,7 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import NDArray
 
-from warpjld.fem.solver.dots import dot, norm
+from warpjld.fem.solver.block_matrix import dot, norm
 
 __all__ = ["minimise"]
 

@@ -13,12 +13,10 @@ from warpjld.errors import InputError
 from warpjld.fem.launch import Launch, shared, threads_of
 from warpjld.fem.mesh.hexmesh import HexMesh
 from warpjld.fem.solver.block_diagonal import block_inverse
-from warpjld.fem.solver.block_matrix import BlockMatrix, padded
+from warpjld.fem.solver.block_matrix import BlockMatrix, IndefiniteError, norm, padded
 from warpjld.fem.solver.conjugate import Iteration, Status, conjugate_gradients
-from warpjld.fem.solver.dots import norm
 from warpjld.fem.solver.gmres import minimal_residuals
 from warpjld.fem.solver.hierarchy import hierarchy_of
-from warpjld.fem.solver.indefinite import IndefiniteError
 from warpjld.fem.solver.multigrid import Multigrid
 
 __all__ = ["METHODS", "LinearSolver"]

@@ -14,10 +14,9 @@ from numpy.typing import NDArray
 
 from warpjld.fem.launch import Launch, shared, threads_of
 from warpjld.fem.solver.block_diagonal import block_inverse
-from warpjld.fem.solver.block_matrix import BlockMatrix, padded
+from warpjld.fem.solver.block_matrix import BlockMatrix, IndefiniteError, padded
 from warpjld.fem.solver.chebyshev import chebyshev_steps, highest_eigenvalue
 from warpjld.fem.solver.galerkin import coarse_matrix, restriction
-from warpjld.fem.solver.indefinite import IndefiniteError
 
 __all__ = ["Multigrid"]
 

@@ -8,10 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from warpjld.fem.body import Tangent
-from warpjld.fem.solver.block_matrix import BlockMatrix
+from warpjld.fem.solver.block_matrix import BlockMatrix, IndefiniteError, norm
 from warpjld.fem.solver.conjugate import Iteration, Status
-from warpjld.fem.solver.dots import norm
-from warpjld.fem.solver.indefinite import IndefiniteError
 from warpjld.fem.solver.problem import Problem
 from warpjld.fem.solver.solution import Instant, Solution
 

@@ -11,8 +11,8 @@ from warpjld.errors import InputError
 from warpjld.fem.body import Body
 from warpjld.fem.load.loads import Loads
 from warpjld.fem.load.prescribed import Prescribed, held_in_place, refuse_free
+from warpjld.fem.solver.block_matrix import IndefiniteError
 from warpjld.fem.solver.conjugate import Status
-from warpjld.fem.solver.indefinite import IndefiniteError
 from warpjld.fem.solver.newton import Newton
 from warpjld.fem.solver.problem import Problem
 from warpjld.fem.solver.solution import Instant, Solution, SolveError

@@ -12,7 +12,7 @@ from warpjld.errors import InputError
 from warpjld.fem.contact.interface.mortar import Mortar
 from warpjld.fem.contact.interface.pairs import Pair
 from warpjld.fem.contact.interface.surface import ContactSurface, surface_of
-from warpjld.fem.contact.obstacles.obstacle import Obstacle, Touching
+from warpjld.fem.contact.obstacles.obstacle import ClosestPoints, Obstacle
 from warpjld.fem.mesh.hexmesh import HexMesh
 
 __all__ = ["ContactPoints", "Interface", "interfaces_of"]
@@ -175,7 +175,7 @@ class Interface:
         assert isinstance(self.pair.master, Obstacle)
         return self.pair.master
 
-    def _near(self, found: Touching, vectors: NDArray[np.float64]) -> NDArray[np.int64]:
+    def _near(self, found: ClosestPoints, vectors: NDArray[np.float64]) -> NDArray[np.int64]:
         """Within reach; of what is inside, only what faces the obstacle's surface: the far side does not touch it."""
         against = np.einsum("ni,ni->n", vectors, found.normal) < 0.5 * np.linalg.norm(vectors, axis=1)
         return np.flatnonzero((found.distance < self.reach) & (against | (found.distance > 0.0)))
@@ -199,11 +199,11 @@ class _Probe:
     columns: NDArray[np.int32]
     rows: NDArray[np.int64]
     area: NDArray[np.float64]
-    found: Touching
+    found: ClosestPoints
 
 
-def _picked(found: Touching, rows: NDArray[np.int64]) -> Touching:
-    return Touching(found.distance[rows], found.closest[rows], found.normal[rows])
+def _picked(found: ClosestPoints, rows: NDArray[np.int64]) -> ClosestPoints:
+    return ClosestPoints(found.distance[rows], found.closest[rows], found.normal[rows])
 
 
 def interfaces_of(mesh: HexMesh, pairs: list[Pair], threads: int) -> list[Interface]:

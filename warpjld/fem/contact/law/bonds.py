@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from warpjld.fem.contact.interface.contact_points import Interface
-from warpjld.fem.contact.law.law import Memory
+from warpjld.fem.contact.law.law import ContactState
 from warpjld.fem.contact.solver.newton_state import Reached
 
 __all__ = ["overstrained", "released"]
@@ -26,7 +26,7 @@ def overstrained(k: int, interface: Interface, found: Reached) -> NDArray[np.boo
     return out
 
 
-def released(memory: Memory, broken: NDArray[np.bool_]) -> Memory:
+def released(memory: ContactState, broken: NDArray[np.bool_]) -> ContactState:
     """No pull across what has parted."""
     pressure = np.where(broken, np.maximum(memory.pressure, 0.0), memory.pressure)
     friction = np.where(broken[:, None], 0.0, memory.friction)

@@ -11,7 +11,7 @@ from warpjld.fem.contact.interface.contact_points import ContactPoints
 from warpjld.fem.contact.interface.pairs import Pair
 from warpjld.rotations import unit
 
-__all__ = ["Memory", "Response", "remember", "respond", "start_memory"]
+__all__ = ["ContactState", "Response", "initial_state", "remember", "respond"]
 
 _GRIPS = 2
 _TORN = 3.0
@@ -19,7 +19,7 @@ _TORN = 3.0
 
 
 @dataclass(frozen=True, eq=False)
-class Memory:
+class ContactState:
     """What an interface knows of each of its s sites.
 
     Attributes:
@@ -74,10 +74,10 @@ class Response:
         return self.friction - self.pressure[:, None] * points.normal
 
 
-def start_memory(count: int, pair: Pair) -> Memory:
+def initial_state(count: int, pair: Pair) -> ContactState:
     """Nothing touches yet; what is bonded is."""
     bonded = np.full(count, pair.bond is not None)
-    return Memory(
+    return ContactState(
         pressure=np.zeros(count),
         friction=np.zeros((count, 3)),
         allowance=np.zeros(count),
@@ -94,7 +94,7 @@ def start_memory(count: int, pair: Pair) -> Memory:
 def respond(
     pair: Pair,
     points: ContactPoints,
-    memory: Memory,
+    memory: ContactState,
     slip: NDArray[np.float64],
     penalty: NDArray[np.float64],
     allowed: float,
@@ -170,7 +170,7 @@ def respond(
 
 def remember(
     pair: Pair,
-    memory: Memory,
+    memory: ContactState,
     points: ContactPoints,
     response: Response,
     slip: NDArray[np.float64],
@@ -178,7 +178,7 @@ def remember(
     known: NDArray[np.bool_],
     *,
     patient: bool = False,
-) -> Memory:
+) -> ContactState:
     """Multipliers after a linear solve that foresees a response and a slip (m, 3), and who sticks from now on (R122).
 
     What stuck slides where its friction exceeds μ p; what slid sticks where friction would push it along its path

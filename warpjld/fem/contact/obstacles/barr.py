@@ -14,7 +14,15 @@ from numpy.typing import ArrayLike, NDArray
 
 from warpjld.errors import InputError
 from warpjld.fem.contact.obstacles.facets import Facets
-from warpjld.fem.contact.obstacles.obstacle import Motion, Obstacle, Points, Rigid, Touching, checked_points, placement
+from warpjld.fem.contact.obstacles.obstacle import (
+    ClosestPoints,
+    Motion,
+    Obstacle,
+    Points,
+    Rigid,
+    checked_points,
+    placement,
+)
 
 __all__ = ["Barr"]
 
@@ -76,11 +84,11 @@ class Barr(Obstacle):
         self._motion = motion
         self._now: tuple[float, ...] | None = (0.0, 0.0, 0.0)
 
-    def project(self, points: Points, time: float) -> Touching:
+    def project(self, points: Points, time: float) -> ClosestPoints:
         """See `Obstacle.project`: to the facets of the deformed shape, with Barr's normals."""
         turn, shift = placement(self._motion, time)
         found = self._at(time).project((checked_points(points) - shift) @ turn)
-        return Touching(found.distance, found.closest @ turn.T + shift, found.normal @ turn.T)
+        return ClosestPoints(found.distance, found.closest @ turn.T + shift, found.normal @ turn.T)
 
     def carried(self, points: Points, time_from: float, time_to: float) -> Points:
         """See `Obstacle.carried`: back through the maps of one time, and forth through those of the other."""

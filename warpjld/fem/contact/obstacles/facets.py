@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from warpjld.errors import InputError
-from warpjld.fem.contact.obstacles.obstacle import Points, Touching
+from warpjld.fem.contact.obstacles.obstacle import ClosestPoints, Points
 from warpjld.threads import in_threads, threads_for
 
 __all__ = ["CREASE", "Facets", "Place"]
@@ -84,11 +84,11 @@ class Facets:
             support_winding_number=True,
         )
 
-    def project(self, points: Points) -> Touching:
+    def project(self, points: Points) -> ClosestPoints:
         """Distances, nearest points and normals of points (n, 3) [m]."""
         return self.locate(points)[0]
 
-    def locate(self, points: Points) -> tuple[Touching, Place]:
+    def locate(self, points: Points) -> tuple[ClosestPoints, Place]:
         """As `project`, and which triangles the nearest points lie in."""
         face, inside = self._nearest(points)
         weights = _closest_weights(self.vertices[self.faces[face]], points)
@@ -104,7 +104,7 @@ class Facets:
         distance = np.where(outside, reach, -reach)
         sharp = self._on_crease(place) & (reach > 1e-9 * self.size)
         normal[sharp] = away[sharp] / distance[sharp, None]
-        return Touching(distance, closest, normal), place
+        return ClosestPoints(distance, closest, normal), place
 
     def at(self, place: Place, vertices: NDArray[np.float64]) -> Points:
         """Places of the surface when its vertices lie there [m], shape (n, 3)."""

@@ -7,7 +7,15 @@ from numpy.typing import ArrayLike, NDArray
 
 from warpjld.errors import InputError
 from warpjld.fem.contact.obstacles.facets import Facets
-from warpjld.fem.contact.obstacles.obstacle import Motion, Obstacle, Points, Rigid, Touching, checked_points, placement
+from warpjld.fem.contact.obstacles.obstacle import (
+    ClosestPoints,
+    Motion,
+    Obstacle,
+    Points,
+    Rigid,
+    checked_points,
+    placement,
+)
 
 __all__ = ["Keyframed", "RigidMesh"]
 
@@ -28,7 +36,7 @@ class RigidMesh(Rigid):
         self._facets = Facets(vertices, faces)
         self.motion = motion
 
-    def _project(self, points: Points) -> Touching:
+    def _project(self, points: Points) -> ClosestPoints:
         return self._facets.project(points)
 
     def _mesh(self) -> tuple[Points, NDArray[np.int32]]:
@@ -62,11 +70,11 @@ class Keyframed(Obstacle):
         self._facets = Facets(self._vertices[0], faces)
         self._now = float(self._times[0])
 
-    def project(self, points: Points, time: float) -> Touching:
+    def project(self, points: Points, time: float) -> ClosestPoints:
         """See `Obstacle.project`."""
         turn, shift = placement(self._motion, time)
         found = self._at(time).project((checked_points(points) - shift) @ turn)
-        return Touching(found.distance, found.closest @ turn.T + shift, found.normal @ turn.T)
+        return ClosestPoints(found.distance, found.closest @ turn.T + shift, found.normal @ turn.T)
 
     def carried(self, points: Points, time_from: float, time_to: float) -> Points:
         """See `Obstacle.carried`: the offset from the nearest facet turns with it."""

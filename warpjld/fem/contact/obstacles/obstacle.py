@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from warpjld.errors import InputError
 
-__all__ = ["Motion", "Obstacle", "Rigid", "Touching", "checked_points", "checked_vector", "placement", "standing"]
+__all__ = ["ClosestPoints", "Motion", "Obstacle", "Rigid", "checked_points", "checked_vector", "placement", "standing"]
 
 Motion = Callable[[float], tuple[ArrayLike, ArrayLike]]
 """Time → position [m] and quaternion x, y, z, w: a point x of the first placement lies at rotation · x + position."""
@@ -21,7 +21,7 @@ Points = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)
-class Touching:
+class ClosestPoints:
     """Nearest points of an obstacle's surface.
 
     Attributes:
@@ -39,7 +39,7 @@ class Obstacle(ABC):
     """A surface that pushes and is not pushed; its place and shape are functions of time."""
 
     @abstractmethod
-    def project(self, points: Points, time: float) -> Touching:
+    def project(self, points: Points, time: float) -> ClosestPoints:
         """Distances of points (n, 3) [m] at a time."""
 
     @abstractmethod
@@ -58,19 +58,19 @@ class Rigid(Obstacle):
     motion: Motion | None
 
     @abstractmethod
-    def _project(self, points: Points) -> Touching:
+    def _project(self, points: Points) -> ClosestPoints:
         """Distances in the first placement."""
 
     @abstractmethod
     def _mesh(self) -> tuple[Points, NDArray[np.int32]]:
         """To draw it in the first placement."""
 
-    def project(self, points: Points, time: float) -> Touching:
+    def project(self, points: Points, time: float) -> ClosestPoints:
         """See `Obstacle.project`."""
         points = checked_points(points)
         turn, shift = placement(self.motion, time)
         found = self._project((points - shift) @ turn)
-        return Touching(found.distance, found.closest @ turn.T + shift, found.normal @ turn.T)
+        return ClosestPoints(found.distance, found.closest @ turn.T + shift, found.normal @ turn.T)
 
     def carried(self, points: Points, time_from: float, time_to: float) -> Points:
         """See `Obstacle.carried`."""

@@ -95,7 +95,7 @@ def by_turns(
         now = after.last.time
         last = replace(last, instants=(replace(_at_rest(body), displacement=after.last.displacement),))
         forces = _missing(body, loads(now), after.last)
-        for side, known in zip(sides, after.memory, strict=True):
+        for side, known in zip(sides, after.states, strict=True):
             side.touching = known.pressure > 0.0
     begun = last.last
     status, message = Status.CONVERGED, Status.CONVERGED.value

@@ -10,10 +10,10 @@ from numpy.typing import NDArray
 from warpjld.fem.body import Body
 from warpjld.fem.contact.interface.pairs import Pair
 from warpjld.fem.contact.interface.surface import ContactSurface, surface_of
-from warpjld.fem.contact.law.law import Memory, start_memory
+from warpjld.fem.contact.law.law import ContactState, initial_state
 from warpjld.fem.contact.obstacles.facets import Facets, Place
 from warpjld.fem.contact.obstacles.obstacle import Obstacle
-from warpjld.fem.contact.results.nodal_contact import imprint_of
+from warpjld.fem.contact.results.nodal_contact import to_nodes
 from warpjld.fem.contact.results.solution import Touch
 
 __all__ = ["Meeting", "Side"]
@@ -49,9 +49,9 @@ class Side:
             self._facets = Facets(body.mesh.nodes[self.nodes], np.concatenate([corners[:, :3], corners[:, [0, 2, 3]]]))
             self.triangles = self._facets.faces
 
-    def memory(self) -> Memory:
+    def memory(self) -> ContactState:
         """Who was pushed, for a later run: nodes with a pressure."""
-        return replace(start_memory(len(self.slave.nodes), self.pair), pressure=self.touching.astype(np.float64))
+        return replace(initial_state(len(self.slave.nodes), self.pair), pressure=self.touching.astype(np.float64))
 
     def meet(self, x: NDArray[np.float64], skin: NDArray[np.float64], time: float) -> Meeting:
         """Nodes that overlap or were pushed, at positions x (N, 3), and the polygons of ``skin`` (N, 3) under them."""
@@ -117,5 +117,5 @@ class Side:
             pressure > 0.0,
             np.zeros(len(nodes), dtype=bool),
             nodal,
-            imprint_of(nodes, pressed * pressure, pressed, pressed, still, there, len(x)),
+            to_nodes(nodes, pressed * pressure, pressed, pressed, still, there, len(x)),
         )

@@ -8,8 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from warpjld.errors import WarpjldError
-from warpjld.fem.contact.law.law import Memory
-from warpjld.fem.contact.results.nodal_contact import Imprint
+from warpjld.fem.contact.law.law import ContactState
+from warpjld.fem.contact.results.nodal_contact import NodalContact
 from warpjld.fem.load.loads import Loads
 from warpjld.fem.solver.conjugate import Status
 
@@ -36,7 +36,7 @@ class Touch:
         sticking: Whether friction or a bond holds, shape (m,).
         bonded: Whether the bond still holds, shape (m,).
         nodal: Forces on every node of the body, both sides [N], shape (N, 3).
-        imprint: What presses, area and slip on every node of the body, both sides.
+        nodal_contact: What presses, area and slip on every node of the body, both sides.
     """
 
     name: str
@@ -53,7 +53,7 @@ class Touch:
     sticking: NDArray[np.bool_]
     bonded: NDArray[np.bool_]
     nodal: NDArray[np.float64]
-    imprint: Imprint
+    nodal_contact: NodalContact
 
     @property
     def active(self) -> NDArray[np.bool_]:
@@ -139,19 +139,19 @@ class ContactSolution:
         status: How it ended.
         instants: One for each time reached, in order.
         message: For people: what ended it.
-        memory: Contact state at the last instant, one for each pair.
+        states: Contact state at the last instant, one for each pair.
         steps: Load steps taken between instants, those that halving added included, and linear solves of each.
         loads: The loads at the last instant.
-        course: How fast the last step went on from where it was expected to [m per unit of time], shape (N, 3).
+        correction_rate: How fast the last step left what was expected [m per unit of time], (N, 3).
     """
 
     status: Status
     instants: tuple[ContactInstant, ...]
     message: str
-    memory: tuple[Memory, ...]
+    states: tuple[ContactState, ...]
     steps: tuple[int, ...]
     loads: Loads
-    course: NDArray[np.float64] | None = None
+    correction_rate: NDArray[np.float64] | None = None
 
     @property
     def converged(self) -> bool:

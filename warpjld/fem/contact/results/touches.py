@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from warpjld.fem.contact.interface.contact_area import Inside
 from warpjld.fem.contact.interface.contact_points import ContactPoints, Interface
 from warpjld.fem.contact.law.law import Response
-from warpjld.fem.contact.results.nodal_contact import imprint_of
+from warpjld.fem.contact.results.nodal_contact import to_nodes
 from warpjld.fem.contact.results.solution import Touch
 from warpjld.rotations import unit
 
@@ -80,7 +80,7 @@ def touch_of(
         sticking=sticking,
         bonded=holds,
         nodal=points.forces(traction),
-        imprint=imprint_of(nodes, push, pressed, held, slipped, there, len(x)),
+        nodal_contact=to_nodes(nodes, push, pressed, held, slipped, there, len(x)),
     )
 
 

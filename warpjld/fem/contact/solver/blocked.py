@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from warpjld.fem.contact.interface.contact_points import ContactPoints, Interface
-from warpjld.fem.contact.law.law import Memory
+from warpjld.fem.contact.law.law import ContactState
 
 __all__ = ["blocked"]
 
@@ -17,7 +17,7 @@ _FREE = 1e-9
 def blocked(
     interfaces: list[Interface],
     points: list[ContactPoints],
-    memory: list[Memory],
+    memory: list[ContactState],
     free: NDArray[np.bool_],
     *,
     allowed: float,

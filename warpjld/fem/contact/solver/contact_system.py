@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from warpjld.fem.contact.interface.contact_points import ContactPoints, Interface
-from warpjld.fem.contact.law.law import Memory, Response, remember, respond
+from warpjld.fem.contact.law.law import ContactState, Response, remember, respond
 from warpjld.fem.contact.solver.tangent import coupling, slopes_of
 
 __all__ = ["Contact", "Interplay", "alike", "shifted"]
@@ -107,7 +107,7 @@ class Interplay:
         points: list[ContactPoints],
         u: NDArray[np.float64],
         start: NDArray[np.float64],
-        memory: list[Memory],
+        memory: list[ContactState],
         *,
         keep: bool,
         allowed: float,
@@ -122,7 +122,9 @@ class Interplay:
         ]
         return Contact(points, slips, responses, self.pushed(points, responses), coupled)
 
-    def sloped(self, contact: Contact, memory: list[Memory], pressed: list[Memory], u: NDArray[np.float64]) -> Contact:
+    def sloped(
+        self, contact: Contact, memory: list[ContactState], pressed: list[ContactState], u: NDArray[np.float64]
+    ) -> Contact:
         """With what a symmetric stiffness leaves out, where points are those of displacement u (3N,).
 
         ``pressed`` knows the multipliers that directions turn with; ``memory`` is the present one.
@@ -151,7 +153,7 @@ class Interplay:
         return total.reshape(-1)
 
     def foreseen(
-        self, contact: Contact, memory: list[Memory], move: NDArray[np.float64], allowed: float, *, patient: bool
+        self, contact: Contact, memory: list[ContactState], move: NDArray[np.float64], allowed: float, *, patient: bool
     ) -> list[Response]:
         """What points answer after a move, by the linear model: the multipliers to go on with."""
         out = []
@@ -165,13 +167,13 @@ class Interplay:
 
     def remembered(
         self,
-        memory: list[Memory],
+        memory: list[ContactState],
         contact: Contact,
         foreseen: list[Response],
         move: NDArray[np.float64],
         *,
         patient: bool,
-    ) -> list[Memory]:
+    ) -> list[ContactState]:
         """Multipliers after a move (3N,) that was foreseen to be answered so."""
         out = []
         for k, (m, p, r) in enumerate(zip(memory, contact.points, foreseen, strict=True)):
@@ -182,7 +184,7 @@ class Interplay:
         return out
 
     def _firmer(
-        self, k: int, memory: Memory, points: ContactPoints, before: Response, foreseen: Response
+        self, k: int, memory: ContactState, points: ContactPoints, before: Response, foreseen: Response
     ) -> NDArray[np.float64]:
         """Penalties raised where flesh is so stiff that multipliers would find their values slowly, shape (s,)."""
         at = points.sites
@@ -192,12 +194,12 @@ class Interplay:
         firm[slow] = np.minimum(_FIRMER * firm[slow], _FIRMEST)
         return firm
 
-    def _penalty(self, k: int, points: ContactPoints, memory: Memory) -> NDArray[np.float64]:
+    def _penalty(self, k: int, points: ContactPoints, memory: ContactState) -> NDArray[np.float64]:
         """ε of points [Pa/m]."""
         return np.asarray((self._penalties[k] * memory.firm)[points.sites])
 
-    def begun(self, memory: list[Memory], start: NDArray[np.float64], time: float) -> list[Memory]:
-        """Memory that knows what is apart as the step begins, where friction asks for it."""
+    def begun(self, memory: list[ContactState], start: NDArray[np.float64], time: float) -> list[ContactState]:
+        """ContactState that knows what is apart as the step begins, where friction asks for it."""
         x = self._rest + start.reshape(-1, 3)
         out = []
         for interface, m in zip(self.interfaces, memory, strict=True):
@@ -209,7 +211,7 @@ class Interplay:
             out.append(m)
         return out
 
-    def settled(self, contact: Contact, memory: list[Memory], negligible: float) -> bool:
+    def settled(self, contact: Contact, memory: list[ContactState], negligible: float) -> bool:
         """Whether multipliers stay: overlap is gone, and forces change by little, or by what is ``negligible``."""
         for k, (p, r, m) in enumerate(zip(contact.points, contact.responses, memory, strict=True)):
             if not r.active.any():

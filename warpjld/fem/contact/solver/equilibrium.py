@@ -13,19 +13,19 @@ from numpy.typing import NDArray
 
 from warpjld.fem.body import Body
 from warpjld.fem.contact.interface.contact_points import Interface
-from warpjld.fem.contact.law.law import Memory
+from warpjld.fem.contact.law.law import ContactState
 from warpjld.fem.contact.solver.contact_system import Interplay
 from warpjld.fem.contact.solver.damping import Damping
 from warpjld.fem.contact.solver.elastic import Elastic
+from warpjld.fem.contact.solver.lagged_solver import LaggedSolver
 from warpjld.fem.contact.solver.line_search import LineSearch
 from warpjld.fem.contact.solver.load_step import Step
 from warpjld.fem.contact.solver.newton_state import Reached, Walk
-from warpjld.fem.contact.solver.step_solver import StepSolver
 from warpjld.fem.contact.solver.stiffness import with_contact
 from warpjld.fem.contact.solver.unconstrained import Loose
 from warpjld.fem.load.prescribed import Prescribed
+from warpjld.fem.solver.block_matrix import IndefiniteError
 from warpjld.fem.solver.conjugate import Iteration, Status
-from warpjld.fem.solver.indefinite import IndefiniteError
 
 __all__ = ["Equilibrium"]
 
@@ -75,14 +75,14 @@ class Equilibrium:
         self._penetration = penetration
         self._loose: tuple[bytes, Loose] | None = None
         self._elastic = Elastic(body)
-        self._solver = StepSolver(body, precision)
+        self._solver = LaggedSolver(body, precision)
         self._damping = Damping(body)
         self._interplay = Interplay(body.mesh.nodes, interfaces, moduli, penalty=penalty, penetration=penetration)
 
     def find(
         self,
         u: NDArray[np.float64],
-        memory: list[Memory],
+        memory: list[ContactState],
         step: Step,
         *guesses: NDArray[np.float64],
     ) -> tuple[Status, Reached | None]:

@@ -8,11 +8,11 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from warpjld.fem.contact.law.law import Memory
+from warpjld.fem.contact.law.law import ContactState
 from warpjld.fem.contact.solver.contact_system import Contact, Interplay
 from warpjld.fem.contact.solver.elastic import Elastic
 from warpjld.fem.contact.solver.load_step import Step
-from warpjld.fem.solver.dots import dot, norm
+from warpjld.fem.solver.block_matrix import dot, norm
 
 __all__ = ["LineSearch"]
 
@@ -65,7 +65,7 @@ class LineSearch:
         move: NDArray[np.float64],
         most: float,
         contact: Contact,
-        memory: list[Memory],
+        memory: list[ContactState],
         residual: NDArray[np.float64],
         watched: NDArray[np.bool_],
         *,
@@ -96,7 +96,7 @@ class LineSearch:
         u: NDArray[np.float64],
         move: NDArray[np.float64],
         most: float,
-        memory: list[Memory],
+        memory: list[ContactState],
         residual: NDArray[np.float64],
         free: NDArray[np.bool_],
         *,

@@ -14,7 +14,7 @@ from warpjld.fem.contact.interface.contact_border import contact_modulus
 from warpjld.fem.contact.interface.contact_points import Interface, interfaces_of
 from warpjld.fem.contact.interface.pairs import Pair
 from warpjld.fem.contact.law.bonds import overstrained, released
-from warpjld.fem.contact.law.law import Memory, start_memory
+from warpjld.fem.contact.law.law import ContactState, initial_state
 from warpjld.fem.contact.results.solution import ContactInstant, ContactSolution
 from warpjld.fem.contact.results.touches import touch_of
 from warpjld.fem.contact.solver.blocked import blocked
@@ -86,13 +86,13 @@ class LoadSteps:
                 raise InputError(f"after: is of a body with {after.last.displacement.size} degrees of freedom")
             self.start = after.last.time
             self.u = after.last.displacement.reshape(-1).copy()
-            self.memory = list(after.memory)
+            self.memory = list(after.states)
         self.steps: list[int] = []
-        self.course = None if after is None else after.course
+        self.correction_rate = None if after is None else after.correction_rate
 
-    def _begin(self, interface: Interface) -> Memory:
+    def _begin(self, interface: Interface) -> ContactState:
         """Bonds made, and the overlap noted that there is at the start."""
-        memory = start_memory(len(interface.edge), interface.pair)
+        memory = initial_state(len(interface.edge), interface.pair)
         points = interface.points(self.body.mesh.nodes, 0.0, 0.0)
         if interface.pair.bond is not None:
             memory.seam[points.sites] = points.gap
@@ -145,7 +145,7 @@ class LoadSteps:
                 todo.insert(0, 0.5 * (now + target))
                 continue
             self.steps.append(self.equilibrium.solves)
-            self.course = (found.displacement - carried).reshape(-1, 3) / (target - now)
+            self.correction_rate = (found.displacement - carried).reshape(-1, 3) / (target - now)
             self.u, self.memory, now = found.displacement, found.memory, target
             todo.pop(0)
             halvings = max(0, halvings - 1)
@@ -206,9 +206,9 @@ class LoadSteps:
     def _guesses(self, step: Step, carried: NDArray[np.float64]) -> list[NDArray[np.float64]]:
         """Where to begin, best first: as asked, and what it was off by in the step before taken to be off by again."""
         plain = [] if self.guess is None else [carried]
-        if self.course is None:
+        if self.correction_rate is None:
             return plain
-        return [carried + _PART * (step.time - step.before) * self.course.reshape(-1), *plain]
+        return [carried + _PART * (step.time - step.before) * self.correction_rate.reshape(-1), *plain]
 
     def _instant(self, time: float, found: Reached, solves: int, iterations: int) -> ContactInstant:
         x = self.body.mesh.nodes + found.displacement.reshape(-1, 3)
@@ -233,4 +233,4 @@ class LoadSteps:
             nothing = np.zeros((len(self.body.mesh.nodes), 3))
             reached = [ContactInstant(self.start, self.u.reshape(-1, 3), nothing, (), 0, 0, 0.0)]
         memory, steps = tuple(self.memory), tuple(self.steps)
-        return ContactSolution(status, tuple(reached), message, memory, steps, step.loads, self.course)
+        return ContactSolution(status, tuple(reached), message, memory, steps, step.loads, self.correction_rate)

@@ -10,11 +10,11 @@ from numpy.typing import NDArray
 
 from warpjld.fem.body import Tangent
 from warpjld.fem.contact.interface.contact_points import ContactPoints
-from warpjld.fem.contact.law.law import Memory, Response
+from warpjld.fem.contact.law.law import ContactState, Response
 from warpjld.fem.contact.solver.contact_system import Contact, Interplay, alike, shifted
 from warpjld.fem.contact.solver.elastic import Elastic
 from warpjld.fem.contact.solver.load_step import Step
-from warpjld.fem.solver.dots import norm
+from warpjld.fem.solver.block_matrix import norm
 
 __all__ = ["Reached", "Walk"]
 
@@ -41,7 +41,7 @@ class Reached:
     points: list[ContactPoints]
     responses: list[Response]
     slips: list[NDArray[np.float64]]
-    memory: list[Memory]
+    memory: list[ContactState]
     residual: float
 
 
@@ -80,7 +80,7 @@ class Walk:
         play: Interplay,
         step: Step,
         start: NDArray[np.float64],
-        memory: list[Memory],
+        memory: list[ContactState],
         guesses: Sequence[NDArray[np.float64]],
         *,
         tolerance: float,

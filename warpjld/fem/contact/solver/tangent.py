@@ -19,7 +19,7 @@ from warpjld.fem.contact.interface.surface import ContactSurface
 if TYPE_CHECKING:
     from warpjld.fem.contact.interface.contact_points import ContactPoints
     from warpjld.fem.contact.interface.mortar import Mortar
-    from warpjld.fem.contact.law.law import Memory, Response
+    from warpjld.fem.contact.law.law import ContactState, Response
 
 __all__ = ["Slopes", "coupling", "slopes_of"]
 
@@ -47,7 +47,7 @@ def slopes_of(
     mortar: Mortar,
     points: ContactPoints,
     response: Response,
-    memory: Memory,
+    memory: ContactState,
     penalty: NDArray[np.float64],
     x: NDArray[np.float64],
     reach: float,

@@ -13,7 +13,7 @@ from warpjld.fem.solver.block_matrix import BlockMatrix
 from warpjld.fem.solver.conjugate import Iteration, Status
 from warpjld.fem.solver.linear import LinearSolver
 
-__all__ = ["StepSolver"]
+__all__ = ["LaggedSolver"]
 
 _INNER = 1e-4
 _MOST = 150
@@ -22,7 +22,7 @@ _PATIENCE = 25
 """Iterations after which a preconditioner made for an earlier matrix has served its time."""
 
 
-class StepSolver:
+class LaggedSolver:
     """Solves with the matrices of a contact problem, one like the other.
 
     Args:
