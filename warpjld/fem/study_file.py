@@ -6,10 +6,8 @@ import inspect
 from collections.abc import Callable
 from pathlib import Path
 
-import numpy as np
-from numpy.typing import NDArray
-
 from warpjld.errors import InputError
+from warpjld.fem.arrays import Ints32
 from warpjld.fem.body import Body
 from warpjld.fem.load.loads import Centrifugal, Loads, external_forces
 from warpjld.fem.material.materials import Fung, LinearElastic, Material, MooneyRivlin, NeoHooke
@@ -117,7 +115,7 @@ def _material(table: TomlTable) -> Material:
         raise InputError(f"[{table.name}] {error.message}") from error
 
 
-def _nodes(mesh: HexMesh, table: TomlTable) -> NDArray[np.int32]:
+def _nodes(mesh: HexMesh, table: TomlTable) -> Ints32:
     """Nodes of a set, cut by planes."""
     nodes = mesh.node_set(table.text("of", "surface") or "")
     for key, sign in (("above", 1.0), ("below", -1.0)):

@@ -19,7 +19,7 @@ EXACT = 1e-5
 """Differences of one in a million of an edge, of polygons with corners that come and go."""
 
 
-class ClosestPoints:
+class WavyBlocks:
     """Two wavy blocks on each other, of different meshes, one turned, with pressures on some of what they share."""
 
     def __init__(self, seed: int, offset: float = 0.0) -> None:
@@ -63,7 +63,7 @@ class ClosestPoints:
 
 @pytest.mark.parametrize(("seed", "offset"), [(0, 0.0), (1, 0.0), (2, 0.0), (3, 0.005)])
 def test_against_differences(seed: int, offset: float) -> None:
-    touching = ClosestPoints(seed, offset)
+    touching = WavyBlocks(seed, offset)
     points, response, slopes = touching.slopes()
     active = response.active
     assert 3 < active.sum() < len(active)
@@ -85,7 +85,7 @@ def test_against_differences(seed: int, offset: float) -> None:
 
 
 def test_moved_as_a_whole_nothing_changes() -> None:
-    touching = ClosestPoints(3)
+    touching = WavyBlocks(3)
     points, _, slopes = touching.slopes()
     for axis in np.eye(3):
         shift = np.broadcast_to(axis, touching.x.shape).ravel()
@@ -98,7 +98,7 @@ def test_moved_as_a_whole_nothing_changes() -> None:
 
 
 def test_nothing_where_nothing_touches() -> None:
-    touching = ClosestPoints(0)
+    touching = WavyBlocks(0)
     points, response, penalty = touching.at(touching.x)
     mortar = touching.interface.mortar
     assert mortar is not None
@@ -108,7 +108,7 @@ def test_nothing_where_nothing_touches() -> None:
 
 def test_gaps_do_not_jump() -> None:
     """Facets that turn away, or slide off, fade: gaps are continuous where they come and go."""
-    touching = ClosestPoints(0)
+    touching = WavyBlocks(0)
     count = len(touching.mesh.node_set("a"))
     worst = 0.0
     before: NDArray[np.float64] | None = None

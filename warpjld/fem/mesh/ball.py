@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from warpjld.errors import InputError
+from warpjld.fem.arrays import Array
 from warpjld.fem.mesh.hexmesh import HexMesh
 from warpjld.fem.mesh.ogrid import Ogrid, ogrid_hexes
 
@@ -141,14 +141,7 @@ def finger_hexes(
     )
 
 
-def _round(
-    s: NDArray[np.float64],
-    depth: NDArray[np.float64],
-    outer: float,
-    inner: float,
-    axes: NDArray[np.float64],
-    solid: bool,
-) -> NDArray[np.float64]:
+def _round(s: Array, depth: Array, outer: float, inner: float, axes: Array, solid: bool) -> Array:
     """Points of the cube |s| ≤ 1 (or square, where ``axes`` says so) and of the layers around it, made round.
 
     Directions are equiangular, tan(π s/4), which keeps elements of a patch alike in size.
@@ -166,7 +159,7 @@ def _round(
     return core + depth[:, None] * (outer * direction - core)
 
 
-def _mesh(topology: Ogrid, nodes: NDArray[np.float64], regions: tuple[str, ...], names: dict[str, str]) -> HexMesh:
+def _mesh(topology: Ogrid, nodes: Array, regions: tuple[str, ...], names: dict[str, str]) -> HexMesh:
     faces = {"outer": topology.outer}
     if len(topology.inner):
         faces["inner"] = topology.inner

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from warpjld.errors import WarpjldError
+from warpjld.fem.arrays import Ints, Ints32, Mask
 from warpjld.fem.launch import on_rows, shared, threads_of
 
 __all__ = ["BlockMatrix", "IndefiniteError", "dot", "norm", "padded"]
@@ -48,8 +49,8 @@ class BlockMatrix:
         values: Blocks, shape (B, 3, 3).
     """
 
-    rows: NDArray[np.int32]
-    columns: NDArray[np.int32]
+    rows: Ints32
+    columns: Ints32
     values: NDArray[Any]
 
     @property
@@ -78,7 +79,7 @@ class BlockMatrix:
         return result
 
     @property
-    def on_diagonal(self) -> NDArray[np.int64]:
+    def on_diagonal(self) -> Ints:
         """Which blocks lie on the diagonal, one for each row, shape (N,)."""
         row = np.repeat(np.arange(self.size, dtype=np.int32), np.diff(self.rows))
         return np.flatnonzero(row == self.columns)
@@ -87,7 +88,7 @@ class BlockMatrix:
         """Diagonal blocks, shape (N, 3, 3)."""
         return np.asarray(self.values[self.on_diagonal])
 
-    def masked(self, free: NDArray[np.bool_], dtype: Any = np.float64) -> BlockMatrix:
+    def masked(self, free: Mask, dtype: Any = np.float64) -> BlockMatrix:
         """K11 in place: rows and columns of prescribed degrees of freedom set to zero (R107).
 
         Args:
@@ -96,7 +97,7 @@ class BlockMatrix:
         """
         values = self.values.astype(dtype)
         kept = free.reshape(-1, 3)
-        touched: NDArray[np.bool_] = np.asarray(~kept.all(axis=1))
+        touched: Mask = np.asarray(~kept.all(axis=1))
         if touched.any():
             row = np.repeat(np.arange(self.size, dtype=np.int32), np.diff(self.rows))
             block = np.flatnonzero(touched[row])

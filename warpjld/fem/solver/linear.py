@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from warpjld.errors import InputError
+from warpjld.fem.arrays import Array, Mask
 from warpjld.fem.launch import Launch, shared, threads_of
 from warpjld.fem.mesh.hexmesh import HexMesh
 from warpjld.fem.solver.block_diagonal import block_inverse
@@ -53,7 +54,7 @@ class LinearSolver:
     def __init__(
         self,
         stiffness: BlockMatrix,
-        free: NDArray[np.bool_],
+        free: Mask,
         mesh: HexMesh,
         *,
         method: str = "auto",
@@ -110,7 +111,7 @@ class LinearSolver:
         out._product = _Product(stiffness, self.threads)
         return out
 
-    def solve(self, b: NDArray[np.float64], *, tolerance: float = 1e-8, iterations: int = 4000) -> Iteration:
+    def solve(self, b: Array, *, tolerance: float = 1e-8, iterations: int = 4000) -> Iteration:
         """U_u for a right side of which only the free part counts, shape (3N,); zero where prescribed."""
         right = b * self._mask
         if self.method == "direct":
@@ -121,19 +122,17 @@ class LinearSolver:
             )
         return self._refined(right, tolerance, iterations)
 
-    def solve_beside(
-        self, beside: Any, b: NDArray[np.float64], *, tolerance: float = 1e-8, iterations: int = 400
-    ) -> Iteration:
+    def solve_beside(self, beside: Any, b: Array, *, tolerance: float = 1e-8, iterations: int = 400) -> Iteration:
         """(K11 + E11) x = b with an E (3N, 3N) that need not be symmetric nor definite, by minimal residuals; what
         preconditions K preconditions the sum.
         """
         right = b * self._mask
         mask = self._mask
 
-        def product(x: NDArray[np.float64]) -> NDArray[np.float64]:
+        def product(x: Array) -> Array:
             return self.masked_product(x) + mask * (beside @ x)
 
-        def precondition(r: NDArray[np.float64]) -> NDArray[np.float64]:
+        def precondition(r: Array) -> Array:
             if self.method != "direct":
                 return np.asarray(self._precondition(r))
             x = np.zeros_like(r)
@@ -148,7 +147,7 @@ class LinearSolver:
         y *= self._mask
         return y
 
-    def _refined(self, b: NDArray[np.float64], tolerance: float, iterations: int) -> Iteration:
+    def _refined(self, b: Array, tolerance: float, iterations: int) -> Iteration:
         """float32 iterations to 1e-2, the residual recomputed in float64, again until done."""
         single = self._stiffness.masked(self.free, np.float32)
         product = _Product(single, self.threads)
@@ -184,7 +183,7 @@ class LinearSolver:
                 break
         return Iteration(x, status, done, now, np.array(history))
 
-    def _direct(self, b: NDArray[np.float64]) -> Iteration:
+    def _direct(self, b: Array) -> Iteration:
         size = norm(b)
         x = np.zeros_like(b)
         if not np.isfinite(size):
@@ -219,7 +218,7 @@ class _Product:
         return self._y.copy()
 
 
-def _factor(stiffness: BlockMatrix, free: NDArray[np.bool_], definite: bool) -> Any:
+def _factor(stiffness: BlockMatrix, free: Mask, definite: bool) -> Any:
     from scipy.sparse.linalg import splu
 
     inside = stiffness.to_scipy().tocsr()[free][:, free].tocsc()

@@ -5,8 +5,8 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from warpjld.fem.arrays import Mask
 from warpjld.fem.contact.interface.contact_points import Interface
 from warpjld.fem.contact.law.law import ContactState
 from warpjld.fem.contact.solver.newton_state import Reached
@@ -14,7 +14,7 @@ from warpjld.fem.contact.solver.newton_state import Reached
 __all__ = ["overstrained", "released"]
 
 
-def overstrained(k: int, interface: Interface, found: Reached) -> NDArray[np.bool_]:
+def overstrained(k: int, interface: Interface, found: Reached) -> Mask:
     """Nodes whose bond does not hold, shape (m,)."""
     memory, points, response = found.memory[k], found.points[k], found.responses[k]
     out = np.zeros(len(memory.bonded), dtype=bool)
@@ -26,7 +26,7 @@ def overstrained(k: int, interface: Interface, found: Reached) -> NDArray[np.boo
     return out
 
 
-def released(memory: ContactState, broken: NDArray[np.bool_]) -> ContactState:
+def released(memory: ContactState, broken: Mask) -> ContactState:
     """No pull across what has parted."""
     pressure = np.where(broken, np.maximum(memory.pressure, 0.0), memory.pressure)
     friction = np.where(broken[:, None], 0.0, memory.friction)

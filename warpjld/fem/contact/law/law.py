@@ -5,8 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from warpjld.fem.arrays import Array, Ints32, Mask
 from warpjld.fem.contact.interface.contact_points import ContactPoints
 from warpjld.fem.contact.interface.pairs import Pair
 from warpjld.rotations import unit
@@ -37,16 +37,16 @@ class ContactState:
         firm: Penalty over the usual one: more where a multiplier does not find its value soon, shape (s,).
     """
 
-    pressure: NDArray[np.float64]
-    friction: NDArray[np.float64]
-    allowance: NDArray[np.float64]
-    gripping: NDArray[np.int32]
-    apart: NDArray[np.bool_]
-    anchor: NDArray[np.float64]
-    stuck: NDArray[np.bool_]
-    bonded: NDArray[np.bool_]
-    seam: NDArray[np.float64]
-    firm: NDArray[np.float64]
+    pressure: Array
+    friction: Array
+    allowance: Array
+    gripping: Ints32
+    apart: Mask
+    anchor: Array
+    stuck: Mask
+    bonded: Mask
+    seam: Array
+    firm: Array
 
 
 @dataclass(frozen=True, eq=False)
@@ -62,14 +62,14 @@ class Response:
         blocks: Stiffness times area of each point [N/m], shape (m, 3, 3).
     """
 
-    pressure: NDArray[np.float64]
-    friction: NDArray[np.float64]
-    active: NDArray[np.bool_]
-    sticking: NDArray[np.bool_]
-    error: NDArray[np.float64]
-    blocks: NDArray[np.float64]
+    pressure: Array
+    friction: Array
+    active: Mask
+    sticking: Mask
+    error: Array
+    blocks: Array
 
-    def traction(self, points: ContactPoints) -> NDArray[np.float64]:
+    def traction(self, points: ContactPoints) -> Array:
         """Force per area on the slave [Pa], shape (m, 3)."""
         return self.friction - self.pressure[:, None] * points.normal
 
@@ -95,8 +95,8 @@ def respond(
     pair: Pair,
     points: ContactPoints,
     memory: ContactState,
-    slip: NDArray[np.float64],
-    penalty: NDArray[np.float64],
+    slip: Array,
+    penalty: Array,
     allowed: float,
     *,
     keep: bool = False,
@@ -173,9 +173,9 @@ def remember(
     memory: ContactState,
     points: ContactPoints,
     response: Response,
-    slip: NDArray[np.float64],
-    penalty: NDArray[np.float64],
-    known: NDArray[np.bool_],
+    slip: Array,
+    penalty: Array,
+    known: Mask,
     *,
     patient: bool = False,
 ) -> ContactState:

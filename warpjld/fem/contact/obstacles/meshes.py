@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from warpjld.errors import InputError
+from warpjld.fem.arrays import Ints32
 from warpjld.fem.contact.obstacles.facets import Facets
 from warpjld.fem.contact.obstacles.obstacle import (
     ClosestPoints,
@@ -39,7 +40,7 @@ class RigidMesh(Rigid):
     def _project(self, points: Points) -> ClosestPoints:
         return self._facets.project(points)
 
-    def _mesh(self) -> tuple[Points, NDArray[np.int32]]:
+    def _mesh(self) -> tuple[Points, Ints32]:
         return self._facets.vertices, self._facets.faces
 
 
@@ -88,7 +89,7 @@ class Keyframed(Obstacle):
         turned = np.einsum("nij,ni->nj", facets.frames(place, after), offset)
         return np.asarray((facets.at(place, after) + turned) @ then.T + there)
 
-    def mesh(self, time: float) -> tuple[Points, NDArray[np.int32]]:
+    def mesh(self, time: float) -> tuple[Points, Ints32]:
         """See `Obstacle.mesh`."""
         turn, shift = placement(self._motion, time)
         return self._shape(time) @ turn.T + shift, self._facets.faces

@@ -5,9 +5,10 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from warpjld.errors import InputError
+from warpjld.fem.arrays import Array, Ints32
 from warpjld.fem.contact.obstacles.obstacle import ClosestPoints, Motion, Points, Rigid, checked_vector
 
 __all__ = ["Box", "Cylinder", "Plane", "Sphere"]
@@ -42,7 +43,7 @@ class Plane(Rigid):
         distance = (points - self._middle) @ self._out
         return ClosestPoints(distance, points - distance[:, None] * self._out, np.tile(self._out, (len(points), 1)))
 
-    def _mesh(self) -> tuple[Points, NDArray[np.int32]]:
+    def _mesh(self) -> tuple[Points, Ints32]:
         along, across = _square(self._out)
         corners = [(-1, -1), (1, -1), (1, 1), (-1, 1)]
         vertices = [self._middle + 0.5 * self.extent * (a * along + b * across) for a, b in corners]
@@ -77,7 +78,7 @@ class Sphere(Rigid):
         normal = np.divide(away, reach[:, None], out=np.tile([0.0, 1.0, 0.0], (len(away), 1)), where=reach[:, None] > 0)
         return ClosestPoints(reach - self.radius, self._middle + self.radius * normal, normal)
 
-    def _mesh(self) -> tuple[Points, NDArray[np.int32]]:
+    def _mesh(self) -> tuple[Points, Ints32]:
         import trimesh
 
         ball = trimesh.creation.icosphere(subdivisions=4, radius=self.radius)
@@ -103,7 +104,7 @@ class Box(Rigid):
     edge: float = 0.0
     motion: Motion | None = None
     _middle: Points = field(init=False, repr=False)
-    _half: NDArray[np.float64] = field(init=False, repr=False)
+    _half: Array = field(init=False, repr=False)
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "_middle", checked_vector("box centre", self.centre))
@@ -114,7 +115,7 @@ class Box(Rigid):
         found = _round_box(points - self._middle, self._half, self.edge)
         return ClosestPoints(found.distance, found.closest + self._middle, found.normal)
 
-    def _mesh(self) -> tuple[Points, NDArray[np.int32]]:
+    def _mesh(self) -> tuple[Points, Ints32]:
         rim = self.edge * (1.0 - np.tan(np.linspace(0.0, 0.25 * np.pi, 6 if self.edge else 1)))
         vertices, faces = _box_surface([np.concatenate([rim - h, h - rim, [-h, h]]) for h in self._half])
         return _round_box(vertices, self._half, self.edge).closest + self._middle, faces
@@ -165,7 +166,7 @@ class Cylinder(Rigid):
         closest, normal = (f[:, :1] * outwards + f[:, 1:] * axis for f in (flat.closest, flat.normal))
         return ClosestPoints(flat.distance, closest + self._middle, normal)
 
-    def _mesh(self) -> tuple[Points, NDArray[np.int32]]:
+    def _mesh(self) -> tuple[Points, Ints32]:
         around = 96
         rim = np.linspace(0.0, 0.5 * np.pi, 7 if self.edge else 1)
         r = self.radius - self.edge * (1.0 - np.sin(rim))
@@ -191,7 +192,7 @@ class Cylinder(Rigid):
         return vertices, np.concatenate(faces).astype(np.int32)
 
 
-def _round_box(points: NDArray[np.float64], half: NDArray[np.float64], edge: float) -> ClosestPoints:
+def _round_box(points: Array, half: Array, edge: float) -> ClosestPoints:
     """Distances to a box |x| ≤ half with rounded edges, in two or three dimensions: a smaller box, made fatter."""
     core = half - edge
     inner = np.clip(points, -core, core)
@@ -213,7 +214,7 @@ def _round_box(points: NDArray[np.float64], half: NDArray[np.float64], edge: flo
     return ClosestPoints(distance, closest, normal)
 
 
-def _box_surface(lines: list[NDArray[np.float64]]) -> tuple[Points, NDArray[np.int32]]:
+def _box_surface(lines: list[Array]) -> tuple[Points, Ints32]:
     """The surface of a box, each side a grid over these coordinates; corners welded."""
     lines = [np.unique(line) for line in lines]
     points, faces, start = [], [], 0
@@ -233,14 +234,14 @@ def _box_surface(lines: list[NDArray[np.float64]]) -> tuple[Points, NDArray[np.i
     return kept, np.asarray(weld.ravel()[np.concatenate(faces)], dtype=np.int32)
 
 
-def _square(axis: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+def _square(axis: Array) -> tuple[Array, Array]:
     """Two unit vectors that make a right-handed frame with a third: u × v = axis."""
     u = np.cross(axis, np.eye(3)[np.abs(axis).argmin()])
     u /= np.linalg.norm(u)
     return u, np.cross(axis, u)
 
 
-def _direction(name: str, value: ArrayLike) -> NDArray[np.float64]:
+def _direction(name: str, value: ArrayLike) -> Array:
     vector = checked_vector(name, value)
     length = float(np.linalg.norm(vector))
     if not length > 1e-12:

@@ -31,8 +31,8 @@ from collections.abc import Callable, Sequence
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from warpjld.fem.arrays import Array
 from warpjld.fem.body import Body
 from warpjld.fem.contact.interface.pairs import Pair
 from warpjld.fem.contact.paper.sides import Side
@@ -66,7 +66,7 @@ def by_turns(
     after: ContactSolution | None = None,
     aitken: bool = False,
     threshold: float = 1e-3,
-    guess: Callable[[float, float, NDArray[np.float64]], NDArray[np.float64]] | None = None,
+    guess: Callable[[float, float, Array], Array] | None = None,
     watch: Callable[[ContactInstant], str | None] | None = None,
     progress: Callable[[str], None] | None = None,
 ) -> ContactSolution:
@@ -142,7 +142,7 @@ def _at_rest(body: Body) -> Instant:
     return Instant(1.0, nothing, nothing, 0, 0, 0.0)
 
 
-def _missing(body: Body, loads: Loads, at: ContactInstant) -> NDArray[np.float64]:
+def _missing(body: Body, loads: Loads, at: ContactInstant) -> Array:
     """Contact forces of an instant [N], shape (N, 3): what loads and reactions leave to balance."""
     internal = body.at(at.displacement, stiffness=False).forces.reshape(-1, 3)
     return np.asarray(

@@ -11,8 +11,8 @@ from dataclasses import dataclass, fields
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from warpjld.fem.arrays import Array, Ints32
 from warpjld.fem.mesh.hexmesh import HexMesh
 
 __all__ = ["NodalContact", "stacked", "to_nodes", "tributary_areas"]
@@ -29,10 +29,10 @@ class NodalContact:
         slid: Integral over it of the way along the other side since the instant before [m³].
     """
 
-    force: NDArray[np.float64]
-    area: NDArray[np.float64]
-    held: NDArray[np.float64]
-    slid: NDArray[np.float64]
+    force: Array
+    area: Array
+    held: Array
+    slid: Array
 
     def of(self, which: Any) -> NodalContact:
         """A part of it, by an index into its arrays."""
@@ -40,13 +40,7 @@ class NodalContact:
 
 
 def to_nodes(
-    slave: NDArray[np.int32],
-    push: NDArray[np.float64],
-    pressed: NDArray[np.float64],
-    held: NDArray[np.float64],
-    slip: NDArray[np.float64],
-    there: Any,
-    count: int,
+    slave: Ints32, push: Array, pressed: Array, held: Array, slip: Array, there: Any, count: int
 ) -> NodalContact:
     """Hand what slave nodes (n) know to all nodes.
 
@@ -80,7 +74,7 @@ def stacked(nodal_contacts: Sequence[NodalContact], count: int) -> NodalContact:
     )
 
 
-def tributary_areas(mesh: HexMesh, faces: NDArray[np.int32] | str, x: NDArray[np.float64]) -> NDArray[np.float64]:
+def tributary_areas(mesh: HexMesh, faces: Ints32 | str, x: Array) -> Array:
     """A quarter of the area of all faces around every node at positions x (N, 3) [m²], 0 elsewhere, shape (N,).
 
     What presses on a node over it is the pressure there that tables and pictures show.

@@ -5,9 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from warpjld.errors import WarpjldError
+from warpjld.fem.arrays import Array, Ints32, Mask
 from warpjld.fem.contact.law.law import ContactState
 from warpjld.fem.contact.results.nodal_contact import NodalContact
 from warpjld.fem.load.loads import Loads
@@ -40,30 +40,30 @@ class Touch:
     """
 
     name: str
-    nodes: NDArray[np.int32]
-    position: NDArray[np.float64]
-    normal: NDArray[np.float64]
-    pressure: NDArray[np.float64]
-    traction: NDArray[np.float64]
-    gap: NDArray[np.float64]
-    area: NDArray[np.float64]
-    pressed: NDArray[np.float64]
-    held: NDArray[np.float64]
-    slip: NDArray[np.float64]
-    sticking: NDArray[np.bool_]
-    bonded: NDArray[np.bool_]
-    nodal: NDArray[np.float64]
+    nodes: Ints32
+    position: Array
+    normal: Array
+    pressure: Array
+    traction: Array
+    gap: Array
+    area: Array
+    pressed: Array
+    held: Array
+    slip: Array
+    sticking: Mask
+    bonded: Mask
+    nodal: Array
     nodal_contact: NodalContact
 
     @property
-    def active(self) -> NDArray[np.bool_]:
+    def active(self) -> Mask:
         """Rows that press, or are bonded, shape (m,)."""
         return (self.pressure > 0.0) | self.bonded
 
     @property
-    def force(self) -> NDArray[np.float64]:
+    def force(self) -> Array:
         """Resultant on the slave [N], shape (3,)."""
-        out: NDArray[np.float64] = self.area @ self.traction
+        out: Array = self.area @ self.traction
         return out
 
     @property
@@ -86,7 +86,7 @@ class Touch:
         return float(self.pressure.max(initial=0.0))
 
     @property
-    def centre(self) -> NDArray[np.float64]:
+    def centre(self) -> Array:
         """Centre of pressure [m], shape (3,); NaN where nothing presses."""
         weight = self.area * np.maximum(self.pressure, 0.0)
         total = float(weight.sum())
@@ -123,8 +123,8 @@ class ContactInstant:
     """
 
     time: float
-    displacement: NDArray[np.float64]
-    reactions: NDArray[np.float64]
+    displacement: Array
+    reactions: Array
     touches: tuple[Touch, ...]
     solves: int
     iterations: int
@@ -151,7 +151,7 @@ class ContactSolution:
     states: tuple[ContactState, ...]
     steps: tuple[int, ...]
     loads: Loads
-    correction_rate: NDArray[np.float64] | None = None
+    correction_rate: Array | None = None
 
     @property
     def converged(self) -> bool:

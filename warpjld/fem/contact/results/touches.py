@@ -5,8 +5,8 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from warpjld.fem.arrays import Array, Ints, Mask
 from warpjld.fem.contact.interface.contact_area import Inside
 from warpjld.fem.contact.interface.contact_points import ContactPoints, Interface
 from warpjld.fem.contact.law.law import Response
@@ -21,13 +21,7 @@ _LEAST = 1e-6
 
 
 def touch_of(
-    interface: Interface,
-    points: ContactPoints,
-    response: Response,
-    slip: NDArray[np.float64],
-    bonded: NDArray[np.bool_],
-    modulus: NDArray[np.float64],
-    x: NDArray[np.float64],
+    interface: Interface, points: ContactPoints, response: Response, slip: Array, bonded: Mask, modulus: Array, x: Array
 ) -> Touch:
     """A pair at an instant, from its points (m) to its slave nodes (n): what presses on a node, over its share of the
     surface (between two meshes the multipliers themselves swing from node to node).
@@ -84,7 +78,7 @@ def touch_of(
     )
 
 
-def _gaps(interface: Interface, points: ContactPoints, near: NDArray[np.int64], mean: Any) -> NDArray[np.float64]:
+def _gaps(interface: Interface, points: ContactPoints, near: Ints, mean: Any) -> Array:
     """Gaps of slave nodes: their own between meshes, else the least of their points [m], shape (n,)."""
     if len(near) == 0:
         return np.empty(0)

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from warpjld.fem.arrays import Mask
 from warpjld.fem.contact.interface.contact_points import ContactPoints, Interface
 from warpjld.fem.contact.law.law import ContactState
 
@@ -18,7 +18,7 @@ def blocked(
     interfaces: list[Interface],
     points: list[ContactPoints],
     memory: list[ContactState],
-    free: NDArray[np.bool_],
+    free: Mask,
     *,
     allowed: float,
     penetration: float,

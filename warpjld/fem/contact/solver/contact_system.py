@@ -6,8 +6,8 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from warpjld.fem.arrays import Array
 from warpjld.fem.contact.interface.contact_points import ContactPoints, Interface
 from warpjld.fem.contact.law.law import ContactState, Response, remember, respond
 from warpjld.fem.contact.solver.tangent import coupling, slopes_of
@@ -33,9 +33,9 @@ class Contact:
     """
 
     points: list[ContactPoints]
-    slips: list[NDArray[np.float64]]
+    slips: list[Array]
     responses: list[Response]
-    forces: NDArray[np.float64]
+    forces: Array
     coupled: bool = False
     beside: Any = None
 
@@ -52,13 +52,7 @@ class Interplay:
     """
 
     def __init__(
-        self,
-        nodes: NDArray[np.float64],
-        interfaces: list[Interface],
-        moduli: list[NDArray[np.float64]],
-        *,
-        penalty: float,
-        penetration: float,
+        self, nodes: Array, interfaces: list[Interface], moduli: list[Array], *, penalty: float, penetration: float
     ) -> None:
         self.interfaces = interfaces
         self._rest = nodes
@@ -70,21 +64,17 @@ class Interplay:
         """How far ahead the least far-sighted interface looks [m]."""
         return min(interface.reach for interface in self.interfaces)
 
-    def normals(self, u: NDArray[np.float64]) -> list[NDArray[np.float64]]:
+    def normals(self, u: Array) -> list[Array]:
         """Of every interface's slave nodes at displacement u (3N,)."""
         x = self._rest + u.reshape(-1, 3)
         return [interface.slave.normals(x) for interface in self.interfaces]
 
-    def points(
-        self, u: NDArray[np.float64], before: float, time: float, normals: list[NDArray[np.float64]]
-    ) -> list[ContactPoints]:
+    def points(self, u: Array, before: float, time: float, normals: list[Array]) -> list[ContactPoints]:
         """Every interface's points at displacement u (3N,)."""
         x = self._rest + u.reshape(-1, 3)
         return [i.points(x, before, time, n) for i, n in zip(self.interfaces, normals, strict=True)]
 
-    def turned(
-        self, normals: list[NDArray[np.float64]], u: NDArray[np.float64], every: bool
-    ) -> list[NDArray[np.float64]]:
+    def turned(self, normals: list[Array], u: Array, every: bool) -> list[Array]:
         """Normals at displacement u (3N,): of surfaces that meet surfaces, or of every one; the others stay."""
         fresh = self.normals(u)
         return [
@@ -92,9 +82,7 @@ class Interplay:
             for interface, old, new in zip(self.interfaces, normals, fresh, strict=True)
         ]
 
-    def refreshed(
-        self, points: list[ContactPoints], u: NDArray[np.float64], before: float, time: float
-    ) -> list[ContactPoints]:
+    def refreshed(self, points: list[ContactPoints], u: Array, before: float, time: float) -> list[ContactPoints]:
         """Points between surfaces as displacement u (3N,) has them, since their derivatives are known; others stay."""
         x = self._rest + u.reshape(-1, 3)
         return [
@@ -105,8 +93,8 @@ class Interplay:
     def answered(
         self,
         points: list[ContactPoints],
-        u: NDArray[np.float64],
-        start: NDArray[np.float64],
+        u: Array,
+        start: Array,
         memory: list[ContactState],
         *,
         keep: bool,
@@ -122,9 +110,7 @@ class Interplay:
         ]
         return Contact(points, slips, responses, self.pushed(points, responses), coupled)
 
-    def sloped(
-        self, contact: Contact, memory: list[ContactState], pressed: list[ContactState], u: NDArray[np.float64]
-    ) -> Contact:
+    def sloped(self, contact: Contact, memory: list[ContactState], pressed: list[ContactState], u: Array) -> Contact:
         """With what a symmetric stiffness leaves out, where points are those of displacement u (3N,).
 
         ``pressed`` knows the multipliers that directions turn with; ``memory`` is the present one.
@@ -145,7 +131,7 @@ class Interplay:
                     beside = part if beside is None else beside + part
         return replace(contact, points=points, beside=beside)
 
-    def pushed(self, points: list[ContactPoints], responses: list[Response]) -> NDArray[np.float64]:
+    def pushed(self, points: list[ContactPoints], responses: list[Response]) -> Array:
         """Nodal forces of all interfaces together [N], shape (3N,)."""
         total = np.zeros_like(self._rest)
         for p, r in zip(points, responses, strict=True):
@@ -153,7 +139,7 @@ class Interplay:
         return total.reshape(-1)
 
     def foreseen(
-        self, contact: Contact, memory: list[ContactState], move: NDArray[np.float64], allowed: float, *, patient: bool
+        self, contact: Contact, memory: list[ContactState], move: Array, allowed: float, *, patient: bool
     ) -> list[Response]:
         """What points answer after a move, by the linear model: the multipliers to go on with."""
         out = []
@@ -166,13 +152,7 @@ class Interplay:
         return out
 
     def remembered(
-        self,
-        memory: list[ContactState],
-        contact: Contact,
-        foreseen: list[Response],
-        move: NDArray[np.float64],
-        *,
-        patient: bool,
+        self, memory: list[ContactState], contact: Contact, foreseen: list[Response], move: Array, *, patient: bool
     ) -> list[ContactState]:
         """Multipliers after a move (3N,) that was foreseen to be answered so."""
         out = []
@@ -185,7 +165,7 @@ class Interplay:
 
     def _firmer(
         self, k: int, memory: ContactState, points: ContactPoints, before: Response, foreseen: Response
-    ) -> NDArray[np.float64]:
+    ) -> Array:
         """Penalties raised where flesh is so stiff that multipliers would find their values slowly, shape (s,)."""
         at = points.sites
         seen = before.active & foreseen.active & (before.error > self._penetration * self.interfaces[k].edge[at])
@@ -194,11 +174,11 @@ class Interplay:
         firm[slow] = np.minimum(_FIRMER * firm[slow], _FIRMEST)
         return firm
 
-    def _penalty(self, k: int, points: ContactPoints, memory: ContactState) -> NDArray[np.float64]:
+    def _penalty(self, k: int, points: ContactPoints, memory: ContactState) -> Array:
         """ε of points [Pa/m]."""
         return np.asarray((self._penalties[k] * memory.firm)[points.sites])
 
-    def begun(self, memory: list[ContactState], start: NDArray[np.float64], time: float) -> list[ContactState]:
+    def begun(self, memory: list[ContactState], start: Array, time: float) -> list[ContactState]:
         """ContactState that knows what is apart as the step begins, where friction asks for it."""
         x = self._rest + start.reshape(-1, 3)
         out = []
@@ -239,7 +219,7 @@ class Interplay:
         return worst
 
 
-def shifted(points: ContactPoints, move: NDArray[np.float64]) -> ContactPoints:
+def shifted(points: ContactPoints, move: Array) -> ContactPoints:
     """Points after a move (N, 3), by the linear model: their normals and weights stay."""
     if not move.any():
         return points

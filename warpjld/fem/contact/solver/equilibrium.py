@@ -9,8 +9,8 @@ leaves of overlap and slip is gone when forces balance (Simo & Laursen 1992; ref
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from warpjld.fem.arrays import Array
 from warpjld.fem.body import Body
 from warpjld.fem.contact.interface.contact_points import Interface
 from warpjld.fem.contact.law.law import ContactState
@@ -59,7 +59,7 @@ class Equilibrium:
         self,
         body: Body,
         interfaces: list[Interface],
-        moduli: list[NDArray[np.float64]],
+        moduli: list[Array],
         *,
         tolerance: float = 1e-5,
         penetration: float = 1e-3,
@@ -79,13 +79,7 @@ class Equilibrium:
         self._damping = Damping(body)
         self._interplay = Interplay(body.mesh.nodes, interfaces, moduli, penalty=penalty, penetration=penetration)
 
-    def find(
-        self,
-        u: NDArray[np.float64],
-        memory: list[ContactState],
-        step: Step,
-        *guesses: NDArray[np.float64],
-    ) -> tuple[Status, Reached | None]:
+    def find(self, u: Array, memory: list[ContactState], step: Step, *guesses: Array) -> tuple[Status, Reached | None]:
         """Equilibrium from displacement u (3N,) at ``step.before``.
 
         It is looked for from the first of the guesses that turns no element inside out, or from u.
@@ -156,7 +150,7 @@ class Equilibrium:
             if done.status is not Status.INDEFINITE or not self._damping.more():
                 return done
 
-    def _stride(self, walk: Walk, move: NDArray[np.float64], loose: Loose) -> float:
+    def _stride(self, walk: Walk, move: Array, loose: Loose) -> float:
         """Share of a move (3N,) that points can see ahead; all of it on the way to what is prescribed."""
         if not walk.arrived:
             return 1.0
@@ -173,7 +167,7 @@ class Equilibrium:
         return self._loose[1]
 
 
-def _length(search: LineSearch, walk: Walk, move: NDArray[np.float64], loose: Loose) -> float:
+def _length(search: LineSearch, walk: Walk, move: Array, loose: Loose) -> float:
     """How far to go along a move (3N,), 1 for all of it; 0 where elements turn inside out however short it is."""
     length = search.upright(walk.u, move, walk.tangent.lowest)
     if length == 0.0:

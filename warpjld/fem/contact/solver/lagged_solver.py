@@ -5,9 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import Any
 
-import numpy as np
-from numpy.typing import NDArray
-
+from warpjld.fem.arrays import Array, Mask
 from warpjld.fem.body import Body
 from warpjld.fem.solver.block_matrix import BlockMatrix
 from warpjld.fem.solver.conjugate import Iteration, Status
@@ -40,9 +38,7 @@ class LaggedSolver:
         """A new step: its first matrix gets a preconditioner of its own."""
         self._solver = None
 
-    def solve(
-        self, matrix: BlockMatrix, free: NDArray[np.bool_], right: NDArray[np.float64], beside: Any = None
-    ) -> Iteration:
+    def solve(self, matrix: BlockMatrix, free: Mask, right: Array, beside: Any = None) -> Iteration:
         """K11 x = b for the free degrees of freedom, shape (3N,), with the preconditioner before while it serves.
 
         Raises:
@@ -68,9 +64,7 @@ class LaggedSolver:
         self._solver, self._hierarchy = solver, solver.hierarchy
         return done
 
-    def _beside(
-        self, matrix: BlockMatrix, free: NDArray[np.bool_], right: NDArray[np.float64], beside: Any
-    ) -> Iteration:
+    def _beside(self, matrix: BlockMatrix, free: Mask, right: Array, beside: Any) -> Iteration:
         """With a part that is not symmetric; what is symmetric makes the preconditioner."""
         if self._solver is not None:
             done = self._solver.over(matrix).solve_beside(beside, right, tolerance=_INNER, iterations=_PATIENCE)

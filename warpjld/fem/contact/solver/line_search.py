@@ -6,8 +6,8 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from warpjld.fem.arrays import Array, Mask
 from warpjld.fem.contact.law.law import ContactState
 from warpjld.fem.contact.solver.contact_system import Contact, Interplay
 from warpjld.fem.contact.solver.elastic import Elastic
@@ -40,9 +40,9 @@ class LineSearch:
     elastic: Elastic
     play: Interplay
     step: Step
-    start: NDArray[np.float64]
+    start: Array
 
-    def upright(self, u: NDArray[np.float64], move: NDArray[np.float64], lowest: NDArray[np.float64]) -> float:
+    def upright(self, u: Array, move: Array, lowest: Array) -> float:
         """The longest of 1, ½, ¼ … that flattens no element to less than a part of what it is, 0 where none does not.
 
         Nearly inside out, flesh answers with forces that no later step finds its way back from.
@@ -61,13 +61,13 @@ class LineSearch:
 
     def by_work(
         self,
-        u: NDArray[np.float64],
-        move: NDArray[np.float64],
+        u: Array,
+        move: Array,
         most: float,
         contact: Contact,
         memory: list[ContactState],
-        residual: NDArray[np.float64],
-        watched: NDArray[np.bool_],
+        residual: Array,
+        watched: Mask,
         *,
         patient: bool,
     ) -> float:
@@ -93,12 +93,12 @@ class LineSearch:
 
     def by_balance(
         self,
-        u: NDArray[np.float64],
-        move: NDArray[np.float64],
+        u: Array,
+        move: Array,
         most: float,
         memory: list[ContactState],
-        residual: NDArray[np.float64],
-        free: NDArray[np.bool_],
+        residual: Array,
+        free: Mask,
         *,
         coupled: bool,
     ) -> float:

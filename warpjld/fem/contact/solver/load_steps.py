@@ -6,9 +6,9 @@ from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from warpjld.errors import InputError
+from warpjld.fem.arrays import Array
 from warpjld.fem.body import Body
 from warpjld.fem.contact.interface.contact_border import contact_modulus
 from warpjld.fem.contact.interface.contact_points import Interface, interfaces_of
@@ -34,7 +34,7 @@ _BREAKS = 100
 _PART = 0.85
 """How far along the course of the step before a first guess goes: contact stiffens what it meets."""
 
-Guess = Callable[[float, float, NDArray[np.float64]], NDArray[np.float64]]
+Guess = Callable[[float, float, Array], Array]
 """Time before, time, displacement before (N, 3) → where to begin to look for the displacement at the time (N, 3)."""
 
 
@@ -112,9 +112,7 @@ class LoadSteps:
         return Step(before, time, now, loads, allowed)
 
     def through(
-        self,
-        watch: Callable[[ContactInstant], str | None] | None,
-        progress: Callable[[str], None] | None,
+        self, watch: Callable[[ContactInstant], str | None] | None, progress: Callable[[str], None] | None
     ) -> ContactSolution:
         """Every time, or as far as equilibria are found; ``watch`` and ``progress`` as in ``press``."""
         now, halvings = self.start, 0
@@ -179,7 +177,7 @@ class LoadSteps:
             penetration=self.penetration,
         )
 
-    def _find(self, step: Step, carried: NDArray[np.float64]) -> tuple[Status, Reached | None]:
+    def _find(self, step: Step, carried: Array) -> tuple[Status, Reached | None]:
         """Equilibrium of a step; again after every bond that did not hold."""
         guesses = self._guesses(step, carried)
         status, found = self.equilibrium.find(self.u, self.memory, step, *guesses)
@@ -197,13 +195,13 @@ class LoadSteps:
             status, found = self.equilibrium.find(self.u, memory, step, found.displacement)
         return Status.MAX_ITERATIONS, None
 
-    def _carried(self, step: Step) -> NDArray[np.float64]:
+    def _carried(self, step: Step) -> Array:
         """The displacement that a step begins from, carried on as the caller knows how, shape (3N,)."""
         if self.guess is None:
             return self.u
         return np.asarray(self.guess(step.before, step.time, self.u.reshape(-1, 3)), dtype=np.float64).reshape(-1)
 
-    def _guesses(self, step: Step, carried: NDArray[np.float64]) -> list[NDArray[np.float64]]:
+    def _guesses(self, step: Step, carried: Array) -> list[Array]:
         """Where to begin, best first: as asked, and what it was off by in the step before taken to be off by again."""
         plain = [] if self.guess is None else [carried]
         if self.correction_rate is None:

@@ -6,8 +6,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from warpjld.fem.arrays import Array
 from warpjld.fem.body import Tangent
 from warpjld.fem.contact.interface.contact_points import ContactPoints
 from warpjld.fem.contact.law.law import ContactState, Response
@@ -36,11 +36,11 @@ the equilibrium before are."""
 class Reached:
     """Equilibrium at the end of a load step."""
 
-    displacement: NDArray[np.float64]
-    reactions: NDArray[np.float64]
+    displacement: Array
+    reactions: Array
     points: list[ContactPoints]
     responses: list[Response]
-    slips: list[NDArray[np.float64]]
+    slips: list[Array]
     memory: list[ContactState]
     residual: float
 
@@ -71,7 +71,7 @@ class Walk:
 
     contact: Contact
     tangent: Tangent
-    residual: NDArray[np.float64]
+    residual: Array
     unbalanced: float
 
     def __init__(
@@ -79,9 +79,9 @@ class Walk:
         elastic: Elastic,
         play: Interplay,
         step: Step,
-        start: NDArray[np.float64],
+        start: Array,
         memory: list[ContactState],
-        guesses: Sequence[NDArray[np.float64]],
+        guesses: Sequence[Array],
         *,
         tolerance: float,
         penetration: float,
@@ -91,7 +91,7 @@ class Walk:
         self.free = step.prescribed.free(len(start))
         self.memory = self._before = play.begun(memory, start, step.before)
         self.jump = np.zeros_like(start)
-        self._pressures: NDArray[np.float64] | None = None
+        self._pressures: Array | None = None
         self._iteration, self._since, self._settled = -1, 0, False
         guess = next((held for held in map(self._held, guesses) if elastic.upright(held)), None)
         if guess is not None:
@@ -172,7 +172,7 @@ class Walk:
         pressed = self.memory if self._iteration >= _SURE else self._before
         self.contact = self._play.sloped(self.contact, self.memory, pressed, self.u)
 
-    def go(self, move: NDArray[np.float64], length: float) -> None:
+    def go(self, move: Array, length: float) -> None:
         """Go a part of the way along a move (3N,), and bring up to date what points remember, and what they see."""
         play, careful = self._play, self.careful
         move = length * move
@@ -208,7 +208,7 @@ class Walk:
             points, self.u, self._start, self.memory, keep=keep, allowed=self._step.allowed, coupled=coupled
         )
 
-    def _held(self, u: NDArray[np.float64]) -> NDArray[np.float64]:
+    def _held(self, u: Array) -> Array:
         """With the prescribed values where there are such."""
         prescribed = self._step.prescribed
         out = np.array(u, dtype=np.float64).reshape(-1)

@@ -12,8 +12,8 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from warpjld.fem.arrays import Array, Ints
 from warpjld.fem.contact.interface.surface import ContactSurface
 
 if TYPE_CHECKING:
@@ -48,8 +48,8 @@ def slopes_of(
     points: ContactPoints,
     response: Response,
     memory: ContactState,
-    penalty: NDArray[np.float64],
-    x: NDArray[np.float64],
+    penalty: Array,
+    x: Array,
     reach: float,
 ) -> Slopes | None:
     """Derivatives at positions x (N, 3), at which the points were found with the normals there; None where nothing
@@ -90,7 +90,7 @@ def slopes_of(
     return Slopes(of_gap, csr_array(-(spreading @ tractions + of_weights)))
 
 
-def coupling(points: ContactPoints, response: Response, friction: float, penalty: NDArray[np.float64]) -> Any:
+def coupling(points: ContactPoints, response: Response, friction: float, penalty: Array) -> Any:
     """How the friction of points that slide follows their pressure, to be added to the stiffness [N/m], ``csr_array``
     (3N, 3N); None where none slides.
 
@@ -129,9 +129,7 @@ class _Pairs:
         far: Of ∫ N_a M_b.
     """
 
-    def __init__(
-        self, mortar: Mortar, points: ContactPoints, rows: NDArray[np.int64], x: NDArray[np.float64], reach: float
-    ) -> None:
+    def __init__(self, mortar: Mortar, points: ContactPoints, rows: Ints, x: Array, reach: float) -> None:
         assert points.facets is not None
         assert points.share is not None
         slave = mortar.slave
@@ -167,7 +165,7 @@ class _Pairs:
         column = np.broadcast_to(self.column[:, :, None], gap.shape)[where]
         return csr_array(coo_array((gap[where], (row, column)), shape=(len(points.sites), self._size)))
 
-    def forces(self, traction: NDArray[np.float64]) -> Any:
+    def forces(self, traction: Array) -> Any:
         """How nodal forces of tractions (m, 3) change with the points' weights [N/m], ``csr_array`` (3N, 3N)."""
         from scipy.sparse import coo_array, csr_array
 
@@ -180,7 +178,7 @@ class _Pairs:
         return csr_array(coo_array((block.ravel(), (row.ravel(), column.ravel())), shape=shape))
 
 
-def _differences(mortar: Mortar, at: NDArray[np.float64], reach: float, step: float) -> NDArray[np.float64]:
+def _differences(mortar: Mortar, at: Array, reach: float, step: float) -> Array:
     """Derivatives of each facet pair's integrals by the coordinates of its corners at (P, 8, 3), shape (P, 24, 33)."""
     count = len(at)
     moved = np.tile(at[:, None], (1, 25, 1, 1)).reshape(count, 25, 24)
@@ -193,7 +191,7 @@ def _differences(mortar: Mortar, at: NDArray[np.float64], reach: float, step: fl
     return np.asarray((found[:, 1:] - found[:, :1]) / step)
 
 
-def _turning(surface: ContactSurface, x: NDArray[np.float64], sites: NDArray[np.int64], rows: NDArray[np.int64]) -> Any:
+def _turning(surface: ContactSurface, x: Array, sites: Ints, rows: Ints) -> Any:
     """Derivatives of the nodes' normals, ``csr_array`` (3m, 3N), zero but at ``rows``."""
     from scipy.sparse import coo_array, csr_array
 
@@ -217,14 +215,14 @@ def _turning(surface: ContactSurface, x: NDArray[np.float64], sites: NDArray[np.
     return csr_array(coo_array((block[known], (row[known], column[known])), shape=shape))
 
 
-def _cross(v: NDArray[np.float64]) -> NDArray[np.float64]:
+def _cross(v: Array) -> Array:
     """[v]× of vectors (n, 3), shape (n, 3, 3)."""
     out = np.zeros((len(v), 3, 3))
     out[:, 0, 1], out[:, 0, 2], out[:, 1, 2] = -v[:, 2], v[:, 1], -v[:, 0]
     return out - out.transpose(0, 2, 1)
 
 
-def _inner(vectors: NDArray[np.float64]) -> Any:
+def _inner(vectors: Array) -> Any:
     """Rows that take the inner product of each point's vector (m, 3) with three values of it, (m, 3m)."""
     from scipy.sparse import csr_array
 

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from warpjld.fem.arrays import Array, Mask
 from warpjld.fem.body import Body
 from warpjld.fem.contact.interface.contact_points import Interface
 from warpjld.fem.contact.solver.contact_system import Contact
@@ -29,7 +29,7 @@ class Loose:
         stiffness: Stiffness of each node [N/m], shape (N,).
     """
 
-    def __init__(self, body: Body, prescribed: Prescribed, stiffness: NDArray[np.float64]) -> None:
+    def __init__(self, body: Body, prescribed: Prescribed, stiffness: Array) -> None:
         self._mesh = body.mesh
         self._stiff = stiffness
         self._bodies = [nodes for nodes, _ in free_motions(body, prescribed)]
@@ -39,7 +39,7 @@ class Loose:
     def __bool__(self) -> bool:
         return bool(self._bodies)
 
-    def falling(self, contact: Contact) -> NDArray[np.bool_]:
+    def falling(self, contact: Contact) -> Mask:
         """Nodes of loose bodies that nothing touches, shape (N,)."""
         out = np.zeros(len(self._mesh.nodes), dtype=bool)
         if self._bodies:
@@ -71,7 +71,7 @@ class Loose:
                 return Status.SLIDING, f"{what} slides at {touching[0][0]}: friction is not enough to hold it{more}"
         return Status.MAX_ITERATIONS, ""
 
-    def leash(self, move: NDArray[np.float64], reach: float) -> float:
+    def leash(self, move: Array, reach: float) -> float:
         """Share of a move (3N,) by which loose bodies go no farther than ``reach`` [m]."""
         far = max((float(np.abs(move.reshape(-1, 3)[nodes]).max()) for nodes in self._bodies), default=0.0)
         return min(1.0, reach / far) if far > 0.0 else 1.0
