@@ -12,7 +12,7 @@ import numpy as np
 from warpjld.errors import InputError
 from warpjld.fem import Loads, Status
 from warpjld.fem.contact import ContactInstant, ContactSolution
-from warpjld.fem.contact.law.law import ContactState
+from warpjld.fem.contact.law.contact_state import ContactState
 from warpjld.fem.contact.results.nodal_contact import NodalContact
 from warpjld.press.frames import SolvedFrame
 from warpjld.whole_file import whole_file

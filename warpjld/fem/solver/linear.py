@@ -122,7 +122,9 @@ class LinearSolver:
             )
         return self._refined(right, tolerance, iterations)
 
-    def solve_beside(self, beside: Any, b: Array, *, tolerance: float = 1e-8, iterations: int = 400) -> Iteration:
+    def solve_nonsymmetric(
+        self, nonsymmetric: Any, b: Array, *, tolerance: float = 1e-8, iterations: int = 400
+    ) -> Iteration:
         """(K11 + E11) x = b with an E (3N, 3N) that need not be symmetric nor definite, by minimal residuals; what
         preconditions K preconditions the sum.
         """
@@ -130,7 +132,7 @@ class LinearSolver:
         mask = self._mask
 
         def product(x: Array) -> Array:
-            return self.masked_product(x) + mask * (beside @ x)
+            return self.masked_product(x) + mask * (nonsymmetric @ x)
 
         def precondition(r: Array) -> Array:
             if self.method != "direct":

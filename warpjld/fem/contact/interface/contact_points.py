@@ -44,8 +44,8 @@ class ContactPoints:
         carried: What the other side, if an obstacle, moved at the point since the start of the step [m], shape (m, 3).
         facets: Slave and master facets that face each other, if the master deforms too, shape (P, 2).
         share: Share of each two that counts, shape (P,).
-        steep: How gaps change with the displacement (3N,), beyond what they do with weights and normals that stay,
-            where that is known, ``csr_array`` (m, 3N).
+        gap_derivative: How gaps change with the displacement (3N,), beyond what they do with weights and normals that
+            stay, where that is known, ``csr_array`` (m, 3N).
     """
 
     sites: Ints
@@ -56,7 +56,7 @@ class ContactPoints:
     carried: Array
     facets: Ints32 | None = None
     share: Array | None = None
-    steep: Any = None
+    gap_derivative: Any = None
 
     def forces(self, traction: Array) -> Array:
         """Nodal forces of tractions (m, 3) that push on the slave [N], shape (N, 3); their sum is zero."""
@@ -71,7 +71,7 @@ class ContactPoints:
     def opened(self, displacement: Array) -> Array:
         """By how much a displacement (N, 3) changes the gaps, to first order [m], shape (m,)."""
         out: Array = -np.einsum("mi,mi->m", self.normal, self.relative(displacement))
-        return out if self.steep is None else out + self.steep @ displacement.reshape(-1)
+        return out if self.gap_derivative is None else out + self.gap_derivative @ displacement.reshape(-1)
 
 
 class Interface:

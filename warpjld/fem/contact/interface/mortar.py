@@ -8,7 +8,7 @@ import numpy as np
 
 from warpjld.errors import InputError
 from warpjld.fem.arrays import Array, Ints, Ints32
-from warpjld.fem.contact.interface.pair_filter import counted
+from warpjld.fem.contact.interface.pair_filter import counted_share
 from warpjld.fem.contact.interface.pairs import Pair
 from warpjld.fem.contact.interface.surface import ContactSurface
 from warpjld.fem.launch import on_rows, shared
@@ -91,7 +91,7 @@ class Mortar:
         found = self.integrals(pairs, slave.quads, master.quads, x, reach)
         some = found[:, 32] > 0.0
         pairs, found = pairs[some], found[some]
-        share = counted(self, pairs, found, normals, x, reach)
+        share = counted_share(self, pairs, found, normals, x, reach)
         some = share > 0.0
         pairs, share = pairs[some], share[some]
         found = share[:, None] * found[some]
@@ -109,10 +109,10 @@ class Mortar:
         table.sort_indices()
         normal = normals[nodes]
         gap = np.asarray(-np.einsum("mi,mi->m", normal, table @ x), np.float64)
-        gap += self.aside(nodes, area[nodes])[0]
+        gap += self.sliver_offset(nodes, area[nodes])[0]
         return ContactPoints(nodes, table, normal, area[nodes], gap, np.zeros((len(nodes), 3)), pairs, share)
 
-    def aside(self, sites: Ints, area: Array) -> tuple[Array, Array]:
+    def sliver_offset(self, sites: Ints, area: Array) -> tuple[Array, Array]:
         """What slivers seem farther off [m], and its derivative by their area [1/m], shape (m,) each."""
         edge = self.slave.edge[sites]
         t = np.minimum(area / (_SLIVER * edge**2), 1.0)

@@ -22,7 +22,7 @@ from warpjld.rotations import unit
 if TYPE_CHECKING:
     from warpjld.fem.contact.interface.mortar import Mortar
 
-__all__ = ["counted"]
+__all__ = ["counted_share"]
 
 _TIMES, _SLACK = 3.0, 0.5
 """Overlap along the normal that counts for nothing: over how deep facets are inside each other, and that of facets that
@@ -32,7 +32,7 @@ _OWN_SLACK = 1.0
 they are joined."""
 
 
-def counted(mortar: Mortar, pairs: Ints32, integrals: Array, normals: Array, x: Array, reach: float) -> Array:
+def counted_share(mortar: Mortar, pairs: Ints32, integrals: Array, normals: Array, x: Array, reach: float) -> Array:
     """Share of pairs (P, 2) of facets that counts, 0 where they only seem to overlap, shape (P,).
 
     Args:

@@ -10,7 +10,7 @@ from warpjld.fem.arrays import Array, Ints
 from warpjld.fem.body import Body
 from warpjld.fem.contact.interface.pairs import Pair
 from warpjld.fem.contact.interface.surface import ContactSurface, surface_of
-from warpjld.fem.contact.law.law import ContactState, initial_state
+from warpjld.fem.contact.law.contact_state import ContactState, initial_state
 from warpjld.fem.contact.obstacles.facets import Facets, Place
 from warpjld.fem.contact.obstacles.obstacle import Obstacle
 from warpjld.fem.contact.results.nodal_contact import to_nodes
@@ -49,7 +49,7 @@ class Side:
             self._facets = Facets(body.mesh.nodes[self.nodes], np.concatenate([corners[:, :3], corners[:, [0, 2, 3]]]))
             self.triangles = self._facets.faces
 
-    def memory(self) -> ContactState:
+    def state(self) -> ContactState:
         """Who was pushed, for a later run: nodes with a pressure."""
         return replace(initial_state(len(self.slave.nodes), self.pair), pressure=self.touching.astype(np.float64))
 

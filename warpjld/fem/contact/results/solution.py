@@ -8,7 +8,7 @@ import numpy as np
 
 from warpjld.errors import WarpjldError
 from warpjld.fem.arrays import Array, Ints32, Mask
-from warpjld.fem.contact.law.law import ContactState
+from warpjld.fem.contact.law.contact_state import ContactState
 from warpjld.fem.contact.results.nodal_contact import NodalContact
 from warpjld.fem.load.loads import Loads
 from warpjld.fem.solver.conjugate import Status

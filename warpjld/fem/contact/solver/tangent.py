@@ -19,9 +19,10 @@ from warpjld.fem.contact.interface.surface import ContactSurface
 if TYPE_CHECKING:
     from warpjld.fem.contact.interface.contact_points import ContactPoints
     from warpjld.fem.contact.interface.mortar import Mortar
-    from warpjld.fem.contact.law.law import ContactState, Response
+    from warpjld.fem.contact.law.contact_state import ContactState
+    from warpjld.fem.contact.law.return_mapping import ContactTractions
 
-__all__ = ["Slopes", "coupling", "slopes_of"]
+__all__ = ["MortarTangent", "friction_coupling", "linearise_mortar"]
 
 _STEP = 1e-6
 """Of the differences, over an edge."""
@@ -31,7 +32,7 @@ to go: its facets will not meet."""
 
 
 @dataclass(frozen=True, eq=False)
-class Slopes:
+class MortarTangent:
     """Derivatives of m points by the displacement (3N,), beyond those with weights and normals that stay.
 
     Attributes:
@@ -43,15 +44,15 @@ class Slopes:
     forces: Any
 
 
-def slopes_of(
+def linearise_mortar(
     mortar: Mortar,
     points: ContactPoints,
-    response: Response,
-    memory: ContactState,
+    tractions: ContactTractions,
+    state: ContactState,
     penalty: Array,
     x: Array,
     reach: float,
-) -> Slopes | None:
+) -> MortarTangent | None:
     """Derivatives at positions x (N, 3), at which the points were found with the normals there; None where nothing
     touches.
 
@@ -61,36 +62,36 @@ def slopes_of(
     Args:
         mortar: The surfaces.
         points: The points.
-        response: Their tractions.
-        memory: Multipliers.
+        tractions: Theirs.
+        state: Multipliers.
         penalty: ε [Pa/m], shape (m,).
         x: [m]
         reach: How far the points look ahead [m].
     """
     from scipy.sparse import csr_array, diags_array
 
-    if not response.active.any():
+    if not tractions.active.any():
         return None
     edge = mortar.slave.edge[points.sites]
-    rows = np.flatnonzero(response.active | (points.gap < _NEAR * edge))
+    rows = np.flatnonzero(tractions.active | (points.gap < _NEAR * edge))
     pairs = _Pairs(mortar, points, rows, x, reach)
-    turning = _turning(mortar.slave, x, points.sites, rows)
-    pressure = np.where(response.active, np.maximum(memory.pressure[points.sites], 0.0), 0.0)
-    carried = np.where(response.active[:, None], memory.friction[points.sites], 0.0)
+    turning = _normal_derivatives(mortar.slave, x, points.sites, rows)
+    pressure = np.where(tractions.active, np.maximum(state.pressure[points.sites], 0.0), 0.0)
+    carried = np.where(tractions.active[:, None], state.friction[points.sites], 0.0)
     of_weights = pairs.forces(carried - pressure[:, None] * points.normal)
-    tractions = -diags_array(np.repeat(pressure, 3)) @ turning
+    change = -diags_array(np.repeat(pressure, 3)) @ turning
     of_gap = csr_array((len(edge), x.size))
-    if not (response.error > _DEEP * edge).any():
+    if not (tractions.error > _DEEP * edge).any():
         apart = np.zeros_like(points.normal)
         apart[pairs.rows] = (points.weights @ x)[pairs.rows]
         of_gap = csr_array(pairs.gaps() - _inner(apart) @ turning)
-        stiff = np.where(response.active, penalty, 0.0)
-        tractions = tractions + _inner(points.normal).T @ (diags_array(stiff) @ of_gap)
+        stiff = np.where(tractions.active, penalty, 0.0)
+        change = change + _inner(points.normal).T @ (diags_array(stiff) @ of_gap)
     spreading = _blocks(points.weights.T @ diags_array(points.area))
-    return Slopes(of_gap, csr_array(-(spreading @ tractions + of_weights)))
+    return MortarTangent(of_gap, csr_array(-(spreading @ change + of_weights)))
 
 
-def coupling(points: ContactPoints, response: Response, friction: float, penalty: Array) -> Any:
+def friction_coupling(points: ContactPoints, tractions: ContactTractions, friction: float, penalty: Array) -> Any:
     """How the friction of points that slide follows their pressure, to be added to the stiffness [N/m], ``csr_array``
     (3N, 3N); None where none slides.
 
@@ -98,22 +99,22 @@ def coupling(points: ContactPoints, response: Response, friction: float, penalty
     of a hand moves a long way for a small force, and taking pressure and friction in turns creeps there.
 
     Args:
-        points: The points, with their ``steep`` if it is known.
-        response: Their tractions, friction bounded by these pressures.
+        points: The points, with their ``gap_derivative`` if it is known.
+        tractions: Theirs, friction bounded by these pressures.
         friction: Coulomb's μ.
         penalty: ε [Pa/m], shape (m,).
     """
     from scipy.sparse import csr_array, diags_array
 
-    size = np.linalg.norm(response.friction, axis=1)
-    slides = response.active & ~response.sticking & (size > 0.0)
+    size = np.linalg.norm(tractions.friction, axis=1)
+    slides = tractions.active & ~tractions.sticking & (size > 0.0)
     if not slides.any():
         return None
-    along = np.where(slides[:, None], response.friction / np.maximum(size, 1e-300)[:, None], 0.0)
+    along = np.where(slides[:, None], tractions.friction / np.maximum(size, 1e-300)[:, None], 0.0)
     weights = _blocks(points.weights)
     of_gap = -_inner(points.normal) @ weights
-    if points.steep is not None:
-        of_gap = of_gap + points.steep
+    if points.gap_derivative is not None:
+        of_gap = of_gap + points.gap_derivative
     rubs = weights.T @ _inner(points.area[:, None] * along).T
     return csr_array(rubs @ (diags_array(friction * penalty) @ of_gap))
 
@@ -152,7 +153,7 @@ class _Pairs:
 
         points, corner, at = self._points, self.corner, self._at
         spread = np.einsum("pkab,pbi->pkai", self.own, at[:, :4]) - np.einsum("pkab,pbi->pkai", self.far, at[:, 4:])
-        off, per_area = self._mortar.aside(points.sites, points.area)
+        off, per_area = self._mortar.sliver_offset(points.sites, points.area)
         wider = self.own.sum(axis=3)
         mean = np.einsum("pkai,pai->pka", spread, points.normal[corner]) + (points.gap - off)[corner][:, None] * wider
         if self._mortar.offset is not None:
@@ -191,7 +192,7 @@ def _differences(mortar: Mortar, at: Array, reach: float, step: float) -> Array:
     return np.asarray((found[:, 1:] - found[:, :1]) / step)
 
 
-def _turning(surface: ContactSurface, x: Array, sites: Ints, rows: Ints) -> Any:
+def _normal_derivatives(surface: ContactSurface, x: Array, sites: Ints, rows: Ints) -> Any:
     """Derivatives of the nodes' normals, ``csr_array`` (3m, 3N), zero but at ``rows``."""
     from scipy.sparse import coo_array, csr_array
 
