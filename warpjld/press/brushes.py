@@ -71,9 +71,9 @@ def _touching(bodies: Bodies, instant: ContactInstant) -> dict[tuple[str, str, s
     out: dict[tuple[str, str, str], float] = {}
     for owner, touch in zip(bodies.owners, instant.touches, strict=False):
         for hand in bodies.hands:
-            if hand.name not in (owner.slave, owner.master) or not touch.imprint.force.any():
+            if hand.name not in (owner.slave, owner.master) or not touch.nodal_contact.force.any():
                 continue
-            force = touch.imprint.force[bodies.spans[hand.name]]
+            force = touch.nodal_contact.force[bodies.spans[hand.name]]
             label = hand.part.hand.node_labels
             skin = np.flatnonzero((label >= 0) & (force > 0.0))
             digit = hand.parts.part_of[label[skin]]

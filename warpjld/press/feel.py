@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from warpjld.fem.contact.results.nodal_contact import Imprint
+from warpjld.fem.contact.results.nodal_contact import NodalContact
 from warpjld.fem.hand.tactile import Tactile, tactile_of
 from warpjld.press.bodies import Bodies
 from warpjld.press.frames import SolvedFrame
@@ -23,7 +23,7 @@ class _Touch:
 
     name: str
     nodal: NDArray[np.float64]
-    imprint: Imprint
+    nodal_contact: NodalContact
 
 
 @dataclass(frozen=True, eq=False)
@@ -45,7 +45,7 @@ def felt(bodies: Bodies, hand: HandBody, frames: Sequence[SolvedFrame]) -> Tacti
         _Instant(
             frame.frame,
             frame.displacement[span],
-            tuple(_Touch(bodies.pairs[k].title, frame.nodal[k, span], frame.imprint.of((k, span))) for k in mine),
+            tuple(_Touch(bodies.pairs[k].title, frame.nodal[k, span], frame.nodal_contact.of((k, span))) for k in mine),
         )
         for frame in frames
     ]

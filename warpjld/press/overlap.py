@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from warpjld.fem.contact.obstacles.facets import Facets
-from warpjld.fem.contact.obstacles.obstacle import Touching
+from warpjld.fem.contact.obstacles.obstacle import ClosestPoints
 from warpjld.press.skin_parts import SkinParts
 
 __all__ = ["Over", "over", "within_itself"]
@@ -37,7 +37,7 @@ class Over:
 
 
 def over(
-    at: NDArray[np.float64], normals: NDArray[np.float64], some: NDArray[np.integer], found: Touching
+    at: NDArray[np.float64], normals: NDArray[np.float64], some: NDArray[np.integer], found: ClosestPoints
 ) -> tuple[Over, NDArray[np.bool_]]:
     """Of vertices (n) for which something was found, those inside that look at what they are in; and which they are.
 

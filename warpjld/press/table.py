@@ -66,7 +66,7 @@ def rows_of(bodies: Bodies, hand: HandBody, solved: SolvedFrame, effort: Effort)
     flesh = hand.part.hand
     labels = [_digit(name) for name in flesh.label_names]
     digit_of = np.array([*labels, ""])[flesh.node_labels]  # "" for nodes inside
-    imprint = solved.imprint.of((slice(None), span))
+    nodal_contact = solved.nodal_contact.of((slice(None), span))
     pressure = solved.pressure(bodies)[span]
     rows = []
     for digit in [*(d.digit.rpartition(".")[2] for d in effort.digits), "palm"]:
@@ -80,8 +80,8 @@ def rows_of(bodies: Bodies, hand: HandBody, solved: SolvedFrame, effort: Effort)
             for owner, push in zip(bodies.owners, pushes, strict=True)
             if np.abs(push).max(initial=0.0) > 0.0
         ]
-        area = float(imprint.area[:, nodes].sum())
-        sliding = 1.0 - float(imprint.held[:, nodes].sum()) / area if area > 0.0 else float("nan")
+        area = float(nodal_contact.area[:, nodes].sum())
+        sliding = 1.0 - float(nodal_contact.held[:, nodes].sum()) / area if area > 0.0 else float("nan")
         work = None if digit == "palm" else effort[digit]
         rows.append(
             Row(

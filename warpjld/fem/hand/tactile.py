@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from warpjld.errors import InputError
 from warpjld.fem.contact import ContactInstant
-from warpjld.fem.contact.results.nodal_contact import Imprint, skin_around
+from warpjld.fem.contact.results.nodal_contact import NodalContact, tributary_areas
 from warpjld.fem.hand.flesh_hand import FleshHand
 from warpjld.fem.hand.labels import WEB
 
@@ -26,7 +26,7 @@ class _Touch(Protocol):
     @property
     def nodal(self) -> NDArray[np.float64]: ...
     @property
-    def imprint(self) -> Imprint: ...
+    def nodal_contact(self) -> NodalContact: ...
 
 
 class _Instant(Protocol):
@@ -131,9 +131,9 @@ def _read(
         if only is None or touch.name == only:
             np.add.at(out.force[frame], pad, touch.nodal[skin])
             for name, values in summed.items():
-                values += getattr(touch.imprint, name)[:count]
+                values += getattr(touch.nodal_contact, name)[:count]
     force, area, held, slid = (np.bincount(pad, values[skin], pads) for values in summed.values())
-    around = skin_around(hand.mesh, hand.skin_faces, x)[skin]
+    around = tributary_areas(hand.mesh, hand.skin_faces, x)[skin]
     weighted = np.stack([np.bincount(pad, summed["force"][skin] * x[skin, k], pads) for k in range(3)], axis=1)
     np.maximum.at(out.peak[frame], pad, summed["force"][skin] / np.maximum(around, 1e-300))
     some, known = force > 0.0, area > 0.0
