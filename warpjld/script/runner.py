@@ -12,6 +12,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from warpjld import render
+from warpjld.covering.device import checked_device
 from warpjld.errors import InputError, WarpjldError
 from warpjld.names import folded
 from warpjld.overwriting import check_outputs
@@ -86,6 +88,7 @@ def run_scene(
         outputs.append(Table("contact.csv"))
     if scene.contact.pressing is not None and scene.contact.grips:
         outputs.append(Grips("grips.csv"))
+    checked_device(device)
     check_available([output.name for output in outputs])
     read = scene.read if script is None else [*scene.read, script]
     names = _names(scene, outputs)
@@ -256,16 +259,18 @@ def _take(studio: FilmStudio | PressureStudio, frame: int, vertices: NDArray[np.
 
 
 def _check_lengths(scene: Scene, outputs: Sequence[Output], frames: int) -> None:
-    """Refuse clips that a format does not take."""
+    """Refuse clips and rates that a format does not take."""
     from warpjld.io.caches import open_cache
     from warpjld.press.where import placed
 
     for output in outputs:
-        for actor in actors_of(output, scene) if isinstance(output, Export) else ():
-            try:
+        try:
+            if isinstance(output, Film):
+                render.Film(output.name, rate=scene.rate)
+            for actor in actors_of(output, scene) if isinstance(output, Export) else ():
                 open_cache(output.name, actor.rig.surface, frames=frames, rate=scene.rate)
-            except InputError as error:
-                raise placed(InputError(f"'{output.name}': {error.message}"), scene.asked.get(output.name)) from None
+        except InputError as error:
+            raise placed(InputError(f"'{output.name}': {error.message}"), scene.asked.get(output.name)) from None
 
 
 def _size(scene: Scene, outputs: Sequence[Output], frames: int) -> float:
