@@ -68,6 +68,8 @@ def _turn(tally: Tally, name: str, number: int, count: int, folder: Path) -> Non
         code, out, err = -signal.SIGALRM, str(error.stdout or ""), ""
     ended = False
     for line in out.splitlines():
+        if not line.startswith('{"kind"'):  # libraries greet
+            continue
         row = json.loads(line)
         if "told" in row:
             tally.found.append((name, row["told"], row["input"]))

@@ -25,6 +25,7 @@ from warpjld.script import Interpreter, Scene
 from warpjld.script.runner import run_scene
 from warpjld.script.staging import frame_numbers, stage
 from warpjld.skeleton import poses_from_angles
+from warpjld.study.columns import Column
 from warpjld.study.grasping import load_plan
 from warpjld.study.run import opened
 from warpjld.study.shards import Shard, Shards
@@ -262,6 +263,7 @@ class _Nothing:
     """An experiment as far as folders of studies know it."""
 
     trials: int = 3
+    columns: tuple[Column, ...] = ()
 
     def identity(self) -> dict[str, object]:
         return {"kind": "nothing", "seed": 4, "trials": self.trials, "hands": [{"name": "a", "length": 0.19}]}

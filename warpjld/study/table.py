@@ -84,14 +84,17 @@ def write_csv(
         for row in rows:
             writer.writerow([_cell(row[c.name]) for c in columns])
     about = [{"name": c.name, "type": c.kind, "unit": c.unit, "description": c.about} for c in columns]
-    path.with_name(described).write_text(json.dumps(about, indent=1, ensure_ascii=False) + "\n", "utf-8")
+    with whole_file(path.with_name(described)) as part:
+        part.write_text(json.dumps(about, indent=1, ensure_ascii=False) + "\n", "utf-8")
 
 
 def write_arrays(path: Path, arrays: dict[str, NDArray[Any]]) -> None:
     """Write a NumPy archive (npz)."""
+    assert not any(array.dtype.hasobject for array in arrays.values())
     with whole_file(path) as part, part.open("wb") as file:
         # numpy dates the archive's members 1980, so bytes do not depend on the clock
-        np.savez_compressed(file, allow_pickle=False, **arrays)
+        # numpy 2.0 knows no allow_pickle here, and would store it as one array more
+        np.savez_compressed(file, **arrays)  # type: ignore[arg-type]
 
 
 def read_table(path: Path) -> list[dict[str, Any]]:
