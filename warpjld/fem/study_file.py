@@ -8,6 +8,8 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from warpjld.errors import InputError
 from warpjld.fem.arrays import Ints32
 from warpjld.fem.body import Body
