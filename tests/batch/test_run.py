@@ -3,6 +3,9 @@
 from __future__ import annotations
 
 import json
+import os
+import subprocess
+import sys
 from dataclasses import replace
 from pathlib import Path
 
@@ -10,9 +13,11 @@ import numpy as np
 import pytest
 
 from tests.finger import finger
+from warpjld import whole_file
 from warpjld.batch import BatchResult, Deforming, clip_jobs, deform_clip, run_batch
 from warpjld.errors import InputError
 from warpjld.folder_lock import locked_folder
+from warpjld.whole_file import part_of
 
 SETTINGS = {"rig": "finger", "rate": None}
 
@@ -63,7 +68,11 @@ def test_a_resumed_batch_makes_what_is_missing_or_changed_and_nothing_else(clips
     stamps = {path.name: path.stat().st_mtime_ns for path in out.glob("*.npz")}
     (out / "half.npz").unlink()
     (out / "whole.pc2").write_bytes(b"damaged")
-    (out / "half.npz.part").write_bytes(b"left by a killed worker")
+    gone = subprocess.run([sys.executable, "-c", "import os; print(os.getpid())"], capture_output=True, text=True)
+    mine = part_of(out / "half.npz").name
+    left = out / mine.replace(f"part{os.getpid()}", f"part{gone.stdout.strip()}")
+    left.write_bytes(b"left by a killed worker")
+    whole_file._swept.clear()
     again = run(clips[:3], out, processes=1)
     assert (again.made, again.failed) == (2, 0)
     assert content(out) == before

@@ -19,7 +19,7 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import NDArray
 
-from warpjld.fem import Body, HexMesh, LinearElastic, Prescribed, ball, prescribe
+from warpjld.fem import Body, HexMesh, LinearElastic, Prescribed, ball_hexes, prescribe
 from warpjld.fem.contact import Pair, press
 from warpjld.fem.contact.obstacles.solids import Plane
 from warpjld.quiet import silence_warp
@@ -38,11 +38,11 @@ def main() -> None:
     parser.add_argument("--no-peer", action="store_true")
     arguments = parser.parse_args()
     times = (np.arange(arguments.increments) + 1) / arguments.increments
-    mesh = ball(1.0, n=arguments.elements, octant=True)
+    mesh = ball_hexes(1.0, n=arguments.elements, octant=True)
     print(f"{len(mesh.elements)} elements, {3 * len(mesh.nodes)} degrees of freedom, {len(times)} increments")
     print(f"{'':26}{'seconds':>8}{'solves':>8}{'iterations':>12}{'force at half':>15}{'at the end':>12}")
     ours(mesh, times)  # compiles
-    line("warpjld", *best(lambda: ours(ball(1.0, n=arguments.elements, octant=True), times), arguments.repeat))
+    line("warpjld", *best(lambda: ours(ball_hexes(1.0, n=arguments.elements, octant=True), times), arguments.repeat))
     peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024
     if not arguments.no_peer:
         line("scikit-fem + SciPy, penalty", *best(lambda: peer(mesh, times), 1))

@@ -20,17 +20,17 @@ from typing import Any
 
 import numpy as np
 
-from warpjld.fem import Body, HexMesh, LinearElastic, box, finger, prescribe
+from warpjld.fem import Body, HexMesh, LinearElastic, box_hexes, finger_hexes, prescribe
 from warpjld.fem.load.prescribed import rigid_modes
 from warpjld.fem.solver.linear import LinearSolver
 from warpjld.quiet import silence_warp
 
 CASES: dict[str, tuple[Callable[[], HexMesh], float, str]] = {
-    "cube45": (lambda: box(counts=(24, 24, 24)), 0.3, "x-"),
-    "cube148": (lambda: box(counts=(36, 36, 36)), 0.3, "x-"),
-    "cube547": (lambda: box(counts=(56, 56, 56)), 0.3, "x-"),
-    "finger57": (lambda: finger(n=16, layers=7, along=30), 0.49, "bone"),
-    "finger157": (lambda: finger(n=20, layers=12, along=40), 0.49, "bone"),
+    "cube45": (lambda: box_hexes(counts=(24, 24, 24)), 0.3, "x-"),
+    "cube148": (lambda: box_hexes(counts=(36, 36, 36)), 0.3, "x-"),
+    "cube547": (lambda: box_hexes(counts=(56, 56, 56)), 0.3, "x-"),
+    "finger57": (lambda: finger_hexes(n=16, layers=7, along=30), 0.49, "bone"),
+    "finger157": (lambda: finger_hexes(n=20, layers=12, along=40), 0.49, "bone"),
 }
 TOO_LARGE_FOR_PARDISO = 300_000
 

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from scipy.sparse.linalg import spsolve
 
-from warpjld.fem import Body, LinearElastic, Loads, box, prescribe, solve
+from warpjld.fem import Body, LinearElastic, Loads, box_hexes, prescribe, solve
 
 skfem = pytest.importorskip("skfem")
 
@@ -17,7 +17,7 @@ YOUNG, POISSON = 2.5, 0.3
 
 @pytest.fixture(scope="module")
 def body() -> Body:
-    mesh = box((1.0, 0.8, 0.6), (5, 4, 3))
+    mesh = box_hexes((1.0, 0.8, 0.6), (5, 4, 3))
     rng = np.random.default_rng(0)
     mesh = replace(mesh, nodes=mesh.nodes + rng.uniform(-0.02, 0.02, mesh.nodes.shape))
     return Body(mesh, LinearElastic(YOUNG, POISSON, mean_dilatation=False))
@@ -68,7 +68,7 @@ def test_solution(body: Body, theirs: np.ndarray, method: str) -> None:
 
 
 def test_same_bits_however_rows_are_shared() -> None:
-    mesh = box(counts=(9, 8, 7))
+    mesh = box_hexes(counts=(9, 8, 7))
     law = LinearElastic(YOUNG, POISSON)
     first = Body(mesh, law, threads=1).at()
     assert first.stiffness is not None

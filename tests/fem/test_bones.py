@@ -9,7 +9,7 @@ import pytest
 import trimesh
 from numpy.typing import NDArray
 
-from warpjld.fem import Body, Fung, HexMesh, box, prescribe
+from warpjld.fem import Body, Fung, HexMesh, box_hexes, prescribe
 from warpjld.fem.contact import Pair, press
 from warpjld.fem.contact.obstacles.solids import Plane
 from warpjld.fem.load.loads import volumes
@@ -114,7 +114,7 @@ def test_a_bone_keeps_its_section_and_elements_their_shape(size: float) -> None:
 
 
 def test_ends_of_a_bone_lie_where_they_are_said_to() -> None:
-    mesh = box((0.01, 0.01, 0.04), (8, 8, 20), origin=(-5e-3, -5e-3, 0.0))
+    mesh = box_hexes((0.01, 0.01, 0.04), (8, 8, 20), origin=(-5e-3, -5e-3, 0.0))
     bone = Bone(np.zeros(3), np.array([0.0, 0.0, 0.04]), np.zeros((2, 3)), np.array([3e-3, 2e-3]), 0.27, 0.78)
     bony = claimed(mesh, [bone]) == 0
     made = fitted(mesh, {0: mesh.elements[bony]}, {0: bone}, 1.6e-3)
@@ -126,14 +126,14 @@ def test_ends_of_a_bone_lie_where_they_are_said_to() -> None:
 
 
 def test_where_elements_are_too_large_a_bone_takes_those_along_its_axis() -> None:
-    mesh = box((0.012, 0.012, 0.04), (4, 4, 10), origin=(-6e-3, -6e-3, 0.0))
+    mesh = box_hexes((0.012, 0.012, 0.04), (4, 4, 10), origin=(-6e-3, -6e-3, 0.0))
     thin = Bone(np.array([1e-3, 1e-3, 0.0]), np.array([0.0, 0.0, 0.04]), np.zeros((2, 3)), np.full(2, 6e-4), 0.2, 0.8)
     owner = claimed(mesh, [thin])
     assert (owner == 0).sum() == 6
     middles = mesh.nodes[mesh.elements[owner == 0]].mean(axis=1)
     np.testing.assert_allclose(middles[:, :2], 1.5e-3)
     # none where all elements are of the outermost layer, unless it may take those
-    plate = box((0.012, 0.004, 0.04), (4, 1, 10), origin=(-6e-3, -2e-3, 0.0))
+    plate = box_hexes((0.012, 0.004, 0.04), (4, 1, 10), origin=(-6e-3, -2e-3, 0.0))
     wide = Bone(np.zeros(3), np.array([0.0, 0.0, 0.04]), np.zeros((2, 3)), np.full(2, 2e-3), 0.2, 0.8)
     assert (claimed(plate, [wide]) == -1).all()
     assert (claimed(plate, [wide], bare=[0]) == 0).sum() == 12

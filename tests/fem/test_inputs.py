@@ -17,7 +17,7 @@ from warpjld.fem import (
     NeoHooke,
     SolveError,
     Status,
-    box,
+    box_hexes,
     merge,
     prescribe,
     solve,
@@ -27,7 +27,7 @@ LAW = LinearElastic(1.0, 0.3)
 
 
 def test_negative_jacobian() -> None:
-    mesh = box(counts=(2, 2, 2))
+    mesh = box_hexes(counts=(2, 2, 2))
     elements = mesh.elements.copy()
     elements[5] = elements[5, [4, 5, 6, 7, 0, 1, 2, 3]]
     with pytest.raises(InputError, match="negative Jacobian, the worst is element 5"):
@@ -53,24 +53,24 @@ def test_poisson_near_a_half_warns() -> None:
 
 def test_unknown_region_suggests() -> None:
     with pytest.raises(InputError, match="did you mean body"):
-        Body(box(counts=(1, 1, 1)), {"bodi": LAW})
+        Body(box_hexes(counts=(1, 1, 1)), {"bodi": LAW})
 
 
 def test_region_without_material() -> None:
-    mesh = merge(box(name="left"), box(origin=(2, 0, 0), name="right"))
+    mesh = merge(box_hexes(name="left"), box_hexes(origin=(2, 0, 0), name="right"))
     with pytest.raises(InputError, match="region 'right' has no material"):
         Body(mesh, {"left": LAW})
 
 
 def test_load_on_missing_face() -> None:
-    mesh = box(counts=(2, 2, 2))
+    mesh = box_hexes(counts=(2, 2, 2))
     held = prescribe(mesh, "x-", x=0, y=0, z=0)
     with pytest.raises(InputError, match=r"pressure on a missing face set: no face set 'top'"):
         solve(Body(mesh, LAW), held, Loads(pressure={"top": 1.0}))
 
 
 def test_two_displacements_for_one_node() -> None:
-    mesh = box(counts=(1, 1, 1))
+    mesh = box_hexes(counts=(1, 1, 1))
     with pytest.raises(InputError, match="given two displacements along x"):
         prescribe(mesh, "x-", x=0) + prescribe(mesh, "y-", x=0.1)
 
@@ -80,27 +80,27 @@ def test_two_displacements_for_one_node() -> None:
     [({}, "moving along x"), ({"x": 0.0}, "moving along y"), ({"x": 0.0, "y": 0.0}, "moving along z")],
 )
 def test_unconstrained_body(held: dict[str, float], free: str) -> None:
-    mesh = box(counts=(2, 2, 2))
+    mesh = box_hexes(counts=(2, 2, 2))
     known = prescribe(mesh, "x-", **held) if held else prescribe(mesh, [0], x=0.0)
     with pytest.raises(FreeBodyError, match=free if held else "not held"):
         solve(Body(mesh, LAW), known)
 
 
 def test_one_of_two_bodies_free() -> None:
-    mesh = merge(box(name="left"), box(origin=(2, 0, 0), name="right"))
+    mesh = merge(box_hexes(name="left"), box_hexes(origin=(2, 0, 0), name="right"))
     with pytest.raises(FreeBodyError, match=r"\(right\) is not held: free in moving along x"):
         solve(Body(mesh, LAW), prescribe(mesh, "left", x=0, y=0, z=0))
 
 
 def test_hinge_is_free_to_turn() -> None:
-    mesh = box(counts=(2, 2, 2))
+    mesh = box_hexes(counts=(2, 2, 2))
     edge = np.flatnonzero((mesh.nodes[:, 0] == 0) & (mesh.nodes[:, 1] == 0))
     with pytest.raises(FreeBodyError, match="turning about"):
         solve(Body(mesh, LAW), prescribe(mesh, edge, x=0, y=0, z=0))
 
 
 def test_free_body_held_under_balanced_loads_has_no_reactions() -> None:
-    mesh = box(counts=(4, 4, 4))
+    mesh = box_hexes(counts=(4, 4, 4))
     loads = Loads(traction={"x-": (-1, 0, 0), "x+": (1, 0, 0)})
     known = prescribe(mesh, "z-", z=0)
     found = solve(Body(mesh, LAW), known, loads, free="hold")
@@ -112,7 +112,7 @@ def test_free_body_held_under_balanced_loads_has_no_reactions() -> None:
 
 @pytest.mark.parametrize("known", [{"x": 0.0}, {"x": 0.0, "y": 0.0}, {"x": 0.0, "y": 0.0, "z": 0.0}])
 def test_one_two_or_three_degrees_of_freedom(known: dict[str, float]) -> None:
-    mesh = box(counts=(2, 2, 2))
+    mesh = box_hexes(counts=(2, 2, 2))
     held = prescribe(mesh, "x-", **known)
     assert len(held.degrees) == 9 * len(known)
     found = solve(Body(mesh, LAW), held, Loads(traction={"x+": (1, 0, 0)}), free="hold")
@@ -122,7 +122,7 @@ def test_one_two_or_three_degrees_of_freedom(known: dict[str, float]) -> None:
 
 
 def test_infinite_load_is_named() -> None:
-    mesh = box(counts=(2, 2, 2))
+    mesh = box_hexes(counts=(2, 2, 2))
     with pytest.raises(InputError, match="gravity: want finite numbers"):
         solve(Body(mesh, LAW), prescribe(mesh, "x-", x=0, y=0, z=0), Loads(gravity=(0, np.nan, 0)))
 
@@ -130,7 +130,7 @@ def test_infinite_load_is_named() -> None:
 def test_too_few_iterations_are_a_status() -> None:
     from warpjld.fem.solver.linear import LinearSolver
 
-    mesh = box(counts=(8, 8, 8))
+    mesh = box_hexes(counts=(8, 8, 8))
     body = Body(mesh, LAW)
     known = prescribe(mesh, "x-", x=0, y=0, z=0)
     stiffness = body.at().stiffness
@@ -164,7 +164,7 @@ def test_stagnation_is_named() -> None:
 
 
 def test_failure_raises_with_what_was_reached() -> None:
-    mesh = box(counts=(2, 2, 2))
+    mesh = box_hexes(counts=(2, 2, 2))
     held = prescribe(mesh, "x-", x=0, y=0, z=0)
     with pytest.raises(SolveError, match="no equilibrium") as caught:
         solve(Body(mesh, NeoHooke(1.0, 0.3)), held + prescribe(mesh, "x+", x=-1.5, y=0, z=0))

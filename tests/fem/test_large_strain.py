@@ -16,8 +16,8 @@ from warpjld.fem import (
     MooneyRivlin,
     NeoHooke,
     Status,
-    ball,
-    box,
+    ball_hexes,
+    box_hexes,
     prescribe,
     solve,
 )
@@ -38,7 +38,7 @@ pytestmark = pytest.mark.filterwarnings("ignore::warpjld.fem.MaterialWarning")
     ],
 )
 def test_tangent_against_finite_differences(law: Material) -> None:
-    mesh = box((1.0, 1.0, 1.0), (2, 2, 2))
+    mesh = box_hexes((1.0, 1.0, 1.0), (2, 2, 2))
     rng = np.random.default_rng(0)
     body = Body(mesh, law, initial_stress=[0.1, 0.2, 0.05, 0.03, 0.02, 0.01])
     u = rng.uniform(-0.06, 0.06, body.degrees)
@@ -51,7 +51,7 @@ def test_tangent_against_finite_differences(law: Material) -> None:
 
 
 def test_pressure_stiffness_against_finite_differences() -> None:
-    mesh = box((1.0, 1.0, 1.0), (2, 2, 2))
+    mesh = box_hexes((1.0, 1.0, 1.0), (2, 2, 2))
     rng = np.random.default_rng(0)
     body = Body(mesh, NeoHooke(1.0, 0.4))
     loads = Loads(pressure={"surface": 1.0})
@@ -73,7 +73,7 @@ def test_pressure_stiffness_against_finite_differences() -> None:
 )
 def test_elastica(load: float, deflection: float, shortening: float) -> None:
     length, young = 40.0, 1000.0
-    mesh = box((length, 1.0, 1.0), (320, 8, 1))
+    mesh = box_hexes((length, 1.0, 1.0), (320, 8, 1))
     force = load * young / 12.0 / length**2
     found = solve(
         Body(mesh, NeoHooke(young, 0.0)),
@@ -98,7 +98,7 @@ def test_elastica(load: float, deflection: float, shortening: float) -> None:
 )
 def test_inflated_shell_beyond_its_limit_point(stretch: float, pressure: float) -> None:
     """The inner wall's radius is prescribed, so that the pressure may fall; reactions give it."""
-    mesh = ball(1.0, inner=0.8, n=4, layers=6, octant=True)
+    mesh = ball_hexes(1.0, inner=0.8, n=4, layers=6, octant=True)
     poisson = 0.4999
     body = Body(mesh, NeoHooke(2.0 * (1.0 + poisson), poisson))
     wall = mesh.node_set("inner")
@@ -114,7 +114,7 @@ def test_inflated_shell_beyond_its_limit_point(stretch: float, pressure: float) 
 
 @pytest.mark.parametrize(("stretch", "pressure"), [(1.05, 0.083654), (1.1, 0.144424), (1.2, 0.219506)])
 def test_shell_under_following_pressure(stretch: float, pressure: float) -> None:
-    mesh = ball(1.0, inner=0.8, n=4, layers=4, octant=True)
+    mesh = ball_hexes(1.0, inner=0.8, n=4, layers=4, octant=True)
     poisson = 0.4999
     body = Body(mesh, NeoHooke(2.0 * (1.0 + poisson), poisson))
     held = prescribe(mesh, "x0", x=0) + prescribe(mesh, "y0", y=0) + prescribe(mesh, "z0", z=0)
@@ -129,7 +129,7 @@ def test_shell_under_following_pressure(stretch: float, pressure: float) -> None
     [NeoHooke(1.0, 0.3), NeoHooke(1.0, 0.3, mean_dilatation=False), MooneyRivlin(0.1, 0.09, 0.3), Fung(1.0, 5.0, 0.3)],
 )
 def test_turning_as_a_whole_costs_nothing(law: Material) -> None:
-    mesh = box((1.0, 1.0, 1.0), (2, 2, 2))
+    mesh = box_hexes((1.0, 1.0, 1.0), (2, 2, 2))
     angle = 2.0
     turn = np.array([[np.cos(angle), -np.sin(angle), 0], [np.sin(angle), np.cos(angle), 0], [0, 0, 1.0]])
     u = mesh.nodes @ turn.T - mesh.nodes
@@ -139,7 +139,7 @@ def test_turning_as_a_whole_costs_nothing(law: Material) -> None:
 @pytest.mark.parametrize("strain", [(0, 0), (1, 1), (2, 2), (0, 1), (1, 2), (2, 0)])
 def test_patch_with_full_integration(strain: tuple[int, int]) -> None:
     """A uniform deformation of a fifth on a distorted mesh, and its stress, μ dev b̄ / J + κ (J − 1)."""
-    mesh = box((1.0, 1.0, 1.0), (3, 3, 3))
+    mesh = box_hexes((1.0, 1.0, 1.0), (3, 3, 3))
     inside = np.setdiff1d(np.arange(len(mesh.nodes)), mesh.node_set("surface"))
     nodes = mesh.nodes.copy()
     nodes[inside] += np.random.default_rng(1).uniform(-0.05, 0.05, (len(inside), 3))
@@ -161,7 +161,7 @@ def test_patch_with_full_integration(strain: tuple[int, int]) -> None:
 
 def test_full_integration_locks() -> None:
     """A shell of nearly incompressible rubber that its own mean-dilatation element swells to 1.1."""
-    mesh = ball(1.0, inner=0.8, n=4, layers=2, octant=True)
+    mesh = ball_hexes(1.0, inner=0.8, n=4, layers=2, octant=True)
     held = prescribe(mesh, "x0", x=0) + prescribe(mesh, "y0", y=0) + prescribe(mesh, "z0", z=0)
     wall = mesh.node_set("inner")
     swollen = []
@@ -175,7 +175,7 @@ def test_full_integration_locks() -> None:
 
 def test_uniform_stretch_of_mooney_rivlin() -> None:
     """Incompressible uniaxial tension: P = 2 (λ − λ⁻²)(c₁₀ + c₀₁/λ)."""
-    mesh = box((1.0, 1.0, 1.0), (2, 2, 2))
+    mesh = box_hexes((1.0, 1.0, 1.0), (2, 2, 2))
     c10, c01, stretch = 0.3, 0.15, 1.8
     held = prescribe(mesh, "x-", x=0) + prescribe(mesh, "y-", y=0) + prescribe(mesh, "z-", z=0)
     held = held + prescribe(mesh, "x+", x=stretch - 1.0)
@@ -186,7 +186,7 @@ def test_uniform_stretch_of_mooney_rivlin() -> None:
 
 def test_uniform_stretch_of_fung() -> None:
     """Incompressible uniaxial tension: P = μ exp(β (λ² + 2/λ − 3)) (λ − λ⁻²), true stress λ P."""
-    mesh = box((1.0, 1.0, 1.0), (2, 2, 2))
+    mesh = box_hexes((1.0, 1.0, 1.0), (2, 2, 2))
     beta, stretch = 2.0, 1.4
     held = prescribe(mesh, "x-", x=0) + prescribe(mesh, "y-", y=0) + prescribe(mesh, "z-", z=0)
     held = held + prescribe(mesh, "x+", x=stretch - 1.0)
@@ -199,7 +199,7 @@ def test_uniform_stretch_of_fung() -> None:
 
 
 def test_too_much_pressure_says_so() -> None:
-    mesh = ball(1.0, inner=0.8, n=2, layers=2, octant=True)
+    mesh = ball_hexes(1.0, inner=0.8, n=2, layers=2, octant=True)
     held = prescribe(mesh, "x0", x=0) + prescribe(mesh, "y0", y=0) + prescribe(mesh, "z0", z=0)
     found = solve(Body(mesh, NeoHooke(2.9, 0.45)), held, Loads(pressure={"inner": 0.6}), instants=4, check=False)
     assert found.status is not Status.CONVERGED

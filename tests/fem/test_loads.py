@@ -5,14 +5,14 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from warpjld.fem import Body, Centrifugal, LinearElastic, Loads, NeoHooke, ball, box, prescribe, solve
+from warpjld.fem import Body, Centrifugal, LinearElastic, Loads, NeoHooke, ball_hexes, box_hexes, prescribe, solve
 from warpjld.fem.load.loads import external_forces
 from warpjld.fem.output.stress import cauchy, mises
 
 
 def test_column_under_its_own_weight() -> None:
     """σ = ρ g (h − z), shortening ρ g h² / 2E, without lateral strain (ν = 0)."""
-    mesh = box((0.1, 0.1, 2.0), (1, 1, 20))
+    mesh = box_hexes((0.1, 0.1, 2.0), (1, 1, 20))
     body = Body(mesh, LinearElastic(1e6, 0.0, 1200.0))
     found = solve(body, prescribe(mesh, "z-", x=0, y=0, z=0), Loads(gravity=(0, 0, -9.81)))
     top = found.displacement[mesh.node_set("z+"), 2]
@@ -25,7 +25,7 @@ def test_column_under_its_own_weight() -> None:
 
 def test_rod_that_turns() -> None:
     """Lengthening ρ ω² L³ / 3E of a rod held at its axis (ν = 0)."""
-    mesh = box((1.0, 0.05, 0.05), (40, 1, 1), origin=(0, -0.025, -0.025))
+    mesh = box_hexes((1.0, 0.05, 0.05), (40, 1, 1), origin=(0, -0.025, -0.025))
     body = Body(mesh, LinearElastic(1e6, 0.0, 1000.0))
     turn = Centrifugal(axis=(0, 0, 2.0), speed=5.0)
     held = prescribe(mesh, "x-", x=0) + prescribe(mesh, [0], y=0, z=0) + prescribe(mesh, [1], y=0)
@@ -35,7 +35,7 @@ def test_rod_that_turns() -> None:
 
 
 def test_pressure_on_a_closed_surface_has_no_resultant_and_the_right_virial() -> None:
-    mesh = ball(1.3, n=8)
+    mesh = ball_hexes(1.3, n=8)
     body = Body(mesh, LinearElastic(1.0, 0.3))
     force = external_forces(body, Loads(pressure={"outer": 2.0})).reshape(-1, 3)
     np.testing.assert_allclose(force.sum(axis=0), 0.0, atol=1e-12)
@@ -45,7 +45,7 @@ def test_pressure_on_a_closed_surface_has_no_resultant_and_the_right_virial() ->
 
 
 def test_concentrated_force_is_shared_by_the_nodes() -> None:
-    mesh = box(counts=(2, 2, 2))
+    mesh = box_hexes(counts=(2, 2, 2))
     body = Body(mesh, LinearElastic(1.0, 0.3))
     force = external_forces(body, Loads(forces={"x+": (3.0, 0.0, -9.0)})).reshape(-1, 3)
     np.testing.assert_allclose(force[mesh.node_set("x+")], np.tile([3 / 9, 0.0, -1.0], (9, 1)))
@@ -55,7 +55,7 @@ def test_concentrated_force_is_shared_by_the_nodes() -> None:
 @pytest.mark.parametrize("law", [LinearElastic(1e5, 0.3), NeoHooke(1e5, 0.3)])
 def test_initial_stress_relaxes_into_strain(law: object) -> None:
     """A free body with σ₀ deforms until it is free of stress: ε = −σ₀ / E along x, here with ν = .3 across."""
-    mesh = box(counts=(2, 2, 2))
+    mesh = box_hexes(counts=(2, 2, 2))
     body = Body(mesh, law, initial_stress=[10.0, 0, 0, 0, 0, 0])  # type: ignore[arg-type]
     held = prescribe(mesh, "x-", x=0) + prescribe(mesh, "y-", y=0) + prescribe(mesh, "z-", z=0)
     found = solve(body, held)
@@ -67,7 +67,7 @@ def test_initial_stress_relaxes_into_strain(law: object) -> None:
 
 
 def test_instants_and_steps_end_in_the_same_place() -> None:
-    mesh = box((1, 1, 2), (2, 2, 4))
+    mesh = box_hexes((1, 1, 2), (2, 2, 4))
     body = Body(mesh, NeoHooke(1.0, 0.45))
     base = prescribe(mesh, "z-", x=0, y=0, z=0)
     loads = Loads(traction={"z+": (0.02, 0, 0.05)})
@@ -85,7 +85,7 @@ def test_instants_and_steps_end_in_the_same_place() -> None:
 
 
 def test_steps_of_a_linear_body() -> None:
-    mesh = box(counts=(2, 2, 2))
+    mesh = box_hexes(counts=(2, 2, 2))
     body = Body(mesh, LinearElastic(1.0, 0.3))
     base = prescribe(mesh, "z-", x=0, y=0, z=0)
     pulled = solve(body, base + prescribe(mesh, "z+", z=0.3))
@@ -95,7 +95,7 @@ def test_steps_of_a_linear_body() -> None:
 
 
 def test_same_bits_every_run() -> None:
-    mesh = ball(1.0, inner=0.7, n=8)
+    mesh = ball_hexes(1.0, inner=0.7, n=8)
     results = []
     for threads in (1, 2, 1):
         body = Body(mesh, NeoHooke(1.0, 0.45), threads=threads)

@@ -10,7 +10,19 @@ import pytest
 import trimesh
 
 from warpjld.errors import InputError
-from warpjld.fem import Body, HexMesh, LinearElastic, Loads, ball, box, cylinder, finger, merge, prescribe, solve
+from warpjld.fem import (
+    Body,
+    HexMesh,
+    LinearElastic,
+    Loads,
+    ball_hexes,
+    box_hexes,
+    cylinder_hexes,
+    finger_hexes,
+    merge,
+    prescribe,
+    solve,
+)
 from warpjld.fem.mesh.embedding import embed
 from warpjld.fem.mesh.envelope import Envelope
 from warpjld.fem.mesh.fit import fit_mesh
@@ -25,13 +37,13 @@ def volume(mesh: HexMesh) -> float:
 @pytest.mark.parametrize(
     ("mesh", "exact"),
     [
-        (box((1, 2, 3), (2, 3, 4)), 6.0),
-        (ball(1.0, n=12), 4.18879),
-        (ball(1.0, inner=0.5, n=12), 3.66519),
-        (ball(1.0, n=8, octant=True), 0.523599),
-        (cylinder(1.0, 2.0, n=12), 6.28319),
-        (cylinder(1.0, 2.0, inner=0.5, n=12), 4.71239),
-        (finger(1.0, 4.0, n=12), 3.0 * np.pi + 2.0 / 3.0 * np.pi),
+        (box_hexes((1, 2, 3), (2, 3, 4)), 6.0),
+        (ball_hexes(1.0, n=12), 4.18879),
+        (ball_hexes(1.0, inner=0.5, n=12), 3.66519),
+        (ball_hexes(1.0, n=8, octant=True), 0.523599),
+        (cylinder_hexes(1.0, 2.0, n=12), 6.28319),
+        (cylinder_hexes(1.0, 2.0, inner=0.5, n=12), 4.71239),
+        (finger_hexes(1.0, 4.0, n=12), 3.0 * np.pi + 2.0 / 3.0 * np.pi),
     ],
 )
 def test_structured_meshes(mesh: HexMesh, exact: float) -> None:
@@ -47,7 +59,7 @@ def test_structured_meshes(mesh: HexMesh, exact: float) -> None:
 
 def prisms() -> HexMesh:
     """A cube of two prisms."""
-    cube = box(counts=(1, 1, 1))
+    cube = box_hexes(counts=(1, 1, 1))
     a, b, c, d, e, f, g, h = cube.elements[0]
     elements = np.array([[a, b, c, c, e, f, g, g], [a, c, d, d, e, g, h, h]], np.int32)
     return HexMesh(cube.nodes, elements, np.zeros(2, np.int32))
@@ -55,7 +67,7 @@ def prisms() -> HexMesh:
 
 def tetrahedra() -> HexMesh:
     """A cube of six tetrahedra."""
-    cube = box(counts=(1, 1, 1))
+    cube = box_hexes(counts=(1, 1, 1))
     corner = cube.elements[0]
     four = [[0, 1, 2, 6], [0, 2, 3, 6], [0, 3, 7, 6], [0, 7, 4, 6], [0, 4, 5, 6], [0, 5, 1, 6]]
     elements = [corner[[a, b, c, c, d, d, d, d]] for a, b, c, d in four]
@@ -147,7 +159,7 @@ def test_manifold_cells() -> None:
 
 
 def test_embedded_points_follow_a_linear_field_exactly() -> None:
-    mesh = ball(1.0, n=8)
+    mesh = ball_hexes(1.0, n=8)
     rng = np.random.default_rng(0)
     points = rng.normal(size=(400, 3))
     points *= (rng.random(400) ** (1 / 3) * 1.01 / np.linalg.norm(points, axis=1))[:, None]
@@ -167,7 +179,7 @@ def test_exchange(tmp_path: Path, suffix: str) -> None:
     pytest.importorskip("meshio")
     from warpjld.fem.mesh.exchange import read_mesh, write_mesh
 
-    mesh = ball(1.0, n=2)
+    mesh = ball_hexes(1.0, n=2)
     write_mesh(tmp_path / f"ball{suffix}", mesh)
     again = read_mesh(tmp_path / f"ball{suffix}")
     np.testing.assert_allclose(again.nodes[again.elements], mesh.nodes[mesh.elements], atol=1e-12)
@@ -192,7 +204,7 @@ def test_tetrahedra_are_read_as_degenerate_hexahedra(data: Path) -> None:
 
 
 def test_merged_bodies_are_solved_apart() -> None:
-    left, right = box(counts=(3, 3, 3), name="left"), box(origin=(2, 0, 0), counts=(2, 2, 2), name="right")
+    left, right = box_hexes(counts=(3, 3, 3), name="left"), box_hexes(origin=(2, 0, 0), counts=(2, 2, 2), name="right")
     both = merge(left, right)
     assert both.region_names == ("left", "right")
     laws = {"left": LinearElastic(1.0, 0.3), "right": LinearElastic(2.0, 0.3)}
@@ -204,7 +216,7 @@ def test_merged_bodies_are_solved_apart() -> None:
 
 
 def test_inverted_corner_has_a_negative_scaled_jacobian() -> None:
-    mesh = box(counts=(1, 1, 1))
+    mesh = box_hexes(counts=(1, 1, 1))
     nodes = mesh.nodes.copy()
     nodes[7] = [-0.5, -0.5, -0.5]
     assert replace(mesh, nodes=nodes).scaled_jacobian()[0] < 0

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from warpjld.fem import Body, HexMesh, LinearElastic, ball, box, finger, prescribe
+from warpjld.fem import Body, HexMesh, LinearElastic, ball_hexes, box_hexes, finger_hexes, prescribe
 from warpjld.fem.solver.galerkin import coarse_matrix
 from warpjld.fem.solver.hierarchy import hierarchy_of
 from warpjld.fem.solver.linear import LinearSolver
@@ -27,33 +27,36 @@ def iterations(mesh: HexMesh, poisson: float, fixed: str, precision: str = "floa
 
 
 def test_iterations_do_not_grow_with_the_mesh() -> None:
-    counts = [iterations(box(counts=(n, n, n)), 0.3, "x-") for n in (8, 16, 24)]
+    counts = [iterations(box_hexes(counts=(n, n, n)), 0.3, "x-") for n in (8, 16, 24)]
     assert max(counts) <= 12
 
 
 @pytest.mark.slow
 def test_iterations_up_to_half_a_million_degrees_of_freedom() -> None:
-    assert iterations(box(counts=(36, 36, 36)), 0.3, "x-") <= 12
-    assert iterations(box(counts=(56, 56, 56)), 0.3, "x-") <= 12
+    assert iterations(box_hexes(counts=(36, 36, 36)), 0.3, "x-") <= 12
+    assert iterations(box_hexes(counts=(56, 56, 56)), 0.3, "x-") <= 12
 
 
 @pytest.mark.parametrize("n", [8, 12])
 def test_iterations_at_poisson_49(n: int) -> None:
-    assert iterations(finger(n=n, layers=n // 2, along=2 * n), 0.49, "bone") <= 30
+    assert iterations(finger_hexes(n=n, layers=n // 2, along=2 * n), 0.49, "bone") <= 30
 
 
 def test_odd_numbers_of_elements() -> None:
-    assert iterations(box(counts=(15, 13, 17)), 0.3, "x-") <= 14
-    assert iterations(ball(n=7, inner=0.5, layers=5).with_nodes(pole=np.arange(20, dtype=np.int32)), 0.3, "pole") <= 30
+    assert iterations(box_hexes(counts=(15, 13, 17)), 0.3, "x-") <= 14
+    assert (
+        iterations(ball_hexes(n=7, inner=0.5, layers=5).with_nodes(pole=np.arange(20, dtype=np.int32)), 0.3, "pole")
+        <= 30
+    )
 
 
 def test_single_precision_refined() -> None:
-    assert iterations(box(counts=(12, 12, 12)), 0.3, "x-", "float32") <= 25
+    assert iterations(box_hexes(counts=(12, 12, 12)), 0.3, "x-", "float32") <= 25
 
 
 @pytest.mark.parametrize("kind", ["blocks", "lattice", "points"])
 def test_weights_reproduce_linear_fields(kind: str) -> None:
-    mesh = box((1, 1, 1), (12, 12, 12))
+    mesh = box_hexes((1, 1, 1), (12, 12, 12))
     grid = np.rint(mesh.nodes * 12).astype(np.int32)
     mesh = HexMesh(
         mesh.nodes,
@@ -75,7 +78,7 @@ def test_weights_reproduce_linear_fields(kind: str) -> None:
 def test_coarse_matrix_is_the_galerkin_product() -> None:
     from scipy.sparse import eye_array, kron
 
-    mesh = box(counts=(9, 8, 7))
+    mesh = box_hexes(counts=(9, 8, 7))
     body = Body(mesh, LinearElastic(1.0, 0.3))
     free = (prescribe(mesh, "x-", x=0) + prescribe(mesh, "y-", z=0)).free(body.degrees)
     stiffness = body.at().stiffness
@@ -93,7 +96,7 @@ def test_coarse_matrix_is_the_galerkin_product() -> None:
 
 
 def test_cycle_is_symmetric_and_positive() -> None:
-    mesh = box(counts=(10, 9, 8))
+    mesh = box_hexes(counts=(10, 9, 8))
     body = Body(mesh, LinearElastic(1.0, 0.3))
     free = prescribe(mesh, "x-", x=0, y=0, z=0).free(body.degrees)
     stiffness = body.at().stiffness

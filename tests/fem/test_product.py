@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.sparse import csr_array, random_array
 
-from warpjld.fem import HexMesh, ball
+from warpjld.fem import HexMesh, ball_hexes
 from warpjld.fem.solver.pattern import pattern_of
 from warpjld.fem.solver.product import product_pattern
 
@@ -29,7 +29,7 @@ def test_a_product_of_three_against_scipy(rows: int, threads: int) -> None:
 
 
 def test_neighbours_of_a_mesh_share_an_element() -> None:
-    mesh = ball(n=4, inner=0.5, layers=3)
+    mesh = ball_hexes(n=4, inner=0.5, layers=3)
     found = pattern_of(mesh, threads=2)
     for node in range(0, len(mesh.nodes), 17):
         around = np.unique(mesh.elements[(mesh.elements == node).any(axis=1)])

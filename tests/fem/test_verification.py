@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from warpjld.fem import Body, HexMesh, LinearElastic, Loads, ball, box, cylinder, prescribe, solve
+from warpjld.fem import Body, HexMesh, LinearElastic, Loads, ball_hexes, box_hexes, cylinder_hexes, prescribe, solve
 from warpjld.fem.load.prescribed import Prescribed
 
 pytestmark = pytest.mark.filterwarnings("ignore::warpjld.fem.MaterialWarning")
@@ -16,7 +16,7 @@ STRAINS = [(0, 0), (1, 1), (2, 2), (0, 1), (1, 2), (2, 0)]
 
 
 def distorted(n: int, shift: float) -> HexMesh:
-    mesh = box((1.0, 1.0, 1.0), (n, n, n))
+    mesh = box_hexes((1.0, 1.0, 1.0), (n, n, n))
     inside = np.setdiff1d(np.arange(len(mesh.nodes)), mesh.node_set("surface"))
     nodes = mesh.nodes.copy()
     nodes[inside] += np.random.default_rng(1).uniform(-shift, shift, (len(inside), 3))
@@ -52,7 +52,7 @@ def test_patch_in_single_precision_reaches_double_residuals() -> None:
 
 def test_cantilever_with_sheared_tip() -> None:
     length, force, young, poisson = 10.0, 1.0, 1000.0, 0.3
-    mesh = box((length, 1.0, 1.0), (80, 8, 8))
+    mesh = box_hexes((length, 1.0, 1.0), (80, 8, 8))
     body = Body(mesh, LinearElastic(young, poisson))
     found = solve(body, prescribe(mesh, "x-", x=0, y=0, z=0), Loads(traction={"x+": (0.0, force, 0.0)}))
     beam = force * length**3 / (3 * young / 12) + 1.2 * force * length / (young / (2 * (1 + poisson)))
@@ -61,7 +61,7 @@ def test_cantilever_with_sheared_tip() -> None:
 
 
 def cook(n: int, young: float, poisson: float, force: float, *, plane_strain: bool) -> tuple[float, float]:
-    mesh = box((48.0, 1.0, 1.0), (n, n, 1 if plane_strain else 2))
+    mesh = box_hexes((48.0, 1.0, 1.0), (n, n, 1 if plane_strain else 2))
     nodes = mesh.nodes.copy()
     share = nodes[:, 0] / 48.0
     nodes[:, 1] = 44.0 * share + nodes[:, 1] * (44.0 - 28.0 * share)
@@ -87,7 +87,7 @@ def test_cook_nearly_incompressible() -> None:
     [(0.3, 0.8, 0.3), (0.45, 0.842857, 0.235714), (0.49, 0.854286, 0.218571), (0.4999, 0.857114, 0.214329)],
 )
 def test_lame_sphere(poisson: float, inside: float, outside: float) -> None:
-    mesh = ball(2.0, inner=1.0, n=12, layers=12, octant=True)
+    mesh = ball_hexes(2.0, inner=1.0, n=12, layers=12, octant=True)
     found = solve(Body(mesh, LinearElastic(1.0, poisson)), octant_planes(mesh), Loads(pressure={"inner": 1.0}))
     radius = np.linalg.norm(mesh.nodes, axis=1)
     outwards = (found.displacement * mesh.nodes).sum(axis=1) / radius
@@ -97,7 +97,7 @@ def test_lame_sphere(poisson: float, inside: float, outside: float) -> None:
 
 @pytest.mark.parametrize(("poisson", "inside", "outside"), [(0.3, 1.90667, 1.21333), (0.49, 1.9966, 1.0132)])
 def test_lame_cylinder(poisson: float, inside: float, outside: float) -> None:
-    mesh = cylinder(2.0, 0.25, inner=1.0, n=12, layers=12, along=2, quarter=True)
+    mesh = cylinder_hexes(2.0, 0.25, inner=1.0, n=12, layers=12, along=2, quarter=True)
     held = prescribe(mesh, "x0", x=0.0) + prescribe(mesh, "y0", y=0.0)
     held = held + prescribe(mesh, "bottom", z=0.0) + prescribe(mesh, "top", z=0.0)
     found = solve(Body(mesh, LinearElastic(1.0, poisson)), held, Loads(pressure={"inner": 1.0}))
@@ -109,7 +109,7 @@ def test_lame_cylinder(poisson: float, inside: float, outside: float) -> None:
 
 def test_locking_without_mean_dilatation() -> None:
     """The comparison that shows what B-bar is for."""
-    mesh = ball(2.0, inner=1.0, n=6, layers=6, octant=True)
+    mesh = ball_hexes(2.0, inner=1.0, n=6, layers=6, octant=True)
     law = LinearElastic(1.0, 0.4999, mean_dilatation=False)
     found = solve(Body(mesh, law), octant_planes(mesh), Loads(pressure={"inner": 1.0}))
     outwards = np.linalg.norm(found.displacement[mesh.node_set("inner")], axis=1).mean()
@@ -136,7 +136,7 @@ def test_convergence_rates() -> None:
     errors = []
     shape, slopes = shape_at(POINTS), slope_at(POINTS)
     for n in (4, 8, 16):
-        mesh = box((1.0, 1.0, 1.0), (n, n, n))
+        mesh = box_hexes((1.0, 1.0, 1.0), (n, n, n))
         bent = mesh.nodes + 0.04 * np.sin(2 * np.pi * mesh.nodes[:, [1, 2, 0]]) * np.sin(np.pi * mesh.nodes)
         mesh = replace(mesh, nodes=bent)
         x = mesh.nodes[mesh.elements]

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from warpjld.fem import Body, LinearElastic, Prescribed, box, merge, prescribe
+from warpjld.fem import Body, LinearElastic, Prescribed, box_hexes, merge, prescribe
 from warpjld.fem.contact import ContactSolution, Pair, press
 from warpjld.fem.contact.obstacles.solids import Plane
 from warpjld.fem.load.loads import Loads
@@ -80,7 +80,7 @@ class Squeeze:
 def pads() -> HexMesh:
     parts = []
     for name, start, skin, back in (("left", -0.5 * EDGE - PAD[0], "x+", "x-"), ("right", 0.5 * EDGE, "x-", "x+")):
-        pad = box(PAD, (1, 2, 2), origin=(start, -0.5 * PAD[1], -0.5 * PAD[2]), name=f"{name}.flesh")
+        pad = box_hexes(PAD, (1, 2, 2), origin=(start, -0.5 * PAD[1], -0.5 * PAD[2]), name=f"{name}.flesh")
         parts.append(replace(pad, faces={f"pad.{name}": pad.faces[skin], f"{name}.back": pad.faces[back]}))
     return merge(*parts)
 

@@ -9,20 +9,20 @@ import numpy as np
 import pytest
 import trimesh
 
-from warpjld.fem import HexMesh, ball, merge
-from warpjld.fem.contact.results.nodal_contact import skin_around
+from warpjld.fem import HexMesh, ball_hexes, merge
+from warpjld.fem.contact.results.nodal_contact import tributary_areas
 from warpjld.fem.mesh.embedding import Embedding, embed
 from warpjld.simulation.display.pressure_map import PressureMap, pressure_map
 from warpjld.simulation.display.refine import RefinedSurface, refine_surface
 
-MESH = ball(1.0, n=8)
+MESH = ball_hexes(1.0, n=8)
 OUTER = np.unique(MESH.quads(MESH.face_set("outer")))
 
 
 def cap(mesh: HexMesh) -> np.ndarray:
     """Pressure that falls from 1 at the pole to 0 at half a radius from it, as forces on the nodes."""
     away = np.linalg.norm(mesh.nodes - [0.0, 0.0, 1.0], axis=1)
-    return np.maximum(1.0 - (away / 0.5) ** 2, 0.0) * skin_around(mesh, "outer", mesh.nodes)
+    return np.maximum(1.0 - (away / 0.5) ** 2, 0.0) * tributary_areas(mesh, "outer", mesh.nodes)
 
 
 def mapped(
@@ -64,7 +64,7 @@ def test_the_peak_is_that_of_the_nodes() -> None:
     visible = trimesh.creation.icosphere(4)
     vertices, faces = np.asarray(visible.vertices), np.asarray(visible.faces, np.int32)
     force = cap(MESH)
-    around = skin_around(MESH, "outer", MESH.nodes)
+    around = tributary_areas(MESH, "outer", MESH.nodes)
     highest = float((force[OUTER] / around[OUTER]).max())
     surface, spread = mapped(MESH, embed(MESH, vertices, reach=3.0), vertices, faces, force)
     found = spread.of(force, surface.of(vertices))
@@ -119,5 +119,5 @@ def test_what_lies_beside_another_part_takes_nothing_of_its_pressure() -> None:
     of_middles = other[surface.edges].all(axis=1)
     assert not found[np.concatenate([other, of_middles])].any()
     assert found.max() == pytest.approx(
-        float((cap(MESH)[OUTER] / skin_around(MESH, "outer", MESH.nodes)[OUTER]).max()), rel=0.06
+        float((cap(MESH)[OUTER] / tributary_areas(MESH, "outer", MESH.nodes)[OUTER]).max()), rel=0.06
     )

@@ -9,7 +9,7 @@ import pytest
 import trimesh
 
 from tests.fem.contact.bodies import lid
-from warpjld.fem import Body, LinearElastic, ball, prescribe
+from warpjld.fem import Body, LinearElastic, ball_hexes, prescribe
 from warpjld.fem.contact import Pair, press
 from warpjld.fem.contact.obstacles.facets import Facets
 from warpjld.fem.contact.obstacles.solids import Plane
@@ -71,7 +71,7 @@ def test_nothing_that_is_apart_moves() -> None:
 
 def test_a_visible_ball_lies_on_the_plate_its_coarse_elements_are_pressed_on() -> None:
     """Elements of a third of the radius: their faces lie 2 % of it within the ball, and contact has to be with it."""
-    mesh = ball(1.0, n=4)
+    mesh = ball_hexes(1.0, n=4)
     visible = trimesh.creation.icosphere(4)
     vertices, faces = np.asarray(visible.vertices), np.asarray(visible.faces, np.int32)
     height = face_offsets(mesh, "outer", vertices, faces)
@@ -94,7 +94,7 @@ def test_a_visible_ball_lies_on_the_plate_its_coarse_elements_are_pressed_on() -
 
 
 def test_nodes_on_the_visible_surface_are_not_outside_of_it_though_faces_are() -> None:
-    mesh = ball(1.0, n=4)
+    mesh = ball_hexes(1.0, n=4)
     visible = trimesh.creation.icosphere(4)
     vertices, faces = np.asarray(visible.vertices), np.asarray(visible.faces, np.int32)
     outer = np.unique(mesh.quads(mesh.face_set("outer")))

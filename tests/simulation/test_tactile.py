@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from warpjld.errors import InputError
 from warpjld.fem.contact import Pair
-from warpjld.fem.contact.results.nodal_contact import Imprint, skin_around
+from warpjld.fem.contact.results.nodal_contact import NodalContact, tributary_areas
 from warpjld.fem.hand import FleshHand
 from warpjld.simulation.report.tactile import tactile_of
 from warpjld.simulation.report.tactile_files import TACTILE_COLUMNS, draw_tactile, write_tactile
@@ -24,7 +24,7 @@ class Touched:
     """As ``Touch`` of the contact package, as far as it is read."""
 
     nodal: NDArray[np.float64]
-    imprint: Imprint
+    nodal_contact: NodalContact
     name: str = "ball"
 
 
@@ -49,11 +49,11 @@ def pressed(hand: FleshHand, name: str, pressure: float) -> Touched:
     np.add.at(out, quads, 0.125 * np.cross(x[:, 2] - x[:, 0], x[:, 3] - x[:, 1])[:, None].repeat(4, axis=1))
     normal = out[nodes] / np.linalg.norm(out[nodes], axis=1)[:, None]
     area = np.zeros(count)
-    area[nodes] = skin_around(hand.mesh, hand.skin_faces, hand.mesh.nodes)[nodes]
+    area[nodes] = tributary_areas(hand.mesh, hand.skin_faces, hand.mesh.nodes)[nodes]
     nodal = np.zeros((count, 3))
     nodal[nodes] = -pressure * area[nodes, None] * normal
     held = np.where(np.arange(count) % 2 == 0, area, 0.0)
-    return Touched(nodal, Imprint(pressure * area, area, held, 1e-3 * (area - held)))
+    return Touched(nodal, NodalContact(pressure * area, area, held, 1e-3 * (area - held)))
 
 
 def test_pads_read_what_presses_them(hand: FleshHand) -> None:
@@ -63,7 +63,7 @@ def test_pads_read_what_presses_them(hand: FleshHand) -> None:
     found = tactile_of(hand, [Moment(1.0, still), Moment(2.0, still, (touched,))])
     p = found.pads.index(name)
     nodes = pad_nodes(hand, name)
-    area = touched.imprint.area
+    area = touched.nodal_contact.area
     assert not found.touching[0].any()
     np.testing.assert_array_equal(np.flatnonzero(found.touching[1]), [p])
     assert found.normal_force[1, p] == pytest.approx(8e3 * area.sum())
@@ -71,7 +71,7 @@ def test_pads_read_what_presses_them(hand: FleshHand) -> None:
     np.testing.assert_allclose(found.centre[1, p], area[nodes] @ hand.mesh.nodes[nodes] / area.sum())
     assert found.area[1, p] == pytest.approx(area.sum())
     assert found.peak[1, p] == pytest.approx(8e3)
-    share = touched.imprint.held.sum() / area.sum()
+    share = touched.nodal_contact.held.sum() / area.sum()
     assert 0.3 < share < 0.7
     assert found.sticking[1, p] == pytest.approx(share)
     assert found.slip[1, p] == pytest.approx(1e-3 * (1.0 - share))

@@ -106,9 +106,12 @@ def deform_clip(
     """
     from contextlib import ExitStack
 
+    from warpjld.covering.device import checked_device
     from warpjld.io.caches import open_cache
     from warpjld.motion.out import write_motion
 
+    if surfaces:
+        checked_device(how.device)
     rig = how.rig
     moved = open_motion(motion, rig, animation=animation, **how.reading)
     first, last = frame_span(how.span, len(moved.poses))

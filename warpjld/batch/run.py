@@ -164,8 +164,5 @@ def _open(out: Path, settings: dict[str, Any], fresh: bool) -> None:
 
 
 def _forget(out: Path, job: ClipJob) -> None:
-    """Remove a clip's record before it is made again, and what a killed worker left of it."""
+    """Remove a clip's record before it is made again."""
     (out / FOLDER / f"{job.name}.json").unlink(missing_ok=True)
-    for part in out.iterdir():
-        if ".part" in part.name and part.name.lstrip(".").startswith(f"{job.name}."):
-            part.unlink(missing_ok=True)

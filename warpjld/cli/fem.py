@@ -12,7 +12,6 @@ import numpy as np
 
 from warpjld.cli import options
 from warpjld.errors import WarpjldError
-from warpjld.folders import make_folder
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -34,7 +33,8 @@ def command(study: Path, out: Path | None, no_pictures: bool, as_json: bool, qui
     """Solve the load steps of STUDY (a .toml file, see examples/fem.md and examples/inflate_ball.toml).
 
     Written: NAME.pvd with one .vtu an instant (for ParaView), reactions.csv, and pictures of displacement and stress
-    after each step. When a step finds no equilibrium, what was reached is written and the exit code is 1.
+    after each step; they take the place of former ones when all are made. When a step finds no equilibrium, or at
+    Ctrl-C, what was reached is written and the exit code is 1, or 130.
     """
     from rich.console import Console
 
@@ -42,6 +42,7 @@ def command(study: Path, out: Path | None, no_pictures: bool, as_json: bool, qui
     from warpjld.fem.output.study_results import StudyResults
     from warpjld.fem.study_file import load_study
     from warpjld.quiet import silence_warp
+    from warpjld.script.folder import OutputFolder
 
     silence_warp()
     console = Console(quiet=quiet, highlight=False, markup=False, soft_wrap=True, stderr=as_json)
@@ -52,25 +53,36 @@ def command(study: Path, out: Path | None, no_pictures: bool, as_json: bool, qui
     for note in notes:
         console.print(f"note: {note}")
     folder = out or Path(study.stem)
-    make_folder(folder)
     mesh = loaded.body.mesh
     console.print(
         f"{loaded.title}: {len(mesh.elements)} elements, {loaded.body.degrees} degrees of freedom, "
         f"least scaled Jacobian {mesh.scaled_jacobian().min():.2f}"
     )
     started = time.perf_counter()
-    results = StudyResults(loaded, folder, study.stem, pictures=not no_pictures)
-    for reached in loaded.run(lambda text: console.print(f"  {text}")):
-        results.add(reached)
-    results.finish()
-    if results.last is None:
-        raise WarpjldError("no equilibrium was reached")
+    stopped = False
+    with OutputFolder(folder) as out_folder:
+        results = StudyResults(loaded, out_folder.work, study.stem, pictures=not no_pictures)
+        try:
+            for reached in loaded.run(lambda text: console.print(f"  {text}")):
+                results.add(reached)
+        except KeyboardInterrupt:
+            if results.last is None:
+                raise
+            stopped = True
+        results.finish()
+        if results.last is None:
+            raise WarpjldError("no equilibrium was reached")
+    results.files = [folder / file.relative_to(out_folder.work) for file in results.files]
     seconds = time.perf_counter() - started
     if as_json:
         answer({"study": str(study), **results.content(), "seconds": round(seconds, 3), "notes": notes})
     else:
         _table(console, results.reactions)
         console.print(f"{seconds:.1f} s; results in {folder}")
+    if stopped:
+        instants = f"step {results.last.step.name}, load {results.last.instant.factor:.3f}"
+        click.echo(f"stopped; what was reached ({instants}) is in {folder}", err=True)
+        raise KeyboardInterrupt
     if not results.last.solution.converged:
         raise WarpjldError(f"{results.last.step.name}: {results.last.solution.message}")
 

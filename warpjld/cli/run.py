@@ -48,7 +48,7 @@ def command(
 
     for path in commands:
         load_commands(path)
-    scene = Scene(folder=out, say=say)
+    scene = Scene(folder=out, say=say, dry=check)
     Interpreter(scene).run_file(script)
     with progress(quiet) as report:
         summary = run_scene(scene, out, script=script, device=device, threads=threads, dry=check, progress=report)

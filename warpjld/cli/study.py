@@ -80,6 +80,7 @@ def command(
     if check:
         _tell_checked(plan, settings, notes, as_json, quiet)
         return
+    warn(result.notes)
     _tell(result, notes, as_json, quiet)
 
 

@@ -22,7 +22,7 @@ def checked_device(name: str) -> wp.Device:
     wp.init()
     try:
         return wp.get_device(name)
-    except ValueError as error:
+    except (ValueError, RuntimeError) as error:  # RuntimeError: no driver for any CUDA device
         known = ", ".join(str(d) for d in wp.get_devices())
         raise InputError(f"device '{name}' is not available; there are: {known}") from error
 

@@ -4,8 +4,8 @@ from warpjld.fem.body import Body
 from warpjld.fem.load.loads import Centrifugal, Loads
 from warpjld.fem.load.prescribed import FreeBodyError, Prescribed, prescribe
 from warpjld.fem.material.materials import Fung, LinearElastic, Material, MaterialWarning, MooneyRivlin, NeoHooke
-from warpjld.fem.mesh.ball import ball, cylinder, finger
-from warpjld.fem.mesh.box import box
+from warpjld.fem.mesh.ball import ball_hexes, cylinder_hexes, finger_hexes
+from warpjld.fem.mesh.box import box_hexes
 from warpjld.fem.mesh.hexmesh import HexMesh, merge
 from warpjld.fem.solver.conjugate import Status
 from warpjld.fem.solver.solution import Instant, Solution, SolveError
@@ -28,10 +28,10 @@ __all__ = [
     "Solution",
     "SolveError",
     "Status",
-    "ball",
-    "box",
-    "cylinder",
-    "finger",
+    "ball_hexes",
+    "box_hexes",
+    "cylinder_hexes",
+    "finger_hexes",
     "merge",
     "prescribe",
     "solve",

@@ -6,9 +6,10 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from warpjld.errors import InputError
+from warpjld.fem.arrays import Array
 from warpjld.fem.launch import grouped, on_rows, threads_of
 from warpjld.fem.material.materials import NEO_HOOKE, Material, laws_of
 from warpjld.fem.mesh.hexmesh import HexMesh
@@ -30,9 +31,9 @@ class Tangent:
     """
 
     stiffness: BlockMatrix | None
-    forces: NDArray[np.float64]
-    lowest: NDArray[np.float64]
-    pressures: NDArray[np.float64]
+    forces: Array
+    lowest: Array
+    pressures: Array
 
 
 class Body:
@@ -89,11 +90,11 @@ class Body:
 
     def at(
         self,
-        displacement: NDArray[np.float64] | None = None,
+        displacement: Array | None = None,
         *,
         stiffness: bool = True,
-        pressures: NDArray[np.float64] | None = None,
-        increment: NDArray[np.float64] | None = None,
+        pressures: Array | None = None,
+        increment: Array | None = None,
         reuse: Tangent | None = None,
     ) -> Tangent:
         """Stiffness and internal forces at a displacement.

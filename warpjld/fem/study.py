@@ -6,8 +6,8 @@ from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
 
 import numpy as np
-from numpy.typing import NDArray
 
+from warpjld.fem.arrays import Ints
 from warpjld.fem.body import Body
 from warpjld.fem.load.loads import Loads
 from warpjld.fem.load.prescribed import Prescribed, prescribe
@@ -82,7 +82,7 @@ class Reached:
     time: float
     instant: Instant
     solution: Solution
-    held: dict[str, NDArray[np.int64]]
+    held: dict[str, Ints]
 
 
 @dataclass(frozen=True, eq=False)
@@ -110,7 +110,7 @@ class Study:
         after: Solution | None = None
         for number, step in enumerate(self.steps):
             known = Prescribed(np.empty(0, np.int64), np.empty(0))
-            held: dict[str, NDArray[np.int64]] = {}
+            held: dict[str, Ints] = {}
             for support in step.prescribed:
                 part = support.on(self.body.mesh)
                 known = known + part

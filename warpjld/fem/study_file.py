@@ -9,14 +9,14 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from warpjld.errors import InputError
+from warpjld.fem.arrays import Ints32
 from warpjld.fem.body import Body
 from warpjld.fem.load.loads import Centrifugal, Loads, external_forces
 from warpjld.fem.material.materials import Fung, LinearElastic, Material, MooneyRivlin, NeoHooke
-from warpjld.fem.mesh.ball import ball, cylinder, finger
-from warpjld.fem.mesh.box import box
+from warpjld.fem.mesh.ball import ball_hexes, cylinder_hexes, finger_hexes
+from warpjld.fem.mesh.box import box_hexes
 from warpjld.fem.mesh.hexmesh import HexMesh
 from warpjld.fem.solver.linear import METHODS, PRECISIONS
 from warpjld.fem.solver.static import FREE
@@ -27,7 +27,12 @@ from warpjld.toml_table import TomlTable, read_toml
 
 __all__ = ["load_study"]
 
-_MESHES: dict[str, Callable[..., HexMesh]] = {"box": box, "ball": ball, "cylinder": cylinder, "finger": finger}
+_MESHES: dict[str, Callable[..., HexMesh]] = {
+    "box": box_hexes,
+    "ball": ball_hexes,
+    "cylinder": cylinder_hexes,
+    "finger": finger_hexes,
+}
 _LAWS: dict[str, tuple[Callable[..., Material], tuple[str, ...]]] = {
     "linear": (LinearElastic, ("young", "poisson")),
     "neo-hooke": (NeoHooke, ("young", "poisson")),
@@ -132,7 +137,7 @@ def _material(table: TomlTable) -> Material:
         raise InputError(f"[{table.name}] {error.message}") from error
 
 
-def _nodes(mesh: HexMesh, table: TomlTable) -> NDArray[np.int32]:
+def _nodes(mesh: HexMesh, table: TomlTable) -> Ints32:
     """Nodes of a set, cut by planes."""
     nodes = mesh.node_set(table.text("of", "surface") or "")
     for key, sign in (("above", 1.0), ("below", -1.0)):

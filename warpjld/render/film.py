@@ -2,20 +2,24 @@
 
 from __future__ import annotations
 
-import math
+import subprocess
+import tempfile
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
 from types import TracebackType
-from typing import Any, Self
+from typing import IO, Any, Self
 
 import numpy as np
 from numpy.typing import NDArray
 
 from warpjld.errors import InputError, MissingExtraError, WarpjldError
+from warpjld.whole_file import part_of
 
 __all__ = ["Film"]
 
+_SLOWEST, _SLOWEST_GIF, _FASTEST = 0.01, 0.002, 1000.0
+"""Frames a second: ffmpeg knows two digits, GIF lets a picture stand for 655 s."""
 _PILLOW = {".gif": "GIF", ".webp": "WEBP"}
 _FFMPEG = {".mp4": "mp4", ".mov": "mov", ".mkv": "matroska"}
 
@@ -50,9 +54,10 @@ class Film:
         known = [*_FFMPEG, *_PILLOW]
         if self.path.suffix.lower() not in known:
             raise InputError(f"unknown kind of film '{self.path.suffix}': want one of {', '.join(known)}", path=path)
-        if not (math.isfinite(self.rate) and self.rate > 0):
-            raise InputError(f"rate: want frames per second above 0, got {rate}")
-        self._part = self.path.with_name(f"{self.path.name}.part")
+        slowest, fastest = (_SLOWEST if self.path.suffix.lower() in _FFMPEG else _SLOWEST_GIF), _FASTEST
+        if not slowest <= self.rate <= fastest:
+            raise InputError(f"rate: want {slowest:g} to {fastest:g} frames per second, got {self.rate:g}", path=path)
+        self._part = part_of(self.path)
         self._shape: tuple[int, ...] | None = None
         self._encoder: Any = None
         self._open = False
@@ -115,43 +120,73 @@ class Film:
 
 
 class _Ffmpeg:
-    """H.264 through the ffmpeg program that imageio-ffmpeg brings."""
+    """H.264 through the ffmpeg program that imageio-ffmpeg brings; run here, since only its exit code and its own words
+    tell whether a film is whole."""
 
     def __init__(self, path: Path, rate: float, container: str) -> None:
         try:
-            import imageio_ffmpeg
+            from imageio_ffmpeg import get_ffmpeg_exe
         except ImportError as error:
             raise MissingExtraError("writing video", "film") from error
-        self._write = imageio_ffmpeg.write_frames
-        self._arguments = {
-            "fps": rate,
-            "codec": "libx264",
-            "quality": None,
-            "macro_block_size": 1,
-            "pix_fmt_out": "yuv420p",
-            "ffmpeg_log_level": "error",
-            # visually lossless, playable while it loads, and with the colours named, or players guess them by size
-            "output_params": [
-                *("-crf", "16", "-preset", "veryfast", "-movflags", "+faststart"),
-                *("-vf", "scale=out_color_matrix=bt709:out_range=tv:flags=accurate_rnd"),
-                *("-colorspace", "bt709", "-color_primaries", "bt709", "-color_trc", "bt709", "-color_range", "tv"),
-                *("-f", container),
-            ],
-        }
-        self._path = path
-        self._frames: Any = None
+        try:
+            self._program = get_ffmpeg_exe()
+        except RuntimeError as error:
+            raise InputError(f"the ffmpeg program is not there: {error}", path=path) from error
+        self._path, self._rate, self._container = path, rate, container
+        self._running: subprocess.Popen[bytes] | None = None
+        self._said: IO[bytes] | None = None
 
     def add(self, picture: NDArray[np.uint8]) -> None:
         # H.264 stores colour for squares of 2 × 2 pixels
         even = np.pad(picture, ((0, picture.shape[0] % 2), (0, picture.shape[1] % 2), (0, 0)), mode="edge")
-        if self._frames is None:
-            self._frames = self._write(str(self._path), even.shape[1::-1], **self._arguments)
-            self._frames.send(None)
-        self._frames.send(np.ascontiguousarray(even))
+        if self._running is None:
+            self._said = tempfile.TemporaryFile()  # noqa: SIM115 - not a pipe: nobody reads while frames are sent
+            command = self._command(even.shape[1], even.shape[0])
+            self._running = subprocess.Popen(command, stdin=subprocess.PIPE, stdout=self._said, stderr=self._said)
+        assert self._running.stdin is not None
+        try:
+            self._running.stdin.write(np.ascontiguousarray(even).data)
+        except BrokenPipeError:
+            self._running.wait()
+            raise OSError(self._reason()) from None
 
     def close(self, complete: bool) -> None:
-        if self._frames is not None:
-            self._frames.close()
+        running, self._running = self._running, None
+        if running is None:
+            return
+        assert running.stdin is not None
+        try:
+            if not complete:
+                running.kill()
+            with suppress(BrokenPipeError):
+                running.stdin.close()
+            code = running.wait()
+            if complete and (code or not self._path.stat().st_size):
+                raise OSError(self._reason() or f"ffmpeg ends with code {code}")
+        finally:
+            if self._said is not None:
+                self._said.close()
+
+    def _command(self, width: int, height: int) -> list[str]:
+        # visually lossless, playable while it loads, and with the colours named, or players guess them by size
+        return [
+            self._program,
+            *("-y", "-v", "error", "-f", "rawvideo", "-vcodec", "rawvideo", "-pix_fmt", "rgb24"),
+            *("-s", f"{width}x{height}", "-r", f"{self._rate:.6f}", "-i", "-", "-an"),
+            *("-vcodec", "libx264", "-pix_fmt", "yuv420p"),
+            *("-crf", "16", "-preset", "veryfast", "-movflags", "+faststart"),
+            *("-vf", "scale=out_color_matrix=bt709:out_range=tv:flags=accurate_rnd"),
+            *("-colorspace", "bt709", "-color_primaries", "bt709", "-color_trc", "bt709", "-color_range", "tv"),
+            *("-f", self._container, str(self._path.absolute())),
+        ]
+
+    def _reason(self) -> str:
+        """What ffmpeg said last."""
+        if self._said is None:
+            return ""
+        self._said.seek(0)
+        lines = self._said.read().decode("utf-8", "replace").strip().splitlines()
+        return lines[-1] if lines else "ffmpeg ended before the film did"
 
 
 class _Pillow:

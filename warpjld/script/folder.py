@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import os
+import re
 import shutil
 import tempfile
 from pathlib import Path
@@ -10,8 +12,13 @@ from typing import Self
 
 from warpjld.errors import InputError
 from warpjld.folders import make_folder
+from warpjld.sequences import remove_former
+from warpjld.whole_file import machine, process_runs
 
 __all__ = ["OutputFolder"]
+
+
+_LEFT = re.compile(rf"\.making([0-9]+)-{machine()}-.*")
 
 
 class OutputFolder:
@@ -37,7 +44,8 @@ class OutputFolder:
         try:
             make_folder(self.path)
             self._made = missing
-            self.work = Path(tempfile.mkdtemp(prefix=".making-", dir=self.path))
+            self._sweep()
+            self.work = Path(tempfile.mkdtemp(prefix=f".making{os.getpid()}-{machine()}-", dir=self.path))
         except OSError as error:
             self._remove_made()
             raise InputError(f"cannot write into this folder: {error.strerror}", path=self.path) from error
@@ -68,11 +76,21 @@ class OutputFolder:
             if kind is not None:
                 self._remove_made()
 
+    def _sweep(self) -> None:
+        """Remove hidden folders of processes that were killed."""
+        for place in self.path.iterdir():
+            found = _LEFT.fullmatch(place.name)
+            if found and not process_runs(int(found[1])):
+                shutil.rmtree(place, ignore_errors=True)
+
     def _publish(self) -> None:
+        published: list[Path] = []
         for name in self.made():
             target = self.path / name
             target.parent.mkdir(parents=True, exist_ok=True)
             (self.work / name).replace(target)
+            published.append(target)
+        remove_former(published)
 
     def _remove_made(self) -> None:
         """Take away the folders that were made for nothing."""

@@ -34,7 +34,7 @@ class Attempt:
         command: As the script calls it, with what it was about.
         frame: The key.
         actor: Who.
-        object: What.
+        object: What; empty where it was about no object.
         status: One word.
         message: For people.
         values: More, as plain values.
@@ -176,7 +176,8 @@ def contact_reports(scene: Scene, crowd: Crowd) -> list[dict[str, Any]]:
 
     moments: dict[tuple[str, str], set[float]] = {}
     for attempt in scene.attempts:
-        moments.setdefault((attempt.actor, attempt.object), set()).add(attempt.frame)
+        if attempt.object:
+            moments.setdefault((attempt.actor, attempt.object), set()).add(attempt.frame)
     for prop in crowd.props:
         for one in prop.associations:
             moments.setdefault((one.actor, prop.name), set()).update((one.start, one.stop))

@@ -8,11 +8,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from warpjld.errors import InputError
+from warpjld.script.failures import Failures
 from warpjld.script.folder import OutputFolder
 from warpjld.script.outputs import MotionFile, Output
 from warpjld.script.per_actor import actors_of, file_of
-from warpjld.simulation.specification import located
 
 if TYPE_CHECKING:
     from warpjld.script.crowd import Crowd
@@ -22,7 +21,12 @@ __all__ = ["write_motions"]
 
 
 def write_motions(
-    scene: Scene, crowd: Crowd, frames: NDArray[np.float64], outputs: Sequence[Output], out: OutputFolder
+    scene: Scene,
+    crowd: Crowd,
+    frames: NDArray[np.float64],
+    outputs: Sequence[Output],
+    out: OutputFolder,
+    failures: Failures,
 ) -> list[str]:
     """Write what was asked for, at these frames (F,); returns notes, and warns through the scene."""
     from warpjld.motion.out import write_motion
@@ -37,7 +41,7 @@ def write_motions(
                 continue
             name = file_of(output, role.actor, scene)
             place = out.place(name)
-            try:
+            with failures.kept(name, place):
                 written = write_motion(
                     place,
                     role.actor.rig,
@@ -46,9 +50,6 @@ def write_motions(
                     start_frame=int(frames[0]),
                     name=role.actor.name.lower(),
                 )
-            except InputError as error:
-                said = error.message if error.path == place else str(error)  # its place for now is no one's concern
-                raise located(InputError(f"'{name}': {said}"), scene.asked.get(output.name)) from error
-            notes += [f"{name}: {note}" for note in written.notes]
-            scene.warned(f"{name}: {warning}" for warning in written.warnings)
+                notes += [f"{name}: {note}" for note in written.notes]
+                scene.warned(f"{name}: {warning}" for warning in written.warnings)
     return notes

@@ -61,6 +61,7 @@ _BUILT_IN = (
     "animation",
     "objects",
     "grasping",
+    "reaching",
     "physical",
     "deforming",
     "gripping",

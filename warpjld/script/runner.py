@@ -5,28 +5,37 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from contextlib import ExitStack
 from dataclasses import replace
+from functools import partial
 from pathlib import Path, PurePosixPath
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from warpjld.errors import InputError
+from warpjld import render
+from warpjld.covering.device import checked_device
+from warpjld.errors import InputError, WarpjldError
 from warpjld.names import folded
 from warpjld.overwriting import check_outputs
 from warpjld.script.contact import check_contact, run_contact, write_contact
 from warpjld.script.crowd import Crowd, role_of
+from warpjld.script.destinations import check_destinations
+from warpjld.script.failures import Failures, Writer
 from warpjld.script.folder import OutputFolder
 from warpjld.script.formats import check_available, video_is_available
 from warpjld.script.grasping import contact_reports
 from warpjld.script.motion_files import write_motions
 from warpjld.script.outputs import ContactSheet, Export, Film, Grips, MotionFile, Output, Picture, Table
 from warpjld.script.per_actor import actors_of, file_of
-from warpjld.script.pictures import draw_contact_sheet, draw_picture, film_studio
+from warpjld.script.pictures import FilmStudio, PressureStudio, draw_contact_sheet, draw_picture, film_studio
 from warpjld.script.props import Prop, prop_surface
 from warpjld.script.scene import Scene
 from warpjld.script.staging import frame_numbers, held, notes, stage
 from warpjld.script.summary import Summary
+
+if TYPE_CHECKING:
+    from warpjld.io.caches import Cache
+    from warpjld.surface import Surface
 
 __all__ = ["Report", "cast", "run_scene"]
 
@@ -50,7 +59,7 @@ def run_scene(
 
     Args:
         scene: What the script described.
-        folder: Where to; made if missing. Files appear in it only when all are complete.
+        folder: Where to; made if missing. Files appear in it when all that can be made are complete.
         script: Named in the summary.
         device: Warp device of the covering.
         threads: CPU threads of the covering; None leaves the choice to it.
@@ -62,6 +71,7 @@ def run_scene(
 
     Raises:
         InputError: Nobody on stage, a key beyond a limit, a folder that cannot be written.
+        WarpjldError: Some output could not be made; all others are in the folder, and the summary names it.
         MissingExtraError: A format needs an optional dependency.
     """
     scene.actor()  # says what to do where there is none
@@ -78,12 +88,15 @@ def run_scene(
         outputs.append(Table("contact.csv"))
     if scene.contact.pressing is not None and scene.contact.grips:
         outputs.append(Grips("grips.csv"))
+    checked_device(device)
     check_available([output.name for output in outputs])
     read = scene.read if script is None else [*scene.read, script]
     names = _names(scene, outputs)
     if "summary.json" in map(folded, names):
         raise InputError("'summary.json' is the name of the summary that every run writes")
     check_outputs([folder / name for name in names], read)
+    check_destinations(folder, [*names, "summary.json"], _size(scene, outputs, len(frames)))
+    _check_lengths(scene, outputs, len(frames))
     summary.notes += check_contact(scene, outputs, frames)
     for actor in scene.actors.values():
         stage(actor, frames[:1], scene.rate)  # keys beyond limits are found here
@@ -91,6 +104,7 @@ def run_scene(
         scene.warned(line for line in held(actor, frames, scene.rate) if line not in scene.warnings)
     if dry:
         return summary.content([{"name": name} for name in _names(scene, outputs)], folder)
+    failures = Failures()
     with OutputFolder(folder) as out:
         with summary.timed("bind"):
             crowd = cast(scene, frames, device=device, progress=progress)
@@ -102,18 +116,26 @@ def run_scene(
             summary.press = simulated.verdict.content() | {"searches": [one.content() for one in simulated.grips]}
             summary.notes += simulated.notes
         with summary.timed("frames"):
-            _make_sequences(scene, crowd, frames, outputs, out, threads, progress)
-        summary.notes += write_motions(scene, crowd, frames, outputs, out)
+            _make_sequences(scene, crowd, frames, outputs, out, threads, progress, failures)
+        summary.notes += write_motions(scene, crowd, frames, outputs, out, failures)
         if simulated is not None:
-            write_contact(simulated, outputs, out)
+            for output in outputs:
+                with failures.kept(output.name, out.place(output.name)):
+                    write_contact(simulated, [output], out)
         if scene.props:
             with summary.timed("contacts"):
                 summary.contacts = contact_reports(scene, crowd)
         with summary.timed("pictures"):
-            _make_pictures(scene, crowd, outputs, out, progress, "" if script is None else script.stem)
+            _make_pictures(scene, crowd, outputs, out, progress, "" if script is None else script.stem, failures)
         for role in crowd.roles:
             scene.warned(f"{role.actor.name}: {line}" for line in (role.contact.told() if role.contact else ()))
-        return summary.write(out)
+        if failures.found and not out.made():
+            raise WarpjldError("; ".join(failures.lines()))
+        summary.failed = failures.found
+        content = summary.write(out)
+    if failures.found:
+        raise WarpjldError(f"not made: {'; '.join(failures.lines())}; all else that was asked for is in {folder}")
+    return content
 
 
 def cast(
@@ -161,9 +183,19 @@ def _make_sequences(
     out: OutputFolder,
     threads: int | None,
     progress: Report,
+    failures: Failures,
 ) -> None:
     """Exports and films, in one pass over the frames."""
     from warpjld.io.caches import open_cache
+
+    def cache_of(name: str, surface: Surface, label: str) -> Writer[Cache]:
+        place = out.place(name)
+        timing: dict[str, Any] = {"frames": len(frames), "rate": scene.rate, "start_frame": int(frames[0])}
+        return Writer(name, place, lambda: open_cache(place, surface, name=label.lower(), **timing), failures)
+
+    def studio_of(film: Film) -> Writer[FilmStudio | PressureStudio]:
+        place = out.place(film.name)
+        return Writer(film.name, place, lambda: film_studio(scene, crowd, film, place), failures)
 
     exports = [output for output in outputs if isinstance(output, Export)]
     films = [output for output in outputs if isinstance(output, Film)]
@@ -173,14 +205,7 @@ def _make_sequences(
         caches = [
             [
                 stack.enter_context(
-                    open_cache(
-                        out.place(file_of(export, role.actor, scene)),
-                        role.actor.rig.surface,
-                        frames=len(frames),
-                        rate=scene.rate,
-                        start_frame=int(frames[0]),
-                        name=role.actor.name.lower(),
-                    )
+                    cache_of(file_of(export, role.actor, scene), role.actor.rig.surface, role.actor.name)
                 )
                 for export in exports
                 if export.actor in (None, role.actor.name)
@@ -189,53 +214,89 @@ def _make_sequences(
         ]
         prop_caches = [
             [
-                stack.enter_context(
-                    open_cache(
-                        out.place(_prop_export_name(export, prop)),
-                        prop_surface(prop),
-                        frames=len(frames),
-                        rate=scene.rate,
-                        start_frame=int(frames[0]),
-                        name=prop.name.lower(),
-                    )
-                )
+                stack.enter_context(cache_of(_prop_export_name(export, prop), prop_surface(prop), prop.name))
                 for export in exports
                 if export.actor is None
             ]
             for prop in crowd.props
         ]
-        studios = [stack.enter_context(film_studio(scene, crowd, film, out.place(film.name))) for film in films]
+        studios = [stack.enter_context(studio_of(film)) for film in films]
         blocks = [
             role.covering.blocks(role.poses, frames=_BLOCK, device=crowd.device, threads=threads)
             for role in crowd.roles
         ]
+        writers: list[Writer[Any]] = [*studios]
+        writers += [writer for group in (*caches, *prop_caches) for writer in group]
         for parts in zip(*blocks, strict=True):
+            if not any(writer.works for writer in writers):
+                return
             start = parts[0][0]
             worn = [crowd.worn(role, v, start) for role, (_, v) in zip(crowd.roles, parts, strict=True)]
             for actor_caches, vertices in zip(caches, worn, strict=True):
                 for cache in actor_caches:
-                    cache.write(vertices)
+                    cache.do(partial(_write, vertices=vertices))
             count = len(parts[0][1])
             for prop, places, object_caches in zip(crowd.props, crowd.places, prop_caches, strict=True):
                 if object_caches:
                     moved = np.stack([crowd.prop_vertices(prop, places, start + k) for k in range(count)])
                 for cache in object_caches:
-                    cache.write(moved.astype(np.float32))
+                    cache.do(partial(_write, vertices=moved.astype(np.float32)))
             for k in range(count):
                 progress("frames", start + k, len(frames))
                 together = np.concatenate([vertices[k] for vertices in worn])
                 for studio in studios:
-                    studio.take(start + k, together)
+                    studio.do(partial(_take, frame=start + k, vertices=together))
+
+
+def _write(cache: Cache, vertices: NDArray[np.float32]) -> None:
+    cache.write(vertices)
+
+
+def _take(studio: FilmStudio | PressureStudio, frame: int, vertices: NDArray[np.float32]) -> None:
+    studio.take(frame, vertices)
+
+
+def _check_lengths(scene: Scene, outputs: Sequence[Output], frames: int) -> None:
+    """Refuse clips and rates that a format does not take."""
+    from warpjld.io.caches import open_cache
+    from warpjld.press.where import placed
+
+    for output in outputs:
+        try:
+            if isinstance(output, Film):
+                render.Film(output.name, rate=scene.rate)
+            for actor in actors_of(output, scene) if isinstance(output, Export) else ():
+                open_cache(output.name, actor.rig.surface, frames=frames, rate=scene.rate)
+        except InputError as error:
+            raise placed(InputError(f"'{output.name}': {error.message}"), scene.asked.get(output.name)) from None
+
+
+def _size(scene: Scene, outputs: Sequence[Output], frames: int) -> float:
+    """About how many bytes the outputs are; films and pictures are small beside what is exported."""
+    size = 0.0
+    for output in outputs:
+        if isinstance(output, Export):
+            size += sum(12.0 * frames * len(actor.rig.surface.weld) for actor in actors_of(output, scene))
+        elif isinstance(output, Picture | ContactSheet):
+            size += 0.1 * scene.size[0] * scene.size[1]
+    return size
 
 
 def _make_pictures(
-    scene: Scene, crowd: Crowd, outputs: Sequence[Output], out: OutputFolder, progress: Report, title: str
+    scene: Scene,
+    crowd: Crowd,
+    outputs: Sequence[Output],
+    out: OutputFolder,
+    progress: Report,
+    title: str,
+    failures: Failures,
 ) -> None:
     wanted = [output for output in outputs if isinstance(output, Picture | ContactSheet)]
     for number, output in enumerate(wanted):
         progress("pictures", number, len(wanted))
         path = out.place(output.name)
-        if isinstance(output, Picture):
-            draw_picture(scene, crowd, output, path)
-        else:
-            draw_contact_sheet(scene, crowd, output, path, title)
+        with failures.kept(output.name, path):
+            if isinstance(output, Picture):
+                draw_picture(scene, crowd, output, path)
+            else:
+                draw_contact_sheet(scene, crowd, output, path, title)

@@ -120,6 +120,7 @@ class Scene:
         outputs: Files to make, relative to the output folder.
         asked: Where in a script they were asked for, by name.
         folder: The output folder.
+        dry: Whether searches only leave their keys, without angles: what ``--check`` does.
         read: Files that were read, which no output may take the place of.
         say: Where PRINT and SHOW write.
         warn: Told what is probably wrong with a rig or a motion, as it is met; ``warnings`` keeps it for the summary.
@@ -140,6 +141,7 @@ class Scene:
     outputs: list[Output] = field(default_factory=list)
     asked: dict[str, SourceLocation] = field(default_factory=dict)
     folder: Path = Path("out")
+    dry: bool = False
     read: list[Path] = field(default_factory=list)
     say: Callable[[str], None] = print
     warn: Callable[[str], None] = _to_stderr

@@ -32,6 +32,7 @@ class Summary:
         seconds: Time of each stage.
         press: How a contact solve ended, if there was one.
         contacts: What touches which object, by frame.
+        failed: Outputs that could not be made, and why.
         notes: What was guessed, held at a limit, left out or looks suspicious.
     """
 
@@ -42,6 +43,7 @@ class Summary:
     seconds: dict[str, float] = field(default_factory=dict)
     contacts: list[dict[str, Any]] = field(default_factory=list)
     press: dict[str, Any] | None = None
+    failed: dict[str, str] = field(default_factory=dict)
     notes: list[str] = field(default_factory=list)
 
     @contextmanager
@@ -100,6 +102,7 @@ class Summary:
             "files": list(files),
             "seconds": self.seconds,
             "warnings": self.scene.warnings,
+            "failed": self.failed,
             "notes": self.notes,
         }
 

@@ -11,7 +11,15 @@ from warpjld.errors import InputError
 from warpjld.rotations import about, conjugate, multiply, rotate
 from warpjld.skeleton.tree import CHANNELS, Skeleton
 
-__all__ = ["Poses", "poses_from_angles", "poses_from_rotations", "poses_from_world", "rest_poses", "vertical_flexion"]
+__all__ = [
+    "Poses",
+    "joint_rotations",
+    "poses_from_angles",
+    "poses_from_rotations",
+    "poses_from_world",
+    "rest_poses",
+    "vertical_flexion",
+]
 
 
 @dataclass(frozen=True, eq=False)
@@ -64,13 +72,26 @@ def poses_from_angles(
     if not np.isfinite(angles).all():
         frame, joint, channel = np.argwhere(~np.isfinite(angles))[0]
         raise InputError(f"angles: {skeleton.names[joint]}.{CHANNELS[channel]} is not finite at frame {frame}")
-    axes, directions, mirror = skeleton.axes, skeleton.directions, skeleton.mirror[:, None]
+    return _compose(skeleton, joint_rotations(skeleton, angles), root_position, root_rotation)
+
+
+def joint_rotations(
+    skeleton: Skeleton, angles: NDArray[np.float64], *, joints: NDArray[np.integer] | None = None
+) -> NDArray[np.float64]:
+    """Rotations of joints relative to their parents' bones, in the axes of the rest pose, shape (F, K, 4).
+
+    Args:
+        skeleton: The rest skeleton.
+        angles: Joint angles [rad], shape (F, K, 4), channels as in ``CHANNELS``.
+        joints: Whose they are, shape (K,); of all where it is left out.
+    """
+    chosen = slice(None) if joints is None else joints
+    axes, directions, mirror = skeleton.axes[chosen], skeleton.directions[chosen], skeleton.mirror[chosen, None]
     normals = np.cross(directions, axes)
     flexion, pivot, twisting, abduction = (angles[..., k, None] for k in range(len(CHANNELS)))
     pivoted = rotate(about(mirror * pivot * directions), axes)
     local = multiply(about(mirror * abduction * normals), about(flexion * pivoted))
-    local = multiply(local, about(-mirror * twisting * directions))
-    return _compose(skeleton, local, root_position, root_rotation)
+    return np.asarray(multiply(local, about(-mirror * twisting * directions)))
 
 
 def poses_from_rotations(

@@ -43,12 +43,14 @@ class StudyResult:
         rates: Success rates, the first of all trials.
         ran: Trials run now; the others were there already.
         seconds: Wall-clock time.
+        notes: What was found in the folder, and done about it.
     """
 
     files: tuple[Path, ...]
     rates: tuple[Rate, ...]
     ran: int
     seconds: float
+    notes: tuple[str, ...] = ()
 
 
 def table_columns(experiment: Experiment) -> tuple[Column, ...]:
@@ -92,9 +94,14 @@ def run_study(
         require_parquet()
     began, moment = time.perf_counter(), datetime.now(UTC)
     folder = Path(out)
-    shards = opened(experiment, folder, fresh=fresh)
+    notes: list[str] = []
+    shards = opened(experiment, folder, fresh=fresh, notes=notes)
     shards.sweep()
     missing = shards.missing(experiment.trials)
+    damaged = [trial for trial in missing if shards.path(trial).exists()]
+    if damaged:
+        few = ", ".join(map(str, damaged[:5])) + (", …" if len(damaged) > 5 else "")
+        notes.append(f"{len(damaged)} trials kept in {folder} are damaged and run again: {few}")
     workers = min(processes or cores(), max(len(missing), 1))
     finished = experiment.trials - len(missing)
     report("trials", finished, experiment.trials)
@@ -134,11 +141,13 @@ def run_study(
             "trial_seconds": [round(value, 4) for value in seconds],
         },
     )
-    return StudyResult((*files, folder / "manifest.json"), tuple(rates), len(missing), total)
+    return StudyResult((*files, folder / "manifest.json"), tuple(rates), len(missing), total, tuple(notes))
 
 
-def opened(experiment: Experiment, folder: Path, *, fresh: bool = False) -> Shards:
+def opened(experiment: Experiment, folder: Path, *, fresh: bool = False, notes: list[str] | None = None) -> Shards:
     """The folder's trials, after making sure that they belong to this experiment.
+
+    Where the file that says what they are is damaged, they are set aside, which is noted, and all are run again.
 
     Raises:
         InputError: They do not, or the folder cannot be used.
@@ -150,14 +159,37 @@ def opened(experiment: Experiment, folder: Path, *, fresh: bool = False) -> Shar
         if fresh and (folder / _TRIALS).exists():
             shutil.rmtree(folder / _TRIALS)
         if known.exists() and not fresh:
-            _same_study(json.loads(known.read_text(encoding="utf-8")), identity, folder)
+            before = _known(known)
+            if before is None:
+                aside = _set_aside(folder)
+                if notes is not None:
+                    notes.append(f"{known} is damaged: what was there is in {aside}, and all trials are run again")
+            else:
+                _same_study(before, identity, folder)
         elif (folder / _TRIALS).exists():
             raise InputError("holds trials of an unknown study; choose another folder, or --fresh", path=folder)
         (folder / _TRIALS).mkdir(parents=True, exist_ok=True)
         write_json(known, identity)
     except (OSError, ValueError) as error:
         raise InputError(f"cannot be used as the study's folder: {error}", path=folder) from error
-    return Shards(folder / _TRIALS)
+    return Shards(folder / _TRIALS, table_columns(experiment))
+
+
+def _known(path: Path) -> dict[str, Any] | None:
+    """What a study's file says it is; None where it is damaged."""
+    try:
+        content = json.loads(path.read_text(encoding="utf-8"))
+    except (ValueError, RecursionError):
+        return None
+    return content if isinstance(content, dict) else None
+
+
+def _set_aside(folder: Path) -> Path:
+    number = next(k for k in range(1, 1000) if not (folder / f"{_TRIALS}.unknown{k}").exists())
+    aside = folder / f"{_TRIALS}.unknown{number}"
+    if (folder / _TRIALS).exists():
+        (folder / _TRIALS).rename(aside)
+    return aside
 
 
 def _same_study(before: dict[str, Any], now: dict[str, Any], folder: Path) -> None:

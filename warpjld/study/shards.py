@@ -5,7 +5,7 @@ from __future__ import annotations
 import base64
 import json
 import os
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -13,8 +13,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from warpjld.errors import WarpjldError
+from warpjld.tables.columns import Column, checked_values
+
 __all__ = ["Shard", "Shards"]
 
+_DAMAGED = (OSError, ValueError, KeyError, TypeError, AttributeError, OverflowError, MemoryError, RecursionError)
 _A_FOLDER = 1000  # file systems and people dislike folders with a hundred thousand files
 
 
@@ -30,10 +34,16 @@ class Shard:
 
 class Shards:
     """The folder of trials. Numbers are kept exactly: JSON holds doubles by their shortest decimal form, arrays by
-    their bytes."""
+    their bytes.
 
-    def __init__(self, folder: Path) -> None:
+    Args:
+        folder: The folder.
+        columns: What the row of a trial must hold to count; empty where any will do.
+    """
+
+    def __init__(self, folder: Path, columns: Sequence[Column] = ()) -> None:
         self._folder = folder
+        self._columns = columns
 
     def path(self, trial: int) -> Path:
         """File of a trial."""
@@ -59,8 +69,15 @@ class Shards:
         try:
             content = json.loads(self.path(trial).read_text(encoding="utf-8"))
             arrays = {name: _unpacked(packed) for name, packed in content["arrays"].items()}
-            return Shard(int(content["trial"]), dict(content["row"]), arrays, float(content["seconds"]))
-        except (OSError, ValueError, KeyError, TypeError):
+            shard = Shard(int(content["trial"]), dict(content["row"]), arrays, float(content["seconds"]))
+            if {shard.trial, shard.row.get("trial", trial)} != {trial} or not isinstance(shard.row["status"], str):
+                return None
+            if self._columns:
+                if list(shard.row) != [column.name for column in self._columns]:
+                    return None
+                checked_values(shard.row, self._columns)
+            return shard
+        except (*_DAMAGED, WarpjldError):
             return None
 
     def missing(self, count: int) -> list[int]:

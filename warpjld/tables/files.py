@@ -52,7 +52,8 @@ def write_csv(
         for row in rows:
             writer.writerow([_cell(row[c.name]) for c in columns])
     about = [{"name": c.name, "type": c.kind, "unit": c.unit, "description": c.about} for c in columns]
-    path.with_name(described).write_text(json.dumps(about, indent=1, ensure_ascii=False) + "\n", "utf-8")
+    with whole_file(path.with_name(described)) as part:
+        part.write_text(json.dumps(about, indent=1, ensure_ascii=False) + "\n", "utf-8")
 
 
 def read_table(path: Path) -> list[dict[str, Any]]:

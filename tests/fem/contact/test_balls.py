@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from tests.fem.contact.bodies import mean_gaps, named, together
-from warpjld.fem import Body, NeoHooke, Prescribed, ball, prescribe
+from warpjld.fem import Body, NeoHooke, Prescribed, ball_hexes, prescribe
 from warpjld.fem.contact import ContactSolution, Pair, press
 
 STEPS = np.arange(1, 6) / 5
@@ -17,7 +17,7 @@ SAG = (0.25**2 + 0.35**2) / 8
 
 def balls(ratio: float, poisson: float, finer: int = 8, coarser: int = 6) -> tuple[Body, Prescribed]:
     """One over the other, a little aside, pressed together by 0.3 radii beyond the gap of 0.0007 between them."""
-    a, b = named(ball(1.0, n=finer), "a"), named(ball(1.0, n=coarser), "b", (0.03, 0.02, 2.0))
+    a, b = named(ball_hexes(1.0, n=finer), "a"), named(ball_hexes(1.0, n=coarser), "b", (0.03, 0.02, 2.0))
     body = together({"a": (a, NeoHooke(1.0, poisson)), "b": (b, NeoHooke(ratio, poisson))})
     height = body.mesh.nodes[:, 2]
     low, top = np.flatnonzero(height < -0.5), np.flatnonzero(height > 2.5)

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from tests.fem.contact.bodies import named, together
-from warpjld.fem import Body, LinearElastic, Prescribed, box, prescribe
+from warpjld.fem import Body, LinearElastic, Prescribed, box_hexes, prescribe
 from warpjld.fem.contact import Bond, ContactSolution, Pair, press
 
 YOUNG = 1e6
@@ -16,7 +16,7 @@ LAW = LinearElastic(YOUNG, 0.0)
 
 def stack() -> Body:
     """Two half cubes that do not match, 0.1 m high together."""
-    lower, upper = box((0.1, 0.1, HALF), (3, 3, 2)), box((0.1, 0.1, HALF), (4, 4, 2))
+    lower, upper = box_hexes((0.1, 0.1, HALF), (3, 3, 2)), box_hexes((0.1, 0.1, HALF), (4, 4, 2))
     return together({"a": (named(lower, "a"), LAW), "b": (named(upper, "b", (0, 0, HALF)), LAW)})
 
 
@@ -74,9 +74,9 @@ def test_a_bond_that_is_strong_enough_is_one_body() -> None:
     from warpjld.fem import solve
 
     law = LinearElastic(YOUNG, 0.3)
-    halves = [named(box((0.1, 0.1, HALF), (4, 4, 2)), name, (0, 0, z)) for name, z in (("a", 0.0), ("b", HALF))]
+    halves = [named(box_hexes((0.1, 0.1, HALF), (4, 4, 2)), name, (0, 0, z)) for name, z in (("a", 0.0), ("b", HALF))]
     body = together({"a": (halves[0], law), "b": (halves[1], law)})
-    whole = Body(box((0.1, 0.1, 2 * HALF), (4, 4, 4)), law)
+    whole = Body(box_hexes((0.1, 0.1, 2 * HALF), (4, 4, 4)), law)
     way = (0.001, 0.0005, 0.002)
     bonded = press(body, pulled(body, way), [Pair("a.z+", "b.z-", bond=Bond())], tolerance=1e-8, penetration=1e-6)
     held = prescribe(whole.mesh, "z-", x=0.0, y=0.0, z=0.0) + prescribe(whole.mesh, "z+", displacement=way)
@@ -90,7 +90,8 @@ def test_a_cube_of_sub_objects_separates() -> None:
     """Eight bonded cubes, pulled at opposite faces: the bonds across the pull part, those along it do not (R102)."""
     names = {(i, j, k): f"{i}{j}{k}" for i in (0, 1) for j in (0, 1) for k in (0, 1)}
     parts = {
-        name: (named(box((0.05, 0.05, 0.05), (2, 2, 2)), name, 0.05 * np.array(at)), LAW) for at, name in names.items()
+        name: (named(box_hexes((0.05, 0.05, 0.05), (2, 2, 2)), name, 0.05 * np.array(at)), LAW)
+        for at, name in names.items()
     }
     body = together(parts)
     pairs, across = [], []
@@ -113,7 +114,7 @@ def test_a_cube_of_sub_objects_separates() -> None:
 def test_a_bond_to_nothing_is_refused() -> None:
     from warpjld.errors import InputError
 
-    lower, upper = box((0.1, 0.1, HALF), (2, 2, 1)), box((0.1, 0.1, HALF), (2, 2, 1))
+    lower, upper = box_hexes((0.1, 0.1, HALF), (2, 2, 1)), box_hexes((0.1, 0.1, HALF), (2, 2, 1))
     body = together({"a": (named(lower, "a"), LAW), "b": (named(upper, "b", (0, 0, 1.0)), LAW)})
     with pytest.raises(InputError, match="a bond to nothing"):
         press(body, pulled(body, (0.0, 0.0, 0.0)), [Pair("a.z+", "b.z-", bond=Bond())])

@@ -24,7 +24,7 @@ import numpy as np
 import pytest
 
 from tests.fem.contact.bodies import lid, symmetric
-from warpjld.fem import Body, HexMesh, LinearElastic, Material, NeoHooke, ball
+from warpjld.fem import Body, HexMesh, LinearElastic, Material, NeoHooke, ball_hexes
 from warpjld.fem.contact import ContactInstant, Pair, press
 
 RUBBER = [0.00489, 0.01427, 0.02681, 0.04232, 0.06052, 0.08115, 0.10472, 0.13062, 0.15986, 0.19229]
@@ -34,7 +34,7 @@ def squeezed(
     law: Material, times: list[float], n: int, inner: float = 0.0, layers: int | None = None, travel: float = 0.2
 ) -> tuple[HexMesh, list[ContactInstant]]:
     """An octant; the plate comes down by ``travel``."""
-    mesh = ball(1.0, inner=inner, n=n, layers=layers, octant=True)
+    mesh = ball_hexes(1.0, inner=inner, n=n, layers=layers, octant=True)
     found = press(Body(mesh, law), symmetric(mesh), [Pair("outer", lid(travel))], times=times)
     return mesh, list(found.instants)
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from tests.fem.contact.bodies import FREE
-from warpjld.fem import Body, LinearElastic, Loads, Status, box
+from warpjld.fem import Body, LinearElastic, Loads, Status, box_hexes
 from warpjld.fem.contact import Pair, press
 from warpjld.fem.contact.obstacles.solids import Plane
 
@@ -16,7 +16,7 @@ GRAVITY = 9.81 * np.array([np.sin(SLOPE), 0.0, -np.cos(SLOPE)])
 
 @pytest.fixture(scope="module")
 def block() -> Body:
-    return Body(box((0.1, 0.1, 0.05), (4, 4, 2)), LinearElastic(1e6, 0.3))
+    return Body(box_hexes((0.1, 0.1, 0.05), (4, 4, 2)), LinearElastic(1e6, 0.3))
 
 
 def test_friction_of_the_slope_and_a_hundredth_more_holds(block: Body) -> None:

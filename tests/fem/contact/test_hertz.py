@@ -12,7 +12,7 @@ import pytest
 from numpy.typing import NDArray
 
 from tests.fem.contact.bodies import lid, named, together
-from warpjld.fem import Body, HexMesh, LinearElastic, Prescribed, box, prescribe
+from warpjld.fem import Body, HexMesh, LinearElastic, Prescribed, box_hexes, prescribe
 from warpjld.fem.contact import ContactInstant, Pair, Touch, press
 from warpjld.fem.contact.interface.contact_border import beyond, held_beyond
 
@@ -25,7 +25,7 @@ TOLERANCE = 0.02
 
 def graded(n: int, grading: float = 4.0) -> HexMesh:
     """A quarter of the sphere's neighbourhood, of radius 1, its pole at the origin; faces grow away from it."""
-    mesh = box(counts=(n, n, n))
+    mesh = box_hexes(counts=(n, n, n))
     x, y, depth = (SIZE * np.sinh(grading * s) / np.sinh(grading) for s in (*mesh.nodes.T[:2], 1.0 - mesh.nodes[:, 2]))
     sphere = 1.0 - np.sqrt(1.0 - x**2 - y**2)
     return replace(mesh, nodes=np.stack([x, y, -depth - (1.0 - depth / SIZE) * sphere], axis=1))

@@ -7,18 +7,17 @@ import pytest
 
 from tests.fem.contact.bodies import FREE, lid, named, symmetric, together
 from warpjld.errors import InputError
-from warpjld.fem import Body, LinearElastic, Loads, NeoHooke, Status, ball, box, cylinder, prescribe
+from warpjld.fem import Body, LinearElastic, Loads, NeoHooke, Status, ball_hexes, box_hexes, cylinder_hexes, prescribe
 from warpjld.fem.contact import Bond, ContactError, Exclusion, Pair, press
 from warpjld.fem.contact.obstacles.solids import Plane, Sphere
 from warpjld.fem.contact.solver.damping import Damping
-from warpjld.fem.contact.solver.step_solver import StepSolver
-from warpjld.fem.solver.block_matrix import BlockMatrix
-from warpjld.fem.solver.indefinite import IndefiniteError
+from warpjld.fem.contact.solver.lagged_solver import LaggedSolver
+from warpjld.fem.solver.block_matrix import BlockMatrix, IndefiniteError
 
 
 @pytest.fixture(scope="module")
 def body() -> Body:
-    return Body(ball(1.0, n=3, octant=True), LinearElastic(1.0, 0.3))
+    return Body(ball_hexes(1.0, n=3, octant=True), LinearElastic(1.0, 0.3))
 
 
 @pytest.mark.parametrize("friction", [float("nan"), -0.1, float("inf")])
@@ -72,7 +71,7 @@ def test_halvings(body: Body) -> None:
 
 def test_labels() -> None:
     law = LinearElastic(1.0, 0.3)
-    parts = {name: (named(box(counts=(2, 2, 1)), name, (0, 0, z)), law) for name, z in (("a", 0.0), ("b", 1.0))}
+    parts = {name: (named(box_hexes(counts=(2, 2, 1)), name, (0, 0, z)), law) for name, z in (("a", 0.0), ("b", 1.0))}
     body = together(parts)
     held = prescribe(body.mesh, "a.z-", x=0.0, y=0.0, z=0.0)
     four, never = np.zeros(4, np.int32), np.zeros((1, 1), bool)
@@ -91,7 +90,7 @@ def test_going_on_from_something_else(body: Body) -> None:
     found = press(body, held, [pair])
     with pytest.raises(InputError, match="after: was found with 1 pairs, not 2"):
         press(body, held, [pair, pair], times=(2.0,), after=found)
-    other = Body(ball(1.0, n=4, octant=True), LinearElastic(1.0, 0.3))
+    other = Body(ball_hexes(1.0, n=4, octant=True), LinearElastic(1.0, 0.3))
     with pytest.raises(InputError, match="after: is of a body with"):
         press(other, symmetric(other.mesh), [pair], times=(2.0,), after=found)
     with pytest.raises(InputError, match="want rising times above 1"):
@@ -104,7 +103,7 @@ def test_going_on_from_something_else(body: Body) -> None:
 )
 def test_a_body_squeezed_to_nothing_says_so(travel: float, message: str) -> None:
     """Two plates that close almost, or entirely: the last equilibrium, and why there is no other."""
-    mesh = ball(1.0, n=3, octant=True)
+    mesh = ball_hexes(1.0, n=3, octant=True)
     with pytest.raises(ContactError, match=message) as caught:
         press(Body(mesh, NeoHooke(1.0, 0.3)), symmetric(mesh), [Pair("outer", lid(travel))], times=(0.2, 1.0))
     solution = caught.value.solution
@@ -135,7 +134,7 @@ def test_a_stiffness_that_nothing_has(young: float) -> None:
 
 def test_a_bond_to_nothing() -> None:
     law = LinearElastic(1.0, 0.3)
-    body = together({name: (named(box(), name, (0, 0, z)), law) for name, z in (("a", 0.0), ("b", 3.0))})
+    body = together({name: (named(box_hexes(), name, (0, 0, z)), law) for name, z in (("a", 0.0), ("b", 3.0))})
     held = prescribe(body.mesh, "a.z-", x=0.0, y=0.0, z=0.0) + prescribe(body.mesh, "b.z+", x=0.0, y=0.0, z=0.0)
     with pytest.raises(InputError, match="a bond to nothing: its two sides do not meet"):
         press(body, held, [Pair("a.z+", "b.z-", bond=Bond())])
@@ -144,7 +143,7 @@ def test_a_bond_to_nothing() -> None:
 @pytest.mark.parametrize("beside", [0.3, 2.0], ids=["some of it", "all of it"])
 def test_overlap_of_sides_that_are_both_prescribed(beside: float) -> None:
     """No force can part what may not move: named at once, without halving."""
-    mesh = box((1.0, 1.0, 0.5), (4, 4, 2))
+    mesh = box_hexes((1.0, 1.0, 0.5), (4, 4, 2))
     above = np.flatnonzero((mesh.nodes[:, 2] == 0.5) & (mesh.nodes[:, 0] < beside))
     held = prescribe(mesh, "z-", x=0.0, y=0.0, z=0.0) + prescribe(mesh, above, x=0.0, y=0.0, z=0.0)
     pair = Pair("z+", lid(0.1, height=0.5), name="lid")
@@ -157,7 +156,7 @@ def test_overlap_of_sides_that_are_both_prescribed(beside: float) -> None:
 def test_what_starts_inside_an_object_that_does_not_give_way() -> None:
     """A palm around a ball: a ring whose outside is held, and a ball in it that is larger than its hole. What there is
     to be parted is parted, or its overlap is named; a bone inside the ball is the second."""
-    mesh = cylinder(1.0, 0.5, inner=0.5, n=8, layers=3, along=2)
+    mesh = cylinder_hexes(1.0, 0.5, inner=0.5, n=8, layers=3, along=2)
     body = Body(mesh, NeoHooke(1.0, 0.45))
     outside = prescribe(mesh, "outer", x=0.0, y=0.0, z=0.0)
     parted = press(body, outside, [Pair("inner", Sphere((0, 0, 0.25), 0.6))], times=(1.0,))
@@ -173,7 +172,7 @@ def test_a_load_that_makes_a_block_give_way_is_named() -> None:
     """A cube on the ground under a pressure that does not turn with it sways at about π² E / 48 (Euler): below that it
     stands, above it there is no equilibrium to be found, and the last one is returned: the block leans over until its
     stiffness gives way, or its foot slides from under it."""
-    mesh = box(counts=(4, 4, 4))
+    mesh = box_hexes(counts=(4, 4, 4))
     pair = Pair("z-", Plane((0, 0, 0), (0, 0, 1)), friction=0.4)
     found = press(
         Body(mesh, NeoHooke(1.0, 0.3)),
@@ -192,7 +191,7 @@ def test_a_load_that_makes_a_block_give_way_is_named() -> None:
 def test_a_stiffness_that_is_not_positive_definite_is_damped_for_a_step() -> None:
     """Stiffness at rest is lent until conjugate gradients have something to go down on; where even the largest share
     is not enough, it is said so. Whole steps give it back, short ones lend more."""
-    mesh = box(counts=(4, 4, 4))
+    mesh = box_hexes(counts=(4, 4, 4))
     body = Body(mesh, LinearElastic(1.0, 0.3))
     free = prescribe(mesh, "z-", x=0.0, y=0.0, z=0.0).free(body.degrees)
     right = np.where(free, 1.0, 0.0)
@@ -200,7 +199,7 @@ def test_a_stiffness_that_is_not_positive_definite_is_damped_for_a_step() -> Non
     assert rest is not None
     for less, solvable in ((0.5, True), (1.1, True), (9.0, False)):
         given = BlockMatrix(rest.rows, rest.columns, (1.0 - less) * rest.values)
-        solver, damping = StepSolver(body, "float64"), Damping(body)
+        solver, damping = LaggedSolver(body, "float64"), Damping(body)
         done = None
         while done is None:
             try:
@@ -225,7 +224,7 @@ def test_a_stiffness_that_is_not_positive_definite_is_damped_for_a_step() -> Non
 
 def test_a_guess_that_squeezes_elements_leads_to_the_same_equilibrium() -> None:
     """Its false pressures are not believed: those of the equilibrium before are."""
-    mesh = ball(1.0, n=4, octant=True)
+    mesh = ball_hexes(1.0, n=4, octant=True)
     body, held, pairs = Body(mesh, NeoHooke(1.0, 0.49)), symmetric(mesh), [Pair("outer", lid(0.1))]
     plain = press(body, held, pairs)
     noise = np.random.default_rng(2).uniform(-0.02, 0.02, mesh.nodes.shape)

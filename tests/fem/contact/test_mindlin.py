@@ -14,7 +14,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from warpjld.fem import Body, HexMesh, LinearElastic, Prescribed, box, prescribe
+from warpjld.fem import Body, HexMesh, LinearElastic, Prescribed, box_hexes, prescribe
 from warpjld.fem.contact import Pair, Touch, press
 from warpjld.fem.contact.obstacles.solids import Plane
 
@@ -29,7 +29,7 @@ SHARES = (0.25, 0.5, 0.75)
 
 def graded(n: int, grading: float = 3.0) -> HexMesh:
     """The half y > 0 of the sphere's neighbourhood, its pole at the origin; faces grow away from it."""
-    mesh = box((2.0, 1.0, 1.0), (2 * n, n, n), origin=(-1.0, 0.0, -1.0))
+    mesh = box_hexes((2.0, 1.0, 1.0), (2 * n, n, n), origin=(-1.0, 0.0, -1.0))
     x, y, z = (SIZE * np.sinh(grading * s) / np.sinh(grading) for s in mesh.nodes.T)
     sphere = 1.0 - np.sqrt(1.0 - np.minimum(x**2 + y**2, 0.9))
     return replace(mesh, nodes=np.stack([x, y, z - (1.0 + z / SIZE) * sphere], axis=1))

@@ -7,7 +7,7 @@ import pytest
 
 from tests.fem.contact.bodies import lid, named, together
 from warpjld.errors import InputError
-from warpjld.fem import Body, LinearElastic, box, prescribe
+from warpjld.fem import Body, LinearElastic, box_hexes, prescribe
 from warpjld.fem.contact import Pair, press
 from warpjld.fem.mesh.hexmesh import HexMesh
 
@@ -15,7 +15,7 @@ SKIN = 0.03
 
 
 def block() -> HexMesh:
-    return box(counts=(3, 3, 3))
+    return box_hexes(counts=(3, 3, 3))
 
 
 @pytest.mark.parametrize("sites", ["nodes", "faces"])
@@ -32,7 +32,9 @@ def test_an_offset_is_as_a_plate_that_is_nearer(sites: str) -> None:
 
 def test_offsets_of_both_sides_add_up() -> None:
     law = LinearElastic(1.0, 0.3)
-    body = together({"a": (named(block(), "a"), law), "b": (named(box(counts=(2, 2, 2)), "b", (0.1, 0.1, 1.0)), law)})
+    body = together(
+        {"a": (named(block(), "a"), law), "b": (named(box_hexes(counts=(2, 2, 2)), "b", (0.1, 0.1, 1.0)), law)}
+    )
     mesh = body.mesh
     offset = np.full(len(mesh.nodes), 0.5 * SKIN)
     held = prescribe(mesh, "a.z-", x=0.0, y=0.0, z=0.0)

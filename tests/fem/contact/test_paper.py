@@ -14,8 +14,8 @@ from warpjld.fem import (
     NeoHooke,
     Prescribed,
     Status,
-    box,
-    finger,
+    box_hexes,
+    finger_hexes,
     merge,
     prescribe,
 )
@@ -31,8 +31,8 @@ def _named(mesh: HexMesh, name: str, shift: tuple[float, float, float]) -> HexMe
 
 def _blocks(master_over_slave: float) -> tuple[Body, Prescribed]:
     """A block pressed .1 of its height into a wider one under it; the upper is repelled by the lower."""
-    lower = _named(box((1, 1, 1), counts=(3, 3, 3)), "lower", (0, 0, 0))
-    upper = _named(box((0.8, 0.8, 1), counts=(3, 3, 3)), "upper", (0.1, 0.1, 1.0))
+    lower = _named(box_hexes((1, 1, 1), counts=(3, 3, 3)), "lower", (0, 0, 0))
+    upper = _named(box_hexes((0.8, 0.8, 1), counts=(3, 3, 3)), "upper", (0.1, 0.1, 1.0))
     mesh = merge(lower, upper)
     fixed = prescribe(mesh, "lower.z-", x=0.0, y=0.0, z=0.0) + prescribe(mesh, "upper.z+", x=0.0, y=0.0, z=-0.1)
     return Body(mesh, {"lower": LinearElastic(master_over_slave, 0.3), "upper": LinearElastic(1.0, 0.3)}), fixed
@@ -71,12 +71,12 @@ def test_relaxed_after_aitken_it_settles_and_agrees_with_the_coupled_method(rati
 
 def _fingertip(plate_over_flesh: float) -> tuple[Body, Prescribed]:
     """A finger along x whose bone comes down by a millimetre, on a plate that deforms as well."""
-    mesh = finger(0.008, 0.03, n=4, along=8)
+    mesh = finger_hexes(0.008, 0.03, n=4, along=8)
     tip = replace(
         mesh, nodes=mesh.nodes[:, [2, 0, 1]], faces={f"finger.{key}": value for key, value in mesh.faces.items()}
     )
     low = float(tip.nodes[:, 2].min()) - 5e-5
-    plate = _named(box((0.03, 0.03, 0.008), (10, 10, 3), origin=(0.008, -0.015, low - 0.008)), "plate", (0, 0, 0))
+    plate = _named(box_hexes((0.03, 0.03, 0.008), (10, 10, 3), origin=(0.008, -0.015, low - 0.008)), "plate", (0, 0, 0))
     whole = merge(tip, plate)
     young = 6e4
     laws = {"bone": NeoHooke(100 * young, 0.3), "flesh": NeoHooke(young, 0.45)}

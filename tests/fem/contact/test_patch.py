@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from tests.fem.contact.bodies import named, together
-from warpjld.fem import Body, LinearElastic, Loads, Material, NeoHooke, Prescribed, box, prescribe
+from warpjld.fem import Body, LinearElastic, Loads, Material, NeoHooke, Prescribed, box_hexes, prescribe
 from warpjld.fem.contact import Pair, press
 from warpjld.fem.output.stress import cauchy
 
@@ -14,7 +14,7 @@ YOUNG = 1.0
 
 
 def blocks(law: Material) -> Body:
-    lower, upper = box((1, 1, 0.5), (3, 3, 2)), box((1, 1, 0.5), (4, 5, 2))
+    lower, upper = box_hexes((1, 1, 0.5), (3, 3, 2)), box_hexes((1, 1, 0.5), (4, 5, 2))
     return together({"a": (named(lower, "a"), law), "b": (named(upper, "b", (0, 0, 0.5)), law)})
 
 

@@ -5,14 +5,14 @@ from __future__ import annotations
 import numpy as np
 
 from tests.fem.contact.bodies import lid, mean_gaps, named, symmetric, together
-from warpjld.fem import Body, LinearElastic, NeoHooke, Prescribed, ball, box, prescribe
+from warpjld.fem import Body, LinearElastic, NeoHooke, Prescribed, ball_hexes, box_hexes, prescribe
 from warpjld.fem.contact import Pair, press
 from warpjld.fem.contact.obstacles.solids import Plane
 
 
 def squeezed() -> tuple[Body, Prescribed, Plane]:
     """An octant of a ball under a plate that comes down, and goes up again from time 1 to 2."""
-    mesh = ball(1.0, n=6, octant=True)
+    mesh = ball_hexes(1.0, n=6, octant=True)
     plate = Plane((0, 0, 1), (0, 0, -1), motion=lambda t: ((0.0, 0.0, -0.1 * min(t, 2.0 - t)), (0, 0, 0, 1)))
     return Body(mesh, NeoHooke(1.0, 0.45)), symmetric(mesh), plate
 
@@ -43,7 +43,7 @@ def test_goes_on_from_a_solution() -> None:
 
 def overlapping() -> Body:
     """Two balls that start a tenth of a radius inside one another."""
-    a, b = named(ball(1.0, n=6), "a"), named(ball(1.0, n=4), "b", (0.02, 0.01, 1.9))
+    a, b = named(ball_hexes(1.0, n=6), "a"), named(ball_hexes(1.0, n=4), "b", (0.02, 0.01, 1.9))
     return together({"a": (a, NeoHooke(1.0, 0.45)), "b": (b, NeoHooke(1.0, 0.45))})
 
 
@@ -64,7 +64,7 @@ def test_overlap_at_the_start_is_resolved_gradually() -> None:
 
 
 def test_a_pair_that_never_touches() -> None:
-    mesh = ball(1.0, n=4, octant=True)
+    mesh = ball_hexes(1.0, n=4, octant=True)
     found = press(Body(mesh, LinearElastic(1.0, 0.3)), symmetric(mesh), [Pair("outer", lid(0.1, height=5.0))])
     touch = found.last.touches[0]
     assert len(touch.nodes) == 0
@@ -77,7 +77,7 @@ def test_a_pair_that_never_touches() -> None:
 
 def test_two_bodies_that_never_touch() -> None:
     parts = {
-        name: (named(box(counts=(2, 2, 2)), name, (0, 0, z)), LinearElastic(1.0, 0.3))
+        name: (named(box_hexes(counts=(2, 2, 2)), name, (0, 0, z)), LinearElastic(1.0, 0.3))
         for name, z in (("a", 0), ("b", 9))
     }
     body = together(parts)

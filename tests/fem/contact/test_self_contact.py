@@ -10,7 +10,7 @@ import pytest
 
 from tests.fem.contact.bodies import named, together
 from warpjld.errors import InputError
-from warpjld.fem import Body, HexMesh, NeoHooke, Prescribed, box, prescribe
+from warpjld.fem import Body, HexMesh, NeoHooke, Prescribed, box_hexes, prescribe
 from warpjld.fem.contact import Exclusion, Pair, press
 
 LENGTH, THICK, ALONG = 0.12, 0.004, 48
@@ -18,7 +18,7 @@ LENGTH, THICK, ALONG = 0.12, 0.004, 48
 
 @pytest.fixture(scope="module")
 def strip() -> Body:
-    return Body(box((LENGTH, 0.012, THICK), (ALONG, 3, 2)), NeoHooke(1e5, 0.4))
+    return Body(box_hexes((LENGTH, 0.012, THICK), (ALONG, 3, 2)), NeoHooke(1e5, 0.4))
 
 
 def upper(body: Body, never: bool, *, backwards: bool = False) -> tuple[np.ndarray, Exclusion]:
@@ -105,7 +105,7 @@ def test_it_does_not_matter_which_side_is_the_slave(strip: Body, friction: float
 def test_as_one_pair_with_itself_or_as_two_bodies() -> None:
     """Two soft lumps pressed together askew, so that they slide and roll: one pair "self", or one between the two."""
     lumps = {
-        name: named(bulging(box((0.02, 0.02, 0.01), (count, count, 3)), sign), name, at)
+        name: named(bulging(box_hexes((0.02, 0.02, 0.01), (count, count, 3)), sign), name, at)
         for name, count, sign, at in (("a", 6, 1.0, (0.0, 0.0, -0.01)), ("b", 5, -1.0, (0.002, 0.001, 0.004)))
     }
     body = together({name: (lump, NeoHooke(1e5, 0.45)) for name, lump in lumps.items()})

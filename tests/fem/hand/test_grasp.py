@@ -8,8 +8,7 @@ import numpy as np
 import pytest
 
 from warpjld.covering import bind
-from warpjld.fem import Body, NeoHooke, Status, merge, prescribe
-from warpjld.fem import ball as ball_mesh
+from warpjld.fem import Body, NeoHooke, Status, ball_hexes, merge, prescribe
 from warpjld.fem.contact import ContactInstant, Pair, press
 from warpjld.fem.contact.obstacles.solids import Sphere
 from warpjld.fem.hand import FleshHand, FleshMotion, build_flesh_hand, hand_laws, motion_of
@@ -117,7 +116,7 @@ def test_rigid_ball(closing: FleshMotion) -> None:
 def test_deformable_ball(closing: FleshMotion) -> None:
     """Held inside: without friction nothing else would keep it between the fingers."""
     hand = closing.hand
-    thing = ball_mesh(RADIUS, n=6)
+    thing = ball_hexes(RADIUS, n=6)
     inside = np.flatnonzero(np.linalg.norm(thing.nodes, axis=1) < 0.01)
     thing = replace(
         thing,

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 import trimesh
 
-from warpjld.fem import box
+from warpjld.fem import box_hexes
 from warpjld.fem.hand import FleshHand, build_flesh_hand, hand_laws
 from warpjld.fem.hand.cushion import coarse_note, cushions
 from warpjld.fem.hand.regions import shares_of_skin
@@ -17,7 +17,7 @@ from warpjld.fem.mesh.envelope import Envelope
 @pytest.mark.parametrize("count", [6, 8, 12])
 def test_skin_is_as_deep_whatever_the_size_of_elements(count: int) -> None:
     block = trimesh.creation.box((0.012, 0.012, 0.012))
-    mesh = box((0.012, 0.012, 0.012), (count,) * 3, origin=(-0.006,) * 3)
+    mesh = box_hexes((0.012, 0.012, 0.012), (count,) * 3, origin=(-0.006,) * 3)
     share = shares_of_skin(mesh, Envelope(block.vertices, block.faces), 1.5e-3)
     assert share.min() == 0.0
     assert share @ volumes(mesh).sum(axis=1) == pytest.approx(0.012**3 - 0.009**3, rel=0.1)

@@ -14,6 +14,7 @@ import pytest
 from warpjld.errors import InputError, MissingExtraError
 from warpjld.io.caches import Cache, open_cache
 from warpjld.surface import Surface
+from warpjld.whole_file import part_of
 
 pytest.importorskip("alembic3d")
 
@@ -89,7 +90,7 @@ def test_a_name_with_a_slash(surface: Surface, clip: np.ndarray, tmp_path: Path)
 
 
 def test_a_place_that_cannot_be_written(surface: Surface, tmp_path: Path) -> None:
-    (tmp_path / "a.abc.part").mkdir()
+    part_of(tmp_path / "a.abc").mkdir()
     with (
         pytest.raises(InputError, match="cannot write"),
         open_cache(tmp_path / "a.abc", surface, frames=1, rate=25),

@@ -4,10 +4,8 @@ from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
-import pytest
 import trimesh
 
-from warpjld.errors import InputError
 from warpjld.io.caches import Cache, open_cache
 from warpjld.surface import Surface
 
@@ -22,11 +20,12 @@ def test_one_numbered_file_a_frame(export: Callable[[str], Cache], surface: Surf
         np.testing.assert_allclose(mesh.visual.uv, surface.uv, atol=1e-7)
 
 
-def test_refuses_to_mix_with_another_sequence(export: Callable[[str], Cache], surface: Surface, tmp_path: Path) -> None:
+def test_a_former_longer_sequence_is_replaced(export: Callable[[str], Cache], surface: Surface, tmp_path: Path) -> None:
     files = export("walk.obj").files
-    with (
-        pytest.raises(InputError, match=r"walk\.0003\.obj.*of another sequence"),
-        open_cache(tmp_path / "walk.obj", surface, frames=2, rate=24, start_frame=5),
-    ):
-        pass
-    assert all(path.exists() for path in files)
+    other = tmp_path / "walker.0003.obj"
+    other.write_text("another sequence")
+    clip = np.zeros((2, len(surface.vertices), 3), np.float32)
+    with open_cache(tmp_path / "walk.obj", surface, frames=2, rate=24, start_frame=5) as cache:
+        assert all(path.exists() for path in files)
+        cache.write(clip)
+    assert sorted(path.name for path in tmp_path.glob("walk*.obj")) == ["walk.0005.obj", "walk.0006.obj", other.name]

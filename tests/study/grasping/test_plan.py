@@ -52,7 +52,7 @@ def read(folder: Path, text: str) -> object:
         ('builtin = "glass"', "", r"study.toml: objects\[1\].builtin: want either"),
         ("height = 0.1", "heigth = 0.1", r"study.toml:14: objects\[1\].heigth: unknown key; did you mean height\?"),
         ("height = 0.1", "mass = 0", r"study.toml:14: objects\[1\].mass: want a number above 0"),
-        ('name = "mug"', 'name = "a/b"', r"study.toml:12: objects\[1\].name: want a word or two"),
+        ('name = "mug"', 'name = "a/b"', r"study.toml:12: objects\[1\].name: the name 'a/b': '/' cannot stand"),
         ('name = "mug"\nbuiltin = "glass"\nheight = 0.1', 'builtin = "ball"', r"objects: two are called 'ball'"),
         ('builtin = "left"', 'file = "no.glb"', r"study.toml:6: hands\[0\].file: no such file: .*no.glb"),
         ('builtin = "left"', 'builtin = "left"\npercentile = 50', r"hands\[0\].sex: is missing: percentile and sex"),

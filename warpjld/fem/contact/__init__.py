@@ -1,12 +1,13 @@
 """Bodies in contact: with one another, with themselves and with obstacles; friction; bonds (B §3.4, R108–R130)."""
 
 from warpjld.fem.contact.interface.pairs import Bond, Exclusion, Pair
-from warpjld.fem.contact.obstacles.obstacle import Obstacle, Touching
+from warpjld.fem.contact.obstacles.obstacle import ClosestPoints, Obstacle
 from warpjld.fem.contact.press import press
 from warpjld.fem.contact.results.solution import ContactError, ContactInstant, ContactSolution, Touch
 
 __all__ = [
     "Bond",
+    "ClosestPoints",
     "ContactError",
     "ContactInstant",
     "ContactSolution",
@@ -14,6 +15,5 @@ __all__ = [
     "Obstacle",
     "Pair",
     "Touch",
-    "Touching",
     "press",
 ]

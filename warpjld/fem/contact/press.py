@@ -9,6 +9,7 @@ import numpy as np
 from warpjld.errors import InputError
 from warpjld.fem.body import Body
 from warpjld.fem.contact.interface.pairs import Pair
+from warpjld.fem.contact.paper.loop import by_turns
 from warpjld.fem.contact.results.solution import ContactError, ContactInstant, ContactSolution
 from warpjld.fem.contact.solver.load_steps import Guess, LoadSteps
 from warpjld.fem.load.loads import Loads
@@ -78,61 +79,17 @@ def press(
     for name, value in (("tolerance", tolerance), ("penetration", penetration)):
         if not 0.0 < value < 1.0:
             raise InputError(f"{name}: want a share between 0 and 1, got {value}")
-    if after is not None and len(after.memory) != len(pairs):
-        raise InputError(f"after: was found with {len(after.memory)} pairs, not {len(pairs)}")
+    if after is not None and len(after.states) != len(pairs):
+        raise InputError(f"after: was found with {len(after.states)} pairs, not {len(pairs)}")
     if method not in _METHODS:
         raise InputError(f"method: want {' or '.join(_METHODS)}, got '{method}'")
     if halvings is not None and halvings < 0:
         raise InputError(f"halvings: want 0 or more, got {halvings}")
     if method == "paper":
-        solution = _by_turns(body, prescribed, pairs, loads, wanted, after, aitken, penetration, guess, watch, progress)
+        solution = by_turns(body, prescribed, pairs, loads, wanted, after, aitken, penetration, guess, watch, progress)
     else:
         way = LoadSteps(body, prescribed, list(pairs), loads, wanted, after, tolerance, penetration, guess, halvings)
-        solution = way.through(watch, progress)
+        solution = way.run(watch, progress)
     if check and not solution.converged and solution.status is not Status.STOPPED:
         raise ContactError(solution)
     return solution
-
-
-def _by_turns(
-    body: Body,
-    prescribed: Prescribed | Callable[[float], Prescribed],
-    pairs: Sequence[Pair],
-    loads: Loads | Callable[[float], Loads] | None,
-    times: list[float],
-    after: ContactSolution | None,
-    aitken: bool,
-    threshold: float,
-    guess: Guess | None,
-    watch: Callable[[ContactInstant], str | None] | None,
-    progress: Callable[[str], None] | None,
-) -> ContactSolution:
-    from warpjld.fem.contact.paper.loop import by_turns
-
-    if any(pair.exclusion is not None for pair in pairs):
-        raise InputError("pairs: the paper's loop does not know a surface that meets itself; use method='augmented'")
-    if any(pair.friction > 0.0 or pair.bond is not None for pair in pairs):
-        raise InputError("pairs: the paper's loop knows neither friction nor bonds; use method='augmented'")
-
-    if any(pair.offset is not None for pair in pairs):
-        raise InputError("pairs: the paper's loop knows no offsets; use method='augmented'")
-
-    def known(time: float) -> Prescribed:
-        return prescribed(time) if callable(prescribed) else prescribed.scaled(time / times[-1])
-
-    def load(time: float) -> Loads:
-        return loads(time) if callable(loads) else (loads or Loads()).scaled(time / times[-1])
-
-    return by_turns(
-        body,
-        known,
-        pairs,
-        load,
-        times,
-        after=after,
-        aitken=aitken,
-        threshold=threshold,
-        guess=guess,
-        watch=watch,
-        progress=progress,
-    )

@@ -20,15 +20,14 @@ from warpjld.errors import InputError
 from warpjld.fem.body import Body, Tangent
 from warpjld.fem.contact.solver.damping import Damping
 from warpjld.fem.contact.solver.elastic import Elastic
-from warpjld.fem.contact.solver.step_solver import StepSolver
+from warpjld.fem.contact.solver.lagged_solver import LaggedSolver
 from warpjld.fem.hand.blend import Moves
 from warpjld.fem.hand.flesh_hand import FleshHand
 from warpjld.fem.hand.motion import halfway
 from warpjld.fem.load.loads import Loads
 from warpjld.fem.load.prescribed import Prescribed
+from warpjld.fem.solver.block_matrix import IndefiniteError, norm
 from warpjld.fem.solver.conjugate import Status
-from warpjld.fem.solver.dots import norm
-from warpjld.fem.solver.indefinite import IndefiniteError
 from warpjld.skeleton.kinematics import Poses
 
 __all__ = ["FleshAlone", "Untouched"]
@@ -77,7 +76,7 @@ class FleshAlone:
         self._degrees = degrees
         self._free = Prescribed(degrees, np.zeros(len(degrees))).free(body.degrees)
         self._elastic = Elastic(body)
-        self._solver = StepSolver(body, "float64")
+        self._solver = LaggedSolver(body, "float64")
         self._damping = Damping(body)
         nothing = np.zeros_like(body.mesh.nodes)
         self._known = [Untouched(rest, nothing, nothing)]

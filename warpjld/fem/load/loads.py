@@ -6,9 +6,10 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from warpjld.errors import InputError
+from warpjld.fem.arrays import Array, Ints32
 from warpjld.fem.body import Body
 from warpjld.fem.mesh.hexmesh import FACES, HexMesh
 from warpjld.fem.mesh.shape import POINTS, shape_at, slope_at
@@ -53,7 +54,7 @@ class Loads:
     pressure: Mapping[str, float] = field(default_factory=dict)
     traction: Mapping[str, tuple[float, float, float]] = field(default_factory=dict)
     forces: Mapping[str, tuple[float, float, float]] = field(default_factory=dict)
-    nodal: NDArray[np.float64] | None = None
+    nodal: Array | None = None
 
     def scaled(self, share: float) -> Loads:
         """A share of the loads: forces in proportion, and a slower turn."""
@@ -68,7 +69,7 @@ class Loads:
         )
 
 
-def external_forces(body: Body, loads: Loads, displacement: NDArray[np.float64] | None = None) -> NDArray[np.float64]:
+def external_forces(body: Body, loads: Loads, displacement: Array | None = None) -> Array:
     """Nodal forces of the loads [N], shape (3N,); pressure and centrifugal force as the displaced body meets them.
 
     Raises:
@@ -117,7 +118,7 @@ def external_forces(body: Body, loads: Loads, displacement: NDArray[np.float64] 
 
 
 def subtract_pressure_stiffness(
-    stiffness: BlockMatrix, body: Body, loads: Loads, displacement: NDArray[np.float64], factor: float = 1.0
+    stiffness: BlockMatrix, body: Body, loads: Loads, displacement: Array, factor: float = 1.0
 ) -> None:
     """Subtract what following pressure adds to the stiffness, in place, symmetric part.
 
@@ -141,14 +142,14 @@ def subtract_pressure_stiffness(
         np.subtract.at(stiffness.values, slot.reshape(-1), tangent.reshape(-1, 3, 3))
 
 
-def volumes(mesh: HexMesh) -> NDArray[np.float64]:
+def volumes(mesh: HexMesh) -> Array:
     """Rest volume at each of the eight integration points [m³], shape (E, 8)."""
     jacobian = np.einsum("eai,qaj->eqij", mesh.nodes[mesh.elements], slope_at(POINTS))
-    out: NDArray[np.float64] = np.linalg.det(jacobian)
+    out: Array = np.linalg.det(jacobian)
     return out
 
 
-def _quad_points() -> list[tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]]:
+def _quad_points() -> list[tuple[Array, Array, Array]]:
     """Shape functions and their two derivatives at the 2 × 2 points of a face."""
     out = []
     for s, t in _QUAD / np.sqrt(3.0):
@@ -157,25 +158,25 @@ def _quad_points() -> list[tuple[NDArray[np.float64], NDArray[np.float64], NDArr
     return out
 
 
-def _area_vectors(x: NDArray[np.float64]) -> NDArray[np.float64]:
+def _area_vectors(x: Array) -> Array:
     out = np.zeros(x.shape)
     for n, along, across in _quad_points():
         out += n[:, None] * np.cross(along @ x, across @ x)[:, None, :]
     return out
 
 
-def _cross_matrix(v: NDArray[np.float64]) -> NDArray[np.float64]:
+def _cross_matrix(v: Array) -> Array:
     out = np.zeros((len(v), 3, 3))
     out[:, 0, 1], out[:, 0, 2], out[:, 1, 2] = -v[:, 2], v[:, 1], -v[:, 0]
     return out - out.transpose(0, 2, 1)
 
 
-def _scatter(out: NDArray[np.float64], corners: NDArray[np.int32], values: NDArray[np.float64]) -> None:
+def _scatter(out: Array, corners: Ints32, values: Array) -> None:
     for axis in range(3):
         out[:, axis] += np.bincount(corners.ravel(), weights=values[:, :, axis].ravel(), minlength=len(out))
 
 
-def _faces(mesh: HexMesh, name: str, kind: str) -> NDArray[np.int32]:
+def _faces(mesh: HexMesh, name: str, kind: str) -> Ints32:
     try:
         faces = mesh.face_set(name)
     except InputError as error:
@@ -190,7 +191,7 @@ def _scaled(vector: tuple[float, float, float], share: float) -> tuple[float, fl
     return x, y, z
 
 
-def _vector(value: ArrayLike, name: str) -> NDArray[np.float64]:
+def _vector(value: ArrayLike, name: str) -> Array:
     out = np.array(value, dtype=np.float64)
     if out.shape not in {(), (3,)} or not np.isfinite(out).all():
         raise InputError(f"loads: {name}: want finite numbers, got {out}")

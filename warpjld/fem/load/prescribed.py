@@ -5,9 +5,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from warpjld.errors import InputError
+from warpjld.fem.arrays import Array, Ints, Ints32, Mask
 from warpjld.fem.body import Body
 from warpjld.fem.mesh.hexmesh import HexMesh
 
@@ -45,8 +46,8 @@ class Prescribed:
         values: Their displacements [m], shape (n,).
     """
 
-    degrees: NDArray[np.int64]
-    values: NDArray[np.float64]
+    degrees: Ints
+    values: Array
 
     def __add__(self, other: Prescribed) -> Prescribed:
         both = np.concatenate([self.degrees, other.degrees])
@@ -70,13 +71,13 @@ class Prescribed:
         """The same degrees of freedom, displaced by ``factor`` times as much: a load instant (R99)."""
         return Prescribed(self.degrees, factor * self.values)
 
-    def free(self, count: int) -> NDArray[np.bool_]:
+    def free(self, count: int) -> Mask:
         """Mask of the free ones of ``count`` degrees of freedom."""
         mask = np.ones(count, dtype=bool)
         mask[self.degrees] = False
         return mask
 
-    def full(self, count: int) -> NDArray[np.float64]:
+    def full(self, count: int) -> Array:
         """A displacement vector that holds U_k, and zero elsewhere, shape (count,)."""
         out = np.zeros(count)
         out[self.degrees] = self.values
@@ -121,7 +122,7 @@ def prescribe(
     return Prescribed(degrees[order], given[chosen][order]) + Prescribed(np.empty(0, np.int64), np.empty(0))
 
 
-def components(body: Body) -> NDArray[np.int32]:
+def components(body: Body) -> Ints32:
     """Connected piece each node belongs to, shape (N,)."""
     from scipy.sparse import csr_array
     from scipy.sparse.csgraph import connected_components
@@ -132,7 +133,7 @@ def components(body: Body) -> NDArray[np.int32]:
     return np.asarray(connected_components(graph, directed=False)[1], dtype=np.int32)
 
 
-def free_motions(body: Body, prescribed: Prescribed) -> list[tuple[NDArray[np.int64], NDArray[np.float64]]]:
+def free_motions(body: Body, prescribed: Prescribed) -> list[tuple[Ints, Array]]:
     """Pieces that can move as a whole: their nodes, and the rigid motions left (6, k), for each such piece."""
     piece = components(body)
     found = []
@@ -154,7 +155,7 @@ def free_motions(body: Body, prescribed: Prescribed) -> list[tuple[NDArray[np.in
     return found
 
 
-def rigid_modes(nodes: NDArray[np.float64]) -> NDArray[np.float64]:
+def rigid_modes(nodes: Array) -> Array:
     """The six rigid motions of points, rotations about their centre and scaled to their size, shape (3n, 6)."""
     centred = nodes - nodes.mean(axis=0)
     reach = float(np.abs(centred).max()) or 1.0

@@ -7,9 +7,9 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from warpjld.errors import InputError
+from warpjld.fem.arrays import Array, Ints32
 from warpjld.fem.mesh.hexmesh import HexMesh
 
 __all__ = ["Fung", "LinearElastic", "Material", "MaterialWarning", "MooneyRivlin", "NeoHooke", "laws_of"]
@@ -152,9 +152,7 @@ def _moduli(young: float, poisson: float, density: float) -> tuple[float, float]
     return young / (2.0 * (1.0 + poisson)), young / (3.0 * (1.0 - 2.0 * poisson))
 
 
-def laws_of(
-    mesh: HexMesh, materials: Material | Mapping[str, Material]
-) -> tuple[NDArray[np.int32], NDArray[np.float64], NDArray[np.float64]]:
+def laws_of(mesh: HexMesh, materials: Material | Mapping[str, Material]) -> tuple[Ints32, Array, Array]:
     """Kind (E,), constants c₁₀, c₀₁, κ, β (E, 4) and density (E,) of every element.
 
     Args:

@@ -3,20 +3,20 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from warpjld.errors import InputError
+from warpjld.fem.arrays import Array
 from warpjld.fem.mesh.hexmesh import HexMesh
-from warpjld.fem.mesh.ogrid import Ogrid, ogrid
+from warpjld.fem.mesh.ogrid import Ogrid, ogrid_hexes
 
-__all__ = ["ball", "cylinder", "finger"]
+__all__ = ["ball_hexes", "cylinder_hexes", "finger_hexes"]
 
 _ALL = ("x-", "x+", "y-", "y+", "z-", "z+")
 _ROUND = 0.45
 """How far the core leans from a cube (0) to a ball (1): angles stay open enough at its edges."""
 
 
-def ball(
+def ball_hexes(
     radius: float = 1.0, *, inner: float = 0.0, n: int = 8, layers: int | None = None, octant: bool = False
 ) -> HexMesh:
     """A ball or a spherical shell about the origin.
@@ -43,7 +43,7 @@ def ball(
         wide = (1.0 if octant else 0.5) * n
         layers = max(1, round(wide if solid else wide * 1.27 * 2 * (radius - inner) / (radius + inner)))
     sides = ("x+", "y+", "z+") if octant else _ALL
-    topology = ogrid((n, n, n), layers, sides, core=solid)
+    topology = ogrid_hexes((n, n, n), layers, sides, core=solid)
     s = topology.place / n if octant else 2.0 * topology.place / n - 1.0
     nodes = _round(s, topology.layer / layers, radius, 0.5 * radius if solid else inner, np.ones(3), solid)
     return _mesh(
@@ -51,7 +51,7 @@ def ball(
     )
 
 
-def cylinder(
+def cylinder_hexes(
     radius: float = 1.0,
     length: float = 2.0,
     *,
@@ -83,7 +83,7 @@ def cylinder(
     solid = inner == 0.0
     layers = layers or max(1, n if quarter else n // 2)
     sides = ("x+", "y+") if quarter else _ALL[:4]
-    topology = ogrid((n, n, along), layers, sides, core=solid)
+    topology = ogrid_hexes((n, n, along), layers, sides, core=solid)
     s = topology.place / n if quarter else 2.0 * topology.place / n - 1.0
     s[:, 2] = 0.0
     flat = np.array([1.0, 1.0, 0.0])
@@ -93,7 +93,7 @@ def cylinder(
     return _mesh(topology, nodes, ("core", "envelope") if solid else ("envelope",), names)
 
 
-def finger(
+def finger_hexes(
     radius: float = 0.008,
     length: float = 0.05,
     *,
@@ -123,7 +123,7 @@ def finger(
         raise InputError(f"n: want an even number of elements across the bone, got {n}")
     layers = layers or n // 2
     cap = n // 2
-    topology = ogrid((n, n, along + cap), layers, (*_ALL[:4], "z+"), core=True)
+    topology = ogrid_hexes((n, n, along + cap), layers, (*_ALL[:4], "z+"), core=True)
     straight = np.minimum(topology.place[:, 2], along)
     s = 2.0 * topology.place / n - 1.0
     s[:, 2] = (topology.place[:, 2] - straight) / cap
@@ -141,14 +141,7 @@ def finger(
     )
 
 
-def _round(
-    s: NDArray[np.float64],
-    depth: NDArray[np.float64],
-    outer: float,
-    inner: float,
-    axes: NDArray[np.float64],
-    solid: bool,
-) -> NDArray[np.float64]:
+def _round(s: Array, depth: Array, outer: float, inner: float, axes: Array, solid: bool) -> Array:
     """Points of the cube |s| ≤ 1 (or square, where ``axes`` says so) and of the layers around it, made round.
 
     Directions are equiangular, tan(π s/4), which keeps elements of a patch alike in size.
@@ -166,7 +159,7 @@ def _round(
     return core + depth[:, None] * (outer * direction - core)
 
 
-def _mesh(topology: Ogrid, nodes: NDArray[np.float64], regions: tuple[str, ...], names: dict[str, str]) -> HexMesh:
+def _mesh(topology: Ogrid, nodes: Array, regions: tuple[str, ...], names: dict[str, str]) -> HexMesh:
     faces = {"outer": topology.outer}
     if len(topology.inner):
         faces["inner"] = topology.inner

@@ -13,6 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from warpjld.fem.arrays import Array, Ints, Ints32, Mask
 from warpjld.fem.mesh.hexmesh import HexMesh
 from warpjld.fem.mesh.untangle import as_far, improve
 
@@ -45,10 +46,10 @@ class Bone:
         far: Share at which it ends.
     """
 
-    start: NDArray[np.float64]
-    along: NDArray[np.float64]
-    shift: NDArray[np.float64]
-    radius: NDArray[np.float64]
+    start: Array
+    along: Array
+    shift: Array
+    radius: Array
     near: float
     far: float
 
@@ -57,9 +58,7 @@ class Bone:
         """From share 0 to 1 [m]."""
         return float(np.linalg.norm(self.along))
 
-    def around(
-        self, points: NDArray[np.float64]
-    ) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
+    def around(self, points: Array) -> tuple[Array, Array, Array]:
         """Share of points (n, 3), where they lie off the axis [m] (n, 3), and its radius there [m] (n,)."""
         share = (points - self.start) @ self.along / self.length**2
         t = np.linspace(0.0, 1.0, len(self.radius))
@@ -67,7 +66,7 @@ class Bone:
         off = points - (self.start + share[:, None] * self.along + shift)
         return share, off, np.interp(share, t, self.radius)
 
-    def depth(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
+    def depth(self, points: Array) -> Array:
         """Distance of points (n, 3) from the axis over the radius; infinite before its beginning and after its end."""
         share, off, radius = self.around(points)
         inside = (share > self.near) & (share < self.far)
@@ -90,7 +89,7 @@ class Bone:
         return np.unique(chosen[found[near]])
 
 
-def claimed(mesh: HexMesh, bones: Sequence[Bone], bare: Collection[int] = ()) -> NDArray[np.int64]:
+def claimed(mesh: HexMesh, bones: Sequence[Bone], bare: Collection[int] = ()) -> Ints:
     """Bone that each element's middle lies in, the nearest of several, -1 in flesh, shape (E,).
 
     Elements of the outermost layer are flesh: there is skin over every bone. Where those below are so large that none
@@ -116,12 +115,7 @@ def claimed(mesh: HexMesh, bones: Sequence[Bone], bare: Collection[int] = ()) ->
     return owner
 
 
-def fitted(
-    mesh: HexMesh,
-    elements: Mapping[int, NDArray[np.int32]],
-    bones: Mapping[int, Bone],
-    spacing: float,
-) -> HexMesh:
+def fitted(mesh: HexMesh, elements: Mapping[int, Ints32], bones: Mapping[int, Bone], spacing: float) -> HexMesh:
     """The mesh with the nodes between bones and flesh on the bones' surfaces, as far as elements stay well shaped.
 
     Nodes on the mesh's own surface stay. A bone of few elements is a prism of few sides: its radius is what gives it
@@ -174,13 +168,13 @@ class _Hull:
     """
 
     bone: Bone
-    nodes: NDArray[np.int64]
-    side: NDArray[np.bool_]
-    end: NDArray[np.float64]
-    quads: NDArray[np.int32]
+    nodes: Ints
+    side: Mask
+    end: Array
+    quads: Ints32
 
     @staticmethod
-    def of(mesh: HexMesh, own: NDArray[np.int32], bone: Bone, spacing: float, still: NDArray[np.bool_]) -> _Hull:
+    def of(mesh: HexMesh, own: Ints32, bone: Bone, spacing: float, still: Mask) -> _Hull:
         """Of the elements of a bone, by their corners (n, 8); nodes that stay are left out."""
         part = HexMesh(mesh.nodes, own, np.zeros(len(own), np.int32))
         quads = part.quads(part.boundary())
@@ -200,9 +194,7 @@ class _Hull:
         nodes = nodes[~still[nodes]]
         return _Hull(bone, nodes, side[nodes], end[nodes], quads[~near & ~far])
 
-    def wanted(
-        self, nodes: NDArray[np.float64]
-    ) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
+    def wanted(self, nodes: Array) -> tuple[Array, Array, Array]:
         """Where its nodes belong [m] (n, 3), normals there (n, 3), and how little they may slide (n,)."""
         bone = self.bone
         x = nodes[self.nodes]
@@ -216,7 +208,7 @@ class _Hull:
         normal = np.where(self.side[:, None], outwards, bone.along / bone.length)
         return target, normal, np.where(self.side & at_end, 1.0, _SLIDE)
 
-    def _stretch(self, nodes: NDArray[np.float64]) -> float:
+    def _stretch(self, nodes: Array) -> float:
         """Radius over the round bone's that gives its side, of flat faces, the same mean section."""
         corners = nodes[self.quads]
         if not len(corners):

@@ -8,10 +8,10 @@ from numpy.typing import ArrayLike
 from warpjld.errors import InputError
 from warpjld.fem.mesh.hexmesh import HexMesh, elements_of
 
-__all__ = ["box"]
+__all__ = ["box_hexes"]
 
 
-def box(
+def box_hexes(
     size: ArrayLike = (1.0, 1.0, 1.0),
     counts: tuple[int, int, int] = (8, 8, 8),
     *,

@@ -7,12 +7,12 @@ hang together: there a path of cells whose middles are inside is added, and fitt
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy import ndimage
 from scipy.sparse import csr_array
 from scipy.sparse.csgraph import dijkstra
 
 from warpjld.errors import InputError
+from warpjld.fem.arrays import Array, Mask
 from warpjld.fem.mesh.envelope import Envelope
 from warpjld.fem.mesh.voxels import core_cells, make_manifold
 
@@ -29,7 +29,7 @@ _ROUNDS = 6
 _LARGEST = 60_000_000
 
 
-def core_of(envelope: Envelope, spacing: float, notes: list[str]) -> tuple[NDArray[np.bool_], NDArray[np.float64]]:
+def core_of(envelope: Envelope, spacing: float, notes: list[str]) -> tuple[Mask, Array]:
     """Cells of the core, shape (ni, nj, nk), and the grid's first node [m], shape (3,).
 
     Args:
@@ -80,9 +80,7 @@ class _Room:
         middle: Depth of the cells' middles in spacings, -1 where no corner is inside, shape (ni, nj, nk).
     """
 
-    def __init__(
-        self, envelope: Envelope, grid: NDArray[np.float64], depth: NDArray[np.float64], spacing: float
-    ) -> None:
+    def __init__(self, envelope: Envelope, grid: Array, depth: Array, spacing: float) -> None:
         self.inside = core_cells(depth > _MARGIN * spacing)
         some = ~core_cells(depth <= 0.0)
         places = np.stack(np.nonzero(some), axis=1)
@@ -98,7 +96,7 @@ class _Room:
             face = (offsets == np.where(np.arange(3) == axis, 1.0, 0.5)).all(axis=1)
             self._across[axis][tuple(places.T)] = found[:, face][:, 0]
 
-    def reached(self, cells: NDArray[np.bool_], banned: NDArray[np.bool_]) -> NDArray[np.bool_]:
+    def reached(self, cells: Mask, banned: Mask) -> Mask:
         """Cells with paths added that join pieces, and that lead where surface is far from any cell."""
         open_ = ((self.middle > _PATH) & ~banned) | cells
         if not cells.any():
@@ -134,13 +132,7 @@ class _Room:
 class _Paths:
     """Ways through cells that are open, the deeper the cheaper."""
 
-    def __init__(
-        self,
-        open_: NDArray[np.bool_],
-        middle: NDArray[np.float64],
-        across: NDArray[np.float64],
-        cells: NDArray[np.bool_],
-    ) -> None:
+    def __init__(self, open_: Mask, middle: Array, across: Array, cells: Mask) -> None:
         self._shape = open_.shape
         self._number = np.full(open_.shape, -1)
         self._number[open_] = np.arange(int(open_.sum()))
@@ -158,28 +150,28 @@ class _Paths:
         i, j = np.concatenate([i, j]), np.concatenate([j, i])
         self._graph = csr_array((0.5 * (price[i] + price[j]), (i, j)), shape=(len(price), len(price)))
 
-    def nearest(self, start: NDArray[np.bool_], ends: NDArray[np.bool_]) -> int | None:
+    def nearest(self, start: Mask, ends: Mask) -> int | None:
         """The end that is cheapest to reach, none if no end is."""
         self._search(start)
         return self._least(ends, self._cost)
 
-    def deepest(self, start: NDArray[np.bool_], ends: NDArray[np.bool_]) -> int | None:
+    def deepest(self, start: Mask, ends: Mask) -> int | None:
         """The deepest end that can be reached."""
         self._search(start)
         return self._least(ends, np.where(np.isfinite(self._cost), -self._depth, np.inf))
 
-    def _search(self, start: NDArray[np.bool_]) -> None:
+    def _search(self, start: Mask) -> None:
         self._cost, self._before, _ = dijkstra(
             self._graph, indices=self._number[start], min_only=True, return_predecessors=True
         )
 
-    def _least(self, ends: NDArray[np.bool_], values: NDArray[np.float64]) -> int | None:
+    def _least(self, ends: Mask, values: Array) -> int | None:
         wanted = self._number[ends & (self._number >= 0)]
         if not np.isfinite(values[wanted]).any():
             return None
         return int(wanted[int(values[wanted].argmin())])
 
-    def add(self, cells: NDArray[np.bool_], target: int) -> None:
+    def add(self, cells: Mask, target: int) -> None:
         """Add the cells from the last search's start to a target."""
         while target >= 0:
             cells[tuple(self._places[target])] = True

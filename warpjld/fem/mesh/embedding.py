@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from warpjld.errors import InputError
+from warpjld.fem.arrays import Array, Ints32
 from warpjld.fem.mesh.hexmesh import HexMesh
 from warpjld.fem.mesh.shape import CENTRE_GRADIENT, shape_at, slope_at
 
@@ -27,16 +28,16 @@ class Embedding:
         outside: How far each point is from its element, 0 inside, in element sizes, shape (P,).
     """
 
-    corners: NDArray[np.int32]
-    weights: NDArray[np.float64]
-    outside: NDArray[np.float64]
+    corners: Ints32
+    weights: Array
+    outside: Array
 
-    def carry(self, displacement: NDArray[np.float64]) -> NDArray[np.float64]:
+    def carry(self, displacement: Array) -> Array:
         """Displacement of the points [m], shape (P, 3), from that of the nodes, shape (N, 3)."""
-        out: NDArray[np.float64] = np.einsum("pa,pai->pi", self.weights, displacement[self.corners])
+        out: Array = np.einsum("pa,pai->pi", self.weights, displacement[self.corners])
         return out
 
-    def gather(self, forces: NDArray[np.float64], count: int) -> NDArray[np.float64]:
+    def gather(self, forces: Array, count: int) -> Array:
         """Nodal forces that do the work of forces on the points: the transpose of ``carry``, shape (count, 3)."""
         out = np.zeros((count, 3))
         for axis in range(3):
@@ -45,7 +46,7 @@ class Embedding:
         return out
 
 
-def embed(mesh: HexMesh, points: NDArray[np.float64], *, reach: float = 1.0) -> Embedding:
+def embed(mesh: HexMesh, points: Array, *, reach: float = 1.0) -> Embedding:
     """Find the element and the place in it of every point; points beyond the boundary are extrapolated.
 
     Args:
@@ -87,7 +88,7 @@ def embed(mesh: HexMesh, points: NDArray[np.float64], *, reach: float = 1.0) -> 
     return Embedding(mesh.elements[owner], shape_at(place), best)
 
 
-def embed_between(mesh: HexMesh, ends: Embedding, edges: NDArray[np.integer], points: NDArray[np.float64]) -> Embedding:
+def embed_between(mesh: HexMesh, ends: Embedding, edges: NDArray[np.integer], points: Array) -> Embedding:
     """Embed points between others in the elements of these: another part of the mesh may lie nearer, but is not theirs.
 
     Args:
@@ -108,7 +109,7 @@ def embed_between(mesh: HexMesh, ends: Embedding, edges: NDArray[np.integer], po
     return Embedding(corners, weights, best)
 
 
-def _local(x: NDArray[np.float64], points: NDArray[np.float64]) -> NDArray[np.float64]:
+def _local(x: Array, points: Array) -> Array:
     """Reference coordinates of points in elements (Newton's method), infinite where it does not converge."""
     at = np.zeros(points.shape)
     for _ in range(12):

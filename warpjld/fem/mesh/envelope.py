@@ -5,9 +5,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from warpjld.errors import InputError
+from warpjld.fem.arrays import Array, Ints, Ints32
 from warpjld.rotations import unit
 
 __all__ = ["Envelope"]
@@ -15,9 +16,9 @@ __all__ = ["Envelope"]
 
 @dataclass(frozen=True)
 class _Answer:
-    distance: NDArray[np.float64]
-    closest: NDArray[np.float64]
-    normal: NDArray[np.float64]
+    distance: Array
+    closest: Array
+    normal: Array
 
 
 class Envelope:
@@ -73,7 +74,7 @@ class Envelope:
         """Whether every edge has two faces."""
         return self.open_edges == 0 and self.crowded_edges == 0
 
-    def ask(self, points: NDArray[np.float64]) -> _Answer:
+    def ask(self, points: Array) -> _Answer:
         """Signed distance [m] (negative inside), closest point and the surface's normal there, of points (n, 3)."""
         import warp as wp
         from warpjld_kernels import fem_inside
@@ -97,7 +98,7 @@ class Envelope:
         )
 
 
-def _capped(points: NDArray[np.float64], triangles: NDArray[np.int32]) -> tuple[NDArray[np.float64], NDArray[np.int32]]:
+def _capped(points: Array, triangles: Ints32) -> tuple[Array, Ints32]:
     """Vertices and triangles with a fan over every hole whose border is a single loop: a wrist that was cut off."""
     edges = triangles[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2)
     count = np.int64(len(points))
@@ -106,8 +107,8 @@ def _capped(points: NDArray[np.float64], triangles: NDArray[np.int32]) -> tuple[
     if not len(open_) or (uses > 1).any() or not np.array_equal(start, np.unique(open_[:, 1])):
         return points, triangles
     onwards = dict(open_.tolist())
-    centres: list[NDArray[np.float64]] = []
-    fans: list[NDArray[np.int64]] = []
+    centres: list[Array] = []
+    fans: list[Ints] = []
     while onwards:
         first, loop = next(iter(onwards)), []
         here = first

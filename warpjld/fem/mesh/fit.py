@@ -7,9 +7,9 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from warpjld.errors import InputError
+from warpjld.fem.arrays import Array, Ints, Ints32, Mask
 from warpjld.fem.mesh.core import core_of
 from warpjld.fem.mesh.envelope import Envelope
 from warpjld.fem.mesh.hexmesh import HexMesh, elements_of
@@ -106,9 +106,7 @@ def mesh_surface_file(path: Path, *, spacing: float, scale: float = 1.0) -> Fit:
     return fit_mesh(Envelope(scale * np.asarray(loaded.vertices), np.asarray(loaded.faces)), spacing)
 
 
-def _grown(
-    cells: NDArray[np.bool_], origin: NDArray[np.float64], spacing: float, name: str
-) -> tuple[HexMesh, NDArray[np.int64]]:
+def _grown(cells: Mask, origin: Array, spacing: float, name: str) -> tuple[HexMesh, Ints]:
     """The cells and one layer of elements on each of their free faces."""
     shape = [n + 1 for n in cells.shape]
     every = elements_of(np.arange(int(np.prod(shape)), dtype=np.int32).reshape(shape))[cells.ravel()]
@@ -144,7 +142,7 @@ def _grown(
 
 
 def _settled(
-    mesh: HexMesh, boundary: NDArray[np.int64], envelope: Envelope, spacing: float, least: float, rounds: int
+    mesh: HexMesh, boundary: Ints, envelope: Envelope, spacing: float, least: float, rounds: int
 ) -> tuple[HexMesh, int]:
     """Boundary nodes on the surface and well-shaped elements, as far as both go together.
 
@@ -202,7 +200,7 @@ def _settled(
     return snapped if best is None else best
 
 
-def _links(quads: NDArray[np.int32], boundary: NDArray[np.int64]) -> Any:
+def _links(quads: Ints32, boundary: Ints) -> Any:
     """Which boundary nodes share an edge, symmetric ``csr_array`` (B, B)."""
     from scipy.sparse import csr_array
 
@@ -212,13 +210,7 @@ def _links(quads: NDArray[np.int32], boundary: NDArray[np.int64]) -> Any:
     return table + table.T
 
 
-def _led(
-    nodes: NDArray[np.float64],
-    closest: NDArray[np.float64],
-    normal: NDArray[np.float64],
-    agrees: NDArray[np.bool_],
-    links: Any,
-) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+def _led(nodes: Array, closest: Array, normal: Array, agrees: Mask, links: Any) -> tuple[Array, Array]:
     """Targets and normals; nodes whose own closest point is none for them move as their neighbours do."""
     move = np.where(agrees[:, None], closest - nodes, 0.0)
     facing = np.where(agrees[:, None], normal, 0.0)
@@ -235,9 +227,7 @@ def _led(
     return nodes + move, np.where(size > 1e-6, facing / np.maximum(size, 1e-6), normal)
 
 
-def _snapped(
-    mesh: HexMesh, boundary: NDArray[np.int64], chosen: NDArray[np.bool_], envelope: Envelope, least: float
-) -> tuple[HexMesh, int]:
+def _snapped(mesh: HexMesh, boundary: Ints, chosen: Mask, envelope: Envelope, least: float) -> tuple[HexMesh, int]:
     """Boundary nodes put on the surface, less far where an element would become worse than ``least``."""
     start = mesh.nodes
     goal = start.copy()

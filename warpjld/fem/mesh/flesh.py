@@ -5,9 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from warpjld.errors import InputError
+from warpjld.fem.arrays import Array, Ints, Ints32
 from warpjld.fem.load.prescribed import Prescribed, prescribe
 from warpjld.fem.mesh.bones import Bone, claimed, fitted
 from warpjld.fem.mesh.embedding import Embedding, embed
@@ -42,7 +42,7 @@ class Flesh:
     shafts: tuple[Bone, ...]
     skin: Embedding
     fit: Fit
-    rest: NDArray[np.float64]
+    rest: Array
 
     def held(self, poses: Poses | None = None, frame: int = 0) -> Prescribed:
         """Bones prescribed: at rest, or moved by a pose of the skeleton (R110)."""
@@ -154,7 +154,7 @@ def _shafts(rig: Rig, envelope: Envelope, bone: float, flush: float, gap: float,
     return shafts
 
 
-def _backwards(rig: Rig, envelope: Envelope, root: int) -> NDArray[np.float64]:
+def _backwards(rig: Rig, envelope: Envelope, root: int) -> Array:
     """From a root joint away from its children, as far as the surface goes [m]."""
     skeleton = rig.skeleton
     children = skeleton.rest[np.asarray(skeleton.parents) == root] - skeleton.rest[root]
@@ -165,11 +165,11 @@ def _backwards(rig: Rig, envelope: Envelope, root: int) -> NDArray[np.float64]:
     steps = np.linspace(0.0, envelope.size, 400)
     inside = envelope.ask(skeleton.rest[root] + steps[:, None] * (away / size)).distance < 0.0
     reach = steps[int(np.argmin(inside))] if not inside.all() else 0.0
-    out: NDArray[np.float64] = away * (reach / size)
+    out: Array = away * (reach / size)
     return out
 
 
-def _owner(mesh: HexMesh, shafts: dict[int, Bone], parents: NDArray[np.int32], *, jointed: bool) -> NDArray[np.int64]:
+def _owner(mesh: HexMesh, shafts: dict[int, Bone], parents: Ints32, *, jointed: bool) -> Ints:
     """Bone of every element by the joint at its far end, -1 in flesh.
 
     In thin fingers of large elements a bone that is covered by flesh may have no element left: it may then reach the
@@ -188,7 +188,7 @@ def _owner(mesh: HexMesh, shafts: dict[int, Bone], parents: NDArray[np.int32], *
     return owner
 
 
-def _jointed(mesh: HexMesh, owner: NDArray[np.int64], parents: NDArray[np.int32]) -> NDArray[np.int64]:
+def _jointed(mesh: HexMesh, owner: Ints, parents: Ints32) -> Ints:
     """At least two elements of flesh between bones that meet at a joint: one would have to bear its whole motion."""
     owner = owner.copy()
     for joint, parent in enumerate(parents):
@@ -206,7 +206,7 @@ def _jointed(mesh: HexMesh, owner: NDArray[np.int64], parents: NDArray[np.int32]
     return owner
 
 
-def _apart(mesh: HexMesh, owner: NDArray[np.int64]) -> NDArray[np.int64]:
+def _apart(mesh: HexMesh, owner: Ints) -> Ints:
     """No node in two bones: where they meet, elements of the later one turn to flesh."""
     owner = owner.copy()
     first = np.full(len(mesh.nodes), np.iinfo(np.int64).max)

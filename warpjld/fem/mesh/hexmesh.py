@@ -5,17 +5,14 @@ from __future__ import annotations
 from dataclasses import dataclass, field, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from warpjld.errors import InputError
+from warpjld.fem.arrays import Array, Ints32, Mask
 from warpjld.suggest import one_of
 
 __all__ = ["EDGES", "FACES", "HexMesh", "elements_of", "merge"]
 
-FACES = np.array(
-    [[0, 4, 7, 3], [1, 2, 6, 5], [0, 1, 5, 4], [3, 7, 6, 2], [0, 3, 2, 1], [4, 5, 6, 7]],
-    dtype=np.int32,
-)
+FACES = np.array([[0, 4, 7, 3], [1, 2, 6, 5], [0, 1, 5, 4], [3, 7, 6, 2], [0, 3, 2, 1], [4, 5, 6, 7]], dtype=np.int32)
 """Corners of the faces −x, +x, −y, +y, −z, +z of an element, anticlockwise seen from outside, shape (6, 4)."""
 
 EDGES = np.array(
@@ -24,8 +21,7 @@ EDGES = np.array(
 """Corners at the ends of an element's edges, shape (12, 2)."""
 
 _CORNERS = np.array(  # corner, and its three neighbours in right-handed order
-    [[1, 3, 4], [2, 0, 5], [3, 1, 6], [0, 2, 7], [7, 5, 0], [4, 6, 1], [5, 7, 2], [6, 4, 3]],
-    dtype=np.int32,
+    [[1, 3, 4], [2, 0, 5], [3, 1, 6], [0, 2, 7], [7, 5, 0], [4, 6, 1], [5, 7, 2], [6, 4, 3]], dtype=np.int32
 )
 
 
@@ -48,14 +44,14 @@ class HexMesh:
         parts: The meshes that were merged into this one, in the order of their nodes; empty for a single one.
     """
 
-    nodes: NDArray[np.float64]
-    elements: NDArray[np.int32]
-    regions: NDArray[np.int32]
+    nodes: Array
+    elements: Ints32
+    regions: Ints32
     region_names: tuple[str, ...] = ("body",)
-    faces: dict[str, NDArray[np.int32]] = field(default_factory=dict)
-    node_sets: dict[str, NDArray[np.int32]] = field(default_factory=dict)
-    blocks: tuple[NDArray[np.int32], ...] = ()
-    lattice: NDArray[np.int32] | None = None
+    faces: dict[str, Ints32] = field(default_factory=dict)
+    node_sets: dict[str, Ints32] = field(default_factory=dict)
+    blocks: tuple[Ints32, ...] = ()
+    lattice: Ints32 | None = None
     parts: tuple[HexMesh, ...] = ()
 
     def __post_init__(self) -> None:
@@ -78,7 +74,7 @@ class HexMesh:
         """Diagonal of the bounding box [m]."""
         return float(np.linalg.norm(np.ptp(self.nodes, axis=0)))
 
-    def boundary(self) -> NDArray[np.int32]:
+    def boundary(self) -> Ints32:
         """Faces that belong to one element only: element and local face, shape (F, 2). They are the surface (R96)."""
         corners = np.sort(self.elements[:, FACES].reshape(-1, 4), axis=1)
         repeated = np.zeros(corners.shape, dtype=bool)
@@ -94,11 +90,11 @@ class HexMesh:
         index = np.flatnonzero(single)
         return np.stack([index // 6, index % 6], axis=1).astype(np.int32)
 
-    def quads(self, faces: NDArray[np.int32]) -> NDArray[np.int32]:
+    def quads(self, faces: Ints32) -> Ints32:
         """Corners of faces given as (element, local face), anticlockwise seen from outside, shape (F, 4)."""
         return self.elements[faces[:, :1], FACES[faces[:, 1]]]
 
-    def face_set(self, name: str) -> NDArray[np.int32]:
+    def face_set(self, name: str) -> Ints32:
         """Named faces; ``surface`` is the whole boundary.
 
         Raises:
@@ -110,7 +106,7 @@ class HexMesh:
             return self.boundary()
         raise InputError(_unknown("face set", name, [*self.faces, "surface"]))
 
-    def node_set(self, name: str) -> NDArray[np.int32]:
+    def node_set(self, name: str) -> Ints32:
         """Nodes of a named set, or of a named part of the boundary, or of a region.
 
         Raises:
@@ -124,7 +120,7 @@ class HexMesh:
             return np.unique(self.elements[self.region(name)]).astype(np.int32)
         raise InputError(_unknown("node set", name, [*self.node_sets, *self.faces, "surface", *self.region_names]))
 
-    def region(self, name: str) -> NDArray[np.bool_]:
+    def region(self, name: str) -> Mask:
         """Mask of the elements of a region.
 
         Raises:
@@ -134,7 +130,7 @@ class HexMesh:
             raise InputError(_unknown("region", name, list(self.region_names)))
         return self.regions == self.region_names.index(name)
 
-    def scaled_jacobian(self) -> NDArray[np.float64]:
+    def scaled_jacobian(self) -> Array:
         """Least scaled Jacobian over the corners of each element: 1 for a box, ≤ 0 for an inverted corner, shape (E,).
 
         Corners whose edges collapse (prisms, tetrahedra) do not count.
@@ -149,20 +145,20 @@ class HexMesh:
             out[solid] = np.minimum(out[solid], volume[solid] / length[solid])
         return out
 
-    def moved(self, displacement: NDArray[np.float64]) -> HexMesh:
+    def moved(self, displacement: Array) -> HexMesh:
         """The same mesh with displaced nodes."""
         return replace(self, nodes=self.nodes + displacement.reshape(-1, 3))
 
-    def with_faces(self, **faces: NDArray[np.int32]) -> HexMesh:
+    def with_faces(self, **faces: Ints32) -> HexMesh:
         """The same mesh with more named faces."""
         return replace(self, faces={**self.faces, **faces})
 
-    def with_nodes(self, **sets: NDArray[np.int32]) -> HexMesh:
+    def with_nodes(self, **sets: Ints32) -> HexMesh:
         """The same mesh with more named nodes."""
         return replace(self, node_sets={**self.node_sets, **sets})
 
 
-def elements_of(grid: NDArray[np.int32]) -> NDArray[np.int32]:
+def elements_of(grid: Ints32) -> Ints32:
     """Elements of a structured grid of node numbers (ni + 1, nj + 1, nk + 1), x index slowest, shape (ni nj nk, 8)."""
     low, high = slice(None, -1), slice(1, None)
     corners = [
@@ -184,8 +180,8 @@ def merge(*meshes: HexMesh) -> HexMesh:
     offset = 0
     count = 0
     nodes, elements, regions, blocks = [], [], [], []
-    faces: dict[str, list[NDArray[np.int32]]] = {}
-    sets: dict[str, list[NDArray[np.int32]]] = {}
+    faces: dict[str, list[Ints32]] = {}
+    sets: dict[str, list[Ints32]] = {}
     for mesh in meshes:
         nodes.append(mesh.nodes)
         elements.append(mesh.elements + offset)

@@ -5,12 +5,12 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from warpjld.errors import InputError
+from warpjld.fem.arrays import Ints, Ints32
 from warpjld.fem.mesh.hexmesh import elements_of
 
-__all__ = ["Ogrid", "ogrid"]
+__all__ = ["Ogrid", "ogrid_hexes"]
 
 _SIDES = {  # axis, end, and the two axes that make a right-handed triple with the outward direction
     "x-": (0, 0, 2, 1),
@@ -37,17 +37,17 @@ class Ogrid:
         blocks: Structured grids of node numbers.
     """
 
-    place: NDArray[np.int32]
-    layer: NDArray[np.int32]
-    elements: NDArray[np.int32]
+    place: Ints32
+    layer: Ints32
+    elements: Ints32
     core: int
-    outer: NDArray[np.int32]
-    inner: NDArray[np.int32]
-    ends: dict[str, NDArray[np.int32]]
-    blocks: tuple[NDArray[np.int32], ...]
+    outer: Ints32
+    inner: Ints32
+    ends: dict[str, Ints32]
+    blocks: tuple[Ints32, ...]
 
 
-def ogrid(counts: tuple[int, int, int], layers: int, sides: tuple[str, ...], *, core: bool) -> Ogrid:
+def ogrid_hexes(counts: tuple[int, int, int], layers: int, sides: tuple[str, ...], *, core: bool) -> Ogrid:
     """Layers of elements around the named sides of a box of elements.
 
     Args:
@@ -83,7 +83,7 @@ def ogrid(counts: tuple[int, int, int], layers: int, sides: tuple[str, ...], *, 
     total = len(elements[0]) if core else 0
     core_elements = total
     outer, inner = [], []
-    ends: dict[str, list[NDArray[np.int32]]] = {side: [] for side in _SIDES if side not in sides}
+    ends: dict[str, list[Ints32]] = {side: [] for side in _SIDES if side not in sides}
     if core:
         cells = np.arange(total).reshape(counts)
         for side in ends:
@@ -123,6 +123,6 @@ def ogrid(counts: tuple[int, int, int], layers: int, sides: tuple[str, ...], *, 
     )
 
 
-def _faces(cells: NDArray[np.int64], local: int) -> NDArray[np.int32]:
+def _faces(cells: Ints, local: int) -> Ints32:
     flat = cells.ravel()
     return np.stack([flat, np.full_like(flat, local)], axis=1).astype(np.int32)

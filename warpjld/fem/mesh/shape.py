@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
+
+from warpjld.fem.arrays import Array
 
 __all__ = ["CENTRE_GRADIENT", "CORNERS", "POINTS", "shape_at", "slope_at"]
 
@@ -16,13 +17,13 @@ POINTS = CORNERS / np.sqrt(3.0)
 """2 × 2 × 2 integration points, weight 1 each, shape (8, 3)."""
 
 
-def shape_at(points: NDArray[np.float64]) -> NDArray[np.float64]:
+def shape_at(points: Array) -> Array:
     """N_a at reference points (n, 3), shape (n, 8)."""
-    out: NDArray[np.float64] = np.prod(1.0 + CORNERS[None] * points[:, None], axis=2) / 8.0
+    out: Array = np.prod(1.0 + CORNERS[None] * points[:, None], axis=2) / 8.0
     return out
 
 
-def slope_at(points: NDArray[np.float64]) -> NDArray[np.float64]:
+def slope_at(points: Array) -> Array:
     """∂N_a/∂ξ_j at reference points (n, 3), shape (n, 8, 3)."""
     h = 1.0 + CORNERS[None] * points[:, None]
     pairs = np.stack([h[..., 1] * h[..., 2], h[..., 0] * h[..., 2], h[..., 0] * h[..., 1]], axis=-1)

@@ -10,8 +10,8 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from warpjld.fem.arrays import Array, Ints, Ints32, Mask
 from warpjld.fem.launch import Launch, shared, threads_of
 from warpjld.fem.mesh.hexmesh import HexMesh
 from warpjld.fem.solver.lbfgs import minimise
@@ -20,19 +20,19 @@ __all__ = ["as_far", "improve"]
 
 
 def improve(
-    nodes: NDArray[np.float64],
-    elements: NDArray[np.int32],
+    nodes: Array,
+    elements: Ints32,
     spacing: float,
-    boundary: NDArray[np.int64],
-    targets: NDArray[np.float64],
-    normals: NDArray[np.float64],
+    boundary: Ints,
+    targets: Array,
+    normals: Array,
     *,
-    pull: NDArray[np.float64],
-    slide: float | NDArray[np.float64] = 0.02,
+    pull: Array,
+    slide: float | Array = 0.02,
     softness: float = 0.1,
     rounds: int = 60,
-    still: NDArray[np.bool_] | None = None,
-) -> NDArray[np.float64]:
+    still: Mask | None = None,
+) -> Array:
     """Better positions of the nodes.
 
     Args:
@@ -70,10 +70,10 @@ def improve(
         threads=threads_of(),
     )
 
-    def cost(vector: NDArray[np.float64]) -> tuple[float, NDArray[np.float64]]:
+    def cost(vector: Array) -> tuple[float, Array]:
         x[:] = vector.reshape(-1, 3)
         launch()
-        gradient: NDArray[np.float64] = np.stack(
+        gradient: Array = np.stack(
             [np.bincount(flat, weights=slopes[:, :, k].ravel(), minlength=count) for k in range(3)], axis=1
         )
         away = x[boundary] - targets
@@ -87,17 +87,11 @@ def improve(
 
     targets = targets / spacing
     start = (nodes / spacing).reshape(-1)
-    improved: NDArray[np.float64] = minimise(cost, start, rounds=rounds, first_step=0.05).reshape(-1, 3) * spacing
+    improved: Array = minimise(cost, start, rounds=rounds, first_step=0.05).reshape(-1, 3) * spacing
     return improved
 
 
-def as_far(
-    mesh: HexMesh,
-    start: NDArray[np.float64],
-    goal: NDArray[np.float64],
-    least: float | NDArray[np.float64],
-    shorter: float,
-) -> HexMesh:
+def as_far(mesh: HexMesh, start: Array, goal: Array, least: float | Array, shorter: float) -> HexMesh:
     """The mesh with its nodes moved from a start towards a goal, less far where elements would become too bad.
 
     Args:

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy import ndimage
+
+from warpjld.fem.arrays import Ints, Mask
 
 __all__ = ["core_cells", "make_manifold"]
 
 
-def core_cells(inside: NDArray[np.bool_]) -> NDArray[np.bool_]:
+def core_cells(inside: Mask) -> Mask:
     """Cells all of whose eight corners are inside; ``inside`` is of grid nodes, shape (ni + 1, nj + 1, nk + 1)."""
     low, high = slice(None, -1), slice(1, None)
     out = np.ones([n - 1 for n in inside.shape], dtype=bool)
@@ -20,7 +21,7 @@ def core_cells(inside: NDArray[np.bool_]) -> NDArray[np.bool_]:
     return out
 
 
-def make_manifold(cells: NDArray[np.bool_], spare: NDArray[np.bool_] | None = None) -> NDArray[np.bool_]:
+def make_manifold(cells: Mask, spare: Mask | None = None) -> Mask:
     """Change as few cells as it takes until no two meet at an edge or a corner only, and neither do two empty ones.
 
     Args:
@@ -42,9 +43,7 @@ def make_manifold(cells: NDArray[np.bool_], spare: NDArray[np.bool_] | None = No
             cells[block], left[block] = _mended(cells[block], left[block], count[block])
 
 
-def _mended(
-    present: NDArray[np.bool_], spare: NDArray[np.bool_], count: NDArray[np.int64]
-) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
+def _mended(present: Mask, spare: Mask, count: Ints) -> tuple[Mask, Mask]:
     """Eight cells around a node and what is still spare of them, changed least: cells that have few neighbours are
     removed, or spare ones added."""
     price = np.where(present, 6.0 + count, np.where(spare, 8.0, np.inf)).ravel()
@@ -59,7 +58,7 @@ def _mended(
     return mended, spare & ~mended & ~present
 
 
-def _shifted(cells: NDArray[np.bool_], corner: tuple[int, int, int]) -> NDArray[np.bool_]:
+def _shifted(cells: Mask, corner: tuple[int, int, int]) -> Mask:
     """Cell at one of the eight places around each grid node."""
     out = np.zeros([n + 1 for n in cells.shape], dtype=bool)
     place = tuple(slice(1 - c, n + 1 - c) for c, n in zip(corner, cells.shape, strict=True))
@@ -67,7 +66,7 @@ def _shifted(cells: NDArray[np.bool_], corner: tuple[int, int, int]) -> NDArray[
     return out
 
 
-def _broken_patterns() -> NDArray[np.bool_]:
+def _broken_patterns() -> Mask:
     """Which of the 256 ways to fill the cells around a node leave them, or the empty ones, in more than one piece."""
     table = np.zeros(256, dtype=bool)
     corners = list(np.ndindex(2, 2, 2))

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from warpjld.fem.arrays import Array
 from warpjld.fem.body import Body
 from warpjld.fem.output.stress import at_nodes, cauchy, mises
 from warpjld.fem.output.vtk import grid_of
@@ -57,7 +58,7 @@ def draw(path: Path, body: Body, instant: Instant, quantity: str, title: str = "
 
 
 def _panel(
-    shown: Any, whole: Any, limits: tuple[float, float], front: NDArray[np.float64], up: NDArray[np.float64], title: str
+    shown: Any, whole: Any, limits: tuple[float, float], front: Array, up: Array, title: str
 ) -> NDArray[np.uint8]:
     import pyvista
 
@@ -107,13 +108,13 @@ def _bar(moved: Any, limits: tuple[float, float], label: str) -> NDArray[np.uint
     return image
 
 
-def _limits(values: NDArray[np.float64]) -> tuple[float, float]:
+def _limits(values: Array) -> tuple[float, float]:
     """Range of the colours: half a percent may saturate at either end, since stress peaks at single nodes."""
     low, high = (float(p) for p in np.percentile(values, [0.5, 99.5]))
     return (low, high) if high > low else (low, low + 1.0)
 
 
-def _view(points: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+def _view(points: Array) -> tuple[Array, Array]:
     """Look across the longest and shortest extents, z upwards unless the body lies along it."""
     extent = np.ptp(points, axis=0)
     if extent[2] > 1.5 * extent[:2].max():

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from warpjld.fem.arrays import Array
 from warpjld.fem.body import Body
 from warpjld.fem.material.materials import NEO_HOOKE
 from warpjld.fem.mesh.shape import CENTRE_GRADIENT
@@ -12,7 +12,7 @@ from warpjld.fem.mesh.shape import CENTRE_GRADIENT
 __all__ = ["at_nodes", "cauchy", "mises"]
 
 
-def cauchy(body: Body, displacement: NDArray[np.float64]) -> NDArray[np.float64]:
+def cauchy(body: Body, displacement: Array) -> Array:
     """Cauchy stress at the centre of each element [Pa], xx yy zz xy yz zx, shape (E, 6).
 
     The pressure is the element's own (mean dilatation), which does not oscillate within it.
@@ -43,15 +43,15 @@ def cauchy(body: Body, displacement: NDArray[np.float64]) -> NDArray[np.float64]
     return np.stack([stress[:, i, j] for i, j in ((0, 0), (1, 1), (2, 2), (0, 1), (1, 2), (2, 0))], axis=1)
 
 
-def mises(stress: NDArray[np.float64]) -> NDArray[np.float64]:
+def mises(stress: Array) -> Array:
     """Von Mises' equivalent stress of (…, 6)."""
     xx, yy, zz, xy, yz, zx = np.moveaxis(stress, -1, 0)
     squared = 0.5 * ((xx - yy) ** 2 + (yy - zz) ** 2 + (zz - xx) ** 2) + 3.0 * (xy**2 + yz**2 + zx**2)
-    out: NDArray[np.float64] = np.sqrt(squared)
+    out: Array = np.sqrt(squared)
     return out
 
 
-def at_nodes(body: Body, values: NDArray[np.float64]) -> NDArray[np.float64]:
+def at_nodes(body: Body, values: Array) -> Array:
     """Element values averaged over the elements at each node, weighted by their volume, shape (N, …)."""
     from warpjld.fem.load.loads import volumes
 
@@ -66,5 +66,5 @@ def at_nodes(body: Body, values: NDArray[np.float64]) -> NDArray[np.float64]:
     return out.reshape(count, *values.shape[1:])
 
 
-def _matrix(voigt: NDArray[np.float64]) -> NDArray[np.float64]:
+def _matrix(voigt: Array) -> Array:
     return voigt[:, [[0, 3, 5], [3, 1, 4], [5, 4, 2]]]

@@ -8,8 +8,8 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from warpjld.fem.arrays import Array
 from warpjld.fem.output.vtk import Series
 from warpjld.fem.study import Reached, Study
 from warpjld.whole_file import whole_file
@@ -31,7 +31,7 @@ class Reaction:
     step: str
     load: float
     where: str
-    force: NDArray[np.float64]
+    force: Array
 
 
 class StudyResults:

@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from warpjld.fem.arrays import Array, Mask
 from warpjld.fem.solver.block_matrix import BlockMatrix
 
 __all__ = ["Aggregation"]
@@ -21,7 +22,7 @@ class Aggregation:
         nodes: Rest positions [m], shape (N, 3): what the rigid-body modes are made of.
     """
 
-    def __init__(self, stiffness: BlockMatrix, free: NDArray[np.bool_], nodes: NDArray[np.float64]) -> None:
+    def __init__(self, stiffness: BlockMatrix, free: Mask, nodes: Array) -> None:
         import pyamg
 
         from warpjld.fem.load.prescribed import rigid_modes

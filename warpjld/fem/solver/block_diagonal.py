@@ -3,15 +3,14 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
-from warpjld.fem.solver.block_matrix import BlockMatrix
-from warpjld.fem.solver.indefinite import IndefiniteError
+from warpjld.fem.arrays import Array, Mask
+from warpjld.fem.solver.block_matrix import BlockMatrix, IndefiniteError
 
 __all__ = ["block_inverse"]
 
 
-def block_inverse(matrix: BlockMatrix, free: NDArray[np.bool_] | None = None) -> NDArray[np.float64]:
+def block_inverse(matrix: BlockMatrix, free: Mask | None = None) -> Array:
     """Inverses of the diagonal blocks, zero where a degree of freedom is prescribed or has no stiffness, (N, 3, 3).
 
     Raises:
@@ -29,5 +28,5 @@ def block_inverse(matrix: BlockMatrix, free: NDArray[np.bool_] | None = None) ->
         on &= free.reshape(-1, 3)
     blocks = blocks * (on[:, :, None] & on[:, None, :])
     blocks[:, [0, 1, 2], [0, 1, 2]] += ~on
-    inverse: NDArray[np.float64] = np.linalg.inv(blocks)
+    inverse: Array = np.linalg.inv(blocks)
     return inverse * (on[:, :, None] & on[:, None, :])

@@ -1,16 +1,37 @@
-"""Sparse matrices of 3×3 blocks: three degrees of freedom a node."""
+"""Sparse matrices of 3×3 blocks, three degrees of freedom a node, and dot products of their vectors."""
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from warpjld.errors import WarpjldError
+from warpjld.fem.arrays import Ints, Ints32, Mask
 from warpjld.fem.launch import on_rows, shared, threads_of
 
-__all__ = ["BlockMatrix", "padded"]
+__all__ = ["BlockMatrix", "IndefiniteError", "dot", "norm", "padded"]
+
+
+class IndefiniteError(WarpjldError):
+    """A matrix that should be positive definite is not."""
+
+
+def dot(a: NDArray[Any], b: NDArray[Any]) -> float:
+    """a · b of two vectors, the same bits every run: one thread, one order of summation.
+
+    BLAS shares a dot product of 50,000 numbers between threads, which costs more than the product where other work
+    waits for the same cores, and sums in an order that depends on how many there are.
+    """
+    return float(np.einsum("i,i->", a, b))
+
+
+def norm(a: NDArray[Any]) -> float:
+    """Euclidean length of a vector; NaN or infinity where it holds one."""
+    return math.sqrt(dot(a, a))
 
 
 def padded(count: int, dtype: Any = np.float64) -> NDArray[Any]:
@@ -28,8 +49,8 @@ class BlockMatrix:
         values: Blocks, shape (B, 3, 3).
     """
 
-    rows: NDArray[np.int32]
-    columns: NDArray[np.int32]
+    rows: Ints32
+    columns: Ints32
     values: NDArray[Any]
 
     @property
@@ -58,7 +79,7 @@ class BlockMatrix:
         return result
 
     @property
-    def on_diagonal(self) -> NDArray[np.int64]:
+    def on_diagonal(self) -> Ints:
         """Which blocks lie on the diagonal, one for each row, shape (N,)."""
         row = np.repeat(np.arange(self.size, dtype=np.int32), np.diff(self.rows))
         return np.flatnonzero(row == self.columns)
@@ -67,7 +88,7 @@ class BlockMatrix:
         """Diagonal blocks, shape (N, 3, 3)."""
         return np.asarray(self.values[self.on_diagonal])
 
-    def masked(self, free: NDArray[np.bool_], dtype: Any = np.float64) -> BlockMatrix:
+    def masked(self, free: Mask, dtype: Any = np.float64) -> BlockMatrix:
         """K11 in place: rows and columns of prescribed degrees of freedom set to zero (R107).
 
         Args:
@@ -76,7 +97,7 @@ class BlockMatrix:
         """
         values = self.values.astype(dtype)
         kept = free.reshape(-1, 3)
-        touched: NDArray[np.bool_] = np.asarray(~kept.all(axis=1))
+        touched: Mask = np.asarray(~kept.all(axis=1))
         if touched.any():
             row = np.repeat(np.arange(self.size, dtype=np.int32), np.diff(self.rows))
             block = np.flatnonzero(touched[row])

@@ -7,8 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from warpjld.fem.solver.block_matrix import BlockMatrix
-from warpjld.fem.solver.dots import dot
+from warpjld.fem.solver.block_matrix import BlockMatrix, dot
 
 __all__ = ["chebyshev_steps", "highest_eigenvalue"]
 

@@ -10,7 +10,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from warpjld.fem.solver.dots import dot, norm
+from warpjld.fem.arrays import Array
+from warpjld.fem.solver.block_matrix import dot, norm
 
 __all__ = ["Iteration", "Status", "conjugate_gradients"]
 
@@ -48,7 +49,7 @@ class Iteration:
     status: Status
     iterations: int
     residual: float
-    history: NDArray[np.float64]
+    history: Array
 
 
 def conjugate_gradients(

@@ -5,8 +5,8 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from warpjld.fem.arrays import Mask
 from warpjld.fem.launch import grouped, on_rows, shared
 from warpjld.fem.solver.block_matrix import BlockMatrix
 from warpjld.fem.solver.product import product_pattern
@@ -14,9 +14,7 @@ from warpjld.fem.solver.product import product_pattern
 __all__ = ["coarse_matrix", "restriction"]
 
 
-def coarse_matrix(
-    fine: BlockMatrix, free: NDArray[np.bool_], weights: Any, transposed: Any, *, threads: int
-) -> BlockMatrix:
+def coarse_matrix(fine: BlockMatrix, free: Mask, weights: Any, transposed: Any, *, threads: int) -> BlockMatrix:
     """Pᵀ K11 P, float64.
 
     Args:

@@ -5,14 +5,14 @@ from __future__ import annotations
 from collections.abc import Callable
 
 import numpy as np
-from numpy.typing import NDArray
 
+from warpjld.fem.arrays import Array
+from warpjld.fem.solver.block_matrix import norm
 from warpjld.fem.solver.conjugate import Iteration, Status
-from warpjld.fem.solver.dots import norm
 
 __all__ = ["minimal_residuals"]
 
-_Vector = NDArray[np.float64]
+_Vector = Array
 _RESTART = 80
 
 

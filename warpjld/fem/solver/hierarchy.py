@@ -6,8 +6,8 @@ from functools import reduce
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from warpjld.fem.arrays import Array, Ints, Ints32
 from warpjld.fem.mesh.hexmesh import HexMesh
 
 __all__ = ["hierarchy_of"]
@@ -36,7 +36,7 @@ def hierarchy_of(mesh: HexMesh) -> list[Any]:
     return [weights, *_from_lattice(coarse)]
 
 
-def _from_blocks(blocks: tuple[NDArray[np.int32], ...], count: int) -> list[Any]:
+def _from_blocks(blocks: tuple[Ints32, ...], count: int) -> list[Any]:
     from scipy.sparse import csr_array, kron
 
     out = []
@@ -80,7 +80,7 @@ def _side_by_side(parts: list[list[Any]], counts: list[int]) -> list[Any]:
     return out
 
 
-def _kept_lines(n: int) -> NDArray[np.int64]:
+def _kept_lines(n: int) -> Ints:
     """Lines 0…n of a block that the coarser one keeps: every other one, the same seen from both ends."""
     if n % 2 == 0:
         return np.arange(0, n + 1, 2)
@@ -90,7 +90,7 @@ def _kept_lines(n: int) -> NDArray[np.int64]:
     return np.concatenate([half, (n - half)[::-1]])
 
 
-def _line_weights(n: int, lines: NDArray[np.int64]) -> Any:
+def _line_weights(n: int, lines: Ints) -> Any:
     from scipy.sparse import csr_array
 
     fine = np.arange(n + 1)
@@ -102,7 +102,7 @@ def _line_weights(n: int, lines: NDArray[np.int64]) -> Any:
     return matrix
 
 
-def _from_lattice(lattice: NDArray[np.int32]) -> list[Any]:
+def _from_lattice(lattice: Ints32) -> list[Any]:
     out = []
     while len(lattice) > _COARSEST:
         weights, coarse = _trilinear(0.5 * (lattice - lattice.min(axis=0)))
@@ -113,7 +113,7 @@ def _from_lattice(lattice: NDArray[np.int32]) -> list[Any]:
     return out
 
 
-def _trilinear(place: NDArray[np.float64]) -> tuple[Any, NDArray[np.int32]]:
+def _trilinear(place: Array) -> tuple[Any, Ints32]:
     """Weights of points in a unit grid, and the integer coordinates of the grid nodes they use."""
     from scipy.sparse import csr_array
 

@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Callable
 
 import numpy as np
-from numpy.typing import NDArray
 
-from warpjld.fem.solver.dots import dot, norm
+from warpjld.fem.arrays import Array
+from warpjld.fem.solver.block_matrix import dot, norm
 
 __all__ = ["minimise"]
 
@@ -15,13 +15,7 @@ _MEMORY = 10
 _SHORTEST = 1e-10
 
 
-def minimise(
-    cost: Callable[[NDArray[np.float64]], tuple[float, NDArray[np.float64]]],
-    start: NDArray[np.float64],
-    *,
-    rounds: int,
-    first_step: float,
-) -> NDArray[np.float64]:
+def minimise(cost: Callable[[Array], tuple[float, Array]], start: Array, *, rounds: int, first_step: float) -> Array:
     """A lower point of ``cost``, after at most so many rounds (Nocedal & Wright, algorithm 7.5, Armijo steps).
 
     SciPy's does the same through BLAS, whose threads wait for one another at every dot product of these sizes.
@@ -35,7 +29,7 @@ def minimise(
     x = start.copy()
     value, slope = cost(x)
     slope = slope.copy()
-    pairs: list[tuple[NDArray[np.float64], NDArray[np.float64], float]] = []
+    pairs: list[tuple[Array, Array, float]] = []
     for _ in range(rounds):
         direction = -slope
         shares = []

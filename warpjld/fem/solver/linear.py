@@ -10,15 +10,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from warpjld.errors import InputError
+from warpjld.fem.arrays import Array, Mask
 from warpjld.fem.launch import Launch, shared, threads_of
 from warpjld.fem.mesh.hexmesh import HexMesh
 from warpjld.fem.solver.block_diagonal import block_inverse
-from warpjld.fem.solver.block_matrix import BlockMatrix, padded
+from warpjld.fem.solver.block_matrix import BlockMatrix, IndefiniteError, norm, padded
 from warpjld.fem.solver.conjugate import Iteration, Status, conjugate_gradients
-from warpjld.fem.solver.dots import norm
 from warpjld.fem.solver.gmres import minimal_residuals
 from warpjld.fem.solver.hierarchy import hierarchy_of
-from warpjld.fem.solver.indefinite import IndefiniteError
 from warpjld.fem.solver.multigrid import Multigrid
 
 __all__ = ["METHODS", "LinearSolver"]
@@ -55,7 +54,7 @@ class LinearSolver:
     def __init__(
         self,
         stiffness: BlockMatrix,
-        free: NDArray[np.bool_],
+        free: Mask,
         mesh: HexMesh,
         *,
         method: str = "auto",
@@ -112,7 +111,7 @@ class LinearSolver:
         out._product = _Product(stiffness, self.threads)
         return out
 
-    def solve(self, b: NDArray[np.float64], *, tolerance: float = 1e-8, iterations: int = 4000) -> Iteration:
+    def solve(self, b: Array, *, tolerance: float = 1e-8, iterations: int = 4000) -> Iteration:
         """U_u for a right side of which only the free part counts, shape (3N,); zero where prescribed."""
         right = b * self._mask
         if self.method == "direct":
@@ -123,8 +122,8 @@ class LinearSolver:
             )
         return self._refined(right, tolerance, iterations)
 
-    def solve_beside(
-        self, beside: Any, b: NDArray[np.float64], *, tolerance: float = 1e-8, iterations: int = 400
+    def solve_nonsymmetric(
+        self, nonsymmetric: Any, b: Array, *, tolerance: float = 1e-8, iterations: int = 400
     ) -> Iteration:
         """(K11 + E11) x = b with an E (3N, 3N) that need not be symmetric nor definite, by minimal residuals; what
         preconditions K preconditions the sum.
@@ -132,10 +131,10 @@ class LinearSolver:
         right = b * self._mask
         mask = self._mask
 
-        def product(x: NDArray[np.float64]) -> NDArray[np.float64]:
-            return self.masked_product(x) + mask * (beside @ x)
+        def product(x: Array) -> Array:
+            return self.masked_product(x) + mask * (nonsymmetric @ x)
 
-        def precondition(r: NDArray[np.float64]) -> NDArray[np.float64]:
+        def precondition(r: Array) -> Array:
             if self.method != "direct":
                 return np.asarray(self._precondition(r))
             x = np.zeros_like(r)
@@ -150,7 +149,7 @@ class LinearSolver:
         y *= self._mask
         return y
 
-    def _refined(self, b: NDArray[np.float64], tolerance: float, iterations: int) -> Iteration:
+    def _refined(self, b: Array, tolerance: float, iterations: int) -> Iteration:
         """float32 iterations to 1e-2, the residual recomputed in float64, again until done."""
         single = self._stiffness.masked(self.free, np.float32)
         product = _Product(single, self.threads)
@@ -186,7 +185,7 @@ class LinearSolver:
                 break
         return Iteration(x, status, done, now, np.array(history))
 
-    def _direct(self, b: NDArray[np.float64]) -> Iteration:
+    def _direct(self, b: Array) -> Iteration:
         size = norm(b)
         x = np.zeros_like(b)
         if not np.isfinite(size):
@@ -221,7 +220,7 @@ class _Product:
         return self._y.copy()
 
 
-def _factor(stiffness: BlockMatrix, free: NDArray[np.bool_], definite: bool) -> Any:
+def _factor(stiffness: BlockMatrix, free: Mask, definite: bool) -> Any:
     from scipy.sparse.linalg import splu
 
     inside = stiffness.to_scipy().tocsr()[free][:, free].tocsc()

@@ -12,12 +12,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from warpjld.fem.arrays import Array, Mask
 from warpjld.fem.launch import Launch, shared, threads_of
 from warpjld.fem.solver.block_diagonal import block_inverse
-from warpjld.fem.solver.block_matrix import BlockMatrix, padded
+from warpjld.fem.solver.block_matrix import BlockMatrix, IndefiniteError, padded
 from warpjld.fem.solver.chebyshev import chebyshev_steps, highest_eigenvalue
 from warpjld.fem.solver.galerkin import coarse_matrix, restriction
-from warpjld.fem.solver.indefinite import IndefiniteError
 
 __all__ = ["Multigrid"]
 
@@ -51,7 +51,7 @@ class Multigrid:
     def __init__(
         self,
         stiffness: BlockMatrix,
-        free: NDArray[np.bool_],
+        free: Mask,
         hierarchy: list[Any],
         *,
         degree: int = 2,
@@ -83,7 +83,7 @@ class Multigrid:
     def _level(
         self,
         matrix: BlockMatrix,
-        free: NDArray[np.bool_],
+        free: Mask,
         weights: Any,
         transposed: Any,
         b: NDArray[Any],
@@ -152,7 +152,7 @@ class Multigrid:
 class _Coarsest:
     """Banded Cholesky of the coarsest level, in the ordering of Cuthill and McKee."""
 
-    def __init__(self, matrix: BlockMatrix, free: NDArray[np.bool_]) -> None:
+    def __init__(self, matrix: BlockMatrix, free: Mask) -> None:
         from scipy.linalg import LinAlgError, cholesky_banded
         from scipy.sparse.csgraph import reverse_cuthill_mckee
 
@@ -175,7 +175,7 @@ class _Coarsest:
         except LinAlgError as error:
             raise IndefiniteError("the stiffness is not positive definite (found on the coarsest level)") from error
 
-    def solve(self, b: NDArray[Any]) -> NDArray[np.float64]:
+    def solve(self, b: NDArray[Any]) -> Array:
         from scipy.linalg import cho_solve_banded
 
         out = np.empty(len(self._order))

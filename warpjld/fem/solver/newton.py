@@ -5,13 +5,11 @@ from __future__ import annotations
 from collections.abc import Callable
 
 import numpy as np
-from numpy.typing import NDArray
 
+from warpjld.fem.arrays import Array, Ints
 from warpjld.fem.body import Tangent
-from warpjld.fem.solver.block_matrix import BlockMatrix
+from warpjld.fem.solver.block_matrix import BlockMatrix, IndefiniteError, norm
 from warpjld.fem.solver.conjugate import Iteration, Status
-from warpjld.fem.solver.dots import norm
-from warpjld.fem.solver.indefinite import IndefiniteError
 from warpjld.fem.solver.problem import Problem
 from warpjld.fem.solver.solution import Instant, Solution
 
@@ -37,13 +35,13 @@ class Newton:
         guess: First guess of the displacement at the full load [m], shape (N, 3).
     """
 
-    def __init__(self, problem: Problem, tolerance: float, guess: NDArray[np.float64] | None = None) -> None:
+    def __init__(self, problem: Problem, tolerance: float, guess: Array | None = None) -> None:
         self._problem = problem
         self._tolerance = tolerance
         self._guess = guess
         self._tangent: Tangent | None = None
 
-    def run(self, steps: list[float], held: NDArray[np.int64], progress: Progress | None) -> Solution:
+    def run(self, steps: list[float], held: Ints, progress: Progress | None) -> Solution:
         """Instant after instant; one that fails is tried again at half the step."""
         u = self._problem.start.copy()
         reached: list[Instant] = []
@@ -91,7 +89,7 @@ class Newton:
         return self._equilibrium(u, target, cautious=False, guessed=pressures)
 
     def _equilibrium(
-        self, u: NDArray[np.float64], target: float, *, cautious: bool, guessed: NDArray[np.float64] | None = None
+        self, u: Array, target: float, *, cautious: bool, guessed: Array | None = None
     ) -> tuple[Status, Instant | None]:
         """Newton's method at one load.
 
@@ -142,9 +140,7 @@ class Newton:
                 u[known] = self._problem.known(target)
         return Status.MAX_ITERATIONS, None
 
-    def _line_search(
-        self, u: NDArray[np.float64], direction: NDArray[np.float64], target: float, before: float | None
-    ) -> tuple[float, Status]:
+    def _line_search(self, u: Array, direction: Array, target: float, before: float | None) -> tuple[float, Status]:
         """Longest of 1, ½, ¼ … that keeps elements upright and, where ``before`` is given, lowers the residual."""
         length, best = 1.0, (np.inf, 0.0)
         upright = False
@@ -169,7 +165,7 @@ class Newton:
             return best[1], Status.CONVERGED
         return 0.0, Status.STAGNATED
 
-    def _step(self, stiffness: BlockMatrix, right: NDArray[np.float64], tolerance: float) -> Iteration:
+    def _step(self, stiffness: BlockMatrix, right: Array, tolerance: float) -> Iteration:
         """One Newton step. On the way to a stable equilibrium K may be indefinite for a while (a slender body pushed
         before it has turned): conjugate gradients cannot pass there, a direct solve of moderate size can.
         """

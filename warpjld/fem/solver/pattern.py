@@ -6,9 +6,9 @@ from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
-from numpy.typing import NDArray
 
 from warpjld.errors import InputError
+from warpjld.fem.arrays import Ints32
 from warpjld.fem.launch import on_rows, shared, threads_of
 from warpjld.fem.mesh.hexmesh import HexMesh
 from warpjld.fem.solver.product import product_pattern
@@ -30,22 +30,22 @@ class Pattern:
         incident: Elements at each node, ascending, shape (8 E,).
     """
 
-    rows: NDArray[np.int32]
-    columns: NDArray[np.int32]
-    slots: NDArray[np.int32]
-    starts: NDArray[np.int32]
-    incident: NDArray[np.int32]
+    rows: Ints32
+    columns: Ints32
+    slots: Ints32
+    starts: Ints32
+    incident: Ints32
 
 
 @dataclass(frozen=True, eq=False)
 class Batches:
     """Elements eight at a time, for ranges of rows that are assembled side by side (see ``fem_element``)."""
 
-    ranges: NDArray[np.int32]
-    range_batches: NDArray[np.int32]
-    elements: NDArray[np.int32]
-    kinds: NDArray[np.int32]
-    counts: NDArray[np.int32]
+    ranges: Ints32
+    range_batches: Ints32
+    elements: Ints32
+    kinds: Ints32
+    counts: Ints32
 
 
 def pattern_of(mesh: HexMesh, *, threads: int | None = None) -> Pattern:
@@ -78,7 +78,7 @@ def pattern_of(mesh: HexMesh, *, threads: int | None = None) -> Pattern:
     return Pattern(product.rows, product.columns, slots, starts, incident)
 
 
-def batches_of(pattern: Pattern, kinds: NDArray[np.int32], parts: int) -> Batches:
+def batches_of(pattern: Pattern, kinds: Ints32, parts: int) -> Batches:
     """Divide the rows into ``parts`` ranges of like work, and the elements that touch each into batches of one kind."""
     count = len(pattern.starts) - 1
     edges = np.searchsorted(pattern.starts, np.linspace(0, pattern.starts[-1], parts + 1)).astype(np.int32)

@@ -5,8 +5,8 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from warpjld.fem.arrays import Array
 from warpjld.fem.body import Body
 from warpjld.fem.load.loads import Loads, external_forces, subtract_pressure_stiffness
 from warpjld.fem.load.prescribed import Prescribed
@@ -53,12 +53,12 @@ class Problem:
         self._method = method
         self._hierarchy: list[Any] | None = None
 
-    def known(self, factor: float) -> NDArray[np.float64]:
+    def known(self, factor: float) -> Array:
         """Prescribed displacements at an instant, from where they started, shape (n,)."""
-        start: NDArray[np.float64] = self.start[self.prescribed.degrees]
+        start: Array = self.start[self.prescribed.degrees]
         return start + factor * (self.prescribed.values - start)
 
-    def external(self, factor: float, u: NDArray[np.float64] | None) -> NDArray[np.float64]:
+    def external(self, factor: float, u: Array | None) -> Array:
         """Nodal forces at an instant, at a displacement (at rest for linear laws), shape (3N,)."""
         forces = factor * external_forces(self.body, self.loads, u)
         if self.after is not None and factor != 1.0:
@@ -66,7 +66,7 @@ class Problem:
             forces += (1.0 - factor) * before
         return forces
 
-    def subtract_pressure(self, stiffness: BlockMatrix, factor: float, u: NDArray[np.float64]) -> None:
+    def subtract_pressure(self, stiffness: BlockMatrix, factor: float, u: Array) -> None:
         """Take from a stiffness what pressures add to it as the surface turns."""
         subtract_pressure_stiffness(stiffness, self.body, self.loads, u, factor)
         if self.after is not None and factor != 1.0:
@@ -88,7 +88,7 @@ class Problem:
         """By factors, of a stiffness that need not be positive definite."""
         return LinearSolver(stiffness, self.free, self.body.mesh, definite=False, method="direct", **self._options)
 
-    def reactions(self, forces: NDArray[np.float64]) -> NDArray[np.float64]:
+    def reactions(self, forces: Array) -> Array:
         """What internal less external forces (3N,) are where displacements are prescribed, shape (N, 3)."""
         return np.where(self.free, 0.0, forces).reshape(-1, 3)
 

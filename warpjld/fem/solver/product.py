@@ -5,8 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from warpjld.fem.arrays import Ints32
 from warpjld.fem.launch import grouped, on_rows, shared
 
 __all__ = ["ProductPattern", "product_pattern"]
@@ -14,7 +14,7 @@ __all__ = ["ProductPattern", "product_pattern"]
 _LEAST_ROWS = 64
 """Rows below which one thread does all."""
 
-Rows = tuple[NDArray[np.int32], NDArray[np.int32]]
+Rows = tuple[Ints32, Ints32]
 """A pattern: where each row begins, and its columns."""
 
 
@@ -29,10 +29,10 @@ class ProductPattern:
         marker: Scratch of as many ranges, shape (parts, n).
     """
 
-    rows: NDArray[np.int32]
-    columns: NDArray[np.int32]
-    ranges: NDArray[np.int32]
-    marker: NDArray[np.int32]
+    rows: Ints32
+    columns: Ints32
+    ranges: Ints32
+    marker: Ints32
 
 
 def product_pattern(first: Rows, second: Rows, third: Rows, width: int, *, threads: int) -> ProductPattern:

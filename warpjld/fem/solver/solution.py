@@ -4,10 +4,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-import numpy as np
-from numpy.typing import NDArray
-
 from warpjld.errors import WarpjldError
+from warpjld.fem.arrays import Array, Ints
 from warpjld.fem.load.loads import Loads
 from warpjld.fem.solver.conjugate import Status
 
@@ -28,8 +26,8 @@ class Instant:
     """
 
     factor: float
-    displacement: NDArray[np.float64]
-    reactions: NDArray[np.float64]
+    displacement: Array
+    reactions: Array
     newton: int
     iterations: int
     residual: float
@@ -50,7 +48,7 @@ class Solution:
     status: Status
     instants: tuple[Instant, ...]
     message: str
-    held: NDArray[np.int64]
+    held: Ints
     loads: Loads
 
     @property
@@ -64,12 +62,12 @@ class Solution:
         return self.instants[-1]
 
     @property
-    def displacement(self) -> NDArray[np.float64]:
+    def displacement(self) -> Array:
         """U of the last equilibrium [m], shape (N, 3)."""
         return self.last.displacement
 
     @property
-    def reactions(self) -> NDArray[np.float64]:
+    def reactions(self) -> Array:
         """Reactions of the last equilibrium [N], shape (N, 3)."""
         return self.last.reactions
 

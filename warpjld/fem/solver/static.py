@@ -5,14 +5,14 @@ from __future__ import annotations
 from collections.abc import Callable
 
 import numpy as np
-from numpy.typing import NDArray
 
 from warpjld.errors import InputError
+from warpjld.fem.arrays import Array, Ints
 from warpjld.fem.body import Body
 from warpjld.fem.load.loads import Loads
 from warpjld.fem.load.prescribed import Prescribed, held_in_place, refuse_free
+from warpjld.fem.solver.block_matrix import IndefiniteError
 from warpjld.fem.solver.conjugate import Status
-from warpjld.fem.solver.indefinite import IndefiniteError
 from warpjld.fem.solver.newton import Newton
 from warpjld.fem.solver.problem import Problem
 from warpjld.fem.solver.solution import Instant, Solution, SolveError
@@ -28,7 +28,7 @@ def solve(
     loads: Loads | None = None,
     *,
     after: Solution | None = None,
-    guess: NDArray[np.float64] | None = None,
+    guess: Array | None = None,
     instants: int | list[float] = 1,
     free: str = "refuse",
     method: str = "auto",
@@ -88,11 +88,7 @@ def solve(
 
 
 def _linear(
-    problem: Problem,
-    steps: list[float],
-    tolerance: float,
-    held: NDArray[np.int64],
-    progress: Callable[[str], None] | None,
+    problem: Problem, steps: list[float], tolerance: float, held: Ints, progress: Callable[[str], None] | None
 ) -> Solution:
     """K is the same at every instant: one set-up, and a solve each."""
     body = problem.body

@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 
 from warpjld.errors import InputError, WarpjldError
 from warpjld.surface import Surface
+from warpjld.whole_file import part_of, sweep
 
 __all__ = ["Cache", "Clip"]
 
@@ -130,14 +131,17 @@ class Cache(ABC):
                     self._finish()
                     for place, part in self._parts.items():
                         part.replace(place)
+                    self._published()
                 self.files = tuple(self._parts)
         finally:
             self._discard()
 
-    def _part(self, place: Path, *, keep_suffix: bool = False) -> Path:
-        """Temporary name of a file that becomes ``place`` on success."""
-        name = f"{place.stem}.part{place.suffix}" if keep_suffix else f"{place.name}.part"
-        return self._parts.setdefault(place, place.with_name(name))
+    def _part(self, place: Path) -> Path:
+        """Temporary place of a file that becomes ``place`` on success: of this process alone, with the same suffix."""
+        if place not in self._parts:
+            sweep(place.parent)
+            self._parts[place] = part_of(place)
+        return self._parts[place]
 
     def _discard(self) -> None:
         self._close()
@@ -162,6 +166,9 @@ class Cache(ABC):
     @abstractmethod
     def _finish(self) -> None:
         """Write what follows the last frame and close the files."""
+
+    def _published(self) -> None:  # noqa: B027 - most formats have nothing to do
+        """The files are at their places."""
 
     @abstractmethod
     def _close(self) -> None:

@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import re
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
-from warpjld.errors import InputError
 from warpjld.io.caches.cache import Cache
+from warpjld.sequences import remove_former
 from warpjld.surface import Surface
 
 __all__ = ["ObjCache", "ObjText"]
@@ -48,13 +47,6 @@ class ObjCache(Cache):
     note = "one file a frame, in the source's vertex order"
 
     def _begin(self) -> None:
-        first, last = self.clip.start, self.clip.start + self.clip.frames - 1
-        numbered = re.compile(re.escape(self.path.stem) + r"\.(-?\d{4,})\.obj", re.IGNORECASE)
-        for place in sorted(self.path.parent.iterdir()):
-            match = numbered.fullmatch(place.name)
-            if match and not first <= int(match[1]) <= last:
-                # tools read a sequence by its name: older frames would silently become part of this one
-                raise InputError(f"is of another sequence than frames {first}…{last}: remove it first", path=place)
         self._text = ObjText(self.surface, self.clip.name)
 
     def _append(self, vertices: NDArray[np.float32]) -> None:
@@ -65,6 +57,9 @@ class ObjCache(Cache):
 
     def _close(self) -> None:
         pass  # every frame closed its own file
+
+    def _published(self) -> None:
+        remove_former(self._parts)
 
     def _numbered(self) -> Path:
         return self.path.with_name(f"{self.path.stem}.{self.clip.start + self.written:04d}{self.path.suffix}")

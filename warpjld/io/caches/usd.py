@@ -34,7 +34,7 @@ class UsdCache(Cache):
         _pxr()
 
     def _begin(self) -> None:
-        self._stage, self._mesh = build_stage(self, self._part(self.path, keep_suffix=True))
+        self._stage, self._mesh = build_stage(self, self._part(self.path))
         self._pending = 0
 
     def _append(self, vertices: NDArray[np.float32]) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from typing import TYPE_CHECKING, cast
 
 from warpjld.script.arguments import Arguments
@@ -95,6 +96,9 @@ def grasp(scene: Scene, arguments: Arguments) -> None:
     )
     coupling = cast("tuple[float, float] | None", options.get("coupling"))
     actor = scene.actor_with(side)
+    if scene.dry:
+        _leave_keys(scene, actor, prop, side, first, last, digits)
+        return
     scene.attempts.append(close_digits(scene, actor, prop, side, first, last, digits, coupling))
 
 
@@ -121,7 +125,28 @@ def _grasp_auto(  # type: ignore[no-untyped-def]
     )
     tries, posture = int(cast(int, options.get("tries", 96))), cast("str | None", options.get("posture"))
     actor = scene.actor_with(side)
+    if scene.dry:
+        _leave_keys(scene, actor, prop, side, first, last, ())
+        return
     scene.attempts.append(grasp_by_itself(scene, actor, prop, side, first, last, tries, posture))
+
+
+def _leave_keys(
+    scene: Scene, actor: Actor, prop: Prop, side: str, first: float, last: float, digits: Sequence[str]
+) -> None:
+    """Keys where a grasp would have them, all of no flexion: what follows it in the script can be checked."""
+    from warpjld.grasp.digits import digit_chains
+    from warpjld.script.grasping import Attempt
+
+    wanted = list(digits) or [name for name in digit_chains(actor.skeleton) if name.startswith(f"{side}.")]
+    grip = {}
+    for joint in (joint for chain in digit_chains(actor.skeleton, wanted).values() for joint in chain):
+        channel = f"{actor.skeleton.names[joint]}.flexion"
+        actor.set_keys(channel, [first, last], 0.0, scene.spline)
+        grip[channel] = 0.0
+    scene.grips[actor.name] = scene.grips.get(actor.name, {}) | grip
+    message = "not searched: nothing is computed by --check"
+    scene.attempts.append(Attempt(f"GRASP {prop.name}", last, actor.name, prop.name, "NOT_SEARCHED", message, {}))
 
 
 @command(
@@ -152,11 +177,10 @@ def _search(scene: Scene, arguments: Arguments, name: str, key: float, side: str
 
     actor = scene.actor_with(side)
     joint = named_joint(actor, f"{side}.{joint_name}", arguments)
-    covering = cover(actor)
     if arguments.keyword("PAD"):
-        vertex = pad_vertex(covering, f"{side}.{finger}".lower())
+        vertex = -1 if scene.dry else pad_vertex(cover(actor), f"{side}.{finger}".lower())
     else:
-        last = len(covering.surface.vertices) - 1
+        last = len(actor.rig.surface.vertices) - 1
         vertex = arguments.integer("the hand vertex (its number, or PAD)", minimum=0, maximum=last)
     prop = read_object(scene, arguments)
     _check_size(actor, prop, arguments)
@@ -166,6 +190,9 @@ def _search(scene: Scene, arguments: Arguments, name: str, key: float, side: str
         facet = arguments.integer("the facet (its number, or NEAREST)", minimum=0, maximum=len(prop.thing.faces) - 1)
     options = arguments.options(distance=lambda: arguments.number("the distance in metres"))
     distance = float(cast(float, options.get("distance", 0.0)))
+    if scene.dry:
+        actor.set_keys(f"{actor.skeleton.names[joint]}.{CHANNELS[0]}", [key], 0.0, scene.spline)
+        return
     found, inside = search_flexion(scene, actor, prop, key, joint, vertex, facet, distance)
     status = Status(int(found.status[0]))
     message = found.message()

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from warpjld.errors import InputError
-from warpjld.fem import Body, HexMesh, LinearElastic, Loads, Prescribed, ball, box, cylinder, solve
+from warpjld.fem import Body, HexMesh, LinearElastic, Loads, Prescribed, ball_hexes, box_hexes, cylinder_hexes, solve
 from warpjld.fem.mesh.embedding import Embedding, embed
 from warpjld.fem.mesh.envelope import Envelope
 from warpjld.fem.mesh.fit import fit_mesh
@@ -89,7 +89,7 @@ def mesh_object(name: str, thing: GraspObject, physical: ObjectMaterial, place: 
     else:
         if thing.origin == "box":
             counts = np.maximum(1, np.round(thing.size / size)).astype(int)
-            mesh = box(thing.size, tuple(counts), origin=-0.5 * thing.size)
+            mesh = box_hexes(thing.size, tuple(counts), origin=-0.5 * thing.size)
         elif thing.origin == "cylinder" and not physical.wall:  # its faces are narrow at the rims
             mesh = _cylinder(thing, size)
         else:
@@ -136,13 +136,13 @@ def _refuse_many(thing: GraspObject, wall: float, size: float) -> None:
 def _ball(thing: GraspObject, wall: float, size: float) -> HexMesh:
     radius = 0.5 * float(thing.size.max())
     count = max(4, 2 * round(0.25 * np.pi * radius / size))
-    return ball(radius, inner=radius - wall if wall else 0.0, n=count, layers=_WALL if wall else None)
+    return ball_hexes(radius, inner=radius - wall if wall else 0.0, n=count, layers=_WALL if wall else None)
 
 
 def _cylinder(thing: GraspObject, size: float) -> HexMesh:
     radius, length = 0.5 * float(thing.size[0]), float(thing.size[1])
     count = max(4, 2 * round(0.25 * np.pi * radius / size))
-    mesh = cylinder(radius, length, n=count, along=max(2, round(length / size)))
+    mesh = cylinder_hexes(radius, length, n=count, along=max(2, round(length / size)))
     x, y, z = mesh.nodes.T
     upright = np.stack([x, z - 0.5 * length, -y], axis=1)
     return replace(mesh, nodes=upright)

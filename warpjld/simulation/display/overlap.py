@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from warpjld.fem.contact.obstacles.facets import Facets
-from warpjld.fem.contact.obstacles.obstacle import Touching
+from warpjld.fem.contact.obstacles.obstacle import ClosestPoints
 from warpjld.simulation.bodies.skin_parts import SkinParts
 
 __all__ = ["Overlap", "SurfacePart", "overlap_of", "self_overlaps"]
@@ -50,7 +50,7 @@ class Overlap:
 
 
 def overlap_of(
-    at: NDArray[np.float64], normals: NDArray[np.float64], some: NDArray[np.integer], found: Touching
+    at: NDArray[np.float64], normals: NDArray[np.float64], some: NDArray[np.integer], found: ClosestPoints
 ) -> tuple[Overlap, NDArray[np.bool_]]:
     """Of vertices (n) for which something was found, those inside that look at what they are in; and which they are.
 

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from warpjld.fem.contact.obstacles.facets import Facets
-from warpjld.fem.contact.results.nodal_contact import skin_around
+from warpjld.fem.contact.results.nodal_contact import tributary_areas
 from warpjld.fem.mesh.embedding import Embedding, embed_between
 from warpjld.fem.mesh.hexmesh import HexMesh
 from warpjld.simulation.bodies.deformable_body import DeformableBody
@@ -49,7 +49,7 @@ class PressureMap:
 
         count, total = len(vertices), len(mesh.nodes)
         self._triangles, self._count = triangles, count
-        around = skin_around(mesh, faces, mesh.nodes)
+        around = tributary_areas(mesh, faces, mesh.nodes)
         weights = np.maximum(carried.weights, 0.0) * (around > 0.0)[carried.corners]
         weights *= embedded[:, None]
         weights /= np.maximum(weights.sum(axis=1), 1e-12)[:, None]

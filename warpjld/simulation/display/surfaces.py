@@ -150,7 +150,7 @@ class DeformedSurfaces:
     def _forces(self) -> NDArray[np.float64]:
         """What presses on the nodes, at the start and at the frames that were solved [N]."""
         nothing = np.zeros((1, len(self.model.body.mesh.nodes)))
-        return np.concatenate([nothing, *(f.imprint.force.sum(axis=0)[None] for f in self.frames)])
+        return np.concatenate([nothing, *(f.nodal_contact.force.sum(axis=0)[None] for f in self.frames)])
 
     @cached_property
     def _displacements(self) -> NDArray[np.float64]:

@@ -141,7 +141,7 @@ def _row(
 ) -> ContactRow:
     """Of a digit's nodes (n,), as the hand numbers them, with the pressure at all of the hand's nodes (N,) [Pa]."""
     span = model.spans[hand.name]
-    imprint = solved.imprint.of((slice(None), span))
+    nodal_contact = solved.nodal_contact.of((slice(None), span))
     pushes = solved.nodal[:, span][:, nodes]
     force = pushes.sum(axis=(0, 1))
     against = [
@@ -149,8 +149,8 @@ def _row(
         for owner, push in zip(model.owners, pushes, strict=True)
         if np.abs(push).max(initial=0.0) > 0.0
     ]
-    area = float(imprint.area[:, nodes].sum())
-    sliding = 1.0 - float(imprint.held[:, nodes].sum()) / area if area > 0.0 else float("nan")
+    area = float(nodal_contact.area[:, nodes].sum())
+    sliding = 1.0 - float(nodal_contact.held[:, nodes].sum()) / area if area > 0.0 else float("nan")
     work = None if digit == "palm" else effort[digit]
     return ContactRow(
         solved.frame,

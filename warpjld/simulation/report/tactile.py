@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from warpjld.errors import InputError
 from warpjld.fem.contact import ContactInstant
-from warpjld.fem.contact.results.nodal_contact import Imprint, skin_around
+from warpjld.fem.contact.results.nodal_contact import NodalContact, tributary_areas
 from warpjld.fem.hand.flesh_hand import FleshHand
 from warpjld.fem.hand.labels import WEB
 from warpjld.simulation.bodies.flesh_body import FleshBody
@@ -72,7 +72,7 @@ def tactile_of(hand: FleshHand, instants: Sequence[ContactInstant], *, only: str
         (
             instant.time,
             instant.displacement[:count],
-            [(one.nodal[:count], one.imprint) for one in instant.touches if only in (None, one.name)],
+            [(one.nodal[:count], one.nodal_contact) for one in instant.touches if only in (None, one.name)],
         )
         for instant in instants
     ]
@@ -88,13 +88,13 @@ def tactile_readings(model: ContactModel, hand: FleshBody, frames: Sequence[Solv
     span = model.spans[hand.name]
     mine = [k for k, owner in enumerate(model.owners) if owner.other(hand.name) is not None]
     read = [
-        (one.frame, one.displacement[span], [(one.nodal[k, span], one.imprint.of((k, span))) for k in mine])
+        (one.frame, one.displacement[span], [(one.nodal[k, span], one.nodal_contact.of((k, span))) for k in mine])
         for one in frames
     ]
     return _read_all(hand.hand, read)
 
 
-_Reading = tuple[float, NDArray[np.float64], list[tuple[NDArray[np.float64], Imprint]]]
+_Reading = tuple[float, NDArray[np.float64], list[tuple[NDArray[np.float64], NodalContact]]]
 """Time, displacement of the hand's nodes, and of each pair forces and what presses on them."""
 
 
@@ -132,12 +132,12 @@ def _read(hand: FleshHand, pad_of: NDArray[np.int64], read: _Reading, out: Tacti
     skin = np.flatnonzero(pad_of >= 0)
     pad = pad_of[skin]
     summed = {name: np.zeros(count) for name in ("force", "area", "held", "slid")}
-    for nodal, imprint in read[2]:
+    for nodal, nodal_contact in read[2]:
         np.add.at(out.force[frame], pad, nodal[skin])
         for name, values in summed.items():
-            values += getattr(imprint, name)[:count]
+            values += getattr(nodal_contact, name)[:count]
     force, area, held, slid = (np.bincount(pad, values[skin], pads) for values in summed.values())
-    around = skin_around(hand.mesh, hand.skin_faces, x)[skin]
+    around = tributary_areas(hand.mesh, hand.skin_faces, x)[skin]
     weighted = np.stack([np.bincount(pad, summed["force"][skin] * x[skin, k], pads) for k in range(3)], axis=1)
     np.maximum.at(out.peak[frame], pad, summed["force"][skin] / np.maximum(around, 1e-300))
     some, known = force > 0.0, area > 0.0

@@ -14,8 +14,8 @@ import numpy as np
 from warpjld.errors import InputError
 from warpjld.fem import Loads, Status
 from warpjld.fem.contact import ContactInstant, ContactSolution
-from warpjld.fem.contact.law.law import Memory
-from warpjld.fem.contact.results.nodal_contact import Imprint
+from warpjld.fem.contact.law.contact_state import ContactState
+from warpjld.fem.contact.results.nodal_contact import NodalContact
 from warpjld.simulation.solve.identity import differences
 from warpjld.simulation.solve.solved_frame import SolvedFrame
 from warpjld.whole_file import whole_file
@@ -92,15 +92,15 @@ def save_checkpoint(path: Path, state: Checkpoint) -> None:
     }
     for k, frame in enumerate(state.frames):
         for one in fields(SolvedFrame):
-            if one.name != "imprint":
+            if one.name != "nodal_contact":
                 arrays[f"frame{k}.{one.name}"] = getattr(frame, one.name)
-        for one in fields(Imprint):
-            arrays[f"frame{k}.imprint.{one.name}"] = getattr(frame.imprint, one.name)
-    if state.solution.course is not None:
-        arrays["course"] = state.solution.course
-    arrays["memories"] = len(state.solution.memory)
-    for k, memory in enumerate(state.solution.memory):
-        for one in fields(Memory):
+        for one in fields(NodalContact):
+            arrays[f"frame{k}.nodal_contact.{one.name}"] = getattr(frame.nodal_contact, one.name)
+    if state.solution.correction_rate is not None:
+        arrays["correction_rate"] = state.solution.correction_rate
+    arrays["memories"] = len(state.solution.states)
+    for k, memory in enumerate(state.solution.states):
+        for one in fields(ContactState):
             arrays[f"memory{k}.{one.name}"] = getattr(memory, one.name)
     try:
         with whole_file(path) as part, part.open("wb") as file:
@@ -121,19 +121,20 @@ def load_checkpoint(path: Path) -> Checkpoint:
                 raise ValueError("it does not say what it belongs to")
             frames = []
             for k in range(int(file["count"])):
-                imprint = Imprint(*(file[f"frame{k}.imprint.{f.name}"] for f in fields(Imprint)))
-                one = {f.name: file[f"frame{k}.{f.name}"] for f in fields(SolvedFrame) if f.name != "imprint"}
+                nodal_contact = NodalContact(*(file[f"frame{k}.nodal_contact.{f.name}"] for f in fields(NodalContact)))
+                one = {f.name: file[f"frame{k}.{f.name}"] for f in fields(SolvedFrame) if f.name != "nodal_contact"}
                 one |= {"frame": float(one["frame"]), "solves": int(one["solves"])}
                 one["penetration"] = float(one["penetration"])
-                frames.append(SolvedFrame(imprint=imprint, **one))
+                frames.append(SolvedFrame(nodal_contact=nodal_contact, **one))
             memory = tuple(
-                Memory(*(file[f"memory{k}.{f.name}"] for f in fields(Memory))) for k in range(int(file["memories"]))
+                ContactState(*(file[f"memory{k}.{f.name}"] for f in fields(ContactState)))
+                for k in range(int(file["memories"]))
             )
             identity, time = json.loads(str(file["identity"])), float(file["time"])
-            course = file.get("course")
+            correction_rate = file.get("course")
     except (OSError, KeyError, ValueError, zipfile.BadZipFile) as error:
         raise InputError(f"no state of a contact solve: {error}", path=path) from error
     last = frames[-1]
     instant = ContactInstant(time, last.displacement, last.reactions, (), last.solves, 0, 0.0)
-    solution = ContactSolution(Status.CONVERGED, (instant,), "", memory, (), Loads(), course)
+    solution = ContactSolution(Status.CONVERGED, (instant,), "", memory, (), Loads(), correction_rate)
     return Checkpoint(identity, tuple(frames), solution)

@@ -72,9 +72,9 @@ def _touching(model: ContactModel, instant: ContactInstant) -> dict[tuple[str, s
     for owner, touch in zip(model.owners, instant.touches, strict=False):
         for hand in model.hands:
             other = owner.other(hand.name)
-            if other is None or not touch.imprint.force.any():
+            if other is None or not touch.nodal_contact.force.any():
                 continue
-            force = touch.imprint.force[model.spans[hand.name]]
+            force = touch.nodal_contact.force[model.spans[hand.name]]
             label = hand.hand.node_labels
             skin = np.flatnonzero((label >= 0) & (force > 0.0))
             digit = hand.parts.part_of[label[skin]]

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from warpjld.fem.contact import ContactInstant
-from warpjld.fem.contact.results.nodal_contact import Imprint, skin_around, stacked
+from warpjld.fem.contact.results.nodal_contact import NodalContact, stacked, tributary_areas
 from warpjld.simulation.bodies.model import ContactModel
 
 __all__ = ["SolvedFrame", "solved_frame"]
@@ -24,7 +24,7 @@ class SolvedFrame:
         displacement: From time 0, of all nodes [m], shape (N, 3).
         reactions: Forces that hold the prescribed nodes [N], shape (N, 3).
         nodal: Contact forces of each pair on all nodes, friction included [N], shape (P, N, 3).
-        imprint: What presses, its area and slip, of each pair on all nodes, shape (P, N).
+        nodal_contact: What presses, its area and slip, of each pair on all nodes, shape (P, N).
         solves: Linear solves it took.
         penetration: Deepest overlap [m].
     """
@@ -33,7 +33,7 @@ class SolvedFrame:
     displacement: NDArray[np.float64]
     reactions: NDArray[np.float64]
     nodal: NDArray[np.float64]
-    imprint: Imprint
+    nodal_contact: NodalContact
     solves: int
     penetration: float
 
@@ -43,8 +43,8 @@ class SolvedFrame:
         x = mesh.nodes + self.displacement
         area = np.zeros(len(x))
         for one in model.bodies:
-            area += skin_around(mesh, one.faces, x)
-        force = self.imprint.force.sum(axis=0)
+            area += tributary_areas(mesh, one.faces, x)
+        force = self.nodal_contact.force.sum(axis=0)
         return np.divide(force, area, out=np.zeros(len(x)), where=area > 0.0)
 
 
@@ -53,9 +53,12 @@ def solved_frame(frame: float, instants: Sequence[ContactInstant]) -> SolvedFram
     last = instants[-1]
     count = len(last.displacement)
     nodal = np.stack([t.nodal for t in last.touches]) if last.touches else np.zeros((0, count, 3))
-    imprint = stacked([t.imprint for t in last.touches], count)
-    slid = sum((stacked([t.imprint for t in instant.touches], count).slid for instant in instants[:-1]), imprint.slid)
+    nodal_contact = stacked([t.nodal_contact for t in last.touches], count)
+    slid = sum(
+        (stacked([t.nodal_contact for t in instant.touches], count).slid for instant in instants[:-1]),
+        nodal_contact.slid,
+    )
     deepest = max((float(np.maximum(-t.gap, 0.0).max(initial=0.0)) for t in last.touches), default=0.0)
     solves = sum(instant.solves for instant in instants)
-    whole = replace(imprint, slid=slid)
+    whole = replace(nodal_contact, slid=slid)
     return SolvedFrame(frame, last.displacement, last.reactions, nodal, whole, solves, deepest)

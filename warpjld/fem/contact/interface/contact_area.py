@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from warpjld.fem.arrays import Array, Ints, Ints32, Mask
 from warpjld.fem.contact.interface.contact_border import beyond, held_beyond
 from warpjld.fem.contact.interface.contact_points import Interface
 
@@ -21,9 +21,7 @@ class Inside:
         x: Positions of the body's nodes [m], shape (N, 3).
     """
 
-    def __init__(
-        self, interface: Interface, near: NDArray[np.int64], area: NDArray[np.float64], x: NDArray[np.float64]
-    ) -> None:
+    def __init__(self, interface: Interface, near: Ints, area: Array, x: Array) -> None:
         surface = interface.slave
         self._interface, self._near, self._x = interface, near, x
         self._count = len(surface.nodes)
@@ -31,13 +29,7 @@ class Inside:
         self._covered = np.zeros(self._count)
         self._covered[near] = np.minimum(area / np.maximum(whole[near], 1e-300), 1.0)
 
-    def areas(
-        self,
-        pressure: NDArray[np.float64],
-        gap: NDArray[np.float64],
-        modulus: NDArray[np.float64],
-        spare: NDArray[np.float64],
-    ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    def areas(self, pressure: Array, gap: Array, modulus: Array, spare: Array) -> tuple[Array, Array]:
         """Area under pressure around nodes, and the part of it that friction holds [m²], shape (n,) each: each face's
         share inside the border goes to its pressed corners, as far as their surroundings have something opposite.
 
@@ -70,7 +62,7 @@ class Inside:
         held = np.where(pressed, np.minimum(depth, held), depth)
         return whole, np.minimum(self._at_nodes(faces, held, pressed), whole)
 
-    def _at_nodes(self, faces: _Faces, depth: NDArray[np.float64], pressed: NDArray[np.bool_]) -> NDArray[np.float64]:
+    def _at_nodes(self, faces: _Faces, depth: Array, pressed: Mask) -> Array:
         corners = faces.corners
         area = _positive_area(faces.at, depth[corners])
         mask = (pressed | (depth > 0.0))[corners]
@@ -81,22 +73,20 @@ class Inside:
 class _Faces:
     """Faces whose corners are nodes (F, 4) of m in all, at positions (F, 4, 3), and their edges, both ways."""
 
-    def __init__(self, corners: NDArray[np.int32], at: NDArray[np.float64], count: int) -> None:
+    def __init__(self, corners: Ints32, at: Array, count: int) -> None:
         self.corners, self.at, self._count = corners, at, count
         start, end = corners.ravel(), np.roll(corners, -1, axis=1).ravel()
         way = (np.roll(at, -1, axis=1) - at).reshape(-1, 3)
         self._start, self._end = np.concatenate([start, end]), np.concatenate([end, start])
         self._way = np.concatenate([way, -way])
 
-    def across(self, inside: NDArray[np.bool_]) -> tuple[NDArray[np.int32], NDArray[np.int32], NDArray[np.float64]]:
+    def across(self, inside: Mask) -> tuple[Ints32, Ints32, Array]:
         """Edges that leave a set of nodes: where from, where to, and their lengths [m]."""
         chosen = inside[self._start] & ~inside[self._end]
         length = np.linalg.norm(self._way[chosen], axis=1)
         return self._start[chosen], self._end[chosen], np.maximum(length, 1e-300)
 
-    def inwards(
-        self, values: NDArray[np.float64], inside: NDArray[np.bool_], i: NDArray[np.int32], j: NDArray[np.int32]
-    ) -> NDArray[np.float64]:
+    def inwards(self, values: Array, inside: Mask, i: Ints32, j: Ints32) -> Array:
         """Values at the inner nodes that best go on backwards from edges j → i; 0 where none lies that way."""
         place = np.zeros((self._count, 3))
         place[self.corners.ravel()] = self.at.reshape(-1, 3)
@@ -116,13 +106,7 @@ class _Faces:
             best[some[better]], out[some[better]] = straight[better], values[inner[better]]
         return out
 
-    def depth(
-        self,
-        inside: NDArray[np.bool_],
-        i: NDArray[np.int32],
-        j: NDArray[np.int32],
-        f: NDArray[np.float64],
-    ) -> NDArray[np.float64]:
+    def depth(self, inside: Mask, i: Ints32, j: Ints32, f: Array) -> Array:
         """How many edges nodes lie inside a border that edges i → j cross f edges beyond i, negative outside, (m,)."""
         count, start, end = self._count, self._start, self._end
         out = np.where(inside, 1.0, -1.0)
@@ -144,7 +128,7 @@ class _Faces:
         return np.where(np.isfinite(most), np.minimum(most, 0.0), out)
 
 
-def _positive_area(at: NDArray[np.float64], values: NDArray[np.float64]) -> NDArray[np.float64]:
+def _positive_area(at: Array, values: Array) -> Array:
     """Area of the part of quadrilaterals (F, 4, 3) where what their corners say (F, 4) is positive, shape (F,)."""
     polygon = np.zeros((len(at), 8, 3))
     used = np.zeros((len(at), 8), dtype=bool)

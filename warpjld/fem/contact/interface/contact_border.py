@@ -16,8 +16,8 @@ next node inwards instead: of what is left at the two, the share is φ(f) / φ(f
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from warpjld.fem.arrays import Array
 from warpjld.fem.body import Body
 from warpjld.fem.contact.interface.contact_points import Interface
 
@@ -26,7 +26,7 @@ __all__ = ["beyond", "contact_modulus", "held_beyond"]
 _ROUNDS = 40
 
 
-def contact_modulus(body: Body, interface: Interface) -> NDArray[np.float64]:
+def contact_modulus(body: Body, interface: Interface) -> Array:
     """E* at small strain at an interface's slave nodes [Pa], 1 / E* = Σ (1 − ν²) / E over both sides, shape (m,)."""
     shear, bulk = 2.0 * body.constants[:, :2].sum(axis=1), body.constants[:, 2]
     young = 9.0 * bulk * shear / (3.0 * bulk + shear)
@@ -39,14 +39,7 @@ def contact_modulus(body: Body, interface: Interface) -> NDArray[np.float64]:
     return np.asarray(1.0 / (own + other))
 
 
-def beyond(
-    pressure: NDArray[np.float64],
-    gap: NDArray[np.float64],
-    length: NDArray[np.float64],
-    modulus: NDArray[np.float64],
-    *,
-    averaged: bool = False,
-) -> NDArray[np.float64]:
+def beyond(pressure: Array, gap: Array, length: Array, modulus: Array, *, averaged: bool = False) -> Array:
     """By how many edges the border lies beyond a pressed node, towards an open one, −1 to 1.
 
     Args:
@@ -69,7 +62,7 @@ def beyond(
     return 0.5 * (low + high)
 
 
-def held_beyond(spare: NDArray[np.float64], inwards: NDArray[np.float64]) -> NDArray[np.float64]:
+def held_beyond(spare: Array, inwards: Array) -> Array:
     """By how many edges the border of what sticks lies beyond a node, −1 to 1.
 
     Args:
@@ -86,13 +79,13 @@ def held_beyond(spare: NDArray[np.float64], inwards: NDArray[np.float64]) -> NDA
     return np.where(known, 0.5 * (low + high), 0.0)
 
 
-def _averaged_pressure(f: NDArray[np.float64]) -> NDArray[np.float64]:
+def _averaged_pressure(f: Array) -> Array:
     """φ(f)."""
     outer, middle, inner = (np.maximum(f + k, 0.0) ** 2.5 for k in (1.0, 0.0, -1.0))
     return np.asarray((4.0 / 15.0) * (outer - 2.0 * middle + inner))
 
 
-def _averaged_gap(t: NDArray[np.float64]) -> NDArray[np.float64]:
+def _averaged_gap(t: Array) -> Array:
     """γ(t)."""
     outer, middle, inner = (np.maximum(t + k, 0.0) ** 1.5 for k in (1.0, 0.0, -1.0))
     return np.asarray((outer + 4.0 * middle + inner) / 6.0)

@@ -6,13 +6,13 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from warpjld.errors import InputError
+from warpjld.fem.arrays import Array, Ints, Ints32
 from warpjld.fem.contact.interface.mortar import Mortar
 from warpjld.fem.contact.interface.pairs import Pair
 from warpjld.fem.contact.interface.surface import ContactSurface, surface_of
-from warpjld.fem.contact.obstacles.obstacle import Obstacle, Touching
+from warpjld.fem.contact.obstacles.obstacle import ClosestPoints, Obstacle
 from warpjld.fem.mesh.hexmesh import HexMesh
 
 __all__ = ["ContactPoints", "Interface", "interfaces_of"]
@@ -44,34 +44,34 @@ class ContactPoints:
         carried: What the other side, if an obstacle, moved at the point since the start of the step [m], shape (m, 3).
         facets: Slave and master facets that face each other, if the master deforms too, shape (P, 2).
         share: Share of each two that counts, shape (P,).
-        steep: How gaps change with the displacement (3N,), beyond what they do with weights and normals that stay,
-            where that is known, ``csr_array`` (m, 3N).
+        gap_derivative: How gaps change with the displacement (3N,), beyond what they do with weights and normals that
+            stay, where that is known, ``csr_array`` (m, 3N).
     """
 
-    sites: NDArray[np.int64]
+    sites: Ints
     weights: Any
-    normal: NDArray[np.float64]
-    area: NDArray[np.float64]
-    gap: NDArray[np.float64]
-    carried: NDArray[np.float64]
-    facets: NDArray[np.int32] | None = None
-    share: NDArray[np.float64] | None = None
-    steep: Any = None
+    normal: Array
+    area: Array
+    gap: Array
+    carried: Array
+    facets: Ints32 | None = None
+    share: Array | None = None
+    gap_derivative: Any = None
 
-    def forces(self, traction: NDArray[np.float64]) -> NDArray[np.float64]:
+    def forces(self, traction: Array) -> Array:
         """Nodal forces of tractions (m, 3) that push on the slave [N], shape (N, 3); their sum is zero."""
-        out: NDArray[np.float64] = self.weights.T @ (self.area[:, None] * traction)
+        out: Array = self.weights.T @ (self.area[:, None] * traction)
         return out
 
-    def relative(self, displacement: NDArray[np.float64]) -> NDArray[np.float64]:
+    def relative(self, displacement: Array) -> Array:
         """Σ c_i u_i of a displacement (N, 3), shape (m, 3)."""
-        out: NDArray[np.float64] = self.weights @ displacement
+        out: Array = self.weights @ displacement
         return out
 
-    def opened(self, displacement: NDArray[np.float64]) -> NDArray[np.float64]:
+    def opened(self, displacement: Array) -> Array:
         """By how much a displacement (N, 3) changes the gaps, to first order [m], shape (m,)."""
-        out: NDArray[np.float64] = -np.einsum("mi,mi->m", self.normal, self.relative(displacement))
-        return out if self.steep is None else out + self.steep @ displacement.reshape(-1)
+        out: Array = -np.einsum("mi,mi->m", self.normal, self.relative(displacement))
+        return out if self.gap_derivative is None else out + self.gap_derivative @ displacement.reshape(-1)
 
 
 class Interface:
@@ -132,9 +132,7 @@ class Interface:
         sides deform, and are not bonded."""
         return self.mortar is not None and self.pair.bond is None
 
-    def points(
-        self, x: NDArray[np.float64], before: float, time: float, normals: NDArray[np.float64] | None = None
-    ) -> ContactPoints:
+    def points(self, x: Array, before: float, time: float, normals: Array | None = None) -> ContactPoints:
         """Contact points at positions x (N, 3) and a time, for a step that began at ``before``.
 
         ``normals`` of the slave nodes (m, 3) are taken from x unless they are given.
@@ -148,7 +146,7 @@ class Interface:
             return found
         return replace(found, gap=found.gap - abs(found.weights) @ self.pair.offset)
 
-    def _at_nodes(self, x: NDArray[np.float64], time: float) -> _Probe:
+    def _at_nodes(self, x: Array, time: float) -> _Probe:
         surface = self.slave
         vectors = surface.at_nodes(surface.area_vectors(x))
         area = surface.at_nodes(np.linalg.norm(surface.area_vectors(x), axis=1))
@@ -157,7 +155,7 @@ class Interface:
         columns, rows = surface.nodes[near], np.arange(len(near) + 1)
         return _Probe(near, np.ones(len(near)), columns, rows, area[near], _picked(found, near))
 
-    def _at_faces(self, x: NDArray[np.float64], time: float) -> _Probe:
+    def _at_faces(self, x: Array, time: float) -> _Probe:
         surface = self.slave
         at_nodes = self._obstacle.project(x[surface.nodes], time).distance
         close = at_nodes[surface.corners].min(axis=1) < 2.0 * self.reach
@@ -175,7 +173,7 @@ class Interface:
         assert isinstance(self.pair.master, Obstacle)
         return self.pair.master
 
-    def _near(self, found: Touching, vectors: NDArray[np.float64]) -> NDArray[np.int64]:
+    def _near(self, found: ClosestPoints, vectors: Array) -> Ints:
         """Within reach; of what is inside, only what faces the obstacle's surface: the far side does not touch it."""
         against = np.einsum("ni,ni->n", vectors, found.normal) < 0.5 * np.linalg.norm(vectors, axis=1)
         return np.flatnonzero((found.distance < self.reach) & (against | (found.distance > 0.0)))
@@ -194,16 +192,16 @@ class Interface:
 class _Probe:
     """Sites near an obstacle: their rows of weights, areas, and what is there."""
 
-    sites: NDArray[np.int64]
-    values: NDArray[np.float64]
-    columns: NDArray[np.int32]
-    rows: NDArray[np.int64]
-    area: NDArray[np.float64]
-    found: Touching
+    sites: Ints
+    values: Array
+    columns: Ints32
+    rows: Ints
+    area: Array
+    found: ClosestPoints
 
 
-def _picked(found: Touching, rows: NDArray[np.int64]) -> Touching:
-    return Touching(found.distance[rows], found.closest[rows], found.normal[rows])
+def _picked(found: ClosestPoints, rows: Ints) -> ClosestPoints:
+    return ClosestPoints(found.distance[rows], found.closest[rows], found.normal[rows])
 
 
 def interfaces_of(mesh: HexMesh, pairs: list[Pair], threads: int) -> list[Interface]:

@@ -5,10 +5,10 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from warpjld.errors import InputError
-from warpjld.fem.contact.interface.pair_filter import counted
+from warpjld.fem.arrays import Array, Ints, Ints32
+from warpjld.fem.contact.interface.pair_filter import counted_share
 from warpjld.fem.contact.interface.pairs import Pair
 from warpjld.fem.contact.interface.surface import ContactSurface
 from warpjld.fem.launch import on_rows, shared
@@ -77,7 +77,7 @@ class Mortar:
         self.fringe = None if exclusion is None else exclusion.fringe
         self._never = never
 
-    def points(self, x: NDArray[np.float64], reach: float, normals: NDArray[np.float64]) -> ContactPoints:
+    def points(self, x: Array, reach: float, normals: Array) -> ContactPoints:
         """Points at positions x (N, 3) with slave normals (m, 3).
 
         Of facets face to face, no farther apart than ``reach``, nor deeper.
@@ -91,7 +91,7 @@ class Mortar:
         found = self.integrals(pairs, slave.quads, master.quads, x, reach)
         some = found[:, 32] > 0.0
         pairs, found = pairs[some], found[some]
-        share = counted(self, pairs, found, normals, x, reach)
+        share = counted_share(self, pairs, found, normals, x, reach)
         some = share > 0.0
         pairs, share = pairs[some], share[some]
         found = share[:, None] * found[some]
@@ -103,24 +103,22 @@ class Mortar:
         places = (np.concatenate([rows.ravel(), rows.ravel()]), np.concatenate([own.ravel(), far.ravel()]))
         table = csr_array(coo_array((entries, places), shape=(len(slave.nodes), self._count)))
         area = np.asarray(np.bincount(rows.ravel(), found[:, :16].ravel(), minlength=len(slave.nodes)), np.float64)
-        nodes: NDArray[np.int64] = np.flatnonzero(area > _LEAST * slave.edge**2)
+        nodes: Ints = np.flatnonzero(area > _LEAST * slave.edge**2)
         table = table[nodes]
         table.data /= np.repeat(area[nodes], np.diff(table.indptr))
         table.sort_indices()
         normal = normals[nodes]
         gap = np.asarray(-np.einsum("mi,mi->m", normal, table @ x), np.float64)
-        gap += self.aside(nodes, area[nodes])[0]
+        gap += self.sliver_offset(nodes, area[nodes])[0]
         return ContactPoints(nodes, table, normal, area[nodes], gap, np.zeros((len(nodes), 3)), pairs, share)
 
-    def aside(
-        self, sites: NDArray[np.int64], area: NDArray[np.float64]
-    ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    def sliver_offset(self, sites: Ints, area: Array) -> tuple[Array, Array]:
         """What slivers seem farther off [m], and its derivative by their area [1/m], shape (m,) each."""
         edge = self.slave.edge[sites]
         t = np.minimum(area / (_SLIVER * edge**2), 1.0)
         return _OFF * edge * (1.0 - t) ** 2, -2.0 * _OFF * (1.0 - t) / (_SLIVER * edge)
 
-    def _neighbours(self, x: NDArray[np.float64], reach: float) -> NDArray[np.int32]:
+    def _neighbours(self, x: Array, reach: float) -> Ints32:
         """Slave and master facets whose boxes are within ``reach``, shape (P, 2); none is left out."""
         import warp as wp
         from warpjld_kernels import contact_mortar
@@ -147,14 +145,7 @@ class Mortar:
         facet = np.repeat(np.arange(count, dtype=np.int32), counts)
         return np.stack([facet, out[: len(facet)]], axis=1)
 
-    def integrals(
-        self,
-        pairs: NDArray[np.int32],
-        slave: NDArray[np.int32],
-        master: NDArray[np.int32],
-        x: NDArray[np.float64],
-        reach: float,
-    ) -> NDArray[np.float64]:
+    def integrals(self, pairs: Ints32, slave: Ints32, master: Ints32, x: Array, reach: float) -> Array:
         """Of pairs (P, 2) of quadrilaterals with corners at x (n, 3), see the kernel, shape (P, 33)."""
         from warpjld_kernels import contact_mortar
 

@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
+from warpjld.fem.arrays import Array, Ints32
 from warpjld.fem.contact.interface.surface import ContactSurface
 from warpjld.fem.launch import on_rows, shared
 from warpjld.rotations import unit
@@ -21,7 +22,7 @@ from warpjld.rotations import unit
 if TYPE_CHECKING:
     from warpjld.fem.contact.interface.mortar import Mortar
 
-__all__ = ["counted"]
+__all__ = ["counted_share"]
 
 _TIMES, _SLACK = 3.0, 0.5
 """Overlap along the normal that counts for nothing: over how deep facets are inside each other, and that of facets that
@@ -31,14 +32,7 @@ _OWN_SLACK = 1.0
 they are joined."""
 
 
-def counted(
-    mortar: Mortar,
-    pairs: NDArray[np.int32],
-    integrals: NDArray[np.float64],
-    normals: NDArray[np.float64],
-    x: NDArray[np.float64],
-    reach: float,
-) -> NDArray[np.float64]:
+def counted_share(mortar: Mortar, pairs: Ints32, integrals: Array, normals: Array, x: Array, reach: float) -> Array:
     """Share of pairs (P, 2) of facets that counts, 0 where they only seem to overlap, shape (P,).
 
     Args:
@@ -80,19 +74,13 @@ def counted(
     return out
 
 
-_Side: TypeAlias = tuple[ContactSurface, NDArray[np.int32]]
+_Side: TypeAlias = tuple[ContactSurface, Ints32]
 """A surface and its facets' labels."""
 
 
 def _depths(
-    asked: NDArray[np.int32],
-    one: _Side,
-    other: _Side,
-    joined: NDArray[np.uint8],
-    x: NDArray[np.float64],
-    reach: float,
-    threads: int,
-) -> NDArray[np.float64]:
+    asked: Ints32, one: _Side, other: _Side, joined: NDArray[np.uint8], x: Array, reach: float, threads: int
+) -> Array:
     """How deep the corners of facets (Q,) of one side are inside what the other belongs to [m], shape (Q, 4)."""
     import warp as wp
     from warpjld_kernels import contact_near

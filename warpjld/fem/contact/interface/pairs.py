@@ -5,9 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from warpjld.errors import InputError
+from warpjld.fem.arrays import Array, Ints32, Mask
 from warpjld.fem.contact.obstacles.obstacle import Obstacle
 
 __all__ = ["Bond", "Exclusion", "Pair"]
@@ -45,11 +45,11 @@ class Exclusion:
             shape (F,).
     """
 
-    slave: NDArray[np.int32]
-    master: NDArray[np.int32]
-    never: NDArray[np.bool_]
-    joined: NDArray[np.bool_] | None = None
-    fringe: NDArray[np.float64] | None = None
+    slave: Ints32
+    master: Ints32
+    never: Mask
+    joined: Mask | None = None
+    fringe: Array | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -70,14 +70,14 @@ class Pair:
             skin finer than the elements. Gaps are measured from there.
     """
 
-    slave: str | NDArray[np.int32]
-    master: str | NDArray[np.int32] | Obstacle
+    slave: str | Ints32
+    master: str | Ints32 | Obstacle
     friction: float = 0.0
     name: str = ""
     exclusion: Exclusion | None = None
     bond: Bond | None = None
     sites: str = "nodes"
-    offset: NDArray[np.float64] | None = None
+    offset: Array | None = None
 
     def __post_init__(self) -> None:
         if not (self.friction >= 0.0 and np.isfinite(self.friction)):

@@ -5,9 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from warpjld.errors import InputError
+from warpjld.fem.arrays import Array, Ints32
 from warpjld.fem.mesh.hexmesh import HexMesh
 from warpjld.rotations import unit
 
@@ -28,36 +28,36 @@ class ContactSurface:
         edge: Typical edge of the faces at each node, at rest [m], shape (m,).
     """
 
-    quads: NDArray[np.int32]
-    nodes: NDArray[np.int32]
-    corners: NDArray[np.int32]
-    edge: NDArray[np.float64]
+    quads: Ints32
+    nodes: Ints32
+    corners: Ints32
+    edge: Array
 
     @property
     def reach(self) -> float:
         """How far ahead its points look [m]."""
         return 2.0 * min(float(self.edge.max()), _LARGE * float(np.median(self.edge)))
 
-    def area_vectors(self, x: NDArray[np.float64]) -> NDArray[np.float64]:
+    def area_vectors(self, x: Array) -> Array:
         """Area times outward normal of each face at positions x (N, 3) [m²], shape (F, 3)."""
         a, b, c, d = (x[self.quads[:, k]] for k in range(4))
-        out: NDArray[np.float64] = 0.5 * np.cross(c - a, d - b)
+        out: Array = 0.5 * np.cross(c - a, d - b)
         return out
 
-    def at_nodes(self, faces: NDArray[np.float64]) -> NDArray[np.float64]:
+    def at_nodes(self, faces: Array) -> Array:
         """Face values shared equally by the corners, shape (m, …)."""
         flat = np.repeat(faces.reshape(len(faces), -1) / 4.0, 4, axis=0)
         where = self.corners.ravel()
         columns = [np.bincount(where, weights=column, minlength=len(self.nodes)) for column in flat.T]
-        out: NDArray[np.float64] = np.asarray(np.stack(columns, axis=1), np.float64).reshape(-1, *faces.shape[1:])
+        out: Array = np.asarray(np.stack(columns, axis=1), np.float64).reshape(-1, *faces.shape[1:])
         return out
 
-    def normals(self, x: NDArray[np.float64]) -> NDArray[np.float64]:
+    def normals(self, x: Array) -> Array:
         """Outward unit normals at the nodes, the average of the faces' by area, shape (m, 3)."""
         return unit(self.at_nodes(self.area_vectors(x)))
 
 
-def surface_of(mesh: HexMesh, faces: str | NDArray[np.int32], what: str) -> ContactSurface:
+def surface_of(mesh: HexMesh, faces: str | Ints32, what: str) -> ContactSurface:
     """Contact surface of a named face set, or of faces (element, local face), shape (F, 2).
 
     Raises:
@@ -78,7 +78,7 @@ def surface_of(mesh: HexMesh, faces: str | NDArray[np.int32], what: str) -> Cont
         raise InputError(f"{what}: no faces")
     quads = np.ascontiguousarray(mesh.quads(found), dtype=np.int32)
     nodes, inverse = np.unique(quads, return_inverse=True)
-    corners: NDArray[np.int32] = np.asarray(inverse, dtype=np.int32).reshape(quads.shape)
+    corners: Ints32 = np.asarray(inverse, dtype=np.int32).reshape(quads.shape)
     surface = ContactSurface(quads, nodes.astype(np.int32), corners, np.empty(len(nodes)))
     area = np.linalg.norm(surface.area_vectors(mesh.nodes), axis=1)
     used = np.bincount(corners.ravel(), minlength=len(nodes))

@@ -10,11 +10,20 @@ from collections.abc import Callable
 from typing import Literal
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from warpjld.errors import InputError
+from warpjld.fem.arrays import Array, Ints32
 from warpjld.fem.contact.obstacles.facets import Facets
-from warpjld.fem.contact.obstacles.obstacle import Motion, Obstacle, Points, Rigid, Touching, checked_points, placement
+from warpjld.fem.contact.obstacles.obstacle import (
+    ClosestPoints,
+    Motion,
+    Obstacle,
+    Points,
+    Rigid,
+    checked_points,
+    placement,
+)
 
 __all__ = ["Barr"]
 
@@ -76,11 +85,11 @@ class Barr(Obstacle):
         self._motion = motion
         self._now: tuple[float, ...] | None = (0.0, 0.0, 0.0)
 
-    def project(self, points: Points, time: float) -> Touching:
+    def project(self, points: Points, time: float) -> ClosestPoints:
         """See `Obstacle.project`: to the facets of the deformed shape, with Barr's normals."""
         turn, shift = placement(self._motion, time)
         found = self._at(time).project((checked_points(points) - shift) @ turn)
-        return Touching(found.distance, found.closest @ turn.T + shift, found.normal @ turn.T)
+        return ClosestPoints(found.distance, found.closest @ turn.T + shift, found.normal @ turn.T)
 
     def carried(self, points: Points, time_from: float, time_to: float) -> Points:
         """See `Obstacle.carried`: back through the maps of one time, and forth through those of the other."""
@@ -89,7 +98,7 @@ class Barr(Obstacle):
         material = self._undeformed((checked_points(points) - shift) @ turn, self._values(time_from))
         return np.asarray(self._deformed(material, self._values(time_to)) @ then.T + there)
 
-    def mesh(self, time: float) -> tuple[Points, NDArray[np.int32]]:
+    def mesh(self, time: float) -> tuple[Points, Ints32]:
         """See `Obstacle.mesh`."""
         turn, shift = placement(self._motion, time)
         return self._deformed(self._rest.vertices, self._values(time)) @ turn.T + shift, self._rest.faces
@@ -110,7 +119,7 @@ class Barr(Obstacle):
             )
         return taper, twist, bend
 
-    def _normals(self, values: tuple[float, float, float]) -> NDArray[np.float64]:
+    def _normals(self, values: tuple[float, float, float]) -> Array:
         """Normals of the corners, shape (t, 3, 3): det J · J⁻ᵀ of those at rest, J by central differences."""
         step = 1e-5 * self._rest.size
         inner = self._rest.vertices.copy()
@@ -144,16 +153,14 @@ class Barr(Obstacle):
         narrow = 1.0 - taper * share
         return self._back(u / narrow, w, v / narrow)
 
-    def _back(self, u: NDArray[np.float64], w: NDArray[np.float64], v: NDArray[np.float64]) -> Points:
+    def _back(self, u: Array, w: Array, v: Array) -> Points:
         out = np.empty((len(u), 3))
         for column, part in zip(self._order, (u, w, v), strict=True):
             out[:, column] = part
         return out + self._centre
 
 
-def _bent(
-    w: NDArray[np.float64], v: NDArray[np.float64], bend: float, low: float, high: float
-) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+def _bent(w: Array, v: Array, bend: float, low: float, high: float) -> tuple[Array, Array]:
     """Barr's bend with its centre half-way: lengths along the axis become angles."""
     middle, rate = 0.5 * (low + high), bend / (high - low)
     held = np.clip(w, low, high)
@@ -164,9 +171,7 @@ def _bent(
     return middle + along - v * sin + beyond * cos, up + v * cos + beyond * sin
 
 
-def _straight(
-    w: NDArray[np.float64], v: NDArray[np.float64], bend: float, low: float, high: float
-) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+def _straight(w: Array, v: Array, bend: float, low: float, high: float) -> tuple[Array, Array]:
     """The inverse of `_bent`, for points nearer than the centre of the bend."""
     middle, rate = 0.5 * (low + high), bend / (high - low)
     away = w - middle
@@ -179,7 +184,7 @@ def _straight(
     return held + off * cos + rise * sin, rise * cos - off * sin
 
 
-def _arc(length: NDArray[np.float64], angle: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+def _arc(length: Array, angle: Array) -> tuple[Array, Array]:
     """Where an arc of this length that turns by this angle ends: along its first direction, and across."""
     half = np.sinc(angle / (2.0 * np.pi))
     return length * np.sinc(angle / np.pi), 0.5 * length * angle * half**2

@@ -9,7 +9,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from warpjld.errors import InputError
-from warpjld.fem.contact.obstacles.obstacle import Points, Touching
+from warpjld.fem.arrays import Array, Ints, Ints32, Mask
+from warpjld.fem.contact.obstacles.obstacle import ClosestPoints, Points
 from warpjld.threads import in_threads, threads_for
 
 __all__ = ["CREASE", "Facets", "Place"]
@@ -33,8 +34,8 @@ class Place:
         weights: Barycentric coordinates there, shape (n, 3).
     """
 
-    face: NDArray[np.int32]
-    weights: NDArray[np.float64]
+    face: Ints32
+    weights: Array
 
 
 class Facets:
@@ -67,7 +68,7 @@ class Facets:
         self._mesh: Any = None
         self.move(points)
 
-    def move(self, vertices: NDArray[np.float64], normals: NDArray[np.float64] | None = None) -> None:
+    def move(self, vertices: Array, normals: Array | None = None) -> None:
         """Put the vertices elsewhere [m], shape (v, 3); with normals of the triangles' corners, of any length, shape
         (t, 3, 3), where they are known better than from the facets."""
         import warp as wp
@@ -84,11 +85,11 @@ class Facets:
             support_winding_number=True,
         )
 
-    def project(self, points: Points) -> Touching:
+    def project(self, points: Points) -> ClosestPoints:
         """Distances, nearest points and normals of points (n, 3) [m]."""
         return self.locate(points)[0]
 
-    def locate(self, points: Points) -> tuple[Touching, Place]:
+    def locate(self, points: Points) -> tuple[ClosestPoints, Place]:
         """As `project`, and which triangles the nearest points lie in."""
         face, inside = self._nearest(points)
         weights = _closest_weights(self.vertices[self.faces[face]], points)
@@ -104,14 +105,14 @@ class Facets:
         distance = np.where(outside, reach, -reach)
         sharp = self._on_crease(place) & (reach > 1e-9 * self.size)
         normal[sharp] = away[sharp] / distance[sharp, None]
-        return Touching(distance, closest, normal), place
+        return ClosestPoints(distance, closest, normal), place
 
-    def at(self, place: Place, vertices: NDArray[np.float64]) -> Points:
+    def at(self, place: Place, vertices: Array) -> Points:
         """Places of the surface when its vertices lie there [m], shape (n, 3)."""
         out: Points = np.einsum("nk,nki->ni", place.weights, vertices[self.faces[place.face]])
         return out
 
-    def frames(self, place: Place, vertices: NDArray[np.float64]) -> NDArray[np.float64]:
+    def frames(self, place: Place, vertices: Array) -> Array:
         """Orthonormal frames of the triangles of places when the vertices lie there; rows are the first edge, the
         normal and their cross product, shape (n, 3, 3)."""
         a, b, c = np.moveaxis(vertices[self.faces[place.face]], 1, 0)
@@ -123,7 +124,7 @@ class Facets:
     def _local(self, points: Points) -> NDArray[np.float32]:
         return np.ascontiguousarray((points - self._origin) / self.size, dtype=np.float32)
 
-    def _nearest(self, points: Points) -> tuple[NDArray[np.int32], NDArray[np.bool_]]:
+    def _nearest(self, points: Points) -> tuple[Ints32, Mask]:
         """Nearest triangle, and inside or not, in single precision."""
         import warp as wp
         from warpjld_kernels import fem_inside
@@ -147,7 +148,7 @@ class Facets:
         in_threads(span, count, threads_for(count, _THREAD), fem_inside.signed_distance, "cpu")
         return np.maximum(face, 0), distance < 0.0
 
-    def _features(self, normals: NDArray[np.float64] | None) -> None:
+    def _features(self, normals: Array | None) -> None:
         """Normals of triangles, edges and corners, and creases."""
         x = self.vertices[self.faces]
         flat = np.cross(x[:, 1] - x[:, 0], x[:, 2] - x[:, 0])
@@ -181,7 +182,7 @@ class Facets:
         which = np.where(count == 1, 1 + zero.argmax(axis=1), np.where(count == 2, 4 + (~zero).argmax(axis=1), 0))
         return smooth, self._feature[place.face, which]
 
-    def _on_crease(self, place: Place) -> NDArray[np.bool_]:
+    def _on_crease(self, place: Place) -> Mask:
         zero = place.weights <= 0.0
         count = zero.sum(axis=1)
         edge = self._sharp_edge[place.face, zero.argmax(axis=1)]
@@ -189,7 +190,7 @@ class Facets:
         return np.asarray(((count == 1) & edge) | ((count == 2) & corner))
 
 
-def _checked(vertices: ArrayLike, faces: ArrayLike) -> tuple[NDArray[np.float64], NDArray[np.int32]]:
+def _checked(vertices: ArrayLike, faces: ArrayLike) -> tuple[Array, Ints32]:
     points = np.ascontiguousarray(vertices, dtype=np.float64)
     triangles = np.ascontiguousarray(faces, dtype=np.int32)
     if points.ndim != 2 or points.shape[1] != 3 or not np.isfinite(points).all():
@@ -201,7 +202,7 @@ def _checked(vertices: ArrayLike, faces: ArrayLike) -> tuple[NDArray[np.float64]
     return points, triangles
 
 
-def _neighbours(faces: NDArray[np.int32]) -> NDArray[np.int64]:
+def _neighbours(faces: Ints32) -> Ints:
     """Triangle across the edge opposite each corner, −1 where there is none or several, shape (t, 3)."""
     edges = np.sort(faces[:, [[1, 2], [2, 0], [0, 1]]].reshape(-1, 2), axis=1)
     _, label, uses = np.unique(edges, axis=0, return_inverse=True, return_counts=True)
@@ -214,9 +215,7 @@ def _neighbours(faces: NDArray[np.int32]) -> NDArray[np.int64]:
     return out.reshape(-1, 3)
 
 
-def _smooth_corners(
-    faces: NDArray[np.int32], soft: NDArray[np.bool_], neighbours: NDArray[np.int64]
-) -> NDArray[np.int64]:
+def _smooth_corners(faces: Ints32, soft: Mask, neighbours: Ints) -> Ints:
     """A number for each corner of each triangle, shape (t, 3): the same where triangles around a vertex are reached
     from one another without crossing a crease."""
     from scipy.sparse import coo_array
@@ -234,19 +233,19 @@ def _smooth_corners(
     return np.asarray(connected_components(graph, directed=False)[1], dtype=np.int64).reshape(-1, 3)
 
 
-def _angles(x: NDArray[np.float64]) -> NDArray[np.float64]:
+def _angles(x: Array) -> Array:
     """Angles at the corners of triangles (t, 3, 3) [rad], shape (t, 3)."""
     ahead, back = np.roll(x, -1, axis=1) - x, np.roll(x, 1, axis=1) - x
     return np.asarray(np.arctan2(np.linalg.norm(np.cross(ahead, back), axis=2), (ahead * back).sum(axis=2)))
 
 
-def _summed(label: NDArray[np.integer], vectors: NDArray[np.float64], count: int) -> NDArray[np.float64]:
+def _summed(label: NDArray[np.integer], vectors: Array, count: int) -> Array:
     """Sums of vectors with the same label, shape (count, 3)."""
     flat = vectors.reshape(-1, 3)
     return np.stack([np.bincount(label, flat[:, axis], minlength=count) for axis in range(3)], axis=1)
 
 
-def _closest_weights(triangles: NDArray[np.float64], points: Points) -> NDArray[np.float64]:
+def _closest_weights(triangles: Array, points: Points) -> Array:
     """Barycentric coordinates of the closest points of triangles (n, 3, 3), exactly zero on edges and corners
     (Ericson, Real-Time Collision Detection, §5.1.5)."""
     a, b, c = np.moveaxis(triangles, 1, 0)
@@ -279,5 +278,5 @@ def _closest_weights(triangles: NDArray[np.float64], points: Points) -> NDArray[
     return out
 
 
-def _dot(a: Points, b: Points) -> NDArray[np.float64]:
+def _dot(a: Points, b: Points) -> Array:
     return np.asarray((a * b).sum(axis=1))

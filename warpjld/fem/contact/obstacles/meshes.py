@@ -3,11 +3,20 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from warpjld.errors import InputError
+from warpjld.fem.arrays import Ints32
 from warpjld.fem.contact.obstacles.facets import Facets
-from warpjld.fem.contact.obstacles.obstacle import Motion, Obstacle, Points, Rigid, Touching, checked_points, placement
+from warpjld.fem.contact.obstacles.obstacle import (
+    ClosestPoints,
+    Motion,
+    Obstacle,
+    Points,
+    Rigid,
+    checked_points,
+    placement,
+)
 
 __all__ = ["Keyframed", "RigidMesh"]
 
@@ -28,10 +37,10 @@ class RigidMesh(Rigid):
         self._facets = Facets(vertices, faces)
         self.motion = motion
 
-    def _project(self, points: Points) -> Touching:
+    def _project(self, points: Points) -> ClosestPoints:
         return self._facets.project(points)
 
-    def _mesh(self) -> tuple[Points, NDArray[np.int32]]:
+    def _mesh(self) -> tuple[Points, Ints32]:
         return self._facets.vertices, self._facets.faces
 
 
@@ -62,11 +71,11 @@ class Keyframed(Obstacle):
         self._facets = Facets(self._vertices[0], faces)
         self._now = float(self._times[0])
 
-    def project(self, points: Points, time: float) -> Touching:
+    def project(self, points: Points, time: float) -> ClosestPoints:
         """See `Obstacle.project`."""
         turn, shift = placement(self._motion, time)
         found = self._at(time).project((checked_points(points) - shift) @ turn)
-        return Touching(found.distance, found.closest @ turn.T + shift, found.normal @ turn.T)
+        return ClosestPoints(found.distance, found.closest @ turn.T + shift, found.normal @ turn.T)
 
     def carried(self, points: Points, time_from: float, time_to: float) -> Points:
         """See `Obstacle.carried`: the offset from the nearest facet turns with it."""
@@ -80,7 +89,7 @@ class Keyframed(Obstacle):
         turned = np.einsum("nij,ni->nj", facets.frames(place, after), offset)
         return np.asarray((facets.at(place, after) + turned) @ then.T + there)
 
-    def mesh(self, time: float) -> tuple[Points, NDArray[np.int32]]:
+    def mesh(self, time: float) -> tuple[Points, Ints32]:
         """See `Obstacle.mesh`."""
         turn, shift = placement(self._motion, time)
         return self._shape(time) @ turn.T + shift, self._facets.faces

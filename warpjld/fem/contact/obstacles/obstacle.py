@@ -8,20 +8,21 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from warpjld.errors import InputError
+from warpjld.fem.arrays import Array, Ints32
 
-__all__ = ["Motion", "Obstacle", "Rigid", "Touching", "checked_points", "checked_vector", "placement", "standing"]
+__all__ = ["ClosestPoints", "Motion", "Obstacle", "Rigid", "checked_points", "checked_vector", "placement", "standing"]
 
 Motion = Callable[[float], tuple[ArrayLike, ArrayLike]]
 """Time → position [m] and quaternion x, y, z, w: a point x of the first placement lies at rotation · x + position."""
 
-Points = NDArray[np.float64]
+Points = Array
 
 
 @dataclass(frozen=True, eq=False)
-class Touching:
+class ClosestPoints:
     """Nearest points of an obstacle's surface.
 
     Attributes:
@@ -30,7 +31,7 @@ class Touching:
         normal: Unit normals there, outward from the obstacle, smooth across the facets of meshes, shape (n, 3).
     """
 
-    distance: NDArray[np.float64]
+    distance: Array
     closest: Points
     normal: Points
 
@@ -39,7 +40,7 @@ class Obstacle(ABC):
     """A surface that pushes and is not pushed; its place and shape are functions of time."""
 
     @abstractmethod
-    def project(self, points: Points, time: float) -> Touching:
+    def project(self, points: Points, time: float) -> ClosestPoints:
         """Distances of points (n, 3) [m] at a time."""
 
     @abstractmethod
@@ -48,7 +49,7 @@ class Obstacle(ABC):
         off the surface goes along as if it were glued to it."""
 
     @abstractmethod
-    def mesh(self, time: float) -> tuple[Points, NDArray[np.int32]]:
+    def mesh(self, time: float) -> tuple[Points, Ints32]:
         """Vertices [m], shape (v, 3), and triangles, shape (t, 3), to draw it at a time."""
 
 
@@ -58,19 +59,19 @@ class Rigid(Obstacle):
     motion: Motion | None
 
     @abstractmethod
-    def _project(self, points: Points) -> Touching:
+    def _project(self, points: Points) -> ClosestPoints:
         """Distances in the first placement."""
 
     @abstractmethod
-    def _mesh(self) -> tuple[Points, NDArray[np.int32]]:
+    def _mesh(self) -> tuple[Points, Ints32]:
         """To draw it in the first placement."""
 
-    def project(self, points: Points, time: float) -> Touching:
+    def project(self, points: Points, time: float) -> ClosestPoints:
         """See `Obstacle.project`."""
         points = checked_points(points)
         turn, shift = placement(self.motion, time)
         found = self._project((points - shift) @ turn)
-        return Touching(found.distance, found.closest @ turn.T + shift, found.normal @ turn.T)
+        return ClosestPoints(found.distance, found.closest @ turn.T + shift, found.normal @ turn.T)
 
     def carried(self, points: Points, time_from: float, time_to: float) -> Points:
         """See `Obstacle.carried`."""
@@ -78,7 +79,7 @@ class Rigid(Obstacle):
         then, there = placement(self.motion, time_to)
         return np.asarray((checked_points(points) - shift) @ turn @ then.T + there)
 
-    def mesh(self, time: float) -> tuple[Points, NDArray[np.int32]]:
+    def mesh(self, time: float) -> tuple[Points, Ints32]:
         """See `Obstacle.mesh`."""
         turn, shift = placement(self.motion, time)
         vertices, faces = self._mesh()
@@ -91,7 +92,7 @@ def standing(position: ArrayLike = (0.0, 0.0, 0.0), rotation: ArrayLike = (0.0, 
     return lambda time: (position, rotation)
 
 
-def placement(motion: Motion | None, time: float) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+def placement(motion: Motion | None, time: float) -> tuple[Array, Array]:
     """Rotation matrix (3, 3) and shift (3,) [m] of a motion at a time.
 
     Raises:
@@ -122,7 +123,7 @@ def checked_points(points: Any) -> Points:
     return array
 
 
-def checked_vector(name: str, value: ArrayLike, *, above: float = -np.inf) -> NDArray[np.float64]:
+def checked_vector(name: str, value: ArrayLike, *, above: float = -np.inf) -> Array:
     """Three finite numbers greater than ``above``; InputError otherwise."""
     array = np.asarray(value, dtype=np.float64)
     if array.shape != (3,) or not np.isfinite(array).all() or not (array > above).all():

@@ -5,10 +5,11 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from warpjld.errors import InputError
-from warpjld.fem.contact.obstacles.obstacle import Motion, Points, Rigid, Touching, checked_vector
+from warpjld.fem.arrays import Array, Ints32
+from warpjld.fem.contact.obstacles.obstacle import ClosestPoints, Motion, Points, Rigid, checked_vector
 
 __all__ = ["Box", "Cylinder", "Plane", "Sphere"]
 
@@ -38,11 +39,11 @@ class Plane(Rigid):
         object.__setattr__(self, "_middle", checked_vector("plane point", self.point))
         object.__setattr__(self, "_out", _direction("plane normal", self.normal))
 
-    def _project(self, points: Points) -> Touching:
+    def _project(self, points: Points) -> ClosestPoints:
         distance = (points - self._middle) @ self._out
-        return Touching(distance, points - distance[:, None] * self._out, np.tile(self._out, (len(points), 1)))
+        return ClosestPoints(distance, points - distance[:, None] * self._out, np.tile(self._out, (len(points), 1)))
 
-    def _mesh(self) -> tuple[Points, NDArray[np.int32]]:
+    def _mesh(self) -> tuple[Points, Ints32]:
         along, across = _square(self._out)
         corners = [(-1, -1), (1, -1), (1, 1), (-1, 1)]
         vertices = [self._middle + 0.5 * self.extent * (a * along + b * across) for a, b in corners]
@@ -71,13 +72,13 @@ class Sphere(Rigid):
         object.__setattr__(self, "_middle", checked_vector("sphere centre", self.centre))
         _length("sphere radius", self.radius)
 
-    def _project(self, points: Points) -> Touching:
+    def _project(self, points: Points) -> ClosestPoints:
         away = points - self._middle
         reach = np.linalg.norm(away, axis=1)
         normal = np.divide(away, reach[:, None], out=np.tile([0.0, 1.0, 0.0], (len(away), 1)), where=reach[:, None] > 0)
-        return Touching(reach - self.radius, self._middle + self.radius * normal, normal)
+        return ClosestPoints(reach - self.radius, self._middle + self.radius * normal, normal)
 
-    def _mesh(self) -> tuple[Points, NDArray[np.int32]]:
+    def _mesh(self) -> tuple[Points, Ints32]:
         import trimesh
 
         ball = trimesh.creation.icosphere(subdivisions=4, radius=self.radius)
@@ -103,18 +104,18 @@ class Box(Rigid):
     edge: float = 0.0
     motion: Motion | None = None
     _middle: Points = field(init=False, repr=False)
-    _half: NDArray[np.float64] = field(init=False, repr=False)
+    _half: Array = field(init=False, repr=False)
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "_middle", checked_vector("box centre", self.centre))
         object.__setattr__(self, "_half", 0.5 * checked_vector("box size", self.size, above=0.0))
         _rounding("box", self.edge, float(self._half.min()))
 
-    def _project(self, points: Points) -> Touching:
+    def _project(self, points: Points) -> ClosestPoints:
         found = _round_box(points - self._middle, self._half, self.edge)
-        return Touching(found.distance, found.closest + self._middle, found.normal)
+        return ClosestPoints(found.distance, found.closest + self._middle, found.normal)
 
-    def _mesh(self) -> tuple[Points, NDArray[np.int32]]:
+    def _mesh(self) -> tuple[Points, Ints32]:
         rim = self.edge * (1.0 - np.tan(np.linspace(0.0, 0.25 * np.pi, 6 if self.edge else 1)))
         vertices, faces = _box_surface([np.concatenate([rim - h, h - rim, [-h, h]]) for h in self._half])
         return _round_box(vertices, self._half, self.edge).closest + self._middle, faces
@@ -152,7 +153,7 @@ class Cylinder(Rigid):
         _length("cylinder length", self.length)
         _rounding("cylinder", self.edge, min(self.radius, 0.5 * self.length))
 
-    def _project(self, points: Points) -> Touching:
+    def _project(self, points: Points) -> ClosestPoints:
         # in the half-plane of the axis and the point it is a rectangle
         axis = self._along
         away = points - self._middle
@@ -163,9 +164,9 @@ class Cylinder(Rigid):
         outwards = np.divide(across, reach[:, None], out=any_way, where=reach[:, None] > 0)
         flat = _round_box(np.stack([reach, along], axis=1), np.array([self.radius, 0.5 * self.length]), self.edge)
         closest, normal = (f[:, :1] * outwards + f[:, 1:] * axis for f in (flat.closest, flat.normal))
-        return Touching(flat.distance, closest + self._middle, normal)
+        return ClosestPoints(flat.distance, closest + self._middle, normal)
 
-    def _mesh(self) -> tuple[Points, NDArray[np.int32]]:
+    def _mesh(self) -> tuple[Points, Ints32]:
         around = 96
         rim = np.linspace(0.0, 0.5 * np.pi, 7 if self.edge else 1)
         r = self.radius - self.edge * (1.0 - np.sin(rim))
@@ -191,7 +192,7 @@ class Cylinder(Rigid):
         return vertices, np.concatenate(faces).astype(np.int32)
 
 
-def _round_box(points: NDArray[np.float64], half: NDArray[np.float64], edge: float) -> Touching:
+def _round_box(points: Array, half: Array, edge: float) -> ClosestPoints:
     """Distances to a box |x| ≤ half with rounded edges, in two or three dimensions: a smaller box, made fatter."""
     core = half - edge
     inner = np.clip(points, -core, core)
@@ -210,10 +211,10 @@ def _round_box(points: NDArray[np.float64], half: NDArray[np.float64], edge: flo
     onto[rows, axis] = (flat * half)[rows, axis]
     normal[deep], closest[deep] = flat, onto
     distance[deep] = beyond[rows, axis] - edge
-    return Touching(distance, closest, normal)
+    return ClosestPoints(distance, closest, normal)
 
 
-def _box_surface(lines: list[NDArray[np.float64]]) -> tuple[Points, NDArray[np.int32]]:
+def _box_surface(lines: list[Array]) -> tuple[Points, Ints32]:
     """The surface of a box, each side a grid over these coordinates; corners welded."""
     lines = [np.unique(line) for line in lines]
     points, faces, start = [], [], 0
@@ -233,14 +234,14 @@ def _box_surface(lines: list[NDArray[np.float64]]) -> tuple[Points, NDArray[np.i
     return kept, np.asarray(weld.ravel()[np.concatenate(faces)], dtype=np.int32)
 
 
-def _square(axis: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+def _square(axis: Array) -> tuple[Array, Array]:
     """Two unit vectors that make a right-handed frame with a third: u × v = axis."""
     u = np.cross(axis, np.eye(3)[np.abs(axis).argmin()])
     u /= np.linalg.norm(u)
     return u, np.cross(axis, u)
 
 
-def _direction(name: str, value: ArrayLike) -> NDArray[np.float64]:
+def _direction(name: str, value: ArrayLike) -> Array:
     vector = checked_vector(name, value)
     length = float(np.linalg.norm(vector))
     if not length > 1e-12:

@@ -31,8 +31,9 @@ from collections.abc import Callable, Sequence
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from warpjld.errors import InputError
+from warpjld.fem.arrays import Array
 from warpjld.fem.body import Body
 from warpjld.fem.contact.interface.pairs import Pair
 from warpjld.fem.contact.paper.sides import Side
@@ -58,57 +59,47 @@ _ADVICE = {
 
 def by_turns(
     body: Body,
-    prescribed: Callable[[float], Prescribed],
+    prescribed: Prescribed | Callable[[float], Prescribed],
     pairs: Sequence[Pair],
-    loads: Callable[[float], Loads],
-    times: Sequence[float],
-    *,
+    loads: Loads | Callable[[float], Loads] | None,
+    times: list[float],
     after: ContactSolution | None = None,
     aitken: bool = False,
     threshold: float = 1e-3,
-    guess: Callable[[float, float, NDArray[np.float64]], NDArray[np.float64]] | None = None,
+    guess: Callable[[float, float, Array], Array] | None = None,
     watch: Callable[[ContactInstant], str | None] | None = None,
     progress: Callable[[str], None] | None = None,
 ) -> ContactSolution:
-    """Instants by the paper's loop.
-
-    Args:
-        body: All bodies, merged.
-        prescribed: Known displacements as a function of time.
-        pairs: Slave nodes are repelled by master facets.
-        loads: Loads as a function of time.
-        times: Rising times.
-        after: Displacements and forces to go on from.
-        aitken: Relax the master's surface after Aitken (Küttler & Wall 2008).
-        threshold: Move of any point, over an edge, below which it has settled.
-        guess: Where step 1 begins to look for the bodies; see ``press``.
-        watch: See ``press``.
-        progress: See ``press``.
+    """Instants by the paper's loop; the arguments are those of ``press``, ``threshold`` the move of any point, over an
+    edge, below which it has settled.
     """
+    _refuse(pairs)
+
+    def load(time: float) -> Loads:
+        return loads(time) if callable(loads) else (loads or Loads()).scaled(time / times[-1])
+
     sides = [Side(body, pair) for pair in pairs]
     edge = min(float(side.slave.edge.min()) for side in sides)
-    reached: list[ContactInstant] = []
-    steps: list[int] = []
-    now, last = 0.0, Solution(Status.CONVERGED, (_at_rest(body),), "", np.empty(0, np.int64), loads(0.0))
+    now, last = 0.0, Solution(Status.CONVERGED, (_at_rest(body),), "", np.empty(0, np.int64), load(0.0))
     forces, omega = np.zeros_like(body.mesh.nodes), _first_omega(body, sides) if aitken else 1.0
     if after is not None:
         now = after.last.time
         last = replace(last, instants=(replace(_at_rest(body), displacement=after.last.displacement),))
-        forces = _missing(body, loads(now), after.last)
-        for side, known in zip(sides, after.memory, strict=True):
+        forces = _missing(body, load(now), after.last)
+        for side, known in zip(sides, after.states, strict=True):
             side.touching = known.pressure > 0.0
+    reached: list[ContactInstant] = []
+    steps: list[int] = []
     begun = last.last
     status, message = Status.CONVERGED, Status.CONVERGED.value
-    todo, halvings = [float(time) for time in times], 0
+    todo, halvings = list(times), 0
     while todo:
         time = todo[0]
+        held = prescribed(time) if callable(prescribed) else prescribed.scaled(time / times[-1])
         first = None if guess is None else guess(now, time, last.displacement)
         touched = [side.touching.copy() for side in sides]
-        deepest = _REPEL * edge if halvings < _HALVINGS else np.inf
-        turns = Turns(
-            body, prescribed(time), sides, loads(time), time, forces, omega if aitken else None, edge * threshold
-        )
-        status = turns.through(last, first, deepest)
+        turns = Turns(body, held, sides, load(time), time, forces, omega if aitken else None, edge * threshold)
+        status = turns.through(last, first, _REPEL * edge if halvings < _HALVINGS else np.inf)
         if progress:
             progress(f"time {time:.3g}: {turns.report}")
         if status is not Status.CONVERGED:
@@ -124,17 +115,25 @@ def by_turns(
         last, now, forces, omega = turns.last, time, turns.forces, turns.omega
         todo.pop(0)
         halvings = max(0, halvings - 1)
-        if time not in times:
-            continue
-        reached.append(turns.instant())
-        reason = watch(reached[-1]) if watch else None
-        if reason:
-            status, message = Status.STOPPED, reason
-            break
+        if time in times:
+            reached.append(turns.instant())
+            if reason := watch(reached[-1]) if watch else None:
+                status, message = Status.STOPPED, reason
+                break
     if not reached:
         reached = [ContactInstant(now, begun.displacement, begun.reactions, (), 0, 0, 0.0)]
-    memory = tuple(side.memory() for side in sides)
-    return ContactSolution(status, tuple(reached), message, memory, tuple(steps), loads(reached[-1].time))
+    states = tuple(side.state() for side in sides)
+    return ContactSolution(status, tuple(reached), message, states, tuple(steps), load(reached[-1].time))
+
+
+def _refuse(pairs: Sequence[Pair]) -> None:
+    for what, asked in (
+        ("a surface that meets itself", any(pair.exclusion is not None for pair in pairs)),
+        ("friction or bonds", any(pair.friction > 0.0 or pair.bond is not None for pair in pairs)),
+        ("offsets", any(pair.offset is not None for pair in pairs)),
+    ):
+        if asked:
+            raise InputError(f"pairs: the paper's loop does not know {what}; use method='augmented'")
 
 
 def _at_rest(body: Body) -> Instant:
@@ -142,7 +141,7 @@ def _at_rest(body: Body) -> Instant:
     return Instant(1.0, nothing, nothing, 0, 0, 0.0)
 
 
-def _missing(body: Body, loads: Loads, at: ContactInstant) -> NDArray[np.float64]:
+def _missing(body: Body, loads: Loads, at: ContactInstant) -> Array:
     """Contact forces of an instant [N], shape (N, 3): what loads and reactions leave to balance."""
     internal = body.at(at.displacement, stiffness=False).forces.reshape(-1, 3)
     return np.asarray(

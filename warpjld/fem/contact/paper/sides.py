@@ -5,15 +5,15 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from warpjld.fem.arrays import Array, Ints
 from warpjld.fem.body import Body
 from warpjld.fem.contact.interface.pairs import Pair
 from warpjld.fem.contact.interface.surface import ContactSurface, surface_of
-from warpjld.fem.contact.law.law import Memory, start_memory
+from warpjld.fem.contact.law.contact_state import ContactState, initial_state
 from warpjld.fem.contact.obstacles.facets import Facets, Place
 from warpjld.fem.contact.obstacles.obstacle import Obstacle
-from warpjld.fem.contact.results.nodal_contact import imprint_of
+from warpjld.fem.contact.results.nodal_contact import to_nodes
 from warpjld.fem.contact.results.solution import Touch
 
 __all__ = ["Meeting", "Side"]
@@ -26,11 +26,11 @@ _DEEPEST = 5.0
 class Meeting:
     """Where a pair's slave nodes are repelled to."""
 
-    rows: NDArray[np.int64]
-    target: NDArray[np.float64]
-    normal: NDArray[np.float64]
+    rows: Ints
+    target: Array
+    normal: Array
     place: Place | None
-    distance: NDArray[np.float64]
+    distance: Array
 
 
 class Side:
@@ -49,11 +49,11 @@ class Side:
             self._facets = Facets(body.mesh.nodes[self.nodes], np.concatenate([corners[:, :3], corners[:, [0, 2, 3]]]))
             self.triangles = self._facets.faces
 
-    def memory(self) -> Memory:
+    def state(self) -> ContactState:
         """Who was pushed, for a later run: nodes with a pressure."""
-        return replace(start_memory(len(self.slave.nodes), self.pair), pressure=self.touching.astype(np.float64))
+        return replace(initial_state(len(self.slave.nodes), self.pair), pressure=self.touching.astype(np.float64))
 
-    def meet(self, x: NDArray[np.float64], skin: NDArray[np.float64], time: float) -> Meeting:
+    def meet(self, x: Array, skin: Array, time: float) -> Meeting:
         """Nodes that overlap or were pushed, at positions x (N, 3), and the polygons of ``skin`` (N, 3) under them."""
         place = None
         points = x[self.slave.nodes]
@@ -70,7 +70,7 @@ class Side:
             place = Place(place.face[rows], place.weights[rows])
         return Meeting(rows, found.closest[rows], found.normal[rows], place, -depth[rows])
 
-    def share(self, meeting: Meeting, reactions: NDArray[np.float64], out: NDArray[np.float64]) -> NDArray[np.float64]:
+    def share(self, meeting: Meeting, reactions: Array, out: Array) -> Array:
         """Add forces on slave nodes (m, 3), and their opposites on the facets' nodes, to ``out`` (N, 3); what pulls is
         let go. The forces that stay, shape (m, 3).
         """
@@ -84,7 +84,7 @@ class Side:
             np.add.at(out, corners, -meeting.place.weights[:, :, None] * forces[:, None, :])
         return forces
 
-    def touch(self, meeting: Meeting, forces: NDArray[np.float64], x: NDArray[np.float64]) -> Touch:
+    def touch(self, meeting: Meeting, forces: Array, x: Array) -> Touch:
         """What a pair says of forces on its slave nodes (m, 3) at positions x (N, 3)."""
         from scipy.sparse import csr_array
 
@@ -117,5 +117,5 @@ class Side:
             pressure > 0.0,
             np.zeros(len(nodes), dtype=bool),
             nodal,
-            imprint_of(nodes, pressed * pressure, pressed, pressed, still, there, len(x)),
+            to_nodes(nodes, pressed * pressure, pressed, pressed, still, there, len(x)),
         )

@@ -5,8 +5,8 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from warpjld.fem.arrays import Array, Ints
 from warpjld.fem.body import Body
 from warpjld.fem.contact.paper.sides import Meeting, Side
 from warpjld.fem.contact.results.solution import ContactInstant, Touch
@@ -45,7 +45,7 @@ class Turns:
         sides: list[Side],
         loads: Loads,
         time: float,
-        forces: NDArray[np.float64],
+        forces: Array,
         omega: float | None,
         threshold: float,
     ) -> None:
@@ -59,7 +59,7 @@ class Turns:
         self.report = ""
         self.diverged = False
 
-    def through(self, last: Solution, first: NDArray[np.float64] | None, deepest: float) -> Status:
+    def through(self, last: Solution, first: Array | None, deepest: float) -> Status:
         """Turn until no point moves any more. Overlap beyond ``deepest`` [m] at the start is left to shorter steps."""
         rest, surface = self._body.mesh.nodes, _surface(self._sides)
         self.last = self._solve(self._known, self._loaded(self.forces), last, first)
@@ -102,12 +102,12 @@ class Turns:
         status = Status.STAGNATED if grows >= 1.0 else Status.MAX_ITERATIONS
         return self._ended(status, f"repelling and releasing did not settle in {len(self.moves)} turns: {how}")
 
-    def _way(self, fixed: Solution, u: NDArray[np.float64]) -> float:
+    def _way(self, fixed: Solution, u: Array) -> float:
         """How far nodes that stay pushed were repelled [m]."""
         pushed = np.concatenate([side.slave.nodes[side.touching] for side in self._sides])
         return float(np.abs(fixed.displacement[pushed] - u[pushed]).max(initial=0.0))
 
-    def _loaded(self, forces: NDArray[np.float64]) -> Loads:
+    def _loaded(self, forces: Array) -> Loads:
         nodal = forces if self._loads.nodal is None else self._loads.nodal + forces
         return replace(self._loads, nodal=nodal)
 
@@ -125,7 +125,7 @@ class Turns:
             self._time, found.displacement, found.reactions, touches, self.solves, self._iterations, found.residual
         )
 
-    def _repelled(self, surface: NDArray[np.int64], meetings: list[Meeting]) -> tuple[Solution, NDArray[np.float64]]:
+    def _repelled(self, surface: Ints, meetings: list[Meeting]) -> tuple[Solution, Array]:
         """Steps 2 to 4: bodies with the skin held and slave nodes on it, and the forces of that on all nodes [N]."""
         rest, u = self._body.mesh.nodes, self.last.displacement
         repelled = _without(_onto_skin(rest, surface, u[surface], self._sides, meetings), self._known)
@@ -137,9 +137,7 @@ class Turns:
             self._touches.append(side.touch(meeting, own, rest + fixed.displacement))
         return fixed, forces
 
-    def _solve(
-        self, known: Prescribed, loads: Loads, after: Solution, guess: NDArray[np.float64] | None = None
-    ) -> Solution:
+    def _solve(self, known: Prescribed, loads: Loads, after: Solution, guess: Array | None = None) -> Solution:
         found = solve(self._body, known, loads, after=after, guess=guess, free="hold", check=False)
         self._iterations += found.last.iterations
         return found
@@ -149,18 +147,12 @@ class Turns:
         return status
 
 
-def _surface(sides: list[Side]) -> NDArray[np.int64]:
+def _surface(sides: list[Side]) -> Ints:
     """Nodes of all masters."""
     return np.unique(np.concatenate([side.nodes for side in sides])).astype(np.int64)
 
 
-def _onto_skin(
-    rest: NDArray[np.float64],
-    surface: NDArray[np.int64],
-    skin: NDArray[np.float64],
-    sides: list[Side],
-    meetings: list[Meeting],
-) -> Prescribed:
+def _onto_skin(rest: Array, surface: Ints, skin: Array, sides: list[Side], meetings: list[Meeting]) -> Prescribed:
     """The skin where it is, and slave nodes on its polygons; a node that is both is skin."""
     nodes = [surface]
     places = [skin]

@@ -11,15 +11,15 @@ from dataclasses import dataclass, fields
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from warpjld.fem.arrays import Array, Ints32
 from warpjld.fem.mesh.hexmesh import HexMesh
 
-__all__ = ["Imprint", "imprint_of", "skin_around", "stacked"]
+__all__ = ["NodalContact", "stacked", "to_nodes", "tributary_areas"]
 
 
 @dataclass(frozen=True, eq=False)
-class Imprint:
+class NodalContact:
     """Of one pair on all nodes of the body, shape (N,), or of several, shape (P, N).
 
     Attributes:
@@ -29,25 +29,19 @@ class Imprint:
         slid: Integral over it of the way along the other side since the instant before [m³].
     """
 
-    force: NDArray[np.float64]
-    area: NDArray[np.float64]
-    held: NDArray[np.float64]
-    slid: NDArray[np.float64]
+    force: Array
+    area: Array
+    held: Array
+    slid: Array
 
-    def of(self, which: Any) -> Imprint:
+    def of(self, which: Any) -> NodalContact:
         """A part of it, by an index into its arrays."""
-        return Imprint(*(getattr(self, one.name)[which] for one in fields(self)))
+        return NodalContact(*(getattr(self, one.name)[which] for one in fields(self)))
 
 
-def imprint_of(
-    slave: NDArray[np.int32],
-    push: NDArray[np.float64],
-    pressed: NDArray[np.float64],
-    held: NDArray[np.float64],
-    slip: NDArray[np.float64],
-    there: Any,
-    count: int,
-) -> Imprint:
+def to_nodes(
+    slave: Ints32, push: Array, pressed: Array, held: Array, slip: Array, there: Any, count: int
+) -> NodalContact:
     """Hand what slave nodes (n) know to all nodes.
 
     Args:
@@ -66,18 +60,21 @@ def imprint_of(
         out[slave] += values
         both.append(out)
     assert all(out.shape == (count,) for out in both)
-    return Imprint(*both)
+    return NodalContact(*both)
 
 
-def stacked(imprints: Sequence[Imprint], count: int) -> Imprint:
+def stacked(nodal_contacts: Sequence[NodalContact], count: int) -> NodalContact:
     """Those of P pairs, shape (P, N)."""
     nothing = np.zeros((0, count))
-    return Imprint(
-        *(np.stack([getattr(i, f.name) for i in imprints]) if imprints else nothing for f in fields(Imprint))
+    return NodalContact(
+        *(
+            np.stack([getattr(i, f.name) for i in nodal_contacts]) if nodal_contacts else nothing
+            for f in fields(NodalContact)
+        )
     )
 
 
-def skin_around(mesh: HexMesh, faces: NDArray[np.int32] | str, x: NDArray[np.float64]) -> NDArray[np.float64]:
+def tributary_areas(mesh: HexMesh, faces: Ints32 | str, x: Array) -> Array:
     """A quarter of the area of all faces around every node at positions x (N, 3) [m²], 0 elsewhere, shape (N,).
 
     What presses on a node over it is the pressure there that tables and pictures show.

@@ -5,11 +5,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from warpjld.errors import WarpjldError
-from warpjld.fem.contact.law.law import Memory
-from warpjld.fem.contact.results.nodal_contact import Imprint
+from warpjld.fem.arrays import Array, Ints32, Mask
+from warpjld.fem.contact.law.contact_state import ContactState
+from warpjld.fem.contact.results.nodal_contact import NodalContact
 from warpjld.fem.load.loads import Loads
 from warpjld.fem.solver.conjugate import Status
 
@@ -36,34 +36,34 @@ class Touch:
         sticking: Whether friction or a bond holds, shape (m,).
         bonded: Whether the bond still holds, shape (m,).
         nodal: Forces on every node of the body, both sides [N], shape (N, 3).
-        imprint: What presses, area and slip on every node of the body, both sides.
+        nodal_contact: What presses, area and slip on every node of the body, both sides.
     """
 
     name: str
-    nodes: NDArray[np.int32]
-    position: NDArray[np.float64]
-    normal: NDArray[np.float64]
-    pressure: NDArray[np.float64]
-    traction: NDArray[np.float64]
-    gap: NDArray[np.float64]
-    area: NDArray[np.float64]
-    pressed: NDArray[np.float64]
-    held: NDArray[np.float64]
-    slip: NDArray[np.float64]
-    sticking: NDArray[np.bool_]
-    bonded: NDArray[np.bool_]
-    nodal: NDArray[np.float64]
-    imprint: Imprint
+    nodes: Ints32
+    position: Array
+    normal: Array
+    pressure: Array
+    traction: Array
+    gap: Array
+    area: Array
+    pressed: Array
+    held: Array
+    slip: Array
+    sticking: Mask
+    bonded: Mask
+    nodal: Array
+    nodal_contact: NodalContact
 
     @property
-    def active(self) -> NDArray[np.bool_]:
+    def active(self) -> Mask:
         """Rows that press, or are bonded, shape (m,)."""
         return (self.pressure > 0.0) | self.bonded
 
     @property
-    def force(self) -> NDArray[np.float64]:
+    def force(self) -> Array:
         """Resultant on the slave [N], shape (3,)."""
-        out: NDArray[np.float64] = self.area @ self.traction
+        out: Array = self.area @ self.traction
         return out
 
     @property
@@ -86,7 +86,7 @@ class Touch:
         return float(self.pressure.max(initial=0.0))
 
     @property
-    def centre(self) -> NDArray[np.float64]:
+    def centre(self) -> Array:
         """Centre of pressure [m], shape (3,); NaN where nothing presses."""
         weight = self.area * np.maximum(self.pressure, 0.0)
         total = float(weight.sum())
@@ -123,8 +123,8 @@ class ContactInstant:
     """
 
     time: float
-    displacement: NDArray[np.float64]
-    reactions: NDArray[np.float64]
+    displacement: Array
+    reactions: Array
     touches: tuple[Touch, ...]
     solves: int
     iterations: int
@@ -139,19 +139,19 @@ class ContactSolution:
         status: How it ended.
         instants: One for each time reached, in order.
         message: For people: what ended it.
-        memory: Contact state at the last instant, one for each pair.
+        states: Contact state at the last instant, one for each pair.
         steps: Load steps taken between instants, those that halving added included, and linear solves of each.
         loads: The loads at the last instant.
-        course: How fast the last step went on from where it was expected to [m per unit of time], shape (N, 3).
+        correction_rate: How fast the last step left what was expected [m per unit of time], (N, 3).
     """
 
     status: Status
     instants: tuple[ContactInstant, ...]
     message: str
-    memory: tuple[Memory, ...]
+    states: tuple[ContactState, ...]
     steps: tuple[int, ...]
     loads: Loads
-    course: NDArray[np.float64] | None = None
+    correction_rate: Array | None = None
 
     @property
     def converged(self) -> bool:

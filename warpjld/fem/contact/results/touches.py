@@ -5,12 +5,12 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from warpjld.fem.arrays import Array, Ints, Mask
 from warpjld.fem.contact.interface.contact_area import Inside
 from warpjld.fem.contact.interface.contact_points import ContactPoints, Interface
-from warpjld.fem.contact.law.law import Response
-from warpjld.fem.contact.results.nodal_contact import imprint_of
+from warpjld.fem.contact.law.return_mapping import ContactTractions
+from warpjld.fem.contact.results.nodal_contact import to_nodes
 from warpjld.fem.contact.results.solution import Touch
 from warpjld.rotations import unit
 
@@ -23,11 +23,11 @@ _LEAST = 1e-6
 def touch_of(
     interface: Interface,
     points: ContactPoints,
-    response: Response,
-    slip: NDArray[np.float64],
-    bonded: NDArray[np.bool_],
-    modulus: NDArray[np.float64],
-    x: NDArray[np.float64],
+    tractions: ContactTractions,
+    slip: Array,
+    bonded: Mask,
+    modulus: Array,
+    x: Array,
 ) -> Touch:
     """A pair at an instant, from its points (m) to its slave nodes (n): what presses on a node, over its share of the
     surface (between two meshes the multipliers themselves swing from node to node).
@@ -35,7 +35,7 @@ def touch_of(
     Args:
         interface: The pair.
         points: Its points.
-        response: Their tractions.
+        tractions: Theirs.
         slip: Relative displacement in the step [m], shape (m, 3).
         bonded: Whether the bond holds, one for each site.
         modulus: E* at all slave nodes [Pa], for the border of contact (see ``border``).
@@ -47,15 +47,15 @@ def touch_of(
     near = np.flatnonzero(area > 0.0)
     area = area[near]
     mean = (weight[near] / area[:, None]).tocsr()
-    traction = response.traction(points)
+    traction = tractions.traction(points)
     across = slip - np.einsum("mi,mi->m", slip, points.normal)[:, None] * points.normal
     normal = unit(mean @ points.normal)
     nodes = interface.slave.nodes[near]
-    pressure, pushed = mean @ response.pressure, mean @ traction
+    pressure, pushed = mean @ tractions.pressure, mean @ traction
     apart = _gaps(interface, points, near, mean)
     holds = mean @ bonded[points.sites].astype(float) > 0.0
-    active = mean @ response.active.astype(float)
-    sticking = mean @ (response.sticking & response.active).astype(float) > 0.5 * active
+    active = mean @ tractions.active.astype(float)
+    sticking = mean @ (tractions.sticking & tractions.active).astype(float) > 0.5 * active
     friction = np.linalg.norm(pushed - np.einsum("mi,mi->m", pushed, normal)[:, None] * normal, axis=1)
     limit = interface.pair.friction * pressure
     spare = np.where(sticking, np.maximum(limit - friction, _LEAST * limit), 0.0)
@@ -63,7 +63,7 @@ def touch_of(
     pressed, held = inside.areas(pressure, mean @ points.gap if interface.averages else apart, modulus, spare)
     pressed, held = np.where(holds, area, pressed), np.where(holds, area, held)
     slipped = mean @ across
-    push = area * (mean @ np.maximum(response.pressure, 0.0))
+    push = area * (mean @ np.maximum(tractions.pressure, 0.0))
     there = mean @ (-points.weights).maximum(0.0)
     return Touch(
         name=interface.pair.label,
@@ -80,11 +80,11 @@ def touch_of(
         sticking=sticking,
         bonded=holds,
         nodal=points.forces(traction),
-        imprint=imprint_of(nodes, push, pressed, held, slipped, there, len(x)),
+        nodal_contact=to_nodes(nodes, push, pressed, held, slipped, there, len(x)),
     )
 
 
-def _gaps(interface: Interface, points: ContactPoints, near: NDArray[np.int64], mean: Any) -> NDArray[np.float64]:
+def _gaps(interface: Interface, points: ContactPoints, near: Ints, mean: Any) -> Array:
     """Gaps of slave nodes: their own between meshes, else the least of their points [m], shape (n,)."""
     if len(near) == 0:
         return np.empty(0)

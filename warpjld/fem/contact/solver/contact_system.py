@@ -1,4 +1,4 @@
-"""What all interfaces of a problem answer together, and what they remember between linear solves."""
+"""Contact forces, tangents and multiplier updates of all interfaces (augmented Lagrangian; see ``contact.solver``)."""
 
 from __future__ import annotations
 
@@ -6,41 +6,64 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from warpjld.fem.arrays import Array
 from warpjld.fem.contact.interface.contact_points import ContactPoints, Interface
-from warpjld.fem.contact.law.law import Memory, Response, remember, respond
-from warpjld.fem.contact.solver.tangent import coupling, slopes_of
+from warpjld.fem.contact.law.contact_state import ActiveSet, ContactState
+from warpjld.fem.contact.law.multipliers import update_multipliers
+from warpjld.fem.contact.law.return_mapping import ContactTractions, return_mapping
+from warpjld.fem.contact.solver.tangent import friction_coupling, linearise_mortar
+from warpjld.fem.load.loads import Loads
+from warpjld.fem.load.prescribed import Prescribed
 
-__all__ = ["Contact", "Interplay", "alike", "shifted"]
+__all__ = ["ContactForces", "ContactSystem", "LoadStep", "same_active_set", "shifted"]
 
 _SETTLED = 2e-3
 """Share of the contact forces by which the multipliers may still change."""
 _SLOW = 0.1
 """Share of the overlap that a linear solve may leave; where it leaves more, the penalty grows,"""
-_FIRMER, _FIRMEST = 5.0, 3125.0
+_STIFFER, _STIFFEST = 5.0, 3125.0
 """by the one factor, up to the other."""
 
 
 @dataclass(frozen=True, eq=False)
-class Contact:
-    """Every interface's points, slips [m] and responses, and their nodal forces together [N], shape (3N,).
+class LoadStep:
+    """A load step.
+
+    Attributes:
+        before: Time it starts from.
+        time: Time it goes to.
+        prescribed: Displacements at ``time``.
+        loads: Loads at ``time``.
+        allowed: Share of the overlap at the start that is still allowed at ``time``.
+    """
+
+    before: float
+    time: float
+    prescribed: Prescribed
+    loads: Loads
+    allowed: float
+
+
+@dataclass(frozen=True, eq=False)
+class ContactForces:
+    """Every interface's points, slips [m] and tractions, and their nodal forces together [N], shape (3N,).
 
     Attributes:
         coupled: Whether friction follows the pressure as it is, and not the multipliers'.
-        beside: What a symmetric stiffness leaves out [N/m], ``csr_array`` (3N, 3N); None where nothing is or it was not
-            asked for (``Interplay.sloped``).
+        nonsymmetric: What a symmetric stiffness leaves out [N/m], ``csr_array`` (3N, 3N); None where nothing is or it
+            was not asked for (``ContactSystem.linearise``).
     """
 
     points: list[ContactPoints]
-    slips: list[NDArray[np.float64]]
-    responses: list[Response]
-    forces: NDArray[np.float64]
+    slips: list[Array]
+    tractions: list[ContactTractions]
+    forces: Array
     coupled: bool = False
-    beside: Any = None
+    nonsymmetric: Any = None
 
 
-class Interplay:
+class ContactSystem:
     """Interfaces between bodies.
 
     Args:
@@ -52,13 +75,7 @@ class Interplay:
     """
 
     def __init__(
-        self,
-        nodes: NDArray[np.float64],
-        interfaces: list[Interface],
-        moduli: list[NDArray[np.float64]],
-        *,
-        penalty: float,
-        penetration: float,
+        self, nodes: Array, interfaces: list[Interface], moduli: list[Array], *, penalty: float, penetration: float
     ) -> None:
         self.interfaces = interfaces
         self._rest = nodes
@@ -70,165 +87,170 @@ class Interplay:
         """How far ahead the least far-sighted interface looks [m]."""
         return min(interface.reach for interface in self.interfaces)
 
-    def normals(self, u: NDArray[np.float64]) -> list[NDArray[np.float64]]:
+    def normals(self, u: Array) -> list[Array]:
         """Of every interface's slave nodes at displacement u (3N,)."""
         x = self._rest + u.reshape(-1, 3)
         return [interface.slave.normals(x) for interface in self.interfaces]
 
-    def points(
-        self, u: NDArray[np.float64], before: float, time: float, normals: list[NDArray[np.float64]]
-    ) -> list[ContactPoints]:
+    def turned(self, normals: list[Array], u: Array, every: bool) -> list[Array]:
+        """Normals at displacement u (3N,): of surfaces that meet surfaces, or of every one; the others stay."""
+        fresh = zip(self.interfaces, normals, self.normals(u), strict=True)
+        return [new if every or interface.slides else old for interface, old, new in fresh]
+
+    def points(self, u: Array, step: LoadStep, normals: list[Array]) -> list[ContactPoints]:
         """Every interface's points at displacement u (3N,)."""
         x = self._rest + u.reshape(-1, 3)
-        return [i.points(x, before, time, n) for i, n in zip(self.interfaces, normals, strict=True)]
+        return [i.points(x, step.before, step.time, n) for i, n in zip(self.interfaces, normals, strict=True)]
 
-    def turned(
-        self, normals: list[NDArray[np.float64]], u: NDArray[np.float64], every: bool
-    ) -> list[NDArray[np.float64]]:
-        """Normals at displacement u (3N,): of surfaces that meet surfaces, or of every one; the others stay."""
-        fresh = self.normals(u)
-        return [
-            new if every or interface.slides else old
-            for interface, old, new in zip(self.interfaces, normals, fresh, strict=True)
-        ]
-
-    def refreshed(
-        self, points: list[ContactPoints], u: NDArray[np.float64], before: float, time: float
-    ) -> list[ContactPoints]:
+    def refreshed(self, points: list[ContactPoints], u: Array, step: LoadStep) -> list[ContactPoints]:
         """Points between surfaces as displacement u (3N,) has them, since their derivatives are known; others stay."""
         x = self._rest + u.reshape(-1, 3)
-        return [
-            interface.points(x, before, time) if interface.slides else p
-            for interface, p in zip(self.interfaces, points, strict=True)
-        ]
+        known = zip(self.interfaces, points, strict=True)
+        return [i.points(x, step.before, step.time) if i.slides else p for i, p in known]
 
-    def answered(
+    def forces(
         self,
         points: list[ContactPoints],
-        u: NDArray[np.float64],
-        start: NDArray[np.float64],
-        memory: list[Memory],
-        *,
-        keep: bool,
+        moved: Array,
+        states: list[ContactState],
         allowed: float,
+        decides: ActiveSet,
+        *,
         coupled: bool = False,
-    ) -> Contact:
-        """What points answer at displacement u (3N,)."""
-        since = (u - start).reshape(-1, 3)
-        slips = [p.relative(since) - p.carried for p in points]
-        responses = [
-            respond(i.pair, p, m, slip, self._penalty(k, p, m), allowed, keep=keep, patient=not keep, coupled=coupled)
-            for k, (i, p, m, slip) in enumerate(zip(self.interfaces, points, memory, slips, strict=True))
+    ) -> ContactForces:
+        """Contact forces at points when bodies have moved (3N,) since the start of the step."""
+        slips = [p.relative(moved.reshape(-1, 3)) - p.carried for p in points]
+        tractions = self._tractions(points, slips, states, allowed, decides, coupled)
+        return ContactForces(points, slips, tractions, self.nodal(points, tractions), coupled)
+
+    def predicted(
+        self, contact: ContactForces, states: list[ContactState], move: Array, allowed: float, decides: ActiveSet
+    ) -> list[ContactTractions]:
+        """Tractions after a move (3N,), by the linear model: the multipliers to go on with."""
+        slips = self._slips(contact, move)
+        points = [shifted(p, move.reshape(-1, 3)) for p in contact.points]
+        # penalties and sites are those of the points before
+        return self._tractions(points, slips, states, allowed, decides, contact.coupled)
+
+    def _tractions(
+        self,
+        points: list[ContactPoints],
+        slips: list[Array],
+        states: list[ContactState],
+        allowed: float,
+        decides: ActiveSet,
+        coupled: bool,
+    ) -> list[ContactTractions]:
+        return [
+            return_mapping(i.pair, p, s, slip, self._penalty(k, p, s), allowed, decides, coupled=coupled)
+            for k, (i, p, s, slip) in enumerate(zip(self.interfaces, points, states, slips, strict=True))
         ]
-        return Contact(points, slips, responses, self.pushed(points, responses), coupled)
 
-    def sloped(self, contact: Contact, memory: list[Memory], pressed: list[Memory], u: NDArray[np.float64]) -> Contact:
-        """With what a symmetric stiffness leaves out, where points are those of displacement u (3N,).
+    def _slips(self, contact: ContactForces, move: Array) -> list[Array]:
+        """Slips after a move (3N,) [m]."""
+        return [s + p.relative(move.reshape(-1, 3)) for s, p in zip(contact.slips, contact.points, strict=True)]
 
-        ``pressed`` knows the multipliers that directions turn with; ``memory`` is the present one.
-        """
-        x = self._rest + u.reshape(-1, 3)
-        points, beside = list(contact.points), None
-        for k, (interface, p, r) in enumerate(zip(self.interfaces, points, contact.responses, strict=True)):
-            penalty, left_out = self._penalty(k, p, memory[k]), []
-            if interface.mortar is not None and interface.slides:
-                slopes = slopes_of(interface.mortar, p, r, pressed[k], penalty, x, interface.reach)
-                if slopes is not None:
-                    points[k] = replace(p, steep=slopes.gap)
-                    left_out.append(slopes.forces)
-            if contact.coupled and interface.pair.friction > 0.0:
-                left_out.append(coupling(points[k], r, interface.pair.friction, penalty))
-            for part in left_out:
-                if part is not None:
-                    beside = part if beside is None else beside + part
-        return replace(contact, points=points, beside=beside)
-
-    def pushed(self, points: list[ContactPoints], responses: list[Response]) -> NDArray[np.float64]:
+    def nodal(self, points: list[ContactPoints], tractions: list[ContactTractions]) -> Array:
         """Nodal forces of all interfaces together [N], shape (3N,)."""
         total = np.zeros_like(self._rest)
-        for p, r in zip(points, responses, strict=True):
-            total += p.forces(r.traction(p))
+        for p, t in zip(points, tractions, strict=True):
+            total += p.forces(t.traction(p))
         return total.reshape(-1)
 
-    def foreseen(
-        self, contact: Contact, memory: list[Memory], move: NDArray[np.float64], allowed: float, *, patient: bool
-    ) -> list[Response]:
-        """What points answer after a move, by the linear model: the multipliers to go on with."""
-        out = []
-        for k, (p, m, slip) in enumerate(zip(contact.points, memory, contact.slips, strict=True)):
-            there = shifted(p, move.reshape(-1, 3))
-            slip = slip + p.relative(move.reshape(-1, 3))
-            penalty = self._penalty(k, p, m)
-            pair, coupled = self.interfaces[k].pair, contact.coupled
-            out.append(respond(pair, there, m, slip, penalty, allowed, patient=patient, coupled=coupled))
-        return out
+    def linearise(
+        self, contact: ContactForces, states: list[ContactState], pressed: list[ContactState], u: Array
+    ) -> ContactForces:
+        """With what a symmetric stiffness leaves out, where points are those of displacement u (3N,).
 
-    def remembered(
+        ``pressed`` knows the multipliers that directions turn with; ``states`` are the present ones.
+        """
+        x = self._rest + u.reshape(-1, 3)
+        points, parts = list(contact.points), []
+        for k, (interface, p, t) in enumerate(zip(self.interfaces, points, contact.tractions, strict=True)):
+            penalty = self._penalty(k, p, states[k])
+            if interface.mortar is not None and interface.slides:
+                found = linearise_mortar(interface.mortar, p, t, pressed[k], penalty, x, interface.reach)
+                if found is not None:
+                    points[k] = replace(p, gap_derivative=found.gap)
+                    parts.append(found.forces)
+            if contact.coupled and interface.pair.friction > 0.0:
+                parts.append(friction_coupling(points[k], t, interface.pair.friction, penalty))
+        known = [part for part in parts if part is not None]
+        return replace(contact, points=points, nonsymmetric=sum(known[1:], known[0]) if known else None)
+
+    def updated(
         self,
-        memory: list[Memory],
-        contact: Contact,
-        foreseen: list[Response],
-        move: NDArray[np.float64],
-        *,
-        patient: bool,
-    ) -> list[Memory]:
-        """Multipliers after a move (3N,) that was foreseen to be answered so."""
+        states: list[ContactState],
+        contact: ContactForces,
+        predicted: list[ContactTractions],
+        move: Array,
+        decides: ActiveSet,
+    ) -> list[ContactState]:
+        """States after a move (3N,) that was predicted to be answered so."""
         out = []
-        for k, (m, p, r) in enumerate(zip(memory, contact.points, foreseen, strict=True)):
-            slip = contact.slips[k] + p.relative(move.reshape(-1, 3))
-            pair, known, penalty = self.interfaces[k].pair, contact.responses[k].active, self._penalty(k, p, m)
-            m = remember(pair, m, p, r, slip, penalty, known, patient=patient)
-            out.append(replace(m, firm=self._firmer(k, m, p, contact.responses[k], r)))
+        for k, (slip, s, p, t) in enumerate(
+            zip(self._slips(contact, move), states, contact.points, predicted, strict=True)
+        ):
+            now, penalty = contact.tractions[k], self._penalty(k, p, s)
+            s = update_multipliers(self.interfaces[k].pair, s, p, t, slip, penalty, now.active, decides)
+            out.append(replace(s, stiffening=self._stiffer(k, s, p, now, t)))
         return out
 
-    def _firmer(
-        self, k: int, memory: Memory, points: ContactPoints, before: Response, foreseen: Response
-    ) -> NDArray[np.float64]:
+    def _stiffer(
+        self,
+        k: int,
+        state: ContactState,
+        points: ContactPoints,
+        before: ContactTractions,
+        predicted: ContactTractions,
+    ) -> Array:
         """Penalties raised where flesh is so stiff that multipliers would find their values slowly, shape (s,)."""
         at = points.sites
-        seen = before.active & foreseen.active & (before.error > self._penetration * self.interfaces[k].edge[at])
-        slow = at[seen & (foreseen.error > _SLOW * before.error)]
-        firm = memory.firm.copy()
-        firm[slow] = np.minimum(_FIRMER * firm[slow], _FIRMEST)
-        return firm
-
-    def _penalty(self, k: int, points: ContactPoints, memory: Memory) -> NDArray[np.float64]:
-        """ε of points [Pa/m]."""
-        return np.asarray((self._penalties[k] * memory.firm)[points.sites])
-
-    def begun(self, memory: list[Memory], start: NDArray[np.float64], time: float) -> list[Memory]:
-        """Memory that knows what is apart as the step begins, where friction asks for it."""
-        x = self._rest + start.reshape(-1, 3)
-        out = []
-        for interface, m in zip(self.interfaces, memory, strict=True):
-            if interface.pair.friction > 0.0:
-                points = interface.points(x, time, time)
-                apart = np.ones(len(m.apart), dtype=bool)
-                apart[points.sites] = points.gap > self._penetration * interface.edge[points.sites]
-                m = replace(m, apart=apart)
-            out.append(m)
+        seen = before.active & predicted.active & (before.error > self._penetration * self.interfaces[k].edge[at])
+        slow = at[seen & (predicted.error > _SLOW * before.error)]
+        out = state.stiffening.copy()
+        out[slow] = np.minimum(_STIFFER * out[slow], _STIFFEST)
         return out
 
-    def settled(self, contact: Contact, memory: list[Memory], negligible: float) -> bool:
+    def _penalty(self, k: int, points: ContactPoints, state: ContactState) -> Array:
+        """ε of points [Pa/m]."""
+        return np.asarray((self._penalties[k] * state.stiffening)[points.sites])
+
+    def begun(self, states: list[ContactState], start: Array, time: float) -> list[ContactState]:
+        """States that know what is apart as the step begins, where friction asks for it."""
+        x = self._rest + start.reshape(-1, 3)
+        out = []
+        for interface, s in zip(self.interfaces, states, strict=True):
+            if interface.pair.friction > 0.0:
+                points = interface.points(x, time, time)
+                apart = np.ones(len(s.open_before), dtype=bool)
+                apart[points.sites] = points.gap > self._penetration * interface.edge[points.sites]
+                s = replace(s, open_before=apart)
+            out.append(s)
+        return out
+
+    def settled(self, contact: ContactForces, states: list[ContactState], negligible: float) -> bool:
         """Whether multipliers stay: overlap is gone, and forces change by little, or by what is ``negligible``."""
-        for k, (p, r, m) in enumerate(zip(contact.points, contact.responses, memory, strict=True)):
-            if not r.active.any():
+        for k, (p, t, s) in enumerate(zip(contact.points, contact.tractions, states, strict=True)):
+            if not t.active.any():
                 continue
-            if (r.error / self.interfaces[k].edge[p.sites]).max() > self._penetration:
+            if (t.error / self.interfaces[k].edge[p.sites]).max() > self._penetration:
                 return False
-            change = np.abs(r.pressure - m.pressure[p.sites]) + np.linalg.norm(r.friction - m.friction[p.sites], axis=1)
-            size = np.abs(r.pressure) + np.linalg.norm(r.friction, axis=1)
+            change = np.abs(t.pressure - s.pressure[p.sites]) + np.linalg.norm(t.friction - s.friction[p.sites], axis=1)
+            size = np.abs(t.pressure) + np.linalg.norm(t.friction, axis=1)
             if p.area @ change > max(_SETTLED * (p.area @ size), negligible):
                 return False
         return True
 
-    def mismatch(self, fresh: list[ContactPoints], points: list[ContactPoints], responses: list[Response]) -> float:
+    def mismatch(
+        self, fresh: list[ContactPoints], points: list[ContactPoints], tractions: list[ContactTractions]
+    ) -> float:
         """How far gaps as they are differ from those believed, where surfaces press or overlap, over an edge."""
         worst = 0.0
-        for k, (p, r, q) in enumerate(zip(points, responses, fresh, strict=True)):
-            edge = self.interfaces[k].edge
+        for interface, p, t, q in zip(self.interfaces, points, tractions, fresh, strict=True):
+            edge = interface.edge
             active = np.zeros(len(edge), dtype=bool)
-            active[p.sites] = r.active
+            active[p.sites] = t.active
             believed = np.full(len(edge), np.inf)
             believed[p.sites] = p.gap
             off = np.abs(q.gap - believed[q.sites])
@@ -237,16 +259,14 @@ class Interplay:
         return worst
 
 
-def shifted(points: ContactPoints, move: NDArray[np.float64]) -> ContactPoints:
+def shifted(points: ContactPoints, move: Array) -> ContactPoints:
     """Points after a move (N, 3), by the linear model: their normals and weights stay."""
-    if not move.any():
-        return points
-    return replace(points, gap=points.gap + points.opened(move))
+    return replace(points, gap=points.gap + points.opened(move)) if move.any() else points
 
 
-def alike(responses: list[Response], others: list[Response]) -> bool:
+def same_active_set(tractions: list[ContactTractions], others: list[ContactTractions]) -> bool:
     """Whether the same points touch, and stick, in both."""
     return all(
-        np.array_equal(r.active, s.active) and np.array_equal(r.sticking, s.sticking)
-        for r, s in zip(responses, others, strict=True)
+        np.array_equal(t.active, o.active) and np.array_equal(t.sticking, o.sticking)
+        for t, o in zip(tractions, others, strict=True)
     )

@@ -8,9 +8,7 @@ with the metric of the elements).
 
 from __future__ import annotations
 
-import numpy as np
-from numpy.typing import NDArray
-
+from warpjld.fem.arrays import Array
 from warpjld.fem.body import Body
 from warpjld.fem.solver.block_matrix import BlockMatrix
 
@@ -31,7 +29,7 @@ class Damping:
 
     def __init__(self, body: Body) -> None:
         self._body = body
-        self._rest: NDArray[np.float64] | None = None
+        self._rest: Array | None = None
         self.share = 0.0
 
     def begin(self) -> None:

@@ -5,8 +5,8 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from warpjld.fem.arrays import Array
 from warpjld.fem.body import Body, Tangent
 from warpjld.fem.load.loads import Loads, external_forces, subtract_pressure_stiffness
 
@@ -25,14 +25,14 @@ class Elastic:
         self.linear = not body.large_strain
         self._rest = body.at()
         self._last: Tangent | None = None
-        self._there: tuple[NDArray[np.float64], Tangent] | None = None
+        self._there: tuple[Array, Tangent] | None = None
         assert self._rest.stiffness is not None
-        self.stiffness: NDArray[np.float64] = np.einsum("nii->n", self._rest.stiffness.diagonal()) / 3.0
+        self.stiffness: Array = np.einsum("nii->n", self._rest.stiffness.diagonal()) / 3.0
         """Of each node at rest [N/m], shape (N,)."""
         if not self.linear:
             self._last = self._rest
 
-    def at(self, u: NDArray[np.float64], pressures: NDArray[np.float64] | None, loads: Loads) -> Tangent:
+    def at(self, u: Array, pressures: Array | None, loads: Loads) -> Tangent:
         """Stiffness, that of following pressure taken off, and internal forces at displacement u (3N,).
 
         ``pressures`` (E,) are those that K takes for its own. The matrix is good until the next call.
@@ -44,7 +44,7 @@ class Elastic:
         subtract_pressure_stiffness(self._last.stiffness, self.body, loads, u)
         return self._last
 
-    def forces(self, u: NDArray[np.float64]) -> Tangent:
+    def forces(self, u: Array) -> Tangent:
         """Internal forces alone; line searches ask for the same place in turn, so the last is kept."""
         if not self.linear:
             if self._there is None or not np.array_equal(u, self._there[0]):
@@ -54,15 +54,15 @@ class Elastic:
         own = self._rest.stiffness.product(u, threads=self.body.threads)
         return replace(self._rest, forces=self._rest.forces + own)
 
-    def external(self, loads: Loads, u: NDArray[np.float64]) -> NDArray[np.float64]:
+    def external(self, loads: Loads, u: Array) -> Array:
         """Nodal forces of loads [N], shape (3N,); as the displaced body meets them at large strain."""
         return external_forces(self.body, loads, None if self.linear else u)
 
-    def pressures(self, u: NDArray[np.float64], move: NDArray[np.float64] | None = None) -> NDArray[np.float64] | None:
+    def pressures(self, u: Array, move: Array | None = None) -> Array | None:
         """Pressure of each element [Pa], shape (E,), as foreseen after a move (3N,); None at small strain."""
         return None if self.linear else self.body.at(u, stiffness=False, increment=move).pressures
 
-    def upright(self, u: NDArray[np.float64], least: NDArray[np.float64] | float = 0.0) -> bool:
+    def upright(self, u: Array, least: Array | float = 0.0) -> bool:
         """Whether the elements' Jacobian determinants are above ``least`` (E,) at displacement u (3N,); at small strain
         they are."""
         return self.linear or bool((self.forces(u).lowest > least).all())

@@ -1,20 +1,18 @@
-"""How far to go along a Newton step where forces have to say it."""
+"""Line search along a Newton step: by elements' Jacobians, by the work of what drives on, by the residual."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-from warpjld.fem.contact.law.law import Memory
-from warpjld.fem.contact.solver.contact_system import Contact, Interplay
+from warpjld.fem.arrays import Array, Mask
+from warpjld.fem.contact.law.contact_state import ActiveSet
 from warpjld.fem.contact.solver.elastic import Elastic
-from warpjld.fem.contact.solver.load_step import Step
-from warpjld.fem.solver.dots import dot, norm
+from warpjld.fem.contact.solver.newton_state import NewtonState
+from warpjld.fem.solver.block_matrix import dot, norm
 
-__all__ = ["LineSearch"]
+__all__ = ["length_by_residual", "length_by_work", "length_upright"]
 
 _TRIALS = 8
 _OVERSHOT = 0.5
@@ -26,102 +24,62 @@ _FLATTEST = 0.2
 """Part of their Jacobian determinants that elements keep in a step."""
 
 
-@dataclass(frozen=True, eq=False)
-class LineSearch:
-    """The step that is being solved, and what it starts from.
+def length_upright(elastic: Elastic, u: Array, move: Array, lowest: Array) -> float:
+    """The longest of 1, ½, ¼ … that flattens no element to less than a part of what it is, 0 where none does not.
 
-    Attributes:
+    Nearly inside out, flesh answers with forces that no later step finds its way back from.
+
+    Args:
         elastic: The bodies.
-        play: Their contact.
-        step: Loads and times.
-        start: Displacement at the start of the load step [m], shape (3N,).
+        u: Displacement [m], shape (3N,).
+        move: From there, shape (3N,).
+        lowest: Lowest Jacobian determinants of the elements there, shape (E,).
     """
+    length = 1.0
+    for _ in range(_TRIALS):
+        if elastic.upright(u + length * move, _FLATTEST * lowest):
+            return length
+        length *= 0.5
+    return 0.0
 
-    elastic: Elastic
-    play: Interplay
-    step: Step
-    start: NDArray[np.float64]
 
-    def upright(self, u: NDArray[np.float64], move: NDArray[np.float64], lowest: NDArray[np.float64]) -> float:
-        """The longest of 1, ½, ¼ … that flattens no element to less than a part of what it is, 0 where none does not.
+def length_by_work(state: NewtonState, move: Array, most: float, watched: Mask) -> float:
+    """``most``; or, where forces on the watched degrees of freedom (3N,) pull back there harder than half of what
+    drives here, to where they balance along the way. A contact that opens and closes in turn settles so, and what
+    falls freely stops where it first touches.
+    """
+    if not watched.any():
+        return most
+    along = np.where(watched, move, 0.0)
 
-        Nearly inside out, flesh answers with forces that no later step finds its way back from.
+    def pull(part: float) -> float:
+        """What drives on after part of the way; contact as the linear model has it."""
+        pushed = state.system.nodal(state.contact.points, state.predicted(part * move))
+        return dot(state.pull(state.u + part * move) + pushed, along)
 
-        Args:
-            u: Displacement [m], shape (3N,).
-            move: From there, shape (3N,).
-            lowest: Lowest Jacobian determinants of the elements there, shape (E,).
-        """
-        length = 1.0
-        for _ in range(_TRIALS):
-            if self.elastic.upright(u + length * move, _FLATTEST * lowest):
-                return length
-            length *= 0.5
-        return 0.0
+    driving, there = dot(state.residual, along), pull(most)
+    if not (driving > 0.0 and there < -_OVERSHOT * driving):
+        return most
+    return max(_balance(pull, most, driving, there), _LEAST)
 
-    def by_work(
-        self,
-        u: NDArray[np.float64],
-        move: NDArray[np.float64],
-        most: float,
-        contact: Contact,
-        memory: list[Memory],
-        residual: NDArray[np.float64],
-        watched: NDArray[np.bool_],
-        *,
-        patient: bool,
-    ) -> float:
-        """``most``; or, where forces on the watched degrees of freedom (3N,) pull back there harder than half of what
-        drives here, to where they balance along the way. A contact that opens and closes in turn settles so, and what
-        falls freely stops where it first touches.
-        """
-        if not watched.any():
-            return most
-        along = np.where(watched, move, 0.0)
 
-        def pull(part: float) -> float:
-            """What drives on after part of the way; contact as the linear model has it."""
-            here = u + part * move
-            foreseen = self.play.foreseen(contact, memory, part * move, self.step.allowed, patient=patient)
-            pushed = self.play.pushed(contact.points, foreseen)
-            return dot(self.elastic.external(self.step.loads, here) - self.elastic.forces(here).forces + pushed, along)
-
-        driving, there = dot(residual, along), pull(most)
-        if not (driving > 0.0 and there < -_OVERSHOT * driving):
-            return most
-        return max(_balance(pull, most, driving, there), _LEAST)
-
-    def by_balance(
-        self,
-        u: NDArray[np.float64],
-        move: NDArray[np.float64],
-        most: float,
-        memory: list[Memory],
-        residual: NDArray[np.float64],
-        free: NDArray[np.bool_],
-        *,
-        coupled: bool,
-    ) -> float:
-        """How far to go, ``most`` at most, for forces to balance better than here: where points come and go in turn, or
-        K is indefinite, the work along the way does not tell.
-        """
-        now = norm(residual)
-        length, best = most, (np.inf, most)
-        for _ in range(_TRIALS):
-            there = u + length * move
-            points = self.play.points(there, self.step.before, self.step.time, self.play.normals(there))
-            allowed = self.step.allowed
-            contact = self.play.answered(
-                points, there, self.start, memory, keep=False, allowed=allowed, coupled=coupled
-            )
-            pulls = self.elastic.external(self.step.loads, there) - self.elastic.forces(there).forces
-            left = norm(np.where(free, pulls + contact.forces, 0.0))
-            if left < (1.0 - 1e-4 * length) * now:
-                return length
-            if left < best[0]:
-                best = (left, length)
-            length *= 0.5
-        return best[1]
+def length_by_residual(state: NewtonState, move: Array, most: float) -> float:
+    """How far to go, ``most`` at most, for forces to balance better than here: where points come and go in turn, or
+    K is indefinite, the work along the way does not tell.
+    """
+    now = norm(state.residual)
+    length, best = most, (np.inf, most)
+    for _ in range(_TRIALS):
+        there = state.u + length * move
+        points = state.system.points(there, state.step, state.system.normals(there))
+        contact = state.forces(points, there, ActiveSet.TRIAL, coupled=state.contact.coupled)
+        left = norm(np.where(state.free, state.pull(there) + contact.forces, 0.0))
+        if left < (1.0 - 1e-4 * length) * now:
+            return length
+        if left < best[0]:
+            best = (left, length)
+        length *= 0.5
+    return best[1]
 
 
 def _balance(pull: Callable[[float], float], end: float, at_start: float, at_end: float) -> float:

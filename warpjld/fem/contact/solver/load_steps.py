@@ -3,24 +3,23 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from warpjld.errors import InputError
+from warpjld.fem.arrays import Array
 from warpjld.fem.body import Body
 from warpjld.fem.contact.interface.contact_border import contact_modulus
 from warpjld.fem.contact.interface.contact_points import Interface, interfaces_of
 from warpjld.fem.contact.interface.pairs import Pair
-from warpjld.fem.contact.law.bonds import overstrained, released
-from warpjld.fem.contact.law.law import Memory, start_memory
+from warpjld.fem.contact.law.contact_state import ContactState, initial_state, without_bonds
+from warpjld.fem.contact.law.return_mapping import overstrained
 from warpjld.fem.contact.results.solution import ContactInstant, ContactSolution
 from warpjld.fem.contact.results.touches import touch_of
-from warpjld.fem.contact.solver.blocked import blocked
-from warpjld.fem.contact.solver.equilibrium import Equilibrium
-from warpjld.fem.contact.solver.load_step import Step
-from warpjld.fem.contact.solver.newton_state import Reached
+from warpjld.fem.contact.solver.contact_newton import ContactNewton
+from warpjld.fem.contact.solver.contact_system import LoadStep
+from warpjld.fem.contact.solver.newton_state import Equilibrium
+from warpjld.fem.contact.solver.unconstrained import blocked
 from warpjld.fem.load.loads import Loads
 from warpjld.fem.load.prescribed import Prescribed
 from warpjld.fem.solver.conjugate import Status
@@ -29,12 +28,13 @@ __all__ = ["Guess", "LoadSteps"]
 
 _HALVINGS = 7
 _HALVINGS_UNHELD = 3
+_UNHELD = (Status.SLIDING, Status.UNHELD)
 """A body that slides away, or falls, seldom does so because the step is long."""
 _BREAKS = 100
 _PART = 0.85
 """How far along the course of the step before a first guess goes: contact stiffens what it meets."""
 
-Guess = Callable[[float, float, NDArray[np.float64]], NDArray[np.float64]]
+Guess = Callable[[float, float, Array], Array]
 """Time before, time, displacement before (N, 3) → where to begin to look for the displacement at the time (N, 3)."""
 
 
@@ -76,93 +76,93 @@ class LoadSteps:
         self.penetration = penetration
         self.interfaces = interfaces_of(body.mesh, pairs, body.threads)
         self.moduli = [contact_modulus(body, interface) for interface in self.interfaces]
-        self.equilibrium = Equilibrium(body, self.interfaces, self.moduli, tolerance=tolerance, penetration=penetration)
+        self.newton = ContactNewton(body, self.interfaces, self.moduli, tolerance=tolerance, penetration=penetration)
         if after is None:
             self.start = 0.0
             self.u = np.zeros(body.degrees)
-            self.memory = [self._begin(interface) for interface in self.interfaces]
+            self.states = [self._begin(interface) for interface in self.interfaces]
         else:
             if after.last.displacement.size != body.degrees:
                 raise InputError(f"after: is of a body with {after.last.displacement.size} degrees of freedom")
             self.start = after.last.time
             self.u = after.last.displacement.reshape(-1).copy()
-            self.memory = list(after.memory)
+            self.states = list(after.states)
         self.steps: list[int] = []
-        self.course = None if after is None else after.course
+        self.correction_rate = None if after is None else after.correction_rate
 
-    def _begin(self, interface: Interface) -> Memory:
+    def _begin(self, interface: Interface) -> ContactState:
         """Bonds made, and the overlap noted that there is at the start."""
-        memory = start_memory(len(interface.edge), interface.pair)
+        state = initial_state(len(interface.edge), interface.pair)
         points = interface.points(self.body.mesh.nodes, 0.0, 0.0)
         if interface.pair.bond is not None:
-            memory.seam[points.sites] = points.gap
+            state.bond_gap[points.sites] = points.gap
             if len(points.sites) == 0:
                 raise InputError(f"{interface.pair.title}: a bond to nothing: its two sides do not meet")
-            memory.bonded[np.isnan(memory.seam)] = False
+            state.bonded[np.isnan(state.bond_gap)] = False
         else:
-            memory.allowance[points.sites] = np.maximum(-points.gap, 0.0)
-        return memory
+            state.allowance[points.sites] = np.maximum(-points.gap, 0.0)
+        return state
 
-    def _step(self, before: float, time: float) -> Step:
+    def _step(self, before: float, time: float) -> LoadStep:
         share = time / self.times[-1]
         known = self.prescribed
         now = known(time) if callable(known) else known.scaled(share)
         loads = self.loads(time) if callable(self.loads) else self.loads.scaled(share)
         allowed = max(0.0, 1.0 - (time - self.start) / (self.times[0] - self.start))
-        return Step(before, time, now, loads, allowed)
+        return LoadStep(before, time, now, loads, allowed)
 
-    def through(
-        self,
-        watch: Callable[[ContactInstant], str | None] | None,
-        progress: Callable[[str], None] | None,
+    def run(
+        self, watch: Callable[[ContactInstant], str | None] | None, progress: Callable[[str], None] | None
     ) -> ContactSolution:
         """Every time, or as far as equilibria are found; ``watch`` and ``progress`` as in ``press``."""
+        tell = progress or (lambda text: None)
         now, halvings = self.start, 0
         reached: list[ContactInstant] = []
         todo = list(self.times)
+        newton = self.newton
         solves, iterations = 0, 0
         while todo:
             target = todo[0]
-            self.equilibrium.solves = self.equilibrium.iterations = 0
+            newton.solves = newton.iterations = 0
             step = self._step(now, target)
             carried = self._carried(step)
             status, found = self._find(step, carried)
-            solves += self.equilibrium.solves
-            iterations += self.equilibrium.iterations
+            solves += newton.solves
+            iterations += newton.iterations
             if overlap := self._blocked(step, found):
                 message = f"no equilibrium at time {target:.4g}: {overlap}; no force can part them"
                 return self._end(Status.BLOCKED, reached, message, step)
             if found is None:
                 halvings += 1
-                unheld = status in (Status.SLIDING, Status.UNHELD)
-                usual = _HALVINGS_UNHELD if unheld else _HALVINGS
-                if halvings > (usual if self.halvings is None else min(usual, self.halvings)):
-                    reason = self.equilibrium.trouble if unheld else status.value
+                if halvings > self._most_halvings(status):
+                    reason = newton.failure if status in _UNHELD else status.value
                     message = f"no equilibrium found after time {now:.4g} (tried {target:.4g}): {reason}"
                     return self._end(status, reached, message, step)
-                if progress:
-                    progress(f"time {target:.3g}: {status.value}; halving the step")
+                tell(f"time {target:.3g}: {status.value}; halving the step")
                 todo.insert(0, 0.5 * (now + target))
                 continue
-            self.steps.append(self.equilibrium.solves)
-            self.course = (found.displacement - carried).reshape(-1, 3) / (target - now)
-            self.u, self.memory, now = found.displacement, found.memory, target
+            self.steps.append(newton.solves)
+            self.correction_rate = (found.displacement - carried).reshape(-1, 3) / (target - now)
+            self.u, self.states, now = found.displacement, found.states, target
             todo.pop(0)
             halvings = max(0, halvings - 1)
             if target not in self.times:
                 continue
-            instant = self._instant(target, found, solves, iterations)
-            reached.append(instant)
-            if progress:
-                progress(f"time {target:.3g}: {solves} solves, {iterations} iterations, residual {found.residual:.1e}")
+            reached.append(self._instant(target, found, solves, iterations))
+            tell(f"time {target:.3g}: {solves} solves, {iterations} iterations, residual {found.residual:.1e}")
             solves = iterations = 0
-            wish = watch(instant) if watch else None
+            wish = watch(reached[-1]) if watch else None
             if wish:
                 return self._end(Status.STOPPED, reached, wish, step)
         return self._end(Status.CONVERGED, reached, Status.CONVERGED.value, step)
 
-    def _blocked(self, step: Step, found: Reached | None) -> str:
+    def _most_halvings(self, status: Status) -> int:
+        usual = _HALVINGS_UNHELD if status in _UNHELD else _HALVINGS
+        return usual if self.halvings is None else min(usual, self.halvings)
+
+    def _blocked(self, step: LoadStep, found: Equilibrium | None) -> str:
         """Overlap that nothing can part, in words; looked for where a step failed, or ended with an overlap."""
+        free = step.prescribed.free(self.body.degrees)
         if found is None:
             u = self.u.copy()
             u[step.prescribed.degrees] = step.prescribed.values
@@ -170,53 +170,44 @@ class LoadSteps:
             points = [interface.points(x, step.before, step.time) for interface in self.interfaces]
         else:
             points = found.points
-        return blocked(
-            self.interfaces,
-            points,
-            self.memory,
-            step.prescribed.free(self.body.degrees),
-            allowed=step.allowed,
-            penetration=self.penetration,
-        )
+        return blocked(self.interfaces, points, self.states, free, allowed=step.allowed, penetration=self.penetration)
 
-    def _find(self, step: Step, carried: NDArray[np.float64]) -> tuple[Status, Reached | None]:
+    def _find(self, step: LoadStep, carried: Array) -> tuple[Status, Equilibrium | None]:
         """Equilibrium of a step; again after every bond that did not hold."""
         guesses = self._guesses(step, carried)
-        status, found = self.equilibrium.find(self.u, self.memory, step, *guesses)
+        status, found = self.newton.find(self.u, self.states, step, *guesses)
         if found is None and guesses and self.guess is None:
-            status, found = self.equilibrium.find(self.u, self.memory, step)
-        memory = self.memory
+            status, found = self.newton.find(self.u, self.states, step)
         for _ in range(_BREAKS):
             if found is None:
                 return status, None
-            broken = [overstrained(i, f, found) for i, f in enumerate(self.interfaces)]
+            known = zip(self.interfaces, found.states, found.points, found.tractions, strict=True)
+            broken = [overstrained(i.pair, s, p, t) for i, s, p, t in known]
             if not any(mask.any() for mask in broken):
                 return status, found
-            memory = [replace(m, bonded=m.bonded & ~mask) for m, mask in zip(found.memory, broken, strict=True)]
-            memory = [released(m, mask) for m, mask in zip(memory, broken, strict=True)]
-            status, found = self.equilibrium.find(self.u, memory, step, found.displacement)
+            states = [without_bonds(s, mask) for s, mask in zip(found.states, broken, strict=True)]
+            status, found = self.newton.find(self.u, states, step, found.displacement)
         return Status.MAX_ITERATIONS, None
 
-    def _carried(self, step: Step) -> NDArray[np.float64]:
+    def _carried(self, step: LoadStep) -> Array:
         """The displacement that a step begins from, carried on as the caller knows how, shape (3N,)."""
         if self.guess is None:
             return self.u
         return np.asarray(self.guess(step.before, step.time, self.u.reshape(-1, 3)), dtype=np.float64).reshape(-1)
 
-    def _guesses(self, step: Step, carried: NDArray[np.float64]) -> list[NDArray[np.float64]]:
+    def _guesses(self, step: LoadStep, carried: Array) -> list[Array]:
         """Where to begin, best first: as asked, and what it was off by in the step before taken to be off by again."""
         plain = [] if self.guess is None else [carried]
-        if self.course is None:
+        if self.correction_rate is None:
             return plain
-        return [carried + _PART * (step.time - step.before) * self.course.reshape(-1), *plain]
+        return [carried + _PART * (step.time - step.before) * self.correction_rate.reshape(-1), *plain]
 
-    def _instant(self, time: float, found: Reached, solves: int, iterations: int) -> ContactInstant:
+    def _instant(self, time: float, found: Equilibrium, solves: int, iterations: int) -> ContactInstant:
         x = self.body.mesh.nodes + found.displacement.reshape(-1, 3)
         touches = []
         for k, interface in enumerate(self.interfaces):
-            bonded = found.memory[k].bonded
-            points, response, slip = found.points[k], found.responses[k], found.slips[k]
-            touches.append(touch_of(interface, points, response, slip, bonded, self.moduli[k], x))
+            points, tractions, slip = found.points[k], found.tractions[k], found.slips[k]
+            touches.append(touch_of(interface, points, tractions, slip, found.states[k].bonded, self.moduli[k], x))
         shape = (-1, 3)
         return ContactInstant(
             time,
@@ -228,9 +219,9 @@ class LoadSteps:
             found.residual,
         )
 
-    def _end(self, status: Status, reached: list[ContactInstant], message: str, step: Step) -> ContactSolution:
+    def _end(self, status: Status, reached: list[ContactInstant], message: str, step: LoadStep) -> ContactSolution:
         if not reached:
             nothing = np.zeros((len(self.body.mesh.nodes), 3))
             reached = [ContactInstant(self.start, self.u.reshape(-1, 3), nothing, (), 0, 0, 0.0)]
-        memory, steps = tuple(self.memory), tuple(self.steps)
-        return ContactSolution(status, tuple(reached), message, memory, steps, step.loads, self.course)
+        states, steps = tuple(self.states), tuple(self.steps)
+        return ContactSolution(status, tuple(reached), message, states, steps, step.loads, self.correction_rate)

@@ -1,4 +1,4 @@
-"""Where a search for equilibrium stands, and how it goes on: Newton's steps in turn with what points remember."""
+"""State of Newton's method in a load step: displacement, contact states and residual, and how they go on."""
 
 from __future__ import annotations
 
@@ -6,17 +6,23 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from warpjld.fem.arrays import Array
 from warpjld.fem.body import Tangent
 from warpjld.fem.contact.interface.contact_points import ContactPoints
-from warpjld.fem.contact.law.law import Memory, Response
-from warpjld.fem.contact.solver.contact_system import Contact, Interplay, alike, shifted
+from warpjld.fem.contact.law.contact_state import ActiveSet, ContactState
+from warpjld.fem.contact.law.return_mapping import ContactTractions
+from warpjld.fem.contact.solver.contact_system import (
+    ContactForces,
+    ContactSystem,
+    LoadStep,
+    same_active_set,
+    shifted,
+)
 from warpjld.fem.contact.solver.elastic import Elastic
-from warpjld.fem.contact.solver.load_step import Step
-from warpjld.fem.solver.dots import norm
+from warpjld.fem.solver.block_matrix import norm
 
-__all__ = ["Reached", "Walk"]
+__all__ = ["Equilibrium", "NewtonState"]
 
 _ROUNDING = 1e-13
 """Part of stiffness times displacement that is rounding, where bodies move without a force."""
@@ -25,35 +31,35 @@ _PLACES = 0.03
 _TURNING = 1
 """Iterations after which normals stay where their derivatives are not known; weights follow until they no longer change
 the gaps. That both are right is looked at once forces balance."""
-_CARELESS = 8
+_FIXED_POINT = 8
 """Iterations with full steps and multipliers brought up to date at once; what has not settled by then takes turns."""
-_SURE = 1
+_MULTIPLIERS_GOOD = 1
 """Iterations after which multipliers are good enough to take the derivatives of directions with; until then those of
 the equilibrium before are."""
 
 
 @dataclass(frozen=True, eq=False)
-class Reached:
+class Equilibrium:
     """Equilibrium at the end of a load step."""
 
-    displacement: NDArray[np.float64]
-    reactions: NDArray[np.float64]
+    displacement: Array
+    reactions: Array
     points: list[ContactPoints]
-    responses: list[Response]
-    slips: list[NDArray[np.float64]]
-    memory: list[Memory]
+    tractions: list[ContactTractions]
+    slips: list[Array]
+    states: list[ContactState]
     residual: float
 
 
-class Walk:
+class NewtonState:
     """A search for the equilibrium at the end of a load step.
 
     Args:
         elastic: The bodies.
-        play: Their contact.
+        system: Their contact.
         step: The load step.
         start: Displacement at its start [m], shape (3N,).
-        memory: What points remember there.
+        states: What is known of contact points there.
         guesses: Where to begin to look, best first [m], shape (3N,): the first that turns no element inside out is.
         tolerance: Residual over the forces that balance.
         penetration: Overlap left, as a share of an edge.
@@ -62,36 +68,36 @@ class Walk:
         u: Displacement [m], shape (3N,).
         jump: What prescribed degrees of freedom have yet to go [m], shape (3N,).
         free: Which are not prescribed, shape (3N,).
-        memory: What points remember.
-        contact: What they answer at ``u``.
+        states: Multipliers and active sets.
+        contact: Contact forces at ``u``.
         tangent: The bodies' forces and stiffness at ``u``.
         residual: Forces left over at what is free [N], shape (3N,).
         unbalanced: Their size over that of the forces that balance.
     """
 
-    contact: Contact
+    contact: ContactForces
     tangent: Tangent
-    residual: NDArray[np.float64]
+    residual: Array
     unbalanced: float
 
     def __init__(
         self,
         elastic: Elastic,
-        play: Interplay,
-        step: Step,
-        start: NDArray[np.float64],
-        memory: list[Memory],
-        guesses: Sequence[NDArray[np.float64]],
+        system: ContactSystem,
+        step: LoadStep,
+        start: Array,
+        states: list[ContactState],
+        guesses: Sequence[Array],
         *,
         tolerance: float,
         penetration: float,
     ) -> None:
-        self._elastic, self._play, self._step, self._start = elastic, play, step, start
+        self.elastic, self.system, self.step, self.start = elastic, system, step, start
         self._tolerance, self._penetration = tolerance, penetration
         self.free = step.prescribed.free(len(start))
-        self.memory = self._before = play.begun(memory, start, step.before)
+        self.states = self._before = system.begun(states, start, step.before)
         self.jump = np.zeros_like(start)
-        self._pressures: NDArray[np.float64] | None = None
+        self._pressures: Array | None = None
         self._iteration, self._since, self._settled = -1, 0, False
         guess = next((held for held in map(self._held, guesses) if elastic.upright(held)), None)
         if guess is not None:
@@ -102,9 +108,9 @@ class Walk:
         else:
             self.u = start.copy()
             self.jump = self._held(start) - start
-        self._normals = play.normals(self.u)
-        self._seen = (play.points(self.u, step.before, step.time, self._normals), self.u)
-        self._answer(self._seen[0], keep=True)
+        self._normals = system.normals(self.u)
+        self._seen = (system.points(self.u, step, self._normals), self.u)
+        self.contact = self.forces(self._seen[0], self.u, ActiveSet.FROZEN)
 
     @property
     def turn(self) -> int:
@@ -112,21 +118,40 @@ class Walk:
         return self._iteration - self._since
 
     @property
-    def careful(self) -> bool:
-        """Whether it has gone on for so long that steps and multipliers take turns."""
-        return self.turn >= _CARELESS
+    def alternating(self) -> bool:
+        """Whether the fixed-point phase is over, and steps and multipliers take turns."""
+        return self.turn >= _FIXED_POINT
+
+    @property
+    def predicts(self) -> ActiveSet:
+        """What decides on the active set after a linear solve."""
+        return ActiveSet.TRIAL if self.alternating else ActiveSet.PREDICTED
 
     @property
     def arrived(self) -> bool:
         """Whether what is prescribed is where it is to be."""
         return not self.jump.any()
 
-    def weigh(self) -> None:
+    def forces(
+        self, points: list[ContactPoints], u: Array, decides: ActiveSet, *, coupled: bool = False
+    ) -> ContactForces:
+        """Contact forces at points of displacement u (3N,), with the present multipliers."""
+        return self.system.forces(points, u - self.start, self.states, self.step.allowed, decides, coupled=coupled)
+
+    def predicted(self, move: Array) -> list[ContactTractions]:
+        """Tractions after a move (3N,), by the linear model."""
+        return self.system.predicted(self.contact, self.states, move, self.step.allowed, self.predicts)
+
+    def pull(self, u: Array) -> Array:
+        """External less internal forces of the bodies alone at displacement u [N], shape (3N,)."""
+        return self.elastic.external(self.step.loads, u) - self.elastic.forces(u).forces
+
+    def assemble(self) -> None:
         """Find the forces, and what of them is left over."""
         self._iteration += 1
-        elastic, u, free, contact = self._elastic, self.u, self.free, self.contact
-        self.tangent = elastic.at(u, self._pressures, self._step.loads)
-        external = elastic.external(self._step.loads, u)
+        elastic, u, free, contact = self.elastic, self.u, self.free, self.contact
+        self.tangent = elastic.at(u, self._pressures, self.step.loads)
+        external = elastic.external(self.step.loads, u)
         self.residual = np.where(free, external + contact.forces - self.tangent.forces, 0.0)
         self._reactions = np.where(free, 0.0, self.tangent.forces - external - contact.forces)
         pushed = norm(np.where(free, contact.forces, 0.0))
@@ -142,75 +167,70 @@ class Walk:
         """Whether forces balance as the points see them."""
         if not (self.arrived and self._near):
             return False
-        return self._quiet or self._play.settled(self.contact, self.memory, self._negligible)
+        return self._quiet or self.system.settled(self.contact, self.states, self._negligible)
 
     def confirmed(self) -> bool:
         """Whether the points see what is so; where not, the search begins anew with points that do."""
-        play, step = self._play, self._step
-        self._normals = play.normals(self.u)
-        fresh = play.points(self.u, step.before, step.time, self._normals)
-        contact = self.contact
-        if step.allowed > 0.0 or play.mismatch(fresh, contact.points, contact.responses) <= self._penetration:
+        self._normals = self.system.normals(self.u)
+        fresh = self.system.points(self.u, self.step, self._normals)
+        if self.step.allowed > 0.0:
+            return True
+        if self.system.mismatch(fresh, self.contact.points, self.contact.tractions) <= self._penetration:
             return True
         self._seen, self._settled, self._since = (fresh, self.u), False, self._iteration
-        self._answer(fresh, keep=True)
+        self.contact = self.forces(fresh, self.u, ActiveSet.FROZEN)
         return False
 
-    def reached(self) -> Reached:
-        """The equilibrium."""
+    def equilibrium(self) -> Equilibrium:
+        """What was found."""
         contact = self.contact
         nothing = np.zeros_like(self.u)
-        kept = self._play.remembered(self.memory, contact, contact.responses, nothing, patient=True)
-        left = 1.0 if self._step.allowed > 0.0 else 0.0  # what was parted stays so
-        kept = [replace(m, anchor=np.zeros_like(m.anchor), allowance=left * m.allowance) for m in kept]
+        kept = self.system.updated(self.states, contact, contact.tractions, nothing, ActiveSet.TRIAL)
+        left = 1.0 if self.step.allowed > 0.0 else 0.0  # what was parted stays so
+        kept = [replace(s, slip_anchor=np.zeros_like(s.slip_anchor), allowance=left * s.allowance) for s in kept]
         # on the way to where friction took hold of it, what was apart slid on nothing
-        slips = [s - m.anchor[p.sites] for s, m, p in zip(contact.slips, self.memory, contact.points, strict=True)]
-        return Reached(self.u, self._reactions, contact.points, contact.responses, slips, kept, self.unbalanced)
+        known = zip(contact.slips, self.states, contact.points, strict=True)
+        slips = [slip - s.slip_anchor[p.sites] for slip, s, p in known]
+        return Equilibrium(self.u, self._reactions, contact.points, contact.tractions, slips, kept, self.unbalanced)
 
-    def slope(self) -> None:
+    def linearise(self) -> None:
         """Find what a symmetric stiffness leaves out."""
-        pressed = self.memory if self._iteration >= _SURE else self._before
-        self.contact = self._play.sloped(self.contact, self.memory, pressed, self.u)
+        pressed = self.states if self._iteration >= _MULTIPLIERS_GOOD else self._before
+        self.contact = self.system.linearise(self.contact, self.states, pressed, self.u)
 
-    def go(self, move: NDArray[np.float64], length: float) -> None:
-        """Go a part of the way along a move (3N,), and bring up to date what points remember, and what they see."""
-        play, careful = self._play, self.careful
+    def advance(self, move: Array, length: float) -> None:
+        """Go a part of the way along a move (3N,), then update multipliers and contact points."""
+        alternating, decides = self.alternating, self.predicts
         move = length * move
-        self._pressures = self._elastic.pressures(self.u, move)
+        self._pressures = self.elastic.pressures(self.u, move)
         self.u = self.u + move
         self.jump = self.jump * (1.0 - length)
         if length == 1.0:
             self.u = self._held(self.u)
             self.jump = np.zeros_like(self.u)
-        foreseen = play.foreseen(self.contact, self.memory, move, self._step.allowed, patient=careful)
-        same = alike(self.contact.responses, foreseen)
-        if not careful or same:
-            self.memory = play.remembered(self.memory, self.contact, foreseen, move, patient=careful)
-        points, keep = self._points(foreseen), self.turn + 1 < _CARELESS
-        coupled = not keep and same and not any((r.active & r.sticking).any() for r in foreseen)
-        self._answer(points, keep=keep, coupled=coupled)
+        predicted = self.predicted(move)
+        same = same_active_set(self.contact.tractions, predicted)
+        if not alternating or same:
+            self.states = self.system.updated(self.states, self.contact, predicted, move, decides)
+        points, last = self._points(predicted), self.turn + 1 >= _FIXED_POINT
+        coupled = last and same and not any((t.active & t.sticking).any() for t in predicted)
+        self.contact = self.forces(points, self.u, ActiveSet.TRIAL if last else ActiveSet.FROZEN, coupled=coupled)
 
-    def _points(self, foreseen: list[Response]) -> list[ContactPoints]:
+    def _points(self, predicted: list[ContactTractions]) -> list[ContactPoints]:
         """Points after a move: seen afresh until that no longer changes the gaps."""
-        play, step = self._play, self._step
         points = [shifted(p, (self.u - self._seen[1]).reshape(-1, 3)) for p in self._seen[0]]
         if not self._settled:
-            self._normals = play.turned(self._normals, self.u, self._iteration < _TURNING)
-            fresh = play.points(self.u, step.before, step.time, self._normals)
+            self._normals = self.system.turned(self._normals, self.u, self._iteration < _TURNING)
+            fresh = self.system.points(self.u, self.step, self._normals)
             if self._iteration > _TURNING:
-                self._settled = play.mismatch(fresh, points, foreseen) <= 0.5 * self._penetration
+                self._settled = self.system.mismatch(fresh, points, predicted) <= 0.5 * self._penetration
             if not self._settled:
                 self._seen, points = (fresh, self.u), fresh
-        return play.refreshed(points, self.u, step.before, step.time) if self._settled else points
+        return self.system.refreshed(points, self.u, self.step) if self._settled else points
 
-    def _answer(self, points: list[ContactPoints], *, keep: bool, coupled: bool = False) -> None:
-        self.contact = self._play.answered(
-            points, self.u, self._start, self.memory, keep=keep, allowed=self._step.allowed, coupled=coupled
-        )
-
-    def _held(self, u: NDArray[np.float64]) -> NDArray[np.float64]:
+    def _held(self, u: Array) -> Array:
         """With the prescribed values where there are such."""
-        prescribed = self._step.prescribed
+        prescribed = self.step.prescribed
         out = np.array(u, dtype=np.float64).reshape(-1)
         out[prescribed.degrees] = prescribed.values
         return out

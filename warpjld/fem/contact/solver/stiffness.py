@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from warpjld.fem.arrays import Array, Ints32
 from warpjld.fem.contact.interface.contact_points import ContactPoints
 from warpjld.fem.launch import on_rows, shared
 from warpjld.fem.solver.block_matrix import BlockMatrix
@@ -15,7 +16,7 @@ __all__ = ["with_contact"]
 
 
 def with_contact(
-    stiffness: BlockMatrix, points: list[ContactPoints], blocks: list[NDArray[np.float64]], *, threads: int
+    stiffness: BlockMatrix, points: list[ContactPoints], blocks: list[Array], *, threads: int
 ) -> BlockMatrix:
     """K + Σ_a c_ai c_aj H_a in a new matrix; its pattern is K's, or wider where contact joins bodies.
 
@@ -55,9 +56,7 @@ def with_contact(
     return BlockMatrix(rows, columns, values)
 
 
-def _widened(
-    stiffness: BlockMatrix, table: Any, threads: int
-) -> tuple[NDArray[np.int32], NDArray[np.int32], NDArray[np.float64]]:
+def _widened(stiffness: BlockMatrix, table: Any, threads: int) -> tuple[Ints32, Ints32, Array]:
     """A copy of K with room for every pair of nodes that a row of the table joins."""
     import warp as wp
     from scipy.sparse import csr_array
@@ -87,5 +86,5 @@ def _widened(
     return rows, columns, values
 
 
-def _int(values: NDArray[Any]) -> NDArray[np.int32]:
+def _int(values: NDArray[Any]) -> Ints32:
     return np.ascontiguousarray(values, dtype=np.int32)

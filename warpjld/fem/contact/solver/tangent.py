@@ -12,16 +12,17 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from warpjld.fem.arrays import Array, Ints
 from warpjld.fem.contact.interface.surface import ContactSurface
 
 if TYPE_CHECKING:
     from warpjld.fem.contact.interface.contact_points import ContactPoints
     from warpjld.fem.contact.interface.mortar import Mortar
-    from warpjld.fem.contact.law.law import Memory, Response
+    from warpjld.fem.contact.law.contact_state import ContactState
+    from warpjld.fem.contact.law.return_mapping import ContactTractions
 
-__all__ = ["Slopes", "coupling", "slopes_of"]
+__all__ = ["MortarTangent", "friction_coupling", "linearise_mortar"]
 
 _STEP = 1e-6
 """Of the differences, over an edge."""
@@ -31,7 +32,7 @@ to go: its facets will not meet."""
 
 
 @dataclass(frozen=True, eq=False)
-class Slopes:
+class MortarTangent:
     """Derivatives of m points by the displacement (3N,), beyond those with weights and normals that stay.
 
     Attributes:
@@ -43,15 +44,15 @@ class Slopes:
     forces: Any
 
 
-def slopes_of(
+def linearise_mortar(
     mortar: Mortar,
     points: ContactPoints,
-    response: Response,
-    memory: Memory,
-    penalty: NDArray[np.float64],
-    x: NDArray[np.float64],
+    tractions: ContactTractions,
+    state: ContactState,
+    penalty: Array,
+    x: Array,
     reach: float,
-) -> Slopes | None:
+) -> MortarTangent | None:
     """Derivatives at positions x (N, 3), at which the points were found with the normals there; None where nothing
     touches.
 
@@ -61,36 +62,36 @@ def slopes_of(
     Args:
         mortar: The surfaces.
         points: The points.
-        response: Their tractions.
-        memory: Multipliers.
+        tractions: Theirs.
+        state: Multipliers.
         penalty: ε [Pa/m], shape (m,).
         x: [m]
         reach: How far the points look ahead [m].
     """
     from scipy.sparse import csr_array, diags_array
 
-    if not response.active.any():
+    if not tractions.active.any():
         return None
     edge = mortar.slave.edge[points.sites]
-    rows = np.flatnonzero(response.active | (points.gap < _NEAR * edge))
+    rows = np.flatnonzero(tractions.active | (points.gap < _NEAR * edge))
     pairs = _Pairs(mortar, points, rows, x, reach)
-    turning = _turning(mortar.slave, x, points.sites, rows)
-    pressure = np.where(response.active, np.maximum(memory.pressure[points.sites], 0.0), 0.0)
-    carried = np.where(response.active[:, None], memory.friction[points.sites], 0.0)
+    turning = _normal_derivatives(mortar.slave, x, points.sites, rows)
+    pressure = np.where(tractions.active, np.maximum(state.pressure[points.sites], 0.0), 0.0)
+    carried = np.where(tractions.active[:, None], state.friction[points.sites], 0.0)
     of_weights = pairs.forces(carried - pressure[:, None] * points.normal)
-    tractions = -diags_array(np.repeat(pressure, 3)) @ turning
+    change = -diags_array(np.repeat(pressure, 3)) @ turning
     of_gap = csr_array((len(edge), x.size))
-    if not (response.error > _DEEP * edge).any():
+    if not (tractions.error > _DEEP * edge).any():
         apart = np.zeros_like(points.normal)
         apart[pairs.rows] = (points.weights @ x)[pairs.rows]
         of_gap = csr_array(pairs.gaps() - _inner(apart) @ turning)
-        stiff = np.where(response.active, penalty, 0.0)
-        tractions = tractions + _inner(points.normal).T @ (diags_array(stiff) @ of_gap)
+        stiff = np.where(tractions.active, penalty, 0.0)
+        change = change + _inner(points.normal).T @ (diags_array(stiff) @ of_gap)
     spreading = _blocks(points.weights.T @ diags_array(points.area))
-    return Slopes(of_gap, csr_array(-(spreading @ tractions + of_weights)))
+    return MortarTangent(of_gap, csr_array(-(spreading @ change + of_weights)))
 
 
-def coupling(points: ContactPoints, response: Response, friction: float, penalty: NDArray[np.float64]) -> Any:
+def friction_coupling(points: ContactPoints, tractions: ContactTractions, friction: float, penalty: Array) -> Any:
     """How the friction of points that slide follows their pressure, to be added to the stiffness [N/m], ``csr_array``
     (3N, 3N); None where none slides.
 
@@ -98,22 +99,22 @@ def coupling(points: ContactPoints, response: Response, friction: float, penalty
     of a hand moves a long way for a small force, and taking pressure and friction in turns creeps there.
 
     Args:
-        points: The points, with their ``steep`` if it is known.
-        response: Their tractions, friction bounded by these pressures.
+        points: The points, with their ``gap_derivative`` if it is known.
+        tractions: Theirs, friction bounded by these pressures.
         friction: Coulomb's μ.
         penalty: ε [Pa/m], shape (m,).
     """
     from scipy.sparse import csr_array, diags_array
 
-    size = np.linalg.norm(response.friction, axis=1)
-    slides = response.active & ~response.sticking & (size > 0.0)
+    size = np.linalg.norm(tractions.friction, axis=1)
+    slides = tractions.active & ~tractions.sticking & (size > 0.0)
     if not slides.any():
         return None
-    along = np.where(slides[:, None], response.friction / np.maximum(size, 1e-300)[:, None], 0.0)
+    along = np.where(slides[:, None], tractions.friction / np.maximum(size, 1e-300)[:, None], 0.0)
     weights = _blocks(points.weights)
     of_gap = -_inner(points.normal) @ weights
-    if points.steep is not None:
-        of_gap = of_gap + points.steep
+    if points.gap_derivative is not None:
+        of_gap = of_gap + points.gap_derivative
     rubs = weights.T @ _inner(points.area[:, None] * along).T
     return csr_array(rubs @ (diags_array(friction * penalty) @ of_gap))
 
@@ -129,9 +130,7 @@ class _Pairs:
         far: Of ∫ N_a M_b.
     """
 
-    def __init__(
-        self, mortar: Mortar, points: ContactPoints, rows: NDArray[np.int64], x: NDArray[np.float64], reach: float
-    ) -> None:
+    def __init__(self, mortar: Mortar, points: ContactPoints, rows: Ints, x: Array, reach: float) -> None:
         assert points.facets is not None
         assert points.share is not None
         slave = mortar.slave
@@ -154,7 +153,7 @@ class _Pairs:
 
         points, corner, at = self._points, self.corner, self._at
         spread = np.einsum("pkab,pbi->pkai", self.own, at[:, :4]) - np.einsum("pkab,pbi->pkai", self.far, at[:, 4:])
-        off, per_area = self._mortar.aside(points.sites, points.area)
+        off, per_area = self._mortar.sliver_offset(points.sites, points.area)
         wider = self.own.sum(axis=3)
         mean = np.einsum("pkai,pai->pka", spread, points.normal[corner]) + (points.gap - off)[corner][:, None] * wider
         if self._mortar.offset is not None:
@@ -167,7 +166,7 @@ class _Pairs:
         column = np.broadcast_to(self.column[:, :, None], gap.shape)[where]
         return csr_array(coo_array((gap[where], (row, column)), shape=(len(points.sites), self._size)))
 
-    def forces(self, traction: NDArray[np.float64]) -> Any:
+    def forces(self, traction: Array) -> Any:
         """How nodal forces of tractions (m, 3) change with the points' weights [N/m], ``csr_array`` (3N, 3N)."""
         from scipy.sparse import coo_array, csr_array
 
@@ -180,7 +179,7 @@ class _Pairs:
         return csr_array(coo_array((block.ravel(), (row.ravel(), column.ravel())), shape=shape))
 
 
-def _differences(mortar: Mortar, at: NDArray[np.float64], reach: float, step: float) -> NDArray[np.float64]:
+def _differences(mortar: Mortar, at: Array, reach: float, step: float) -> Array:
     """Derivatives of each facet pair's integrals by the coordinates of its corners at (P, 8, 3), shape (P, 24, 33)."""
     count = len(at)
     moved = np.tile(at[:, None], (1, 25, 1, 1)).reshape(count, 25, 24)
@@ -193,7 +192,7 @@ def _differences(mortar: Mortar, at: NDArray[np.float64], reach: float, step: fl
     return np.asarray((found[:, 1:] - found[:, :1]) / step)
 
 
-def _turning(surface: ContactSurface, x: NDArray[np.float64], sites: NDArray[np.int64], rows: NDArray[np.int64]) -> Any:
+def _normal_derivatives(surface: ContactSurface, x: Array, sites: Ints, rows: Ints) -> Any:
     """Derivatives of the nodes' normals, ``csr_array`` (3m, 3N), zero but at ``rows``."""
     from scipy.sparse import coo_array, csr_array
 
@@ -217,14 +216,14 @@ def _turning(surface: ContactSurface, x: NDArray[np.float64], sites: NDArray[np.
     return csr_array(coo_array((block[known], (row[known], column[known])), shape=shape))
 
 
-def _cross(v: NDArray[np.float64]) -> NDArray[np.float64]:
+def _cross(v: Array) -> Array:
     """[v]× of vectors (n, 3), shape (n, 3, 3)."""
     out = np.zeros((len(v), 3, 3))
     out[:, 0, 1], out[:, 0, 2], out[:, 1, 2] = -v[:, 2], v[:, 1], -v[:, 0]
     return out - out.transpose(0, 2, 1)
 
 
-def _inner(vectors: NDArray[np.float64]) -> Any:
+def _inner(vectors: Array) -> Any:
     """Rows that take the inner product of each point's vector (m, 3) with three values of it, (m, 3m)."""
     from scipy.sparse import csr_array
 

@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 
 from tests.fem.contact.bodies import named
-from warpjld.fem import Body, LinearElastic, Loads, ball, box, merge, prescribe
+from warpjld.fem import Body, LinearElastic, Loads, ball_hexes, box_hexes, merge, prescribe
 from warpjld.fem.contact import ContactInstant, Pair, press
 from warpjld.fem.contact.obstacles.solids import Plane
-from warpjld.fem.contact.results.nodal_contact import skin_around, stacked
+from warpjld.fem.contact.results.nodal_contact import stacked, tributary_areas
 from warpjld.simulation.report.tactile import tactile_of_pairs
 
 STEP, FRICTION, DEPTH = 2e-4, 0.3, 1e-4
@@ -18,8 +18,8 @@ STEP, FRICTION, DEPTH = 2e-4, 0.3, 1e-4
 @pytest.fixture(scope="module")
 def dragged() -> tuple[Body, list[ContactInstant]]:
     """A soft pad pressed on a wide block whose elements do not match its own, and drawn over it, step by step."""
-    pad = named(box((0.02, 0.02, 0.01), (4, 4, 2)), "pad", (0.0, 0.0, 0.01))
-    floor = named(box((0.06, 0.05, 0.01), (7, 6, 2)), "floor", (-0.015, -0.015, 0.0))
+    pad = named(box_hexes((0.02, 0.02, 0.01), (4, 4, 2)), "pad", (0.0, 0.0, 0.01))
+    floor = named(box_hexes((0.06, 0.05, 0.01), (7, 6, 2)), "floor", (-0.015, -0.015, 0.0))
     mesh = merge(pad, floor)
     body = Body(mesh, {"pad": LinearElastic(5e4, 0.3), "floor": LinearElastic(2e5, 0.3)})
     still = prescribe(mesh, "floor.z-", x=0.0, y=0.0, z=0.0)
@@ -42,19 +42,19 @@ def test_both_sides_feel_the_same(dragged: tuple[Body, list[ContactInstant]]) ->
     pad[np.unique(body.mesh.quads(body.mesh.face_set("pad.z-")))] = True
     for instant in instants:
         touch = instant.touches[0]
-        imprint = touch.imprint
+        nodal_contact = touch.nodal_contact
         for name, whole in (
             ("force", touch.normal_force),
             ("area", touch.contact_area),
             ("held", touch.held.sum()),
             ("slid", touch.pressed @ np.linalg.norm(touch.slip, axis=1)),
         ):
-            values = getattr(imprint, name)
+            values = getattr(nodal_contact, name)
             assert values[pad].sum() == pytest.approx(whole, rel=1e-9, abs=1e-18), name
             assert values[~pad].sum() == pytest.approx(whole, rel=1e-9, abs=1e-18), name
             assert (values >= 0.0).all()
         lift = touch.nodal[pad, 2].sum()
-        assert imprint.force[pad].sum() == pytest.approx(lift, rel=2e-3)
+        assert nodal_contact.force[pad].sum() == pytest.approx(lift, rel=2e-3)
 
 
 def test_a_pad_that_slides_feels_how_far(dragged: tuple[Body, list[ContactInstant]]) -> None:
@@ -77,15 +77,15 @@ def test_a_pad_that_slides_feels_how_far(dragged: tuple[Body, list[ContactInstan
 
 
 def test_an_obstacle_leaves_its_imprint_on_the_slave_alone() -> None:
-    body = Body(ball(0.01, n=4), LinearElastic(1e5, 0.3))
+    body = Body(ball_hexes(0.01, n=4), LinearElastic(1e5, 0.3))
     top = np.flatnonzero(body.mesh.nodes[:, 2] > 0.007)
     pair = Pair("outer", Plane((0, 0, -0.0097), (0, 0, 1)))
     found = press(body, prescribe(body.mesh, top, x=0, y=0, z=0), [pair], Loads()).last
     touch = found.touches[0]
-    assert touch.imprint.force.sum() == pytest.approx(touch.normal_force)
-    assert touch.imprint.area.sum() == pytest.approx(touch.contact_area)
+    assert touch.nodal_contact.force.sum() == pytest.approx(touch.normal_force)
+    assert touch.nodal_contact.area.sum() == pytest.approx(touch.contact_area)
     x = body.mesh.nodes + found.displacement
-    pressure = touch.imprint.force[touch.nodes] / skin_around(body.mesh, "outer", x)[touch.nodes]
+    pressure = touch.nodal_contact.force[touch.nodes] / tributary_areas(body.mesh, "outer", x)[touch.nodes]
     np.testing.assert_allclose(pressure, np.maximum(touch.pressure, 0.0), rtol=1e-5)
 
 

@@ -1,19 +1,17 @@
-"""Linear solves of one load step after another, with a preconditioner kept while it serves."""
+"""Linear solves with a lagged preconditioner: one made for an earlier matrix is kept while it serves."""
 
 from __future__ import annotations
 
 from dataclasses import replace
 from typing import Any
 
-import numpy as np
-from numpy.typing import NDArray
-
+from warpjld.fem.arrays import Array, Mask
 from warpjld.fem.body import Body
 from warpjld.fem.solver.block_matrix import BlockMatrix
 from warpjld.fem.solver.conjugate import Iteration, Status
 from warpjld.fem.solver.linear import LinearSolver
 
-__all__ = ["StepSolver"]
+__all__ = ["LaggedSolver"]
 
 _INNER = 1e-4
 _MOST = 150
@@ -22,7 +20,7 @@ _PATIENCE = 25
 """Iterations after which a preconditioner made for an earlier matrix has served its time."""
 
 
-class StepSolver:
+class LaggedSolver:
     """Solves with the matrices of a contact problem, one like the other.
 
     Args:
@@ -40,16 +38,16 @@ class StepSolver:
         """A new step: its first matrix gets a preconditioner of its own."""
         self._solver = None
 
-    def solve(
-        self, matrix: BlockMatrix, free: NDArray[np.bool_], right: NDArray[np.float64], beside: Any = None
-    ) -> Iteration:
+    def solve(self, matrix: BlockMatrix, free: Mask, right: Array, nonsymmetric: Any = None) -> Iteration:
         """K11 x = b for the free degrees of freedom, shape (3N,), with the preconditioner before while it serves.
+
+        What is added to K and not symmetric, ``csr_array`` (3N, 3N), is preconditioned by K.
 
         Raises:
             IndefiniteError: K is not positive definite.
         """
-        if beside is not None:
-            return self._beside(matrix, free, right, beside)
+        if nonsymmetric is not None:
+            return self._nonsymmetric(matrix, free, right, nonsymmetric)
         sofar = None
         if self._solver is not None:
             before = self._solver.of(matrix)
@@ -59,24 +57,27 @@ class StepSolver:
             if done.status is Status.MAX_ITERATIONS and done.residual < 1.0:
                 sofar = done
                 left = right - before.masked_product(done.x)
-        solver = LinearSolver(matrix, free, self._mesh, hierarchy=self._hierarchy, **self._options)
+        solver = self._new(matrix, free)
         if sofar is not None:  # go on from where the old preconditioner got to
             done = solver.solve(left, tolerance=_INNER / sofar.residual)
             done = replace(done, x=done.x + sofar.x, iterations=done.iterations + sofar.iterations)
         else:
             done = solver.solve(right, tolerance=_INNER)
-        self._solver, self._hierarchy = solver, solver.hierarchy
-        return done
+        return self._kept(solver, done)
 
-    def _beside(
-        self, matrix: BlockMatrix, free: NDArray[np.bool_], right: NDArray[np.float64], beside: Any
-    ) -> Iteration:
-        """With a part that is not symmetric; what is symmetric makes the preconditioner."""
+    def _nonsymmetric(self, matrix: BlockMatrix, free: Mask, right: Array, nonsymmetric: Any) -> Iteration:
         if self._solver is not None:
-            done = self._solver.over(matrix).solve_beside(beside, right, tolerance=_INNER, iterations=_PATIENCE)
+            before = self._solver.over(matrix)
+            done = before.solve_nonsymmetric(nonsymmetric, right, tolerance=_INNER, iterations=_PATIENCE)
             if done.status is Status.CONVERGED:
                 return done
-        solver = LinearSolver(matrix, free, self._mesh, hierarchy=self._hierarchy, **self._options)
-        done = solver.over(matrix).solve_beside(beside, right, tolerance=_INNER, iterations=_MOST)
+        solver = self._new(matrix, free)
+        done = solver.over(matrix).solve_nonsymmetric(nonsymmetric, right, tolerance=_INNER, iterations=_MOST)
+        return self._kept(solver, done)
+
+    def _new(self, matrix: BlockMatrix, free: Mask) -> LinearSolver:
+        return LinearSolver(matrix, free, self._mesh, hierarchy=self._hierarchy, **self._options)
+
+    def _kept(self, solver: LinearSolver, done: Iteration) -> Iteration:
         self._solver, self._hierarchy = solver, solver.hierarchy
         return done

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from warpjld.fem import HexMesh, box, merge
+from warpjld.fem import HexMesh, box_hexes, merge
 from warpjld.fem.contact import Exclusion, Pair
 from warpjld.fem.contact.interface.contact_points import ContactPoints, Interface
 
@@ -17,7 +17,7 @@ SIDE, THICK = 0.02, 0.006
 
 def blocks(shift: tuple[float, float, float]) -> tuple[HexMesh, NDArray[np.int32], Exclusion]:
     """Two plates, the second one shifted, as one body whose skin meets itself; plates 6 mm thick, edges of 4 mm."""
-    plate = box((SIDE, SIDE, THICK), (5, 5, 2))
+    plate = box_hexes((SIDE, SIDE, THICK), (5, 5, 2))
     other = replace(plate, nodes=plate.nodes + np.array(shift), region_names=("other",), faces={}, node_sets={})
     mesh = merge(replace(plate, faces={}, node_sets={}), other)
     faces = mesh.boundary()

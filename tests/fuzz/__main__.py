@@ -1,0 +1,110 @@
+"""``python -m tests.fuzz --minutes N``: damaged inputs of every kind that is read, until the time is up.
+
+Each kind runs in a process of its own with 3 GiB and 20 s an input. Findings are printed, their inputs kept in the
+folder named at the end, and the exit code is 1 where there are any.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import os
+import shutil
+import signal
+import subprocess
+import sys
+import tempfile
+import time
+from collections import Counter
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from tests.fuzz.sound import KINDS
+from tests.fuzz.worker import SECONDS
+
+__all__ = ["Tally", "fuzz"]
+
+_AT_ONCE = 150  # inputs of one kind before the next has its turn
+
+
+@dataclass
+class Tally:
+    """What was tried, and what was found.
+
+    Attributes:
+        tried: Inputs by kind.
+        found: Findings: kind, what went wrong, where the input lies.
+        memory: The most that a process held [bytes].
+    """
+
+    tried: Counter[str] = field(default_factory=Counter)
+    found: list[tuple[str, str, str]] = field(default_factory=list)
+    memory: int = 0
+
+
+def fuzz(seconds: float, start: int, kinds: list[str], folder: Path, *, at_once: int = _AT_ONCE) -> Tally:
+    """Try inputs of each kind in turn until the time is up, with seeds from ``start`` on; every kind has one turn."""
+    tally, until, number = Tally(), time.monotonic() + seconds, start
+    while True:
+        for name in kinds:
+            _turn(tally, name, number, at_once, folder)
+            if time.monotonic() > until and number > start:
+                return tally
+        number += 1
+        if time.monotonic() > until:
+            return tally
+
+
+def _turn(tally: Tally, name: str, number: int, count: int, folder: Path) -> None:
+    place = Path(tempfile.mkdtemp(prefix=f"{name}-", dir=folder))
+    arguments = [sys.executable, "-m", "tests.fuzz.worker", name, str(number), str(count), str(place)]
+    environment = os.environ | {"OMP_NUM_THREADS": "1", "WARPJLD_CACHE": "off", "PYTHONHASHSEED": "0"}
+    try:
+        done = subprocess.run(
+            arguments, capture_output=True, text=True, errors="replace", env=environment, timeout=count * SECONDS
+        )
+        code, out, err = done.returncode, done.stdout, done.stderr
+    except subprocess.TimeoutExpired as error:
+        code, out, err = -signal.SIGALRM, str(error.stdout or ""), ""
+    ended = False
+    for line in out.splitlines():
+        if not line.startswith('{"kind"'):  # libraries greet
+            continue
+        row = json.loads(line)
+        if "told" in row:
+            tally.found.append((name, row["told"], row["input"]))
+        else:
+            tally.tried[name] += row["tried"]
+            tally.memory = max(tally.memory, row["memory"])
+            ended = True
+    if ended and not code:
+        if not any(found[0] == name for found in tally.found):
+            shutil.rmtree(place, ignore_errors=True)
+        return
+    kept = place / f"ended-{number}-{name}"
+    if (place / name).exists():
+        shutil.copy(place / name, kept)
+    what = f"more than {SECONDS} s" if code == -signal.SIGALRM else f"the process ends with {code}"
+    tally.found.append((name, f"{what}\n{err.strip()[-800:]}", str(kept)))
+
+
+def main() -> int:
+    parser = argparse.ArgumentParser(prog="python -m tests.fuzz", description=__doc__)
+    parser.add_argument("--minutes", type=float, default=1.0, help="how long")
+    parser.add_argument("--seed", type=int, default=1, help="of the first turn; each following one has the next")
+    parser.add_argument("--kinds", nargs="*", choices=list(KINDS), default=list(KINDS), help="only these")
+    parser.add_argument("--at-once", type=int, default=_AT_ONCE, help="inputs of a kind before the next has its turn")
+    given = parser.parse_args()
+    folder = Path(tempfile.mkdtemp(prefix="warpjld-fuzz-"))
+    tally = fuzz(60.0 * given.minutes, given.seed, given.kinds, folder, at_once=given.at_once)
+    for kind, told, path in tally.found:
+        print(f"{kind}: {' | '.join(told.strip().splitlines()[-3:])}\n  {path}")
+    print(
+        f"{sum(tally.tried.values()):,} inputs of {len(tally.tried)} kinds, {len(tally.found)} findings, "
+        f"at most {tally.memory >> 20} MiB; {folder}"
+    )
+    return bool(tally.found)
+
+
+if __name__ == "__main__":
+    sys.exit(main())

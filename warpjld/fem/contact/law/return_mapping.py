@@ -1,0 +1,145 @@
+"""Return mapping: tractions at contact points, trial values brought back to contact's cone (R122).
+
+Pressure is p = max(0, λ_n − ε g), bonds apart. Friction is the trial traction q = λ_t − ε s where it is no more than
+μ p (stick), and μ p along it where it is more (slip): Alart & Curnier 1991; Simo & Laursen 1992, Comput. Struct. 42.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from warpjld.fem.arrays import Array, Mask
+from warpjld.fem.contact.interface.contact_points import ContactPoints
+from warpjld.fem.contact.interface.pairs import Pair
+from warpjld.fem.contact.law.contact_state import ActiveSet, ContactState
+from warpjld.rotations import unit
+
+__all__ = ["FRICTION_FROM", "ContactTractions", "overstrained", "return_mapping"]
+
+FRICTION_FROM = 2
+"""Iterations that something must have pressed for before friction acts."""
+
+
+@dataclass(frozen=True, eq=False)
+class ContactTractions:
+    """Tractions and stiffness of one interface's points.
+
+    Attributes:
+        pressure: p [Pa], shape (m,).
+        friction: Tangential traction on the slave [Pa], shape (m, 3).
+        active: Whether the point touches, shape (m,).
+        sticking: Whether friction, or a bond, holds it, shape (m,).
+        error: Overlap, or gap under pressure, that the multipliers have yet to remove [m], shape (m,).
+        blocks: Stiffness times area of each point [N/m], shape (m, 3, 3).
+    """
+
+    pressure: Array
+    friction: Array
+    active: Mask
+    sticking: Mask
+    error: Array
+    blocks: Array
+
+    def traction(self, points: ContactPoints) -> Array:
+        """Force per area on the slave [Pa], shape (m, 3)."""
+        return self.friction - self.pressure[:, None] * points.normal
+
+
+def return_mapping(
+    pair: Pair,
+    points: ContactPoints,
+    state: ContactState,
+    slip: Array,
+    penalty: Array,
+    allowed: float,
+    decides: ActiveSet,
+    *,
+    coupled: bool = False,
+) -> ContactTractions:
+    """Tractions and their stiffness at points.
+
+    The stiffness is symmetric: that the friction of a sliding point depends on its pressure is left to the iteration,
+    or to ``friction_coupling``.
+
+    Args:
+        pair: Friction and bond.
+        points: The points.
+        state: Multipliers.
+        slip: Relative displacement of the two sides since the start of the step [m], shape (m, 3).
+        penalty: ε [Pa/m], shape (m,).
+        allowed: Share of the state's allowance that still counts, 0 to 1.
+        decides: ``FROZEN``: what pressed, by its multiplier, presses, or pulls for the moment, whatever its gap:
+            whether it lets go is then for the linear solve to say, and not for the second-order error of the move
+            before, which the penalty makes large. ``TRIAL``: tractions are then continuous, and with multipliers that
+            stay the problem is convex, so that a search along a line settles it.
+        coupled: Friction is bounded by the pressure as it is, and not by the multiplier's.
+    """
+    at, normal = points.sites, points.normal
+    bonded = state.bonded[at]
+    seam = np.nan_to_num(state.bond_gap[at])
+    gap = np.where(bonded, points.gap - seam, points.gap + allowed * state.allowance[at])
+    pressure = state.pressure[at] - penalty * gap
+    active = bonded | (pressure > 0.0)
+    if decides is ActiveSet.FROZEN:
+        active |= state.pressure[at] > 0.0
+    pressure = np.where(active, pressure, 0.0)
+    error = np.where(active, np.minimum(np.abs(gap), np.where(bonded, np.inf, np.maximum(-gap, pressure / penalty))), 0)
+    outer = normal[:, :, None] * normal[:, None, :]
+    blocks = np.zeros((len(at), 3, 3))
+    blocks += np.where(active, points.area * penalty, 0.0)[:, None, None] * outer
+    if not (pair.friction > 0.0 or bonded.any()):
+        return ContactTractions(pressure, np.zeros((len(at), 3)), active, bonded.copy(), error, blocks)
+    across = np.eye(3) - outer
+    # the pressure of the iterate before bounds the friction of this one: each iterate is then a convex problem
+    before = decides is not ActiveSet.PREDICTED and not coupled
+    bound = np.maximum(state.pressure[at] if before else pressure, 0.0)
+    grips = active & ((state.pressed_for[at] >= FRICTION_FROM) | bonded)
+    limit = np.where(grips, pair.friction * bound, 0.0)
+    friction, sticking, tangent = _friction(state, points, across, slip, penalty, grips, limit, decides)
+    blocks += np.where(grips, points.area, 0.0)[:, None, None] * tangent
+    return ContactTractions(pressure, friction, active, sticking, error, blocks)
+
+
+def _friction(
+    state: ContactState,
+    points: ContactPoints,
+    across: Array,
+    slip: Array,
+    penalty: Array,
+    grips: Mask,
+    limit: Array,
+    decides: ActiveSet,
+) -> tuple[Array, Mask, Array]:
+    """Friction [Pa] (m, 3), who sticks (m,), and the derivative by slip, less sign [Pa/m] (m, 3, 3)."""
+    at = points.sites
+    slip = np.einsum("mij,mj->mi", across, slip - state.slip_anchor[at])
+    carried = np.einsum("mij,mj->mi", across, state.friction[at])
+    trial = carried - penalty[:, None] * slip
+    if decides is ActiveSet.TRIAL:
+        size = np.linalg.norm(trial, axis=1)
+        sticking = grips & ((size <= limit) | state.bonded[at])
+        along = unit(trial)
+        turning = penalty * np.divide(limit, size, out=np.zeros(len(at)), where=size > 0.0)
+    else:
+        sticking = grips & (state.sticking[at] | state.bonded[at])
+        along = unit(carried)
+        # a sliding point resists what would turn its path, as much as it slides
+        far = np.linalg.norm(slip, axis=1)
+        turning = np.minimum(penalty, np.divide(limit, far, out=penalty.copy(), where=far > 0.0))
+    friction = np.where(sticking[:, None], trial, limit[:, None] * along)
+    turning = np.where(limit > 0.0, turning, 0.0)
+    beside = across - along[:, :, None] * along[:, None, :]
+    tangent = np.where(sticking[:, None, None], penalty[:, None, None] * across, turning[:, None, None] * beside)
+    return friction, sticking, tangent
+
+
+def overstrained(pair: Pair, state: ContactState, points: ContactPoints, tractions: ContactTractions) -> Mask:
+    """Sites whose bond does not hold the traction across it, shape (s,) (R102)."""
+    out = np.zeros(len(state.bonded), dtype=bool)
+    if pair.bond is not None:
+        pull = -tractions.pressure > pair.bond.normal
+        shear = np.linalg.norm(tractions.friction, axis=1) > pair.bond.shear
+        out[points.sites] = (pull | shear) & state.bonded[points.sites]
+    return out

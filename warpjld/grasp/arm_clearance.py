@@ -1,0 +1,120 @@
+"""How deep an arm lies in the rest of its body: samples along its bones against skin that stays where it is."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from warpjld.covering import Covering
+from warpjld.covering.intersections import crossing_faces
+from warpjld.grasp.palm import palm_of
+from warpjld.rotations import rotate
+from warpjld.skeleton import Poses
+from warpjld.skeleton.arm import Arm
+
+__all__ = ["ArmClearance", "pierced_faces"]
+
+_UPPER, _FORE, _HAND = (0.6, 0.75, 0.9), (0.0, 0.2, 0.4, 0.6, 0.8), (0.0, 0.5, 1.0)
+"""Samples along the upper arm, whose first half is one with the trunk, along the forearm, and from the wrist on."""
+_SPACING = 0.015
+"""Longest edge of the triangles whose middles stand for the skin [m]."""
+_BESIDE = 0.15
+"""Part of a bone's length on both sides of a sample whose skin says how thick the arm is there."""
+_SHOULDER = 2.5
+"""Radii of the upper arm round the shoulder in which skin belongs to both."""
+
+
+class ArmClearance:
+    """Depths of an arm's flesh in the skin of trunk, legs, head and the other arm, in one pose of these.
+
+    The arm is a chain of spheres as thick as its flesh at rest; the skin is a cloud of points with normals.
+
+    Args:
+        covering: The body.
+        arm: One of its arms.
+        body: The pose of everything else, one frame.
+    """
+
+    def __init__(self, covering: Covering, arm: Arm, body: Poses) -> None:
+        import trimesh
+        from scipy.spatial import cKDTree
+
+        self._arm = arm
+        side = arm.skeleton.names[arm.joints[-1]].partition(".")[0]
+        self._hand = palm_of(arm.skeleton, side).middle - arm.skeleton.rest[arm.joints[-1]]
+        self.own = _own_vertices(covering, arm)
+        self._radii = self._thickness(covering)
+        vertices = np.asarray(covering.deform(body)[0], dtype=np.float64)
+        faces = covering.surface.faces
+        faces = faces[~self.own[faces].any(axis=1)]
+        fine, small = trimesh.remesh.subdivide_to_size(vertices, faces, _SPACING, max_iter=20)
+        corners = fine[small]
+        normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+        size = np.linalg.norm(normals, axis=1)
+        middles = corners.mean(axis=1)
+        shoulder = arm.chains(np.zeros((len(arm.skeleton), 4)), arm.limits[None, :, 0] * 0.0, body)[0][0, arm.shoulder]
+        near = np.linalg.norm(middles - shoulder, axis=1) < _SHOULDER * self._radii[0]
+        kept = np.asarray((size > 0.0) & ~near)
+        self._middles, self._normals = middles[kept], normals[kept] / size[kept, None]
+        self._tree = cKDTree(self._middles)
+
+    def __call__(self, positions: NDArray[np.float64], rotations: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Depths of the samples [m], none below 0, shape (B, samples)."""
+        points = self._samples(positions, rotations)
+        _, near = self._tree.query(points)
+        away = points - self._middles[near]
+        height = (away * self._normals[near]).sum(axis=-1)
+        distance = np.where(height < 0.0, -1.0, 1.0) * np.linalg.norm(away, axis=-1)
+        return np.asarray(np.maximum(self._radii - distance, 0.0))
+
+    def _samples(self, positions: NDArray[np.float64], rotations: NDArray[np.float64]) -> NDArray[np.float64]:
+        arm = self._arm
+        shoulder, elbow, wrist = (positions[:, k] for k in (arm.shoulder, arm.elbow, arm.wrist))
+        hand = wrist + rotate(rotations[:, arm.wrist], self._hand)
+        lines = ((shoulder, elbow, _UPPER), (elbow, wrist, _FORE), (wrist, hand, _HAND))
+        return np.stack([a + share * (b - a) for a, b, shares in lines for share in shares], axis=1)
+
+    def _thickness(self, covering: Covering) -> NDArray[np.float64]:
+        """Radius of the flesh about every sample at rest [m]."""
+        arm, rest = self._arm, self._arm.skeleton.rest
+        shoulder, elbow, wrist = (rest[arm.joints[k]] for k in (arm.shoulder, arm.elbow, arm.wrist))
+        skin = covering.surface.vertices[self.own]
+        out = []
+        for a, b, shares in ((shoulder, elbow, _UPPER), (elbow, wrist, _FORE), (wrist, wrist + self._hand, _HAND)):
+            along = b - a
+            share = (skin - a) @ along / (along @ along)
+            away = np.linalg.norm(skin - a - share[:, None] * along, axis=1)
+            for at in shares:
+                beside = away[np.abs(share - at) < _BESIDE]
+                beside = beside[beside < np.linalg.norm(along)]
+                # of a section that is not round the thin side: an arm lies flat on what it touches
+                out.append(float(np.percentile(beside, 25)) if len(beside) else 0.0)
+        return np.array(out)
+
+
+def pierced_faces(covering: Covering, arm: Arm, skin: NDArray[np.floating]) -> NDArray[np.int64]:
+    """Faces of the body that an arm's forearm or hand passes through.
+
+    Args:
+        covering: The body.
+        arm: One of its arms.
+        skin: Its surface in a pose [m], shape (V, 3).
+    """
+    faces = covering.surface.faces
+    below = np.all(_own_vertices(covering, arm, whole=False)[faces], axis=1)
+    rest = ~np.any(_own_vertices(covering, arm)[faces], axis=1)
+    pairs = crossing_faces(skin, faces).pairs
+    other = pairs[below[pairs[:, 0]] & rest[pairs[:, 1]]][:, 1], pairs[below[pairs[:, 1]] & rest[pairs[:, 0]]][:, 0]
+    return np.unique(np.concatenate(other))
+
+
+def _own_vertices(covering: Covering, arm: Arm, *, whole: bool = True) -> NDArray[np.bool_]:
+    """Vertices on segments of an arm and its hand, or of those below the elbow only, shape (V,)."""
+    skeleton = arm.skeleton
+    own = np.zeros(len(skeleton), dtype=bool)
+    own[arm.joints[arm.shoulder if whole else arm.elbow]] = True
+    for joint, parent in enumerate(skeleton.parents.tolist()):
+        own[joint] |= parent >= 0 and own[parent]
+    anchors = covering.anchors
+    strongest = anchors.segment[np.arange(len(anchors)), anchors.weight.argmax(axis=1)]
+    return np.asarray(own[anchors.ends[strongest, 0]])

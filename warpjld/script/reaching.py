@@ -1,0 +1,163 @@
+"""REACH: an arm brings its hand to a place, and the body stays where it is (A §7, R90)."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from warpjld.rotations import unit
+from warpjld.script.binding import cover
+from warpjld.script.grasping import Attempt, placed_at, posture
+from warpjld.script.staging import stage
+from warpjld.skeleton import CHANNELS, Poses, poses_from_angles
+
+if TYPE_CHECKING:
+    from warpjld.covering import Covering
+    from warpjld.script.props import Prop
+    from warpjld.script.scene import Actor, Scene
+    from warpjld.skeleton.arm import Arm
+    from warpjld.skeleton.reach import Reached
+
+__all__ = ["REACHED", "Goal", "nearest_side", "reach_for"]
+
+REACHED = 0.002
+"""Distance up to which a place is reached [m]."""
+_ROUNDS = 4  # solutions, each with the skin where the one before has it
+_SETTLED = 2e-4  # change of the skin's place on the hand that ends them [m]
+_LOOKS = 6  # frames on the way at which it is looked whether the arm passes through the body
+
+
+@dataclass(frozen=True, eq=False)
+class Goal:
+    """Where a hand is to come.
+
+    Attributes:
+        name: Of the object or ``(x, y, z)``, for messages.
+        object: Name of the object; empty for a point.
+        place: [m], shape (3,).
+        look: Where the palm is to look, a unit direction; None: anywhere.
+        part: What of the hand is to come there: ``palm``, ``wrist``, or a digit's pad (``index``).
+    """
+
+    name: str
+    object: str
+    place: NDArray[np.float64]
+    look: NDArray[np.float64] | None
+    part: str
+
+
+def reach_for(scene: Scene, actor: Actor, side: str, first: float, last: float, goal: Goal) -> Attempt:
+    """Find the arm's angles at ``last`` and set keys: the arm as it was at ``first``, the hand at the goal at ``last``.
+
+    Raises:
+        InputError: No arm, or an actor that a motion file drives.
+    """
+    from warpjld.grasp.arm_clearance import ArmClearance, pierced_faces
+    from warpjld.skeleton.arm import arm_of
+
+    arm = arm_of(actor.skeleton, side)
+    covering = cover(actor)
+    poses, angles = posture(scene, actor, last)
+    found, at = _solved(scene, actor, covering, arm, poses, angles[0], last, goal, ArmClearance(covering, arm, poses))
+    for row in arm.free.tolist():
+        joint, column = arm.joints[row[0]], row[1]
+        channel = f"{actor.skeleton.names[joint]}.{CHANNELS[column]}"
+        before = float(actor.motion.value(channel, first)) if channel in actor.motion.tracks else 0.0
+        actor.set_keys(channel, [first], before, scene.spline)
+        actor.set_keys(channel, [last], float(found.angles[joint, column]), scene.spline)
+    short = float(np.linalg.norm(at - goal.place))
+    frames = np.linspace(first, last, _LOOKS)
+    skins = covering.deform(stage(actor, frames, scene.rate))
+    pierced = {f: len(pierced_faces(covering, arm, skin)) for f, skin in zip(frames.tolist(), skins, strict=True)}
+    status = "CONVERGED" if short <= REACHED else "SHORT"
+    if pierced[last]:
+        status = "PIERCES"
+    values = {
+        "short_mm": round(1e3 * short, 3),
+        "palm_off_degrees": round(math.degrees(found.off), 2),
+        "pierced_faces": {f"{frame:g}": count for frame, count in pierced.items() if count},
+    }
+    message = _told(goal, short, found, pierced, last)
+    if status != "CONVERGED":
+        scene.warned([f"{actor.name}: REACH {goal.name} at frame {last:g}: {message}"])
+    return Attempt(f"REACH {goal.name}", last, actor.name, goal.object, status, message, values)
+
+
+def nearest_side(
+    scene: Scene, actor: Actor, side: str, prop: Prop, key: float
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """The point of an object that lies nearest to a shoulder [m], and where a palm looks that lies on it there."""
+    from trimesh.triangles import closest_point
+
+    poses, _ = posture(scene, actor, key)
+    shoulder = poses.positions[0, actor.skeleton.index(f"{side}.shoulder")]
+    thing = placed_at(scene, prop, key)
+    corners = thing.place.apply(thing.vertices)[0][thing.faces]
+    points = closest_point(corners, np.repeat(shoulder[None], len(corners), axis=0))
+    place = points[np.linalg.norm(points - shoulder, axis=1).argmin()]
+    return np.asarray(place), unit(place - shoulder)
+
+
+def _solved(
+    scene: Scene,
+    actor: Actor,
+    covering: Covering,
+    arm: Arm,
+    poses: Poses,
+    angles: NDArray[np.float64],
+    key: float,
+    goal: Goal,
+    clearance: object,
+) -> tuple[Reached, NDArray[np.float64]]:
+    """The arm's posture and where it brings the part of the hand [m]: skin slides a little on bones, so the offset of
+    the skin from the wrist is taken anew from the posture found."""
+    from warpjld.grasp.digits import pad_vertex
+    from warpjld.grasp.palm import palm_of
+    from warpjld.skeleton.reach import Target, reach
+
+    side = arm.skeleton.names[arm.joints[-1]].partition(".")[0]
+    palm = palm_of(arm.skeleton, side)
+    vertex = None
+    if goal.part == "palm":
+        middle = palm.on_skin(covering.surface.vertices).middle
+        vertex = int(np.linalg.norm(covering.surface.vertices - middle, axis=1).argmin())
+    elif goal.part != "wrist":
+        vertex = pad_vertex(covering, f"{side}.{goal.part}")
+
+    def part_of(body: Poses) -> NDArray[np.float64]:
+        if vertex is None:
+            return np.asarray(body.positions[0, arm.joints[-1]])
+        return np.asarray(covering.points(body, [vertex])[0, 0], dtype=np.float64)
+
+    _, root = actor.motion.sample(np.array([key]), actor.skeleton)
+    body, offset = poses, arm.carried(part_of(poses), poses)
+    for _ in range(_ROUNDS):
+        target = Target(goal.place, offset, palm.normal, goal.look)
+        found = reach(arm, angles, poses, target, depths=clearance)  # type: ignore[arg-type]
+        body = actor.placement.apply(
+            poses_from_angles(arm.skeleton, found.angles[None], root_position=root), np.array([key])
+        )
+        now = arm.carried(part_of(body), body)
+        if float(np.linalg.norm(now - offset)) < _SETTLED:
+            break
+        offset = now
+    return found, part_of(body)
+
+
+def _told(goal: Goal, short: float, found: Reached, pierced: dict[float, int], last: float) -> str:
+    if short > REACHED:
+        text = f"out of reach: the {goal.part} comes within {1e3 * short:.0f} mm of it; the nearest posture is keyed"
+    else:
+        text = f"the {goal.part} is there to {1e3 * short:.2f} mm"
+    if goal.look is not None and math.degrees(found.off) > 5.0:
+        text += f"; the palm is turned {math.degrees(found.off):.0f}° from it"
+    if pierced[last]:
+        text += f"; the arm passes through {pierced[last]} faces of the body"
+    way = [frame for frame, count in pierced.items() if count and frame != last]
+    if way:
+        text += f"; on its way the arm passes through the body at frame {', '.join(f'{frame:.4g}' for frame in way)}"
+    return text
