@@ -107,9 +107,9 @@ def test_a_limit_that_is_too_low_is_named(holding: PrescribedTrials) -> None:
 
 def test_what_cannot_be_is_refused(holding: PrescribedTrials) -> None:
     body, known, pairs = holding.body, holding.prescribed, holding.pairs
-    with pytest.raises(InputError, match="want a pair"):
+    with pytest.raises(InputError, match="pairs: want one"):
         PrescribedTrials(body, known, [], "block")
-    with pytest.raises(InputError, match="no region 'blok'; there are block, "):
+    with pytest.raises(InputError, match="there is no region 'blok'; there are block, "):
         PrescribedTrials(body, known, pairs, "blok")
     with pytest.raises(InputError, match="gravity: want a pull along one axis"):
         PrescribedTrials(body, known, pairs, "block", (1.0, 0.0, -9.81))

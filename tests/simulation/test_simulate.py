@@ -7,6 +7,7 @@ import pytest
 import trimesh
 
 from warpjld.errors import InputError
+from warpjld.grasp.shapes import box
 from warpjld.simulation.recorded import RecordedAnimation, RecordedObject
 from warpjld.simulation.simulate import Simulation, simulate
 from warpjld.simulation.specification import ContactSpecification, ObjectMaterial, SolveSpecification
@@ -18,7 +19,7 @@ EDGE, YOUNG, DEPTH = 0.02, 1e5, 5e-4
 @pytest.fixture(scope="module")
 def pressed() -> Simulation:
     """A block whose top is held, and a plate that rises against it by half a millimetre from frame 1 to frame 2."""
-    block = RecordedObject("block", trimesh.creation.box((EDGE, EDGE, EDGE)), positions=(0.0, 0.5 * EDGE + 1e-4, 0.0))
+    block = RecordedObject("block", box(EDGE, EDGE, EDGE), positions=(0.0, 0.5 * EDGE + 1e-4, 0.0))
     rises = np.array([[0.0, -0.01, 0.0], [0.0, -0.01 + 1e-4, 0.0], [0.0, -0.01 + 1e-4 + DEPTH, 0.0]])
     plate = RecordedObject("plate", trimesh.creation.box((0.1, 0.02, 0.1)), positions=rises)
     contact = ContactSpecification(
