@@ -2,16 +2,23 @@
 
 from __future__ import annotations
 
+from dataclasses import fields
+from pathlib import Path
+
 import numpy as np
 import pytest
 import trimesh
 
 from warpjld.errors import InputError
 from warpjld.grasp.shapes import box
-from warpjld.simulation.recorded import RecordedAnimation, RecordedObject
+from warpjld.rig import Rig
+from warpjld.script import Interpreter, Scene
+from warpjld.script.contact import SceneAnimation, run_contact
+from warpjld.simulation.recorded import RecordedActor, RecordedAnimation, RecordedObject
 from warpjld.simulation.simulate import Simulation, simulate
 from warpjld.simulation.specification import ContactSpecification, ObjectMaterial, SolveSpecification
 from warpjld.simulation.state_variables import Points, PrescribedPoints
+from warpjld.skeleton import Poses
 
 EDGE, YOUNG, DEPTH = 0.02, 1e5, 5e-4
 
@@ -60,3 +67,38 @@ def test_what_cannot_be_is_refused_by_name(pressed: Simulation) -> None:
     asked = ContactSpecification(physical={"ball": ObjectMaterial()}, pressing=SolveSpecification(0, 1))
     with pytest.raises(InputError, match="there is no object ball; there are none"):
         simulate(asked, nothing)
+
+
+def test_names_that_differ_by_case_alone_are_refused() -> None:
+    """Face sets of hands are called in lower case: whoever is called Lid and lid would be one."""
+    lids = [
+        RecordedObject(name, box(EDGE, EDGE, EDGE), positions=(k, 0.0, 0.0)) for k, name in enumerate(("Lid", "lid"))
+    ]
+    solid = ObjectMaterial(element=0.01)
+    contact = ContactSpecification(physical={"Lid": solid, "lid": solid}, pressing=SolveSpecification(0, 1))
+    with pytest.raises(InputError, match="two bodies are called lid"):
+        simulate(contact, RecordedAnimation(objects=lids))
+
+
+@pytest.mark.slow
+def test_poses_of_a_script_press_as_the_script_does(rig: Rig, tmp_path: Path) -> None:
+    """A fingertip on a plate, once from a script and once from arrays of its poses."""
+    scene = Scene(say=lambda text: None)
+    scene.add("left", rig)
+    Interpreter(scene).run_text(
+        "OBJECT plate BOX 0.036 0.006 0.036 AT 0.034 -0.0275 -0.165\nMOVE LEFT 0 0 0.002 0\nMOVE LEFT 6 0 -0.006 0\n"
+        "FLESH LEFT INDEX ELEMENT 0.004\nPRESS 0 6 EVERY 2"
+    )
+    actor = SceneAnimation(scene).actors["LEFT"]
+    poses = [actor.pose(float(frame)) for frame in range(7)]
+    arrays = Poses(*(np.concatenate([getattr(one, f.name) for one in poses]) for f in fields(Poses)))
+    hand = RecordedActor("LEFT", rig, poses=arrays, covering=actor.covering)
+    plate = RecordedObject("PLATE", scene.prop("plate").thing, positions=(0.034, -0.0275, -0.165))
+    found = simulate(scene.contact, RecordedAnimation([hand], [plate]))
+    asked = run_contact(scene, tmp_path)
+    assert found.verdict.status == "CONVERGED"
+    np.testing.assert_array_equal(found.frames, asked.frames)
+    np.testing.assert_allclose(found.force("LEFT"), asked.force("LEFT"), rtol=1e-3, atol=1e-4)
+    assert np.linalg.norm(found.force("LEFT")[-1]) > 0.1
+    assert [row.digit for row in found.rows] == [row.digit for row in asked.rows]
+    assert found.tactile("LEFT").touching.any()

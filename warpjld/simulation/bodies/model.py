@@ -201,7 +201,8 @@ def assemble_model(
     bodies: list[DeformableBody] = [*hands, *objects]
     if not bodies:
         raise InputError("nothing deforms: make a body do so with FLESH or PHYSICAL")
-    names = [*(body.name for body in bodies), *obstacles]
+    sets = [name for body in bodies for name in body.mesh.faces if name != body.faces]  # insides, as ``BALL.inside``
+    names = [name.lower() for name in (*(body.name for body in bodies), *obstacles, *sets)]
     twice = next((name for k, name in enumerate(names) if name in names[:k]), None)
     if twice is not None:
         raise InputError(f"two bodies are called {twice}: want a name of its own for each")
