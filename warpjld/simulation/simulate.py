@@ -228,8 +228,8 @@ def _model(
 def _frames(specification: ContactSpecification, request: SolveSpecification, start: float) -> list[float]:
     """Frames to solve: every so many, the last, and those at which a grip begins or ends."""
     frames = {float(f) for f in range(request.first, request.last + 1, request.every)} | {float(request.last)}
-    for wish in specification.grips:
-        frames |= {wish.first, wish.middle, wish.last}
+    for grip in specification.grips:
+        frames |= {grip.first, grip.middle, grip.last}
     return sorted(f for f in frames if f > start)
 
 
@@ -264,7 +264,7 @@ def _report(
     verdict = replace(
         verdict,
         text="; ".join([verdict.text, *before.notes()]),
-        grips=tuple(f"{one.wish.actor} at frame {one.wish.first:g}: {one.text}" for one in solved.grips),
+        grips=tuple(f"{one.request.actor} at frame {one.request.first:g}: {one.text}" for one in solved.grips),
         corrections=tuple(corrections),
     )
     notes = [*notes, *table.notes()]

@@ -229,12 +229,12 @@ class ContactSpecification:
     @property
     def pull(self) -> tuple[float, float, float]:
         """Acceleration [m/s²]: as asked, and that of the earth, downwards, where something is lifted without a word."""
-        lifts = any(wish.lift for wish in self.grips)
+        lifts = any(grip.lift for grip in self.grips)
         return (0.0, -_EARTH, 0.0) if lifts and not any(self.gravity) else self.gravity
 
     def lifted(self, name: str) -> GripSpecification | None:
         """The grip that is to hold an object, if any."""
-        return next((wish for wish in self.grips if wish.lift and wish.object == name), None)
+        return next((grip for grip in self.grips if grip.lift and grip.object == name), None)
 
     def coefficient(self, one: str, other: str) -> float:
         """Friction between two."""

@@ -159,8 +159,8 @@ def build_object_body(
         volume = mesh_object(name, thing, physical, at(0.0) if place is None else place)
         states = _states(contact, name, volume.local, thing.place.apply(volume.local)[0])
         support = None
-        if (wish := contact.lifted(name)) is not None:
-            volume, support = _lifted(contact, wish, volume)
+        if (grip := contact.lifted(name)) is not None:
+            volume, support = _lifted(contact, grip, volume)
             if not states:
                 foot = Points("lower" if contact.pull[support.axis] < 0.0 else "upper", support.axis, _FOOT)
                 states.append((PrescribedPoints(foot, held=True), foot.choose(volume.mesh.nodes, volume.mesh.nodes)))
@@ -218,13 +218,13 @@ def _states(
 
 
 def _lifted(
-    contact: ContactSpecification, wish: GripSpecification, volume: ObjectMesh
+    contact: ContactSpecification, grip: GripSpecification, volume: ObjectMesh
 ) -> tuple[ObjectMesh, ObjectSupport]:
     """The object with its weight, and what it stands on."""
     pull = np.array(contact.pull)
     axis = int(np.argmax(np.abs(pull)))
-    if wish.weight is not None:
-        density = wish.weight / (float(np.abs(pull).max()) * float(volumes(volume.mesh).sum()))
+    if grip.weight is not None:
+        density = grip.weight / (float(np.abs(pull).max()) * float(volumes(volume.mesh).sum()))
         volume = replace(volume, physical=replace(volume.physical, density=density))
     return volume, ObjectSupport(handle_of(volume.mesh.nodes), axis)
 

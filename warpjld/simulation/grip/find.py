@@ -69,7 +69,7 @@ class FoundGrip:
     """A grip that was searched for.
 
     Attributes:
-        wish: What was asked.
+        request: What was asked.
         status: Name of how it ended.
         text: One line for people.
         grip: Angle by which the digits close on [rad]; 0 where nothing was found.
@@ -81,7 +81,7 @@ class FoundGrip:
         release: How the object's support lets go; None where it does not.
     """
 
-    wish: GripSpecification
+    request: GripSpecification
     status: str
     text: str
     grip: float
@@ -95,9 +95,9 @@ class FoundGrip:
     def content(self) -> dict[str, Any]:
         """As plain values."""
         return {
-            "actor": self.wish.actor,
-            "object": self.wish.object,
-            "frame": self.wish.first,
+            "actor": self.request.actor,
+            "object": self.request.object,
+            "frame": self.request.first,
             "status": self.status,
             "message": self.text,
             "grip_degrees": round(math.degrees(self.grip), 4),
@@ -113,73 +113,74 @@ class FoundGrip:
 def find_grip(
     model: ContactModel,
     history: History,
-    wish: GripSpecification,
+    request: GripSpecification,
     after: ContactSolution,
     limits: Mapping[str, float],
 ) -> FoundGrip:
-    """Search, from the equilibrium at the wish's first frame.
+    """Search, from the equilibrium at its first frame.
 
     Args:
         model: Everything.
         history: What is known at that frame.
-        wish: What is asked.
+        request: What is asked.
         after: The equilibrium.
         limits: Digit → largest force [N], where it is not the default.
     """
-    hand = next(one for one in model.hands if one.name == wish.actor)
-    joints = [hand.bones.skeleton.index(channel.rpartition(".")[0]) for channel in wish.channels]
+    hand = next(one for one in model.hands if one.name == request.actor)
+    joints = [hand.bones.skeleton.index(channel.rpartition(".")[0]) for channel in request.channels]
     squeeze = Squeeze(model, history, hand, joints, after, limits)
-    most = max(min(wish.most, squeeze.room), 1e-6)
-    found = _gentlest(wish, squeeze, most) if wish.lift else _firm(wish, squeeze, most)
+    most = max(min(request.most, squeeze.room), 1e-6)
+    found = _gentlest(request, squeeze, most) if request.lift else _firm(request, squeeze, most)
     release = None
     if found.lowered is not None:
-        begins, free = wish.middle - model.start, wish.last - model.start
-        release = SupportRelease(wish.object, begins, free, found.lowered)
-    return replace(found, edits=_edits(hand, wish, joints, found.grip), release=release)
+        begins, free = request.middle - model.start, request.last - model.start
+        release = SupportRelease(request.object, begins, free, found.lowered)
+    return replace(found, edits=_edits(hand, request, joints, found.grip), release=release)
 
 
-def _edits(hand: FleshBody, wish: GripSpecification, joints: Sequence[int], grip: float) -> tuple[AngleEdit, ...]:
+def _edits(hand: FleshBody, request: GripSpecification, joints: Sequence[int], grip: float) -> tuple[AngleEdit, ...]:
     """Digits closed on by a grip from where they are held."""
     if grip == 0.0:
         return ()
-    now = hand.bones.animation.angles(wish.first)[joints, FLEXION]
+    now = hand.bones.animation.angles(request.first)[joints, FLEXION]
     closed = np.maximum(now, np.minimum(now + grip, hand.bones.skeleton.limits[joints, FLEXION, 1]))
     return tuple(
-        AngleEdit(hand.name, joint, wish.first, None, float(value)) for joint, value in zip(joints, closed, strict=True)
+        AngleEdit(hand.name, joint, request.first, None, float(value))
+        for joint, value in zip(joints, closed, strict=True)
     )
 
 
-def _gentlest(wish: GripSpecification, squeeze: Squeeze, most: float) -> FoundGrip:
+def _gentlest(request: GripSpecification, squeeze: Squeeze, most: float) -> FoundGrip:
     model = squeeze.model
-    one = next(body for body in model.objects if body.name == wish.object)
+    one = next(body for body in model.objects if body.name == request.object)
     friction = max(
         pair.friction
         for pair, owner in zip(model.pairs, model.owners, strict=True)
-        if owner.other(wish.object) == wish.actor
+        if owner.other(request.object) == request.actor
     )
     trials = HandTrials(squeeze, one)
     heavy = trials.weight.weight
     found = gentlest_grip(trials, 0.0, most, weight=heavy, friction=friction, start=min(_START, most), tolerance=_NEAR)
     taken = trials.taken(found.grip) if found.status in _HELD else None
     instant = squeeze.closed(found.grip).last if taken is None else taken[1]
-    text = f"{heavy:.3g} N of {wish.object}: {found.text}"
+    text = f"{heavy:.3g} N of {request.object}: {found.text}"
     if taken is not None:
         text += f"; the digits close on by {math.degrees(found.grip):.2f}°"
     text += f"; {found.ended}"
     effort = squeeze.effort(found.grip, instant) if instant.touches else None
     rows = [
-        _row(wish, grip, trial, grip == found.grip, found.status.name)
+        _row(request, grip, trial, grip == found.grip, found.status.name)
         | {"outcome": trial.outcome.name, "held": int(trial.held), "sliding": trial.sliding, "borne": trial.borne}
         for grip, trial in found.trials
     ]
     grip, lowered = (0.0, None) if taken is None else (found.grip, taken[0])
     digits = _digits(effort)
-    return FoundGrip(wish, found.status.name, text, grip, lowered, found.trial.force, digits, tuple(rows))
+    return FoundGrip(request, found.status.name, text, grip, lowered, found.trial.force, digits, tuple(rows))
 
 
-def _firm(wish: GripSpecification, squeeze: Squeeze, most: float) -> FoundGrip:
-    assert wish.force is not None
-    counted = wish.digits or tuple(dict.fromkeys(channel.split(".")[-3] for channel in wish.channels))
+def _firm(request: GripSpecification, squeeze: Squeeze, most: float) -> FoundGrip:
+    assert request.force is not None
+    counted = request.digits or tuple(dict.fromkeys(channel.split(".")[-3] for channel in request.channels))
     instants: dict[float, ContactInstant] = {}
 
     def press(grip: float) -> PressedForce | None:
@@ -192,15 +193,15 @@ def _firm(wish: GripSpecification, squeeze: Squeeze, most: float) -> FoundGrip:
         mine = sum(d.force for d in effort.digits if d.digit.rpartition(".")[2] in counted)
         return PressedForce(mine, worst.share, worst.digit)
 
-    found = force_grip(press, 0.0, most, wish.force, start=min(_START, most))
+    found = force_grip(press, 0.0, most, request.force, start=min(_START, most))
     text = f"{' + '.join(counted)}: {found.text}"
     if found.status is ForceStatus.REACHED:
         text += f"; they close on by {math.degrees(found.grip):.2f}°"
     instant = instants.get(found.grip)
     effort = squeeze.effort(found.grip, instant) if instant is not None else None
-    rows = [_row(wish, grip, one, grip == found.grip, found.status.name) for grip, one in found.trials]
+    rows = [_row(request, grip, one, grip == found.grip, found.status.name) for grip, one in found.trials]
     force = found.pressed.force if found.pressed is not None else 0.0
-    return FoundGrip(wish, found.status.name, text, found.grip, None, force, _digits(effort), tuple(rows))
+    return FoundGrip(request, found.status.name, text, found.grip, None, force, _digits(effort), tuple(rows))
 
 
 def _digits(effort: Effort | None) -> dict[str, tuple[float, float, float]]:
@@ -212,12 +213,12 @@ def _digits(effort: Effort | None) -> dict[str, tuple[float, float, float]]:
 
 
 def _row(
-    wish: GripSpecification, grip: float, tried: Trial | PressedForce, chosen: bool, status: str
+    request: GripSpecification, grip: float, tried: Trial | PressedForce, chosen: bool, status: str
 ) -> dict[str, Any]:
     return {
-        "actor": wish.actor,
-        "object": wish.object,
-        "frame": wish.first,
+        "actor": request.actor,
+        "object": request.object,
+        "frame": request.first,
         "grip_deg": round(math.degrees(grip), 5),
         "force_n": tried.force,
         "share": tried.share,

@@ -46,14 +46,14 @@ def check_specification(animation: Animation, contact: ContactSpecification, req
         if unknown := [name for name in names if name not in known]:
             raise InputError(f"there is no {kind} {unknown[0]}; there are {', '.join(known) or 'none'}")
     begun = set()
-    for wish in contact.grips:
+    for grip in contact.grips:
         try:
-            _check_grip(contact, wish, request)
-            if wish.first in begun:
-                raise InputError(f"another grip begins at frame {wish.first:g}")
+            _check_grip(contact, grip, request)
+            if grip.first in begun:
+                raise InputError(f"another grip begins at frame {grip.first:g}")
         except InputError as error:
-            raise located(error, wish.where) from None
-        begun.add(wish.first)
+            raise located(error, grip.where) from None
+        begun.add(grip.first)
     if request.state is not None and (contact.grips or request.correct):
         raise InputError("STATE keeps no grips and no corrections: leave it out")
     if request.correct and request.method == "paper":
@@ -63,27 +63,27 @@ def check_specification(animation: Animation, contact: ContactSpecification, req
         raise InputError(f"actor {recorded[0]} is driven by a MOTION file: no angle can be corrected")
 
 
-def _check_grip(contact: ContactSpecification, wish: GripSpecification, request: SolveSpecification) -> None:
-    if wish.actor not in contact.flesh:
-        raise InputError(f"{wish.actor} has no flesh that deforms: FLESH {wish.actor} makes it so")
-    if wish.first <= request.first or wish.last > request.last:
+def _check_grip(contact: ContactSpecification, grip: GripSpecification, request: SolveSpecification) -> None:
+    if grip.actor not in contact.flesh:
+        raise InputError(f"{grip.actor} has no flesh that deforms: FLESH {grip.actor} makes it so")
+    if grip.first <= request.first or grip.last > request.last:
         span = f"after {request.first} and up to {request.last}"
-        raise InputError(f"its frames must lie in those of PRESS, {span}, got {wish.first:g} to {wish.last:g}")
+        raise InputError(f"its frames must lie in those of PRESS, {span}, got {grip.first:g} to {grip.last:g}")
     if request.method == "paper":
         raise InputError("a grip cannot be searched for by the paper's method, which knows no friction")
-    if not wish.lift:
+    if not grip.lift:
         return
     if np.count_nonzero(contact.pull) != 1:
         x, y, z = contact.pull
         raise InputError(f"LIFT wants a GRAVITY along one axis of the stage, got {x:g} {y:g} {z:g}")
-    bonded = next((b for b in contact.bonds if wish.object in (b.one, b.other)), None)
+    bonded = next((b for b in contact.bonds if grip.object in (b.one, b.other)), None)
     if bonded is not None:
-        other = bonded.other if bonded.one == wish.object else bonded.one
-        raise InputError(f"LIFT takes the weight of one object, and {wish.object} is bonded to {other}")
-    if any(state.tracks for (name, _), state in contact.prescribed.items() if name == wish.object):
+        other = bonded.other if bonded.one == grip.object else bonded.one
+        raise InputError(f"LIFT takes the weight of one object, and {grip.object} is bonded to {other}")
+    if any(state.tracks for (name, _), state in contact.prescribed.items() if name == grip.object):
         raise InputError("LIFT wants an object that nothing but HOLD keeps in its place: no VECTOR and no PARTIAL")
-    if wish.weight is None and not contact.physical[wish.object].density > 0.0:
-        raise InputError(f"{wish.object} weighs nothing: give it a DENSITY, or LIFT it with a WEIGHT")
+    if grip.weight is None and not contact.physical[grip.object].density > 0.0:
+        raise InputError(f"{grip.object} weighs nothing: give it a DENSITY, or LIFT it with a WEIGHT")
 
 
 def check_model(model: ContactModel, contact: ContactSpecification) -> None:
@@ -96,14 +96,14 @@ def check_model(model: ContactModel, contact: ContactSpecification) -> None:
     surfaces = {one.name: outer_surface(one.mesh, one.faces) for one in model.objects}
     for bonded in contact.bonds:
         _refuse_apart(surfaces, bonded)
-    for wish in contact.grips:
-        if wish.lift and (below := _below(model, surfaces, wish.object)):
+    for grip in contact.grips:
+        if grip.lift and (below := _below(model, surfaces, grip.object)):
             raise located(
                 InputError(
-                    f"LIFT {wish.object}: it stands on {below}, which bears it however the hand grips: "
-                    f"move {below} away, or {wish.object} higher; LIFT has a support of its own"
+                    f"LIFT {grip.object}: it stands on {below}, which bears it however the hand grips: "
+                    f"move {below} away, or {grip.object} higher; LIFT has a support of its own"
                 ),
-                wish.where,
+                grip.where,
             )
     for hand in model.hands:
         flesh = Facets(hand.surface, hand.triangles)

@@ -103,10 +103,10 @@ def solve_frames(
             checkpoint.save(run.done, run.last)
         if reason := watch(run.model, run.done[-1]):
             return run.ended(Status.STOPPED, reason)
-        for wish in contact.grips:
-            if wish.first == frame:
+        for grip in contact.grips:
+            if grip.first == frame:
                 progress(f"looking for a grip, frame {frame:g}", len(run.done), len(frames))
-                run.grip(wish)
+                run.find(grip)
     return run.ended(Status.CONVERGED, Status.CONVERGED.value)
 
 
@@ -158,11 +158,11 @@ class _Run:
         self._note(self.done[-1])
         return None
 
-    def grip(self, wish: GripSpecification) -> None:
+    def find(self, grip: GripSpecification) -> None:
         """Look for a grip, and go on with it."""
         assert self.last is not None
-        limits = self.contact.strength.get(wish.actor, {})
-        found = find_grip(self.model, self.history, wish, self.last, limits)
+        limits = self.contact.strength.get(grip.actor, {})
+        found = find_grip(self.model, self.history, grip, self.last, limits)
         self.grips.append(found)
         self._edit(found.edits)
         if found.release is not None:

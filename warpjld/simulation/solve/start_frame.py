@@ -74,7 +74,7 @@ def find_start(animation: Animation, contact: ContactSpecification, request: Sol
     Before it nothing touches, or what is touched gives way: a free object that is pushed, and that friction could not
     hold where it is, goes where nothing pushes it any more.
     """
-    stands = {o for o, _ in contact.prescribed} | {wish.object for wish in contact.grips if wish.lift}
+    stands = {o for o, _ in contact.prescribed} | {grip.object for grip in contact.grips if grip.lift}
     free = [name for name in contact.physical if name not in stands]
     keyed = any(state.tracks for state in contact.prescribed.values())
     # what stands on its points gives way to its weight by so little that it may do so in the first step
@@ -95,7 +95,7 @@ class _Approach:
     def start(self, request: SolveSpecification) -> StartFrame:
         """Moment after moment until something is held."""
         # a grip is searched for from digits that touch, and may do so without pressing: that has to be solved
-        latest = min([request.last - 1.0, *(np.ceil(wish.first) - 1.0 for wish in self._contact.grips)])
+        latest = min([request.last - 1.0, *(np.ceil(grip.first) - 1.0 for grip in self._contact.grips)])
         for frame in range(request.first, int(latest) + 1):
             for moment in [float(frame)] if frame == request.first else self._moments(frame):
                 places = self._pushed(moment)
@@ -185,19 +185,19 @@ class _Approach:
         return friction_closure(points[inside], -found.normal[inside], -found.distance[inside], friction)
 
 
-def _meets_itself(actor: ActorAnimation, wish: FleshMaterial, skin: NDArray[np.float64]) -> bool:
+def _meets_itself(actor: ActorAnimation, material: FleshMaterial, skin: NDArray[np.float64]) -> bool:
     """Whether skin of two digits, or of a digit and the palm, has passed through one another where flesh would touch
     (R126); where digits part they lie together at rest."""
     from warpjld.covering.intersections import crossing_faces, surface_parts
 
-    if not wish.itself:
+    if not material.itself:
         return False
     covering = actor.covering
     parts = surface_parts(covering)
     pairs = crossing_faces(skin, covering.surface.faces).contact(parts).pairs
     middle = covering.surface.vertices[covering.surface.faces].mean(axis=1)
     far = np.linalg.norm(middle[pairs[:, 0]] - middle[pairs[:, 1]], axis=1) > _PARTED
-    mine = np.array([not wish.digits or name.rpartition(".")[2] in wish.digits for name in parts.names])
+    mine = np.array([not material.digits or name.rpartition(".")[2] in material.digits for name in parts.names])
     return bool((far & mine[parts.of_face[pairs]].all(axis=1)).any())
 
 
