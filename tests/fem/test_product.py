@@ -7,8 +7,7 @@ import pytest
 from scipy.sparse import csr_array, random_array
 
 from warpjld.fem import HexMesh, ball_hexes
-from warpjld.fem.solver.pattern import pattern_of
-from warpjld.fem.solver.product import product_pattern
+from warpjld.fem.assembly.pattern import pattern_of, product_pattern
 
 
 def pattern(matrix: csr_array) -> tuple[np.ndarray, np.ndarray]:

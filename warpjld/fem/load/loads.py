@@ -10,10 +10,10 @@ from numpy.typing import ArrayLike
 
 from warpjld.errors import InputError
 from warpjld.fem.arrays import Array, Ints32
+from warpjld.fem.assembly.block_matrix import BlockMatrix
 from warpjld.fem.body import Body
 from warpjld.fem.mesh.hexmesh import FACES, HexMesh
 from warpjld.fem.mesh.shape import POINTS, shape_at, slope_at
-from warpjld.fem.solver.block_matrix import BlockMatrix
 
 __all__ = ["Centrifugal", "Loads", "external_forces", "subtract_pressure_stiffness", "volumes"]
 

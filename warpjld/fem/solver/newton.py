@@ -6,10 +6,10 @@ from collections.abc import Callable
 
 import numpy as np
 
-from warpjld.fem.arrays import Array, Ints
+from warpjld.fem.arrays import Array, Ints, norm
+from warpjld.fem.assembly.block_matrix import BlockMatrix, IndefiniteError
 from warpjld.fem.body import Tangent
-from warpjld.fem.solver.block_matrix import BlockMatrix, IndefiniteError, norm
-from warpjld.fem.solver.conjugate import Iteration, Status
+from warpjld.fem.solver.krylov import Iteration, Status
 from warpjld.fem.solver.problem import Problem
 from warpjld.fem.solver.solution import Instant, Solution
 

@@ -15,7 +15,7 @@ from warpjld.fem.contact.interface.surface import ContactSurface, surface_of
 from warpjld.fem.contact.obstacles.obstacle import ClosestPoints, Obstacle
 from warpjld.fem.mesh.hexmesh import HexMesh
 
-__all__ = ["ContactPoints", "Interface", "interfaces_of"]
+__all__ = ["ContactPoints", "Interface", "interfaces_of", "tangential"]
 
 _NEAR, _FAR = 0.5 * (1.0 + 1.0 / np.sqrt(3.0)), 0.5 * (1.0 - 1.0 / np.sqrt(3.0))
 _GAUSS = np.array(
@@ -186,6 +186,11 @@ class Interface:
         found = probe.found
         carried = found.closest - self._obstacle.carried(found.closest, time, before)
         return ContactPoints(probe.sites, weights, -found.normal, probe.area, found.distance, carried)
+
+
+def tangential(vectors: Array, normals: Array) -> Array:
+    """Vectors (m, 3) less their parts along unit normals (m, 3)."""
+    return np.asarray(vectors - np.einsum("mi,mi->m", vectors, normals)[:, None] * normals)
 
 
 @dataclass(frozen=True, eq=False)

@@ -13,8 +13,8 @@ from warpjld.fem.contact.interface.surface import ContactSurface, surface_of
 from warpjld.fem.contact.law.contact_state import ContactState, initial_state
 from warpjld.fem.contact.obstacles.facets import Facets, Place
 from warpjld.fem.contact.obstacles.obstacle import Obstacle
+from warpjld.fem.contact.results.contact_solution import Touch
 from warpjld.fem.contact.results.nodal_contact import to_nodes
-from warpjld.fem.contact.results.solution import Touch
 
 __all__ = ["Meeting", "Side"]
 

@@ -9,8 +9,8 @@ with the metric of the elements).
 from __future__ import annotations
 
 from warpjld.fem.arrays import Array
+from warpjld.fem.assembly.block_matrix import BlockMatrix
 from warpjld.fem.body import Body
-from warpjld.fem.solver.block_matrix import BlockMatrix
 
 __all__ = ["Damping"]
 

@@ -11,7 +11,7 @@ import numpy as np
 
 from warpjld.fem.arrays import Array
 from warpjld.fem.output.vtk import Series
-from warpjld.fem.study import Reached, Study
+from warpjld.fem.study.study import Reached, Study
 from warpjld.whole_file import whole_file
 
 __all__ = ["Reaction", "StudyResults"]
