@@ -12,7 +12,7 @@ from warpjld.fem.arrays import Ints32
 from warpjld.fem.launch import grouped, on_rows, shared, threads_of
 from warpjld.fem.mesh.hexmesh import HexMesh
 
-__all__ = ["Batches", "Pattern", "ProductPattern", "batches_of", "pattern_of", "product_pattern"]
+__all__ = ["Batches", "Pattern", "ProductPattern", "batches_of", "pattern_of", "triple_product"]
 
 _LEAST_ROWS = 64
 """Rows below which one thread does all."""
@@ -38,7 +38,7 @@ class ProductPattern:
     marker: Ints32
 
 
-def product_pattern(first: Rows, second: Rows, third: Rows, width: int, *, threads: int) -> ProductPattern:
+def triple_product(first: Rows, second: Rows, third: Rows, width: int, *, threads: int) -> ProductPattern:
     """Where first · second · third, ``width`` columns wide, may differ from zero."""
     from warpjld_kernels import fem_pattern
 
@@ -112,7 +112,7 @@ def pattern_of(mesh: HexMesh, *, threads: int | None = None) -> Pattern:
     incident = (np.argsort(flat, kind="stable") // 8).astype(np.int32)
     numbers = np.arange(len(elements) + 1, dtype=np.int32)
     # node → its elements → themselves → their nodes
-    product = product_pattern((starts, incident), (numbers, numbers[:-1]), (8 * numbers, flat), count, threads=workers)
+    product = triple_product((starts, incident), (numbers, numbers[:-1]), (8 * numbers, flat), count, threads=workers)
     slots = np.empty((len(elements), 64), np.int32)
     on_rows(
         fem_pattern.element_slots,

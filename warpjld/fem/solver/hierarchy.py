@@ -1,4 +1,4 @@
-"""Coarser and coarser node sets of a mesh, and the weights that interpolate between them."""
+"""Geometric multigrid's levels: coarser and coarser node sets of a mesh, and the prolongations between them."""
 
 from __future__ import annotations
 

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from warpjld.fem.arrays import Array, Mask
 from warpjld.fem.assembly.block_matrix import BlockMatrix, IndefiniteError, padded
-from warpjld.fem.assembly.pattern import product_pattern
+from warpjld.fem.assembly.pattern import triple_product
 from warpjld.fem.launch import Launch, grouped, on_rows, shared, threads_of
 from warpjld.fem.solver.smoother import block_inverse, chebyshev_steps, highest_eigenvalue
 
@@ -34,7 +34,7 @@ def coarse_matrix(fine: BlockMatrix, free: Mask, weights: Any, transposed: Any, 
     from warpjld_kernels import fem_galerkin
 
     down, up = (transposed.indptr, transposed.indices), (weights.indptr, weights.indices)
-    product = product_pattern(down, (fine.rows, fine.columns), up, weights.shape[1], threads=threads)
+    product = triple_product(down, (fine.rows, fine.columns), up, weights.shape[1], threads=threads)
     values = np.zeros((len(product.columns), 3, 3))
     arguments = [
         shared(product.ranges),

@@ -19,7 +19,7 @@ _HALVINGS = 8
 _ITERATIONS, _CAUTIOUS = 16, 25
 _LINE_SEARCH = 8
 _ROUNDING, _PLACES = 1e-13, 0.03
-"""As in ``contact.walk``."""
+"""As in ``contact.solver.newton_state``."""
 _DIRECT = 40_000
 """Degrees of freedom up to which a step with an indefinite stiffness is solved directly."""
 

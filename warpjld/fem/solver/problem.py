@@ -1,4 +1,4 @@
-"""A body at load instants: what is prescribed, what pulls, and the solver of its stiffness (B eq. 5, R107)."""
+"""Static problem of a body at load instants: prescribed displacements, loads, solver (B eq. 5, R107)."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What a static solve gives back."""
+"""Results of a static solve: equilibria, and how it ended."""
 
 from __future__ import annotations
 

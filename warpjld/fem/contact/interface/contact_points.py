@@ -1,4 +1,4 @@
-"""Contact points: what each of them weighs, where it looks, and how far it is from the other side."""
+"""Contact points of a pair at a configuration: mortar or node-to-surface weights, normals, areas and gaps."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Mortar points between two surfaces that both deform."""
+"""Mortar integrals between two deformable surfaces: weighted gaps at slave nodes (Puso & Laursen 2004)."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What contact does not deform: the face every obstacle shows to the solver, and rigid motion (R94)."""
+"""Obstacles: surfaces in prescribed motion and their closest-point projection (R94)."""
 
 from __future__ import annotations
 

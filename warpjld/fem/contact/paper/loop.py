@@ -1,4 +1,4 @@
-"""The paper's loop: objects are repelled by the skin, then both are released under the forces found (B Fig. 9, R113).
+"""Staggered contact of the paper: objects are repelled by the skin, then both are released (B Fig. 9, R113).
 
 1. The bones are prescribed. 2. Slave nodes that overlap are put onto the master's polygons, the master's surface is
 held. 3. K11 U_u = R_k − K12 U_k and the reactions. 4. Each reaction goes, equal and opposite, to the three nodes of the

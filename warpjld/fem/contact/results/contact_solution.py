@@ -1,4 +1,4 @@
-"""What a contact solve gives back."""
+"""Results of a contact solve: equilibria, each pair's contact in them, and the state to go on from."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Load steps one after another: each begun where the one before leads to, and taken in halves where it fails."""
+"""Load stepping: an equilibrium at each time from a predictor, steps halved where they fail."""
 
 from __future__ import annotations
 
