@@ -1,4 +1,4 @@
-"""Array types that signatures of ``fem`` are written with, and dot products that are the same bits every run."""
+"""Array types that signatures of ``fem`` are written with, and what vectors are multiplied by."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["Array", "Ints", "Ints32", "Mask", "dot", "norm"]
+__all__ = ["Array", "Ints", "Ints32", "Mask", "cross_matrix", "dot", "norm"]
 
 Array = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -28,3 +28,10 @@ def dot(a: NDArray[Any], b: NDArray[Any]) -> float:
 def norm(a: NDArray[Any]) -> float:
     """Euclidean length of a vector; NaN or infinity where it holds one."""
     return math.sqrt(dot(a, a))
+
+
+def cross_matrix(v: Array) -> Array:
+    """[v]× of vectors (n, 3), shape (n, 3, 3)."""
+    out = np.zeros((len(v), 3, 3))
+    out[:, 0, 1], out[:, 0, 2], out[:, 1, 2] = -v[:, 2], v[:, 1], -v[:, 0]
+    return out - out.transpose(0, 2, 1)

@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from warpjld.fem.arrays import Array, Ints, Ints32
+from warpjld.fem.arrays import Array, Ints, Ints32, cross_matrix
 from warpjld.fem.assembly.block_matrix import BlockMatrix
 from warpjld.fem.contact.interface.contact_points import ContactPoints
 from warpjld.fem.contact.interface.mortar import Mortar
@@ -281,7 +281,7 @@ def _normal_derivatives(surface: ContactSurface, x: Array, sites: Ints, rows: In
     length = np.where(length > 0.0, length, 1.0)
     a, b, c, d = (x[quads[:, k]] for k in range(4))
     # of (c − a) × (d − b) / 8: to each corner a quarter of the face's area vector
-    along, across = _cross(c - a), _cross(d - b)
+    along, across = cross_matrix(c - a), cross_matrix(d - b)
     each = 0.125 * np.stack([across, -along, -across, along], axis=1)  # face, node, 3, 3
     n = surface.normals(x)[surface.corners[some]]
     plane = np.eye(3) - n[:, :, :, None] * n[:, :, None, :]
@@ -291,13 +291,6 @@ def _normal_derivatives(surface: ContactSurface, x: Array, sites: Ints, rows: In
     column = np.broadcast_to((3 * quads[:, :, None] + np.arange(3))[:, None, :, None, :], block.shape)
     shape = (3 * len(sites), x.size)
     return csr_array(coo_array((block[known], (row[known], column[known])), shape=shape))
-
-
-def _cross(v: Array) -> Array:
-    """[v]× of vectors (n, 3), shape (n, 3, 3)."""
-    out = np.zeros((len(v), 3, 3))
-    out[:, 0, 1], out[:, 0, 2], out[:, 1, 2] = -v[:, 2], v[:, 1], -v[:, 0]
-    return out - out.transpose(0, 2, 1)
 
 
 def _inner(vectors: Array) -> Any:
