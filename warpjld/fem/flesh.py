@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
+from scipy.spatial.transform import Rotation
 
 from warpjld.errors import InputError
 from warpjld.fem.arrays import Array, Ints, Ints32
@@ -46,8 +47,6 @@ class Flesh:
 
     def held(self, poses: Poses | None = None, frame: int = 0) -> Prescribed:
         """Bones prescribed: at rest, or moved by a pose of the skeleton (R110)."""
-        from scipy.spatial.transform import Rotation
-
         out = Prescribed(np.empty(0, np.int64), np.empty(0))
         for name, parent in zip(self.names, self.parents, strict=True):
             nodes = self.mesh.node_sets[name]

@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.sparse import bsr_array
 
 from warpjld.errors import WarpjldError
 from warpjld.fem.arrays import Ints, Ints32, Mask
@@ -93,7 +94,5 @@ class BlockMatrix:
 
     def to_scipy(self) -> Any:
         """The same matrix as ``scipy.sparse.bsr_array``."""
-        from scipy.sparse import bsr_array
-
         n = 3 * self.size
         return bsr_array((self.values, self.columns, self.rows), shape=(n, n))

@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.sparse.linalg import splu
 
 from warpjld.errors import InputError
 from warpjld.fem.arrays import Array, Mask, norm
@@ -220,8 +221,6 @@ class _Product:
 
 
 def _factor(stiffness: BlockMatrix, free: Mask, definite: bool) -> Any:
-    from scipy.sparse.linalg import splu
-
     inside = stiffness.to_scipy().tocsr()[free][:, free].tocsc()
     pivoting = 0.0 if definite else 0.1
     try:

@@ -11,6 +11,9 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.linalg import LinAlgError, cho_solve_banded, cholesky_banded
+from scipy.sparse import bsr_matrix
+from scipy.sparse.csgraph import reverse_cuthill_mckee
 
 from warpjld.fem.arrays import Array, Mask
 from warpjld.fem.assembly.block_matrix import BlockMatrix, IndefiniteError, padded
@@ -190,9 +193,6 @@ class _Coarsest:
     """Banded Cholesky of the coarsest level, in the ordering of Cuthill and McKee."""
 
     def __init__(self, matrix: BlockMatrix, free: Mask) -> None:
-        from scipy.linalg import LinAlgError, cholesky_banded
-        from scipy.sparse.csgraph import reverse_cuthill_mckee
-
         self.size = matrix.size
         plain = matrix.masked(free).to_scipy().tocsr()
         diagonal = plain.diagonal()
@@ -213,8 +213,6 @@ class _Coarsest:
             raise IndefiniteError("the stiffness is not positive definite (found on the coarsest level)") from error
 
     def solve(self, b: NDArray[Any]) -> Array:
-        from scipy.linalg import cho_solve_banded
-
         out = np.empty(len(self._order))
         out[self._order] = cho_solve_banded((self._factor, True), b[self._order].astype(np.float64), check_finite=False)
         return out
@@ -240,8 +238,6 @@ class Aggregation:
         # prescribed degrees of freedom stay in the blocks, uncoupled
         matrix.values[on[:, None], [0, 1, 2], [0, 1, 2]] += ~free.reshape(-1, 3) * diagonal.max()
         modes = rigid_modes(nodes) * free[:, None]
-        from scipy.sparse import bsr_matrix
-
         n = 3 * matrix.size
         self._free = free
         self._levels = pyamg.smoothed_aggregation_solver(

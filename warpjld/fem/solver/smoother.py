@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.linalg import eigh_tridiagonal
 
 from warpjld.fem.arrays import Array, Mask, dot
 from warpjld.fem.assembly.block_matrix import BlockMatrix, IndefiniteError
@@ -90,6 +91,4 @@ def highest_eigenvalue(matrix: BlockMatrix, inverse: NDArray[Any], threads: int,
         before = alpha
     if not diagonal:
         return 1.0
-    from scipy.linalg import eigh_tridiagonal
-
     return float(eigh_tridiagonal(np.array(diagonal), np.array(beside[:-1]), eigvals_only=True)[-1])

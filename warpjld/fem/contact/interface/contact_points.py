@@ -6,6 +6,7 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
+from scipy.sparse import csr_array, eye_array
 
 from warpjld.errors import InputError
 from warpjld.fem.arrays import Array, Ints, Ints32
@@ -90,8 +91,6 @@ class Interface:
     """
 
     def __init__(self, mesh: HexMesh, pair: Pair, threads: int) -> None:
-        from scipy.sparse import csr_array, eye_array
-
         self.pair = pair
         self.slave: ContactSurface = surface_of(mesh, pair.slave, f"{pair.title}: slave")
         self._count = len(mesh.nodes)
@@ -179,8 +178,6 @@ class Interface:
         return np.flatnonzero((found.distance < self.reach) & (against | (found.distance > 0.0)))
 
     def _against(self, probe: _Probe, before: float, time: float) -> ContactPoints:
-        from scipy.sparse import csr_array
-
         weights = csr_array((probe.values, probe.columns, probe.rows), shape=(len(probe.sites), self._count))
         weights.sum_duplicates()  # corners of a degenerate face coincide
         found = probe.found

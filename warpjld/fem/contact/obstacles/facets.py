@@ -7,6 +7,8 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
+from scipy.sparse import coo_array
+from scipy.sparse.csgraph import connected_components
 
 from warpjld.errors import InputError
 from warpjld.fem.arrays import Array, Ints, Ints32, Mask
@@ -207,9 +209,6 @@ def _neighbours(faces: Ints32) -> Ints:
 def _smooth_corners(faces: Ints32, soft: Mask, neighbours: Ints) -> Ints:
     """A number for each corner of each triangle, shape (t, 3): the same where triangles around a vertex are reached
     from one another without crossing a crease."""
-    from scipy.sparse import coo_array
-    from scipy.sparse.csgraph import connected_components
-
     links = []
     for k in range(3):
         mine = np.flatnonzero(soft[:, k])

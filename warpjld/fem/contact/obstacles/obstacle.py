@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
+from scipy.spatial.transform import Rotation
 
 from warpjld.errors import InputError
 from warpjld.fem.arrays import Array, Ints32
@@ -116,8 +117,6 @@ def placement(motion: Motion | None, time: float) -> tuple[Array, Array]:
     Raises:
         InputError: The motion gives something else than a finite position and a quaternion.
     """
-    from scipy.spatial.transform import Rotation
-
     if motion is None:
         return np.eye(3), np.zeros(3)
     position, rotation = (np.asarray(part, dtype=np.float64) for part in motion(time))

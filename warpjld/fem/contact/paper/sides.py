@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
+from scipy.sparse import csr_array
 
 from warpjld.fem.arrays import Array, Ints
 from warpjld.fem.body import Body
@@ -86,8 +87,6 @@ class Side:
 
     def touch(self, meeting: Meeting, forces: Array, x: Array) -> Touch:
         """What a pair says of forces on its slave nodes (m, 3) at positions x (N, 3)."""
-        from scipy.sparse import csr_array
-
         surface = self.slave
         nodes = surface.nodes[meeting.rows]
         area = surface.at_nodes(np.linalg.norm(surface.area_vectors(x), axis=1))[meeting.rows]

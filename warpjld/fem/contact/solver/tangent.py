@@ -13,6 +13,7 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.sparse import coo_array, csr_array, diags_array, eye_array, kron, vstack
 
 from warpjld.fem.arrays import Array, Ints, Ints32, cross_matrix
 from warpjld.fem.assembly.block_matrix import BlockMatrix
@@ -38,7 +39,6 @@ def with_contact(
         threads: Threads.
     """
     import warp as wp
-    from scipy.sparse import vstack
     from warpjld_kernels import contact_stiffness
 
     tables, rows_of = [], []
@@ -70,7 +70,6 @@ def with_contact(
 def _widened(stiffness: BlockMatrix, table: Any, threads: int) -> tuple[Ints32, Ints32, Array]:
     """A copy of K with room for every pair of nodes that a row of the table joins."""
     import warp as wp
-    from scipy.sparse import csr_array
     from warpjld_kernels import contact_stiffness
 
     if int(np.diff(table.indptr).max()) == 1:  # each point is a node: the diagonal
@@ -145,8 +144,6 @@ def linearise_mortar(
         x: [m]
         reach: How far the points look ahead [m].
     """
-    from scipy.sparse import csr_array, diags_array
-
     if not tractions.active.any():
         return None
     edge = mortar.slave.edge[points.sites]
@@ -181,8 +178,6 @@ def friction_coupling(points: ContactPoints, tractions: ContactTractions, fricti
         friction: Coulomb's μ.
         penalty: ε [Pa/m], shape (m,).
     """
-    from scipy.sparse import csr_array, diags_array
-
     size = np.linalg.norm(tractions.friction, axis=1)
     slides = tractions.active & ~tractions.sticking & (size > 0.0)
     if not slides.any():
@@ -226,8 +221,6 @@ class _Pairs:
 
     def gaps(self) -> Any:
         """How the points' gaps change with their weights, ``csr_array`` (m, 3N)."""
-        from scipy.sparse import coo_array, csr_array
-
         points, corner, at = self._points, self.corner, self._at
         spread = np.einsum("pkab,pbi->pkai", self.own, at[:, :4]) - np.einsum("pkab,pbi->pkai", self.far, at[:, 4:])
         off, per_area = self._mortar.sliver_offset(points.sites, points.area)
@@ -245,8 +238,6 @@ class _Pairs:
 
     def forces(self, traction: Array) -> Any:
         """How nodal forces of tractions (m, 3) change with the points' weights [N/m], ``csr_array`` (3N, 3N)."""
-        from scipy.sparse import coo_array, csr_array
-
         known = np.where(self.corner[:, :, None] >= 0, traction[self.corner], 0.0)
         pushed = [np.einsum("pkab,pai->pkbi", part, known) for part in (self.own, -self.far)]
         block = np.concatenate(pushed, axis=2).reshape(-1, 24, 24)  # by what moves, then by what is pushed
@@ -271,8 +262,6 @@ def _differences(mortar: Mortar, at: Array, reach: float, step: float) -> Array:
 
 def _normal_derivatives(surface: ContactSurface, x: Array, sites: Ints, rows: Ints) -> Any:
     """Derivatives of the nodes' normals, ``csr_array`` (3m, 3N), zero but at ``rows``."""
-    from scipy.sparse import coo_array, csr_array
-
     number = np.full(len(surface.nodes), -1)
     number[sites[rows]] = rows
     some = np.flatnonzero((number[surface.corners] >= 0).any(axis=1))
@@ -295,14 +284,10 @@ def _normal_derivatives(surface: ContactSurface, x: Array, sites: Ints, rows: In
 
 def _inner(vectors: Array) -> Any:
     """Rows that take the inner product of each point's vector (m, 3) with three values of it, (m, 3m)."""
-    from scipy.sparse import csr_array
-
     count = len(vectors)
     return csr_array((vectors.ravel(), np.arange(3 * count), 3 * np.arange(count + 1)), shape=(count, 3 * count))
 
 
 def _blocks(weights: Any) -> Any:
     """A table of scalars (n, m) as one of 3 × 3 diagonal blocks."""
-    from scipy.sparse import csr_array, eye_array, kron
-
     return csr_array(kron(weights, eye_array(3), format="csr"))
