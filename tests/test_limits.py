@@ -59,9 +59,10 @@ def _run(text: str, tmp_path: Path) -> Scene:
     return scene
 
 
-def test_macros_of_macros(tmp_path: Path) -> None:
+def test_macros_of_macros(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("WARPJLD_LIMIT_STATEMENTS", "2000")
     levels = "".join(f"MACRO M{k + 1}\n" + f"M{k}\n" * 10 + "END\n" for k in range(8))
-    with pytest.raises(InputError, match=r"<script>:11:1: 100,001 statements; the limit is 100,000"):
+    with pytest.raises(InputError, match=r"<script>:2:1: 2,001 statements; the limit is 2,000"):
         _run(f"MACRO M0\nPRINT\nEND\n{levels}M8\n", tmp_path)
 
 
@@ -71,11 +72,12 @@ def test_texts_that_double(tmp_path: Path) -> None:
         _run(f'MACRO T0 x\nPRINT "$x"\nEND\n{levels}T30 "a"\n', tmp_path)
 
 
-def test_files_that_include_two_each(tmp_path: Path) -> None:
+def test_files_that_include_two_each(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("WARPJLD_LIMIT_STATEMENTS", "2000")
     for k in range(25):
         (tmp_path / f"{k}.jld").write_text(f'INCLUDE "{k + 1}.jld"\nINCLUDE "{k + 1}.jld"\n')
     (tmp_path / "25.jld").write_text("PRINT\n")
-    with pytest.raises(InputError, match="100,001 statements; the limit is 100,000"):
+    with pytest.raises(InputError, match="2,001 statements; the limit is 2,000"):
         Interpreter(Scene(folder=tmp_path, say=lambda line: None)).run_file(tmp_path / "0.jld")
 
 
