@@ -14,10 +14,10 @@ from warpjld.errors import InputError
 from warpjld.rotations import unit
 from warpjld.skeleton.actor import face_points
 from warpjld.skeleton.actor_points import ACTOR_POINTS
-from warpjld.skeleton.place.branches import centre_line, find_branches, point_at
+from warpjld.skeleton.place.branches import centre_line, find_branches
 from warpjld.skeleton.place.hand import place_hand
 from warpjld.skeleton.place.solid import Solid, solid_of
-from warpjld.skeleton.place.stance import Stance, find_stance, pieces
+from warpjld.skeleton.place.stance import find_stance, pieces
 
 __all__ = ["place_body"]
 
@@ -145,7 +145,9 @@ def _foot(solid: Solid, side: str, sign: float, points: Points) -> None:
     front = along > back + 0.8 * length
     low, width = float(across[front].min()), float(np.ptp(across[front]))
     for name, share in (("big", 0.22), ("middle", 0.52), ("little", 0.85)):
-        strip = (np.abs(across - (low + share * width)) < 0.13 * width + 0.5 * solid.size) & (along > back + 0.5 * length)
+        strip = (np.abs(across - (low + share * width)) < 0.13 * width + 0.5 * solid.size) & (
+            along > back + 0.5 * length
+        )
         end = float(along[strip].max())
         column = strip & (along > end - 3.0 * solid.size)
         points[f"{side}.{name}_toe_tip"] = foot[column].mean(axis=0)
@@ -157,7 +159,10 @@ def _trunk(solid: Solid, points: Points) -> None:
     heights = np.arange(*_NECK, 1.5 * solid.size)
     widths = [float((_slab(solid, y) & (np.abs(solid.points[:, 0]) < 0.12)).sum()) for y in heights]
     # slabs hold a varying number of layers
-    widths = [w / max(1, len(np.unique(np.round(solid.points[_slab(solid, y), 1] / solid.size)))) for w, y in zip(widths, heights, strict=True)]
+    widths = [
+        w / max(1, len(np.unique(np.round(solid.points[_slab(solid, y), 1] / solid.size))))
+        for w, y in zip(widths, heights, strict=True)
+    ]
     neck = float(heights[int(np.argmin(widths))])
     lowest, base = neck - 0.02, neck + 0.035
     spine = {"vertebra5": lowest, "skull_base": base}
@@ -219,7 +224,7 @@ def _arm(
     line, areas = centre_line(solid, np.flatnonzero(np.isfinite(from_tip)), from_tip, step)
     widths = np.sqrt(areas)
     at = (np.arange(len(widths)) + 0.5) * step
-    usual = float(np.median(widths[(at > 0.13) & (at < 0.3)]))
+    usual = float(np.median(widths[(at > 0.26) & (at < 0.34)]))
     wide = np.flatnonzero((at > 0.25) & (widths > _WIDER * usual))
     # the arm's flesh ends at the armpit; its joint is as far aside as shoulders are
     beside = np.flatnonzero((at > 0.25) & (np.abs(line[:, 0]) < _SHOULDER))
@@ -232,12 +237,8 @@ def _arm(
     hand = place_hand(*_fine(solid, surface, faces, line, from_tip, wrist), label)
     points |= {f"{side}.{name}": point for name, point in hand.items()}
     points[f"{side}.elbow"], points[f"{side}.shoulder"] = there["elbow"], there["shoulder"]
-    points[f"{side}.forearm_twist"] = _between(line, at, hand["wrist"], place)
-
-
-def _between(line: Array, at: Array, wrist: Array, place: dict[str, float]) -> Array:
     middle = (place["wrist"] + place["elbow"]) / 2
-    return np.stack([np.interp(middle, at, line[:, k]) for k in range(3)])
+    points[f"{side}.forearm_twist"] = np.stack([np.interp(middle, at, line[:, k]) for k in range(3)])
 
 
 def _fine(

@@ -92,7 +92,7 @@ def centre_line(
     count = np.bincount(slices)
     sums = np.stack([np.bincount(slices, weights=solid.points[voxels, k]) for k in range(3)], axis=1)
     there = count > 0
-    return sums[there] / count[there, None], count[there] * solid.size**3 / step
+    return sums[there] / count[there, None], np.asarray(count[there] * solid.size**3 / step, dtype=np.float64)
 
 
 def point_at(line: NDArray[np.float64], length: float) -> NDArray[np.float64]:

@@ -132,10 +132,14 @@ def _follow(solid: Solid, distance: Array, branch: Branch, web: float) -> _Digit
     own = own[np.isfinite(from_tip[own])]
     line, _ = centre_line(solid, own, from_tip, 2.0 * solid.size)
     length = float(distance[branch.tip]) - web
-    keep = max(2, int(0.92 * len(line)))  # the last slices lean towards the neighbour
-    end = solid.points[branch.tip]
-    line = np.vstack([end + 0.0 * line[0], line[1:keep]])
+    keep = max(3, int(0.8 * len(line)))  # the last slices lean towards the neighbour: the digit goes on straight
+    line = np.vstack([solid.points[branch.tip], line[1:keep]])
+    line = np.vstack([line, point_at(line, max(length, 1.02 * _long(line)))])
     return _Digit(branch, line, length)
+
+
+def _long(line: Array) -> float:
+    return float(np.linalg.norm(np.diff(line, axis=0), axis=1).sum())
 
 
 def _wrist(solid: Solid, distance: Array, web: float, free: float) -> tuple[Array, float]:
@@ -168,14 +172,13 @@ def _finger(solid: Solid, name: str, digit: _Digit, wrist: Array, palm: float, n
     line = np.vstack([digit.line, base])
     whole = float(np.linalg.norm(np.diff(line, axis=0), axis=1).sum())
     scale = whole / (first + second + third)
-    points = {
+    return {
         f"{name}.carpometacarpal": _middle(solid, wrist + _CARPAL * (base - wrist), normal),
         f"{name}.base": base,
         f"{name}.knuckle2": point_at(line, (second + third) * scale),
         f"{name}.knuckle3": point_at(line, third * scale),
         f"{name}.tip": _tip(solid, line, third * scale),
     }
-    return points
 
 
 def _thumb(

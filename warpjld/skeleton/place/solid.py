@@ -14,6 +14,7 @@ from scipy.spatial import cKDTree
 __all__ = ["Solid", "capped", "solid_of"]
 
 _FINE = 0.3  # of a voxel: nowhere are samples of the surface further apart, so that it has no gap
+_MOST_INSIDE = 200_000  # voxels of a solid
 _MOST = 6_000_000  # voxels of a grid
 _STEPS = [s for s in np.ndindex(3, 3, 3) if s > (1, 1, 1)]  # half of the 26 neighbours
 
@@ -101,13 +102,14 @@ def solid_of(
     outside = np.isin(label, reached) & ~wall
     solid = ndimage.binary_erosion(~outside, border_value=1)
     solid &= ~rim
+    if (count := int(solid.sum())) > _MOST_INSIDE:
+        coarser = size * (1.2 * count / _MOST_INSIDE) ** (1 / 3)
+        return solid_of(vertices, faces, coarser, low=low, high=high, within=within)
     depth = ndimage.distance_transform_edt(~outside) * size - 0.5 * size
     return _connected(solid, depth, origin, size)
 
 
-def _connected(
-    solid: NDArray[np.bool_], depth: NDArray[np.float64], origin: NDArray[np.float64], size: float
-) -> Solid:
+def _connected(solid: NDArray[np.bool_], depth: NDArray[np.float64], origin: NDArray[np.float64], size: float) -> Solid:
     number = np.full(solid.shape, -1)
     count = int(solid.sum())
     number[solid] = np.arange(count)
@@ -120,9 +122,7 @@ def _connected(
         rows.append(number[here][both])
         columns.append(number[there][both])
         lengths.append(np.full(int(both.sum()), size * float(np.linalg.norm(d))))
-    ways = coo_matrix(
-        (np.concatenate(lengths), (np.concatenate(rows), np.concatenate(columns))), shape=(count, count)
-    )
+    ways = coo_matrix((np.concatenate(lengths), (np.concatenate(rows), np.concatenate(columns))), shape=(count, count))
     return Solid(origin + (np.argwhere(solid) + 0.5) * size, depth[solid], size, ways)
 
 
