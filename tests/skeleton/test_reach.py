@@ -75,15 +75,19 @@ def test_of_what_is_out_of_reach_the_distance_is_told() -> None:
     skeleton = body()
     limits = skeleton.limits.copy()
     limits[skeleton.index("left.clavicle")] = 0.0
-    limits[skeleton.index("left.shoulder"), 0] = np.radians([-120.0, 120.0])
     limits[skeleton.index("left.elbow"), 0, 0] = np.radians(-60.0)
     skeleton = replace(skeleton, limits=limits)
     shoulder = skeleton.rest[skeleton.index("left.shoulder")]
     opened = np.zeros((181, len(skeleton), 4))
     opened[:, skeleton.index("left.elbow"), 0] = np.radians(np.linspace(-60.0, 120.0, 181))
     wrists = poses_from_angles(skeleton, opened).positions[:, skeleton.index("left.wrist")]
-    length = np.linalg.norm(wrists - shoulder, axis=1).max()
-    way = np.array([0.5, -0.2, 0.8]) / np.linalg.norm([0.5, -0.2, 0.8])
+    away = np.linalg.norm(wrists - shoulder, axis=1)
+    length = away.max()
+    # the way that an arm opened as far points at angles inside the shoulder's limits
+    pointing = opened[away.argmax()]
+    pointing[skeleton.index("left.shoulder")] = np.radians([-30.0, 0.0, 10.0, 20.0])
+    way = poses_from_angles(skeleton, pointing[None]).positions[0, skeleton.index("left.wrist")] - shoulder
+    way /= np.linalg.norm(way)
     _, found, _ = _reach(skeleton, "left", shoulder + (length + 0.25) * way)
     assert found.short == pytest.approx(0.25, abs=2e-4)
     _, found, _ = _reach(skeleton, "left", shoulder + (length - 0.01) * way)
