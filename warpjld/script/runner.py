@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from warpjld import render
 from warpjld.covering.device import checked_device
 from warpjld.errors import InputError, WarpjldError
-from warpjld.io.motion_out import check_motion_out
+from warpjld.motion.out import check_motion_out
 from warpjld.names import folded
 from warpjld.overwriting import check_outputs
 from warpjld.script.contact import check_contact, run_contact, write_contact
