@@ -1,25 +1,25 @@
-"""Closing a hand: its digits bend until their skin touches the object (A §7, R76; R90)."""
+"""Closing hands: their digits bend until their skin touches the object (A §7, R76; R90)."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
 
 from warpjld.covering import Covering
-from warpjld.grasp.both_ways import BothWays, give_way
-from warpjld.grasp.closing import ClosingHands
+from warpjld.grasp.both_ways import BothWays
+from warpjld.grasp.closing import ClosingHands, MovedSkin
 from warpjld.grasp.digits import digit_chains
-from warpjld.grasp.distance import ObjectSet
 from warpjld.grasp.found import Status
-from warpjld.grasp.objects import Places
+from warpjld.grasp.give_way import give_way
+from warpjld.grasp.objects import GraspObject, Places
+from warpjld.grasp.posed_skins import PosedSkins
 from warpjld.grasp.separate import keep_apart
 from warpjld.skeleton import Poses
 
-__all__ = ["Closed", "close_hand"]
+__all__ = ["Closed", "Closer"]
 
 _ROUNDS = 4  # of bending and opening again
 _TOUCH = 1e-4  # skin this near touches [m]
@@ -53,95 +53,92 @@ class Closed:
         return np.asarray(self.gap < _TOUCH)
 
 
-def close_hand(
-    covering: Covering,
-    poses: Poses,
-    angles: NDArray[np.float64],
-    objects: ObjectSet,
-    *,
-    which: NDArray[np.int32] | int = 0,
-    places: Places | None = None,
-    digits: Sequence[str] = (),
-    coupling: tuple[float, float] | None = None,
-    apart: bool = True,
-    quick: bool = False,
-    tolerance: float = 1e-5,
-    threads: int | None = None,
-) -> Closed:
-    """Close the digits of G hands, each on its object, in a few launches.
-
-    Every digit bends at its base until a vertex beyond touches, then at its second joint, then at its third; a joint
-    whose skin touches already stays. With ``coupling`` all three bend together until the first touch, the others at
-    these times the base's rate; joints beyond the touch then go on together. Skin that swells as a finger bends may
-    enter the object beside a touch: the base then opens as far as it must, and the joints beyond close again. What of
-    the object, an edge or a corner, then is deeper than half a millimetre in the skin between its vertices, opens the
-    digit it is in (``give_way``).
+class Closer:
+    """Closes one hand on one object, many postures at a time; what it knows of both it keeps.
 
     Args:
         covering: The hand, smooth method.
-        poses: G postures to start from, open.
-        angles: Their joint angles [rad], shape (G, J, 4).
-        objects: Search structures.
-        which: Object of every hand.
-        places: Place of every hand's object; the objects' own if left out.
-        digits: Names of digits; all if left out.
-        coupling: Rates of the second and third joint relative to the base.
-        apart: Stop digits that would pass through one another or the palm; the costliest part.
-        quick: For a first look at many hands: a third of the vertices search, and nothing opens again; ``apart`` is
-            left out.
-        tolerance: Distance that counts as a touch [m].
-        threads: CPU threads.
+        thing: The object.
 
-    Raises:
-        InputError: No such digit, or postures of another skeleton.
+    Attributes:
+        both: How deep the two are in one another.
     """
-    chains = digit_chains(covering.skeleton, digits)
-    count = len(poses)
-    which = np.broadcast_to(objects.check(which), count)
-    if places is None:
-        places = objects.places(which)
-    elif len(places) == 1:
-        places = places[np.zeros(count, dtype=int)]
-    hands = ClosingHands(
-        covering,
-        poses,
-        angles,
-        objects,
-        which,
-        places,
-        every=_QUICK if quick else 1,
-        tolerance=tolerance,
-        threads=threads,
-    )
-    joints = np.array(list(chains.values()))
-    if coupling is not None:
-        hands.bend(joints, np.array([1.0, *coupling]))
-    status = _bend_in_turn(hands, joints, rounds=1 if quick else _ROUNDS)
-    names = tuple(chains)
-    if quick:
-        gap, depth = hands.skin_gaps(joints[:, 0].tolist())
-        return Closed(hands.angles, names, status, gap, depth)
-    both = [BothWays(covering, thing) for thing in objects.objects]
 
-    def gaps(g: int, wanted: NDArray[np.float64], moved: bool = True) -> NDArray[np.float64]:
-        skin = covering.deform(hands.poses_of(g, wanted[None]), threads=threads)[0]
-        return both[which[g]].gaps(skin, places[g], moved=moved)
+    def __init__(self, covering: Covering, thing: GraspObject) -> None:
+        self.covering, self.thing, self.both = covering, thing, BothWays(covering, thing)
+        self._skin, self._posed = MovedSkin(covering), PosedSkins.of(covering)
 
-    gap, depth = np.empty((count, len(names))), np.empty(count)
-    for g in range(count):
-        parts = both[which[g]].parts
-        hands.angles[g], _ = give_way(
-            partial(gaps, g), parts, angles[g], hands.angles[g], chains, allowed=_PRESSED, on_the_way=_THROUGH
+    def close(
+        self,
+        poses: Poses,
+        angles: NDArray[np.float64],
+        *,
+        places: Places | None = None,
+        digits: Sequence[str] = (),
+        coupling: tuple[float, float] | None = None,
+        apart: bool = True,
+        quick: bool = False,
+        tolerance: float = 1e-5,
+    ) -> Closed:
+        """Close the digits of G hands. Each ends bit for bit as it does alone.
+
+        Every digit bends at its base until a vertex beyond touches, then at its second joint, then at its third; a
+        joint whose skin touches already stays. With ``coupling`` all three bend together until the first touch, the
+        others at these times the base's rate; joints beyond the touch then go on together. Skin that swells as a finger
+        bends may enter the object beside a touch: the base then opens as far as it must, and the joints beyond close
+        again. What of the object, an edge or a corner, then is deeper than half a millimetre in the skin between its
+        vertices, opens the digit it is in (``give_way``).
+
+        Args:
+            poses: G postures to start from, open.
+            angles: Their joint angles [rad], shape (G, J, 4).
+            places: Place of every hand's object, or one for all; the object's own if left out.
+            digits: Names of digits; all if left out.
+            coupling: Rates of the second and third joint relative to the base.
+            apart: Stop digits that would pass through one another or the palm.
+            quick: For a first look at many hands: a third of the vertices search, and nothing opens again; ``apart`` is
+                left out.
+            tolerance: Distance that counts as a touch [m].
+
+        Raises:
+            InputError: No such digit, or postures of another skeleton.
+        """
+        chains = digit_chains(self.covering.skeleton, digits)
+        where = self.thing.place if places is None else places
+        where = where[np.zeros(len(poses), dtype=int)] if len(where) == 1 else where
+        hands = ClosingHands(
+            self._skin, poses, angles, self.both.near, where, every=_QUICK if quick else 1, tolerance=tolerance
         )
+        joints = np.array(list(chains.values()))
+        if coupling is not None:
+            hands.bend(np.arange(len(hands)), joints, np.array([1.0, *coupling]))
+        status = _bend_in_turn(hands, joints, rounds=1 if quick else _ROUNDS)
+        if quick:
+            return Closed(hands.angles, tuple(chains), status, *hands.skin_gaps(joints[:, 0].tolist()))
+        return self._given_way(hands, angles, status, chains, where, apart)
+
+    def _given_way(
+        self,
+        hands: ClosingHands,
+        start: NDArray[np.float64],
+        status: NDArray[np.int32],
+        chains: dict[str, tuple[int, ...]],
+        places: Places,
+        apart: bool,
+    ) -> Closed:
+        """Digits opened where the object cuts into them, and where they would pass through one another."""
+
+        def depths(rows: NDArray[np.int64], wanted: NDArray[np.float64]) -> NDArray[np.float64]:
+            return self.both.depths(hands.skins_of(rows, wanted), places[rows], moved=True)
+
+        parts, names = self.both.parts, tuple(chains)
+        closed, _ = give_way(depths, parts, start, hands.angles, chains, allowed=_PRESSED, on_the_way=_THROUGH)
         if apart:
-            hands.angles[g], stopped = keep_apart(
-                covering, partial(hands.poses_of, g), angles[g], hands.angles[g], chains
-            )
-            status[g, [names.index(name) for name in stopped]] = int(Status.BLOCKED)
-        now = gaps(g, hands.angles[g], moved=False)
-        gap[g] = now[[parts.index(name) for name in names]]
-        depth[g] = max(0.0, -float(now.min()))
-    return Closed(hands.angles, names, status, gap, depth)
+            closed, gone = keep_apart(self._posed, hands.skins_of, start, closed, chains)
+            status[gone < 1.0] = int(Status.BLOCKED)
+        gaps = self.both.gaps(hands.skins_of(np.arange(len(hands)), closed), places)
+        depth = np.maximum(0.0, -gaps.min(axis=1))
+        return Closed(closed, names, status, gaps[:, [parts.index(name) for name in names]], depth)
 
 
 def _bend_in_turn(hands: ClosingHands, joints: NDArray[np.int64], rounds: int) -> NDArray[np.int32]:
@@ -151,20 +148,17 @@ def _bend_in_turn(hands: ClosingHands, joints: NDArray[np.int64], rounds: int) -
         How the joints' searches ended, shape (G, D, 3).
     """
     status = np.full((len(hands), *joints.shape), int(Status.NO_CONTACT), dtype=np.int32)
-    going = np.ones(len(hands), dtype=bool)
+    going = np.arange(len(hands))
     for again in range(rounds):
-        before = hands.angles.copy()
         for k in range(1 if again else 0, 3):
             # a joint with a touch at or beyond its segment finds it at once and stays
-            ended = hands.bend(joints[:, k:], np.array([1.0, 0.0, 0.0])[: 3 - k])
+            ended = hands.bend(going, joints[:, k:], np.array([1.0, 0.0, 0.0])[: 3 - k])
             # skin left inside by less than twice the tolerance is a touch
             ended = np.where(ended == int(Status.INSIDE), int(Status.CONVERGED), ended) if again else ended
-            status[going, :, k] = ended[going]
-        # what has settled stays, or a hand would end otherwise beside others than alone
-        hands.angles[~going] = before[~going]
+            status[going, :, k] = ended
         if rounds == 1:
             break
-        going &= hands.settle(joints[:, 0].tolist())
-        if not going.any():
+        going = going[hands.settle(going, joints[:, 0].tolist())]
+        if not len(going):
             break
     return status
