@@ -1,4 +1,4 @@
-"""How far chains of joints close until the first of many vertices touches an object, and open until none is too deep."""
+"""How far chains of joints close until the first of many vertices touches, and open until none is too deep."""
 
 import warp as wp
 
@@ -10,10 +10,11 @@ from warpjld_kernels.flexion_search import (
     OPENING,
     top_speed,
 )
+from warpjld_kernels.lanes import VECTORISED
 from warpjld_kernels.signed_grid import SignedGrid, distance_bounds
 from warpjld_kernels.surface_distance import Hit, Solids, nearest
 
-wp.set_module_options({"max_unroll": 1, "enable_backward": False})
+wp.set_module_options({**VECTORISED, "max_unroll": 1})
 
 # steps towards the object, as parts of the chain's reach
 _SHORTEST = wp.constant(64)
@@ -52,20 +53,17 @@ def seen_from_object(hands: Hands, chain: Chain, r: int, v: int) -> wp.vec3:
 
 
 @wp.func
-def march(hands: Hands, r: int, v: int, target: float, tolerance: float, best: float, open_hand: Chain) -> Touch:
-    """First closing below ``best`` at which |distance − target| < tolerance.
+def march(
+    hands: Hands, r: int, v: int, target: float, tolerance: float, best: float, first: Hit, speed: float
+) -> Touch:
+    """First closing below ``best`` at which |distance − target| < tolerance, from the nearest point at the start.
 
     Steps no longer than the distance allows bring the vertex to the first change of sign, which is then halved.
     """
     touch = Touch()
     touch.status = NO_CONTACT
     reach = hands.drives.reach[r]
-    speed = top_speed(
-        hands.posture, hands.drives, r, mapped_by(hands.skin, hands.posture, hands.drives, open_hand, r, v)
-    )
-    local = seen_from_object(hands, open_hand, r, v)
-    two = distance_bounds(hands.solids, hands.grid, wp.vec3d(local))
-    hit = nearest(hands.solids, 0, wp.vec3d(local), two[1])
+    hit = first
     distance = hit.distance - target
     low = float(0.0)
     high = float(0.0)
@@ -84,7 +82,7 @@ def march(hands: Hands, r: int, v: int, target: float, tolerance: float, best: f
                 touch.status = OPENING
                 touch.closing = s
                 going = False
-        elif s >= reach:
+        elif s >= reach or s + distance / speed > best:
             going = False
         else:
             low = s
@@ -120,6 +118,7 @@ def first_touch(
     tolerance: float,
     # scratch
     earliest: wp.array2d(dtype=float),
+    measured: wp.array2d(dtype=wp.int32),
     # out
     status_out: wp.array(dtype=wp.int32),
     closing_out: wp.array(dtype=float),
@@ -131,20 +130,21 @@ def first_touch(
     """
     r = wp.tid()
     digit = r % (first_of.shape[0] - 1)
+    g = hands.drives.frame[r]
     first = first_of[digit]
     count = first_of[digit + 1] - first
     open_hand = chain_at(hands.posture, hands.drives, r, 0.0)
     status = int(NO_CONTACT)
-    best = float(_NEVER)
+    best = hands.drives.reach[r] * 1.00001  # what comes later does not come
     winner = int(-1)
     n = int(0)
     while n < count:
-        v = vertex[first + n]
-        local = seen_from_object(hands, open_hand, r, v)
-        two = distance_bounds(hands.solids, hands.grid, wp.vec3d(local))
+        x = mapped_by(hands.skin, hands.posture, hands.drives, open_hand, r, vertex[first + n])
+        local = wp.vec3d(wp.quat_rotate_inv(hands.rotation[g], x - hands.position[g]))
+        two = distance_bounds(hands.solids, hands.grid, local)
         distance = float(two[0]) - target
         if distance < tolerance:
-            hit = nearest(hands.solids, 0, wp.vec3d(local), two[1])
+            hit = nearest(hands.solids, 0, local, two[1])
             distance = hit.distance - target
             if wp.abs(distance) < tolerance:
                 status = CONVERGED
@@ -156,8 +156,8 @@ def first_touch(
             best = 0.0
             n = count
         else:
-            x = mapped_by(hands.skin, hands.posture, hands.drives, open_hand, r, v)
             earliest[r, n] = distance / top_speed(hands.posture, hands.drives, r, x)
+            measured[r, n] = 0
             n += 1
     looking = winner < 0 and hands.drives.reach[r] >= 1.0e-6
     while looking:
@@ -170,12 +170,22 @@ def first_touch(
         if at < 0:
             looking = False
         else:
-            earliest[r, at] = _NEVER
-            touch = march(hands, r, vertex[first + at], target, tolerance, best, open_hand)
-            if touch.status != NO_CONTACT and (touch.closing < best or (touch.closing == best and at < winner)):
-                best = touch.closing
-                status = touch.status
-                winner = at
+            v = vertex[first + at]
+            x = mapped_by(hands.skin, hands.posture, hands.drives, open_hand, r, v)
+            local = wp.vec3d(wp.quat_rotate_inv(hands.rotation[g], x - hands.position[g]))
+            two = distance_bounds(hands.solids, hands.grid, local)
+            hit = nearest(hands.solids, 0, local, two[1])
+            speed = top_speed(hands.posture, hands.drives, r, x)
+            if measured[r, at] == 0:  # so far only a bound: it may have to wait for others
+                measured[r, at] = 1
+                earliest[r, at] = (hit.distance - target) / speed
+            else:
+                earliest[r, at] = _NEVER
+                touch = march(hands, r, v, target, tolerance, best, hit, speed)
+                if touch.status != NO_CONTACT and (touch.closing < best or (touch.closing == best and at < winner)):
+                    best = touch.closing
+                    status = touch.status
+                    winner = at
     status_out[r] = status
     closing_out[r] = best
 

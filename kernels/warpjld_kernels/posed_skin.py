@@ -1,7 +1,7 @@
-"""Poses of one skin, each with a tree of boxes round its triangles: how deep points are in them, which triangles cross.
+"""Poses of one skin, each with a tree of boxes: how deep points are in them, which of their triangles cross.
 
-The trees have one shape, that of the rest pose (``warpjld.grasp.posed_skins``); a pose only fits the boxes anew. Holes of
-the skin are closed by fans, so that a ray from any point meets the skin as often as it winds round the point.
+The trees have one shape, that of the rest pose (``warpjld.grasp.posed_skins``); a pose only fits the boxes anew. Holes
+of the skin are closed by fans, so that a ray from any point meets the skin as often as it winds round the point.
 """
 
 import warp as wp
@@ -82,7 +82,6 @@ class PosedSkins:
 )
 def fit_boxes(skins: PosedSkins, pose: int):
     """Fit the tree of a pose to its points."""
-    ...
 
 
 @wp.kernel
@@ -176,7 +175,6 @@ def corner_of(skins: PosedSkins, pose: int, face: int, k: int) -> wp.vec3d:
 )
 def winds_along_x(tree: Tree, pose: int, point: wp.vec3d) -> int:
     """How often a closed surface winds round a point: the crossings of a ray along x, outwards less inwards."""
-    ...
 
 
 @wp.kernel
@@ -336,7 +334,6 @@ def crossings_of(
     counts: wp.array2d(dtype=wp.int32),
 ) -> int:
     """Count the triangles of other parts that cross one, by part, where no more than a corner is common."""
-    ...
 
 
 @wp.kernel

@@ -129,7 +129,7 @@ def measure_near(
     face_out: wp.array(dtype=wp.int32),
     point_out: wp.array(dtype=wp.vec3),
 ):
-    """Signed distances, nearest triangles and points; a point that is surely farther outside than ``limit`` has none."""
+    """Signed distances, nearest triangles and points; what is surely farther outside than ``limit`` has none."""
     n = wp.tid()
     two = distance_bounds(solids, grid, points[n])
     face_out[n] = -1

@@ -48,6 +48,9 @@ class Closed:
     gap: NDArray[np.float64]
     penetration: NDArray[np.float64]
 
+    def __getitem__(self, hands: slice) -> Closed:
+        return Closed(self.angles[hands], self.digits, self.status[hands], self.gap[hands], self.penetration[hands])
+
     def touching(self) -> NDArray[np.bool_]:
         """Digits within a tenth of a millimetre of the object, shape (G, D)."""
         return np.asarray(self.gap < _TOUCH)
@@ -66,7 +69,7 @@ class Closer:
 
     def __init__(self, covering: Covering, thing: GraspObject) -> None:
         self.covering, self.thing, self.both = covering, thing, BothWays(covering, thing)
-        self._skin, self._posed = MovedSkin(covering), PosedSkins.of(covering)
+        self._skin, self._posed = MovedSkin.of(covering), PosedSkins.of(covering)
 
     def close(
         self,
@@ -104,41 +107,71 @@ class Closer:
             InputError: No such digit, or postures of another skeleton.
         """
         chains = digit_chains(self.covering.skeleton, digits)
-        where = self.thing.place if places is None else places
-        where = where[np.zeros(len(poses), dtype=int)] if len(where) == 1 else where
-        hands = ClosingHands(
-            self._skin, poses, angles, self.both.near, where, every=_QUICK if quick else 1, tolerance=tolerance
-        )
+        where = self._places(places, len(poses))
+        hands = self._hands(poses, angles, where, every=_QUICK if quick else 1, tolerance=tolerance)
         joints = np.array(list(chains.values()))
         if coupling is not None:
             hands.bend(np.arange(len(hands)), joints, np.array([1.0, *coupling]))
         status = _bend_in_turn(hands, joints, rounds=1 if quick else _ROUNDS)
         if quick:
             return Closed(hands.angles, tuple(chains), status, *hands.skin_gaps(joints[:, 0].tolist()))
-        return self._given_way(hands, angles, status, chains, where, apart)
 
-    def _given_way(
+        def depths(rows: NDArray[np.int64], wanted: NDArray[np.float64]) -> NDArray[np.float64]:
+            return self.both.depths(hands.skins_of(rows, wanted), where[rows], moved=True)
+
+        way = {"allowed": _PRESSED, "on_the_way": _THROUGH}
+        given, _ = give_way(depths, self.both.parts, angles, hands.angles, chains, **way)
+        if apart:
+            return self._parted(hands, angles, given, status, chains, where)
+        return self._closed(hands, given, status, chains, where)
+
+    def parted(
+        self, poses: Poses, angles: NDArray[np.float64], closed: Closed, *, places: Places | None = None
+    ) -> Closed:
+        """What hands would have closed to with ``apart``, from what they closed to without.
+
+        Args:
+            poses: The open hands, as given to ``close``; likewise ``angles`` and ``places``.
+            closed: The answer.
+        """
+        where = self._places(places, len(poses))
+        hands = self._hands(poses, angles, where, every=1, tolerance=0.0)
+        chains = digit_chains(self.covering.skeleton, closed.digits)
+        return self._parted(hands, angles, closed.angles, closed.status.copy(), chains, where)
+
+    def _places(self, places: Places | None, count: int) -> Places:
+        where = self.thing.place if places is None else places
+        return where[np.zeros(count, dtype=int)] if len(where) == 1 else where
+
+    def _hands(
+        self, poses: Poses, angles: NDArray[np.float64], places: Places, *, every: int, tolerance: float
+    ) -> ClosingHands:
+        return ClosingHands(self._skin, poses, angles, self.both.near, places, every=every, tolerance=tolerance)
+
+    def _parted(
         self,
         hands: ClosingHands,
         start: NDArray[np.float64],
+        given: NDArray[np.float64],
         status: NDArray[np.int32],
         chains: dict[str, tuple[int, ...]],
         places: Places,
-        apart: bool,
     ) -> Closed:
-        """Digits opened where the object cuts into them, and where they would pass through one another."""
+        angles, gone = keep_apart(self._posed, hands.skins_of, start, given, chains)
+        status[gone < 1.0] = int(Status.BLOCKED)
+        return self._closed(hands, angles, status, chains, places)
 
-        def depths(rows: NDArray[np.int64], wanted: NDArray[np.float64]) -> NDArray[np.float64]:
-            return self.both.depths(hands.skins_of(rows, wanted), places[rows], moved=True)
-
-        parts, names = self.both.parts, tuple(chains)
-        closed, _ = give_way(depths, parts, start, hands.angles, chains, allowed=_PRESSED, on_the_way=_THROUGH)
-        if apart:
-            closed, gone = keep_apart(self._posed, hands.skins_of, start, closed, chains)
-            status[gone < 1.0] = int(Status.BLOCKED)
-        gaps = self.both.gaps(hands.skins_of(np.arange(len(hands)), closed), places)
-        depth = np.maximum(0.0, -gaps.min(axis=1))
-        return Closed(closed, names, status, gaps[:, [parts.index(name) for name in names]], depth)
+    def _closed(
+        self,
+        hands: ClosingHands,
+        angles: NDArray[np.float64],
+        status: NDArray[np.int32],
+        chains: dict[str, tuple[int, ...]],
+        places: Places,
+    ) -> Closed:
+        gaps = self.both.gaps(hands.skins_of(np.arange(len(hands)), angles), places)
+        of_digits = gaps[:, [self.both.parts.index(name) for name in chains]]
+        return Closed(angles, tuple(chains), status, of_digits, np.maximum(0.0, -gaps.min(axis=1)))
 
 
 def _bend_in_turn(hands: ClosingHands, joints: NDArray[np.int64], rounds: int) -> NDArray[np.int32]:

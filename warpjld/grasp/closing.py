@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from functools import cached_property
 from typing import Any
+from weakref import WeakKeyDictionary
 
 import numpy as np
 from numpy.typing import NDArray
@@ -25,6 +26,8 @@ _MOST_JOINTS = 4
 _WIDEST = 0.35  # how far a base joint may open again for the sake of swelling skin [rad]
 _CUTS, _PIECES = 3, 8  # the opening is found to a 512th of that
 
+_kept: WeakKeyDictionary[Covering, MovedSkin] = WeakKeyDictionary()
+
 
 class MovedSkin:
     """The skin of one hand as searches want it, and which of it moves with which joint.
@@ -37,6 +40,13 @@ class MovedSkin:
         self.covering = covering
         self._beyond: dict[int, NDArray[np.int32]] = {}
         self._moving: dict[tuple[int, ...], NDArray[np.int32]] = {}
+
+    @staticmethod
+    def of(covering: Covering) -> MovedSkin:
+        """That of a covering, made once."""
+        if covering not in _kept:
+            _kept[covering] = MovedSkin(covering)
+        return _kept[covering]
 
     @cached_property
     def packed(self) -> Any:
@@ -143,7 +153,7 @@ class ClosingHands:
         vertices = [self._skin.beyond(int(chain[0]))[:: self._every] for chain in joints]
         first = np.cumsum([0, *map(len, vertices)])
         frames, used = np.repeat(np.arange(count), len(joints)), np.tile(joints[:, moving], (count, 1))
-        packed, reached = self._on_object(hands, frames, used, rates[moving])
+        packed = self._on_object(hands, frames, used, rates[moving])
         status = np.empty((count, len(joints)), dtype=np.int32)
         closing = np.empty(status.shape, dtype=np.float32)
         earliest = np.empty((status.size, max(map(len, vertices))), dtype=np.float32)
@@ -153,6 +163,7 @@ class ClosingHands:
             self._tolerance,
             self._tolerance,
             wp.array(earliest, dtype=float, device="cpu", copy=False),
+            wp.array(np.empty_like(earliest, dtype=np.int32), dtype=wp.int32, device="cpu", copy=False),
         ]
         outs = [
             wp.array(a.reshape(-1), dtype=kind, device="cpu", copy=False)
@@ -160,12 +171,12 @@ class ClosingHands:
         ]
         wp.launch(first_touch, status.size, inputs=[packed, *inputs], outputs=outs, device="cpu")
         touched = status != int(Status.NO_CONTACT)
-        best = np.where(touched, closing.astype(np.float64), reached.reshape(status.shape))
+        by = closing.astype(np.float64)
         for d, chain in enumerate(joints):
             for joint, rate in zip(chain[moving], rates[moving], strict=True):
                 low, high = self._skeleton.limits[joint, _FLEXION]
                 now = self.angles[hands, joint, _FLEXION]
-                far = np.where(touched[:, d], now + rate * best[:, d], high)
+                far = np.where(touched[:, d], now + rate * by[:, d], high)
                 self.angles[hands, joint, _FLEXION] = np.maximum(now, np.clip(far, low, high))
         return status
 
@@ -184,7 +195,7 @@ class ClosingHands:
         if not len(rows):
             return np.zeros(len(hands), dtype=bool)
         pressed, deep, allowed = vertices[columns], now[rows, columns], self._floor[hands][rows, columns]
-        at_widest = np.stack([self._opened_distances(hands, base, rows, pressed) for base in bases])
+        at_widest = self._opened_distances(hands, bases, rows, pressed)
         # a vertex is brought out by the digit whose opening moves it most
         gain = at_widest - deep
         culprit = np.where(gain.max(axis=0) > 1e-6, gain.argmax(axis=0), -1)
@@ -208,7 +219,7 @@ class ClosingHands:
         from warpjld_kernels.first_touch import least_opening
 
         some, first = np.unique(rows, return_index=True)
-        packed, _ = self._opening(hands[some], base)
+        packed = self._opening(hands[some], [base])
         by = np.zeros(len(some), dtype=np.float32)
         inputs = [
             array_on("cpu", vertices, wp.int32),
@@ -224,25 +235,32 @@ class ClosingHands:
         self.angles[hands[some], base, _FLEXION] = np.maximum(now - by, np.minimum(start, now))
 
     def _opened_distances(
-        self, hands: NDArray[np.int64], base: int, rows: NDArray[np.int64], vertices: NDArray[np.int32]
+        self, hands: NDArray[np.int64], bases: list[int], rows: NDArray[np.int64], vertices: NDArray[np.int32]
     ) -> NDArray[np.float64]:
-        """Signed distances of vertices (n,) of hands (n,) with a base joint opened as far as it may [m], shape (n,)."""
+        """Signed distances of vertices (n,) of hands (n,) with each base joint opened as far as it may [m], (D, n)."""
         import warp as wp
         from warpjld_kernels.first_touch import distances_at
 
         some, row = np.unique(rows, return_inverse=True)
-        packed, _ = self._opening(hands[some], base)
-        out = np.empty(len(rows), dtype=np.float32)
-        inputs = [array_on("cpu", row, wp.int32), array_on("cpu", vertices, wp.int32), _WIDEST]
-        outs = [wp.array(out, dtype=float, device="cpu", copy=False)]
-        wp.launch(distances_at, len(rows), inputs=[packed, *inputs], outputs=outs, device="cpu")
+        packed = self._opening(hands[some], bases)
+        chain = np.arange(len(bases))[:, None] * len(some) + row
+        out = np.empty(chain.shape, dtype=np.float32)
+        inputs = [
+            array_on("cpu", chain.ravel(), wp.int32),
+            array_on("cpu", np.tile(vertices, len(bases)), wp.int32),
+            _WIDEST,
+        ]
+        outs = [wp.array(out.reshape(-1), dtype=float, device="cpu", copy=False)]
+        wp.launch(distances_at, out.size, inputs=[packed, *inputs], outputs=outs, device="cpu")
         return out.astype(np.float64)
 
-    def _opening(self, hands: NDArray[np.int64], base: int) -> tuple[Any, NDArray[np.float64]]:
-        """Hands whose base joint opens, no farther than it began."""
+    def _opening(self, hands: NDArray[np.int64], bases: list[int]) -> Any:
+        """Hands of which base joints open, row d · n + i joint d of hand i, no farther than it began."""
         count = len(hands)
-        stops = np.minimum(self._open[hands, base, _FLEXION], self.angles[hands, base, _FLEXION])
-        return self._on_object(hands, np.arange(count), np.full((count, 1), base), np.array([-1.0]), stops[:, None])
+        frames, joints = np.tile(np.arange(count), len(bases)), np.repeat(bases, count)
+        own = hands[frames], joints, _FLEXION
+        stops = np.minimum(self._open[own], self.angles[own])
+        return self._on_object(hands, frames, joints[:, None], np.array([-1.0]), stops[:, None])
 
     def _on_object(
         self,
@@ -251,8 +269,8 @@ class ClosingHands:
         joints: NDArray[np.int64],
         rates: NDArray[np.float64],
         stops: NDArray[np.float64] | None = None,
-    ) -> tuple[Any, NDArray[np.float64]]:
-        """``warpjld_kernels.first_touch.Hands`` with chains (R, k) in frames (R,) of n hands, and their reach (R,)."""
+    ) -> Any:
+        """``warpjld_kernels.first_touch.Hands`` with chains (R, k) in frames (R,) of n hands."""
         import warp as wp
         from warpjld_kernels.first_touch import Hands
 
@@ -276,7 +294,7 @@ class ClosingHands:
         out.drives = drives_on("cpu", skeleton, poses, angles, chains)
         out.position = array_on("cpu", self._places.position[hands] - origin, wp.vec3)
         out.rotation = array_on("cpu", self._places.rotation[hands], wp.quat)
-        return out, chains.reach
+        return out
 
     def _depths(
         self, hands: NDArray[np.int64], vertices: NDArray[np.int32], angles: NDArray[np.float64]

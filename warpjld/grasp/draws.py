@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from warpjld.covering import Covering
-from warpjld.grasp.distance import ObjectSet
+from warpjld.grasp.near_object import NearObject
 from warpjld.grasp.objects import GraspObject
 from warpjld.grasp.obstacles import Obstacles
 from warpjld.grasp.opening import Opening, closing_in_air
@@ -35,7 +35,7 @@ class Draws:
 
     Attributes:
         covering: The hand.
-        objects: The object.
+        near: The object.
         obstacles: What no hand may enter on its way to its placement.
         side: Which hand.
         posture: Name of the posture.
@@ -46,7 +46,7 @@ class Draws:
     """
 
     covering: Covering
-    objects: ObjectSet
+    near: NearObject
     obstacles: Obstacles
     side: str
     posture: str
@@ -76,14 +76,13 @@ class Draws:
         return hands[np.flatnonzero(clear)]
 
     def _both_kinds(self, count: int) -> Candidates:
-        (thing,) = self.objects.objects
         openings = self._variants()
         most = max(one.width[0] for one in openings)
-        widths = sample_widths(self.objects, _LINES, self.rng, widest=float(most))
+        widths = sample_widths(self.near, _LINES, self.rng, widest=float(most))
         across = count - int(_PALM_FIRST * count) if len(widths) else 0
         some = []
         if across:
-            chosen = self.rng.choice(len(widths), size=across, p=_preference(widths, thing))
+            chosen = self.rng.choice(len(widths), size=across, p=_preference(widths, self.near.thing))
             turned = self.rng.random(across) < 0.5
             picked = widths[chosen]
             ends = (
@@ -92,17 +91,17 @@ class Draws:
             )
             into = 0.3 if self.posture == "pinch" else 1.0
             these = Widths(*ends, picked.slant)
-            some.append(across_widths(self.covering, openings, self.objects, these, self.side, self.rng, into=into))
+            some.append(across_widths(self.covering, openings, self.near, these, self.side, self.rng, into=into))
         if count > across:
             ahead = AHEAD.get(self.posture, 0.0)
             some.append(
-                sample_wrists(self.covering, self.start, thing, self.side, count - across, self.rng, ahead=ahead)
+                sample_wrists(self.covering, self.start, self.near, self.side, count - across, self.rng, ahead=ahead)
             )
         return Candidates.joined(some)
 
     def _variants(self) -> list[Opening]:
         """The posture as it is, and with thumb and fingers a little elsewhere."""
-        skeleton, rng, found = self.covering.skeleton, self.rng, []
+        skeleton, rng, starts = self.covering.skeleton, self.rng, []
         for variant in range(_VARIANTS):
             angles = self.start.copy()
             if variant:
@@ -115,8 +114,8 @@ class Draws:
                         column = CHANNELS.index(channel)
                         turned = angles[row, column] + np.radians(degrees)
                         angles[row, column] = np.clip(turned, *skeleton.limits[row, column])
-            found.append(closing_in_air(self.covering, self.side, angles, self.closing))
-        return found
+            starts.append(angles)
+        return closing_in_air(self.covering, self.side, np.array(starts), self.closing)
 
 
 def _preference(widths: Widths, thing: GraspObject) -> NDArray[np.float64]:

@@ -138,7 +138,7 @@ def contacts(
 
     where = thing.place if place is None else place
     both = BothWays(covering, thing)
-    gaps = both.gaps(vertices, where)
+    (gaps,) = both.gaps(vertices[None], where)
     objects = ObjectSet(thing.placed(where.position[0], where.rotation[0]))
     near = objects.distances(vertices, limit=2.0 * tolerance).distance[0] < tolerance
     counts = np.bincount(both.part_of_vertex[near], minlength=len(gaps))

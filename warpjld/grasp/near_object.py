@@ -37,7 +37,7 @@ class NearObject:
     """An object in its own frame, with a grid of signed distances that is filled where it is looked at.
 
     Args:
-        thing: The object; where it stands does not matter.
+        thing: The object where it stands.
 
     Attributes:
         objects: It alone, standing at the origin.
@@ -87,7 +87,18 @@ class NearObject:
         inputs = [wp.array(a, dtype=kind, device="cpu", copy=False) for a, kind in arrays]
         wp.launch(least_by_part, len(gaps), inputs=[self.objects.solids, self.grid, points, *inputs], device="cpu")
 
-    def near(self, points: NDArray[np.float64], limit: float) -> NearPoints:
+    def least(self, skins: NDArray[np.floating]) -> NDArray[np.float64]:
+        """Smallest signed distance of any vertex of skins (P, V, 3) on the stage to the object at its place, (P,)."""
+        import warp as wp
+
+        count = skins.shape[1]
+        local = self.thing.place.to_local(skins.reshape(-1, 3))[0].astype(np.float32)
+        points = wp.array(local.reshape(skins.shape), dtype=wp.vec3, device="cpu", copy=False)
+        gaps = np.full((len(skins), 1), np.inf)
+        self.least_by_part(points, np.arange(count, dtype=np.int32), np.zeros(count, dtype=np.int32), gaps)
+        return gaps[:, 0]
+
+    def near(self, points: NDArray[np.floating], limit: float) -> NearPoints:
         """Distances of points in the object's frame (n, 3) that may lie within a limit [m], or in the object."""
         import warp as wp
         from warpjld_kernels.signed_grid import measure_near

@@ -9,8 +9,7 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from warpjld.covering import Covering
-from warpjld.grasp.distance import ObjectSet
-from warpjld.grasp.objects import GraspObject
+from warpjld.grasp.near_object import NearObject
 from warpjld.grasp.opening import Opening
 from warpjld.grasp.palm import palm_of
 from warpjld.grasp.widths import Widths
@@ -22,7 +21,7 @@ __all__ = ["Candidates", "across_widths", "sample_wrists"]
 _CLEARANCE = 3e-4  # between the open hand and the object [m]
 _SPARE = 0.02  # by which a hand opens wider than what it takes [m]
 _STEPS = 32
-_COARSE = 4  # at first every fourth vertex keeps the hand away
+_NEXT = 1e-5  # a step shorter than this is none [m]
 
 
 @dataclass(frozen=True, eq=False)
@@ -70,7 +69,7 @@ class Candidates:
 def sample_wrists(
     covering: Covering,
     angles: NDArray[np.float64],
-    thing: GraspObject,
+    near: NearObject,
     side: str,
     count: int,
     rng: np.random.Generator,
@@ -84,7 +83,7 @@ def sample_wrists(
     then comes as near as it can without touching: its skin's distance bounds each step. With ``ahead`` [m] the object
     is met up to that far before the palm's middle towards the fingers, and the palm stays as far away from it.
     """
-    palm = palm_of(covering.skeleton, side)
+    palm, thing = palm_of(covering.skeleton, side), near.thing
     part = rng.uniform(0.0, 1.0, size=(count, 1)) if ahead else np.zeros((count, 1))
     middle = palm.middle + ahead * part * palm.fingers
     golden = np.pi * (3.0 - 5.0**0.5)
@@ -104,14 +103,14 @@ def sample_wrists(
         np.repeat(angles[None], count, axis=0),
     )
     back = np.full(count, float(np.linalg.norm(thing.size)) + 0.1)
-    near = _come(covering, there.moved(-back), ObjectSet(thing), 2.0 * back)
-    return near.moved(-ahead * part[:, 0])
+    beside = _come(covering, there.moved(-back), near, 2.0 * back)
+    return beside.moved(-ahead * part[:, 0])
 
 
 def across_widths(
     covering: Covering,
     openings: list[Opening],
-    objects: ObjectSet,
+    near: NearObject,
     widths: Widths,
     side: str,
     rng: np.random.Generator,
@@ -127,7 +126,7 @@ def across_widths(
     Args:
         covering: The hand.
         openings: Postures; every width takes one of them.
-        objects: The object.
+        near: The object.
         widths: N of them.
         side: Which hand.
         rng: Source of randomness.
@@ -151,28 +150,22 @@ def across_widths(
     angles = np.stack([one.angles[k] for one, k in zip(rows, loose, strict=True)])
     there = Candidates(position, rotation.as_quat(), wanted[:, 1], angles)
     deeper = ((between - middle) * own[:, 1]).sum(axis=1) * rng.uniform(0.0, into, size=count)
-    (thing,) = objects.objects
-    back = np.full(count, float(np.linalg.norm(thing.size)) + 0.15)
-    return _come(covering, there.moved(-back), objects, back + deeper)
+    back = np.full(count, float(np.linalg.norm(near.thing.size)) + 0.15)
+    return _come(covering, there.moved(-back), near, back + deeper)
 
 
-def _come(covering: Covering, hands: Candidates, objects: ObjectSet, reach: NDArray[np.float64]) -> Candidates:
+def _come(covering: Covering, hands: Candidates, near: NearObject, reach: NDArray[np.float64]) -> Candidates:
     """Move hands along their approach, as far as ``reach`` (G,) or until their skin is next to the object."""
-    skin = covering.deform(hands.poses(covering.skeleton))
-    moved, which = np.zeros(len(hands)), np.zeros(len(hands), dtype=int)
-    some = skin[:, ::_COARSE]
-    for step in range(_STEPS):
-        going = np.flatnonzero(moved < reach)
-        if not len(going):
-            break
+    skin = covering.deform(hands.poses(covering.skeleton), threads=1)
+    moved, going = np.zeros(len(hands)), np.arange(len(hands))
+    for _ in range(_STEPS):
         shift = (hands.approach[going] * moved[going, None])[:, None].astype(np.float32)
-        gap = objects.distances(some[going] + shift, which=which[going]).distance.min(axis=1)
-        # with all vertices a hand may have come too near: it goes back by as much
+        gap = near.least(skin[going] + shift)
+        # a hand that has come too near goes back by as much
         ahead = np.minimum(gap - _CLEARANCE, reach[going] - moved[going])
         moved[going] += np.where(ahead > 0.0, ahead, 1.05 * ahead - 1e-5)
-        if len(some[0]) < len(skin[0]) and (step > _STEPS // 2 or (ahead < 1e-3).all()):
-            some = skin
-        elif (np.abs(ahead) < 1e-5).all():
+        going = going[(np.abs(ahead) >= _NEXT) & (moved[going] < reach[going])]
+        if not len(going):
             break
     return hands.moved(moved)
 

@@ -28,8 +28,8 @@ class PosedSkins:
     """The skin of a covering, ready to be posed.
 
     Its tree is built once, at rest, and fitted to every pose: skin that is near by at rest stays so. Holes, such as a
-    hand's wrist, are closed by flat fans, and a point is inside that the skin winds round: folds and pieces that overlap
-    do not matter.
+    hand's wrist, are closed by flat fans, and a point is inside that the skin winds round: folds, and pieces that
+    overlap, do not matter.
 
     Args:
         covering: The hand or body.
@@ -165,8 +165,8 @@ class PosedSkins:
         found = counts.astype(np.int64)
         if part is not None:
             return found
-        found = found.reshape(poses, names, names)
-        return found + found.transpose(0, 2, 1)
+        square = found.reshape(poses, names, names)
+        return np.asarray(square + square.transpose(0, 2, 1))
 
     def _room(self, count: int) -> Any:
         """Arrays for so many poses; those of a smaller batch are the first of a larger one's."""

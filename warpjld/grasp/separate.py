@@ -63,9 +63,9 @@ def keep_apart(
     for _ in order:
         rows, way = np.repeat(going, len(_WAY)), np.tile(_WAY, len(going))
         now = skin.crossings(skins(rows, way, gone[rows])).reshape(len(going), len(_WAY), len(names), len(names))
-        worse = (now > before[going][:, None]).any(axis=3)[:, :, label]
-        crossing = worse.any(axis=1)
-        some = crossing.any(axis=1)
+        worse = np.asarray((now > before[going][:, None]).any(axis=3))[:, :, label]
+        crossing = np.asarray(worse.any(axis=1))
+        some = np.asarray(crossing.any(axis=1))
         going, worse, crossing = going[some], worse[some], crossing[some]
         if not len(going):
             break

@@ -10,7 +10,7 @@ from warpjld.grasp.quality.gravity import SIX_DIRECTIONS, GravityResponse, gravi
 from warpjld.grasp.quality.penetration import Penetration, depth_inside, penetration
 from warpjld.grasp.quality.resistance import resisted_wrench
 from warpjld.grasp.quality.touch import Patches, contact_patches, vertex_areas
-from warpjld.grasp.quality.wrench_space import WrenchSpace, wrench_space
+from warpjld.grasp.quality.wrench_space import WrenchSpace, least_resistance, wrench_space
 from warpjld.grasp.quality.wrenches import contact_wrenches, grasp_matrix
 
 __all__ = [
@@ -28,6 +28,7 @@ __all__ = [
     "friction_cone",
     "grasp_matrix",
     "gravity_displacement",
+    "least_resistance",
     "patch_spin",
     "penetration",
     "resisted_wrench",

@@ -12,7 +12,6 @@ from scipy.spatial.transform import Rotation
 
 from warpjld.errors import InputError
 from warpjld.grasp.auto import find_grasp
-from warpjld.grasp.close import close_hand
 from warpjld.grasp.hand_scale import doubt_of_size, hand_length
 from warpjld.grasp.postures import posture_for
 from warpjld.grasp.quality import Patches
@@ -22,7 +21,7 @@ from warpjld.study.columns import Column
 from warpjld.study.experiment import Outcome
 from warpjld.study.grasping.choices import HandChoice, ObjectChoice
 from warpjld.study.grasping.columns import GRASP_COLUMNS
-from warpjld.study.grasping.load import Hand, Thing, hand_of, opened_hand, thing_of
+from warpjld.study.grasping.load import Hand, Thing, closer_of, hand_of, opened_hand, thing_of
 from warpjld.study.grasping.measure import measure_grasp
 from warpjld.study.grasping.plan import GraspPlan
 from warpjld.study.grasping.wrist import Approach, draw_approach, place_palm, touch_along
@@ -119,7 +118,7 @@ class GraspExperiment:
         choice, wanted, scale, friction = self.settings.combination(trial)
         hand, thing = hand_of(choice), self._thing(wanted, scale)
         best_of = self.settings.wrist.best_of
-        tried = self._best_of(best_of, hand, thing, friction, rng) if best_of else self._one(choice, thing, rng)
+        tried = self._best_of(best_of, hand, thing, friction, rng) if best_of else self._one(choice, wanted, scale, rng)
         if isinstance(tried, Outcome):
             return tried
         root = {"root_position": tried.position, "root_rotation": tried.rotation}
@@ -133,9 +132,11 @@ class GraspExperiment:
         arrays = {f"{choice.name}/{name}": array for name, array in kept.items()}
         return Outcome("closed" if tried.touches else "no contact", {**tried.values, **placed, **measured}, arrays)
 
-    def _one(self, choice: HandChoice, thing: Thing, rng: np.random.Generator) -> _Tried | Outcome:
+    def _one(
+        self, choice: HandChoice, wanted: ObjectChoice, scale: float, rng: np.random.Generator
+    ) -> _Tried | Outcome:
         """One placement drawn from the plan's ranges."""
-        hand = hand_of(choice)
+        hand, thing = hand_of(choice), self._thing(wanted, scale)
         approach = draw_approach(self.settings.wrist, rng, thing.body.size)
         values = {**_direction(approach.direction), "gap": approach.gap, "tilt": approach.tilt}
         start = approach.aim + 4.0 * thing.radius * approach.direction
@@ -155,9 +156,8 @@ class GraspExperiment:
         angles = opened.angles[None]
         poses = poses_from_angles(hand.rig.skeleton, angles, root_position=position[None], root_rotation=rotation[None])
         coupling = self.settings.coupling if any(self.settings.coupling) else None
-        closed = close_hand(
-            hand.covering, poses, angles, thing.objects, digits=self.settings.digits, coupling=coupling, threads=1
-        )
+        closer = closer_of(choice, wanted, scale, self.settings.measuring.density)
+        closed = closer.close(poses, angles, digits=self.settings.digits, coupling=coupling)
         return _Tried(closed.angles[0], position, rotation, bool(closed.touching().any()), values)
 
     def _best_of(
