@@ -131,7 +131,7 @@ def test_digits_do_not_pass_through_one_another(covering) -> None:
     def deformed(hands, angles):
         return covering.deform(poses_from_angles(skeleton, angles))
 
-    apart, gone = keep_apart(PosedSkins.of(covering), deformed, start[None], closed[None], chains)
+    apart, gone = keep_apart(PosedSkins(covering), deformed, start[None], closed[None], chains)
     assert (gone < 1.0).any()
     assert between(apart[0]) == 0
 

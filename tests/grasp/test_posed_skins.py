@@ -24,7 +24,7 @@ def skins(covering) -> np.ndarray:
 
 
 def test_depths_are_those_of_the_skin_with_its_wrist_closed(covering, skins) -> None:
-    posed, place = PosedSkins.of(covering), Places.of((0.05, -0.02, 0.01), (0.2, 0.1, 0.4, 0.8))
+    posed, place = PosedSkins(covering), Places.of((0.05, -0.02, 0.01), (0.2, 0.1, 0.4, 0.8))
     rng = np.random.default_rng(0)
     boundary, loop = closing_fans(covering.surface.faces)
     for skin in skins:
@@ -45,7 +45,7 @@ def test_depths_are_those_of_the_skin_with_its_wrist_closed(covering, skins) -> 
 
 
 def test_crossings_are_those_of_every_pair(covering, skins) -> None:
-    posed = PosedSkins.of(covering)
+    posed = PosedSkins(covering)
     found = posed.crossings(skins)
     for skin, table in zip(skins, found, strict=True):
         pairs = crossing_faces(skin, covering.surface.faces).contact(posed.parts).pairs

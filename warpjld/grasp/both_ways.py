@@ -7,6 +7,7 @@ from numpy.typing import NDArray
 
 from warpjld.covering import Covering
 from warpjld.grasp.digits import digit_chains
+from warpjld.grasp.kept import kept_with
 from warpjld.grasp.moved import share_moved
 from warpjld.grasp.near_object import NearObject
 from warpjld.grasp.objects import GraspObject, Places
@@ -40,21 +41,14 @@ class BothWays:
         import warp as wp
 
         self.covering, self.thing, self.near = covering, thing, NearObject(thing)
-        self._skins, self._points = PosedSkins.of(covering), wp.array(outline(thing), dtype=wp.vec3d, device="cpu")
-        parts = self._skins.parts
-        self.parts = parts.names
-        faces = covering.surface.faces
-        of_vertex = np.zeros(len(covering.surface.vertices), dtype=np.int32)
-        of_vertex[faces.ravel()] = np.repeat(parts.of_face, 3)
-        self.part_of_vertex, self._owners = of_vertex, (parts.of_face, of_vertex)
-        chains = {name: chain for name, chain in digit_chains(covering.skeleton).items() if name in parts.names}
-        numbers = np.array([parts.names.index(name) for name in chains], dtype=np.int32)
-        share = np.stack([share_moved(covering, chain[0]) for chain in chains.values()])
-        of_digit = np.isin(of_vertex, numbers)
-        movers = np.where(~of_digit & (share.max(axis=0) > _SWELLS), numbers[share.argmax(axis=0)], of_vertex)
-        most = np.take_along_axis(faces, share.max(axis=0)[faces].argmax(axis=1)[:, None], axis=1)[:, 0]
-        self._movers = np.where(np.isin(parts.of_face, numbers), parts.of_face, movers[most]), movers
-        self._all = np.arange(len(of_vertex), dtype=np.int32)
+        self._skins, self._points = (
+            kept_with(covering, PosedSkins),
+            wp.array(outline(thing), dtype=wp.vec3d, device="cpu"),
+        )
+        self.parts = self._skins.parts.names
+        owned = kept_with(covering, _Owners)
+        self.part_of_vertex, self._owners, self._movers = owned.owners[1], owned.owners, owned.movers
+        self._all = np.arange(len(self.part_of_vertex), dtype=np.int32)
 
     def gaps(self, vertices: NDArray[np.floating], places: Places | None = None) -> NDArray[np.float64]:
         """Smallest signed distance by part [m], negative where something is inside, shape (P, parts).
@@ -97,3 +91,20 @@ class BothWays:
                 skins, self._points, of_face, found, near=_NEAR, limit=_DEEPEST, outside=most > 0.0
             )
         return gaps
+
+
+class _Owners:
+    """Parts that faces (T,) and vertices (V,) count as: their own, or that of the digit that moves them."""
+
+    def __init__(self, covering: Covering) -> None:
+        parts, faces = kept_with(covering, PosedSkins).parts, covering.surface.faces
+        of_vertex = np.zeros(len(covering.surface.vertices), dtype=np.int32)
+        of_vertex[faces.ravel()] = np.repeat(parts.of_face, 3)
+        chains = {name: chain for name, chain in digit_chains(covering.skeleton).items() if name in parts.names}
+        numbers = np.array([parts.names.index(name) for name in chains], dtype=np.int32)
+        share = np.stack([share_moved(covering, chain[0]) for chain in chains.values()])
+        of_digit = np.isin(of_vertex, numbers)
+        movers = np.where(~of_digit & (share.max(axis=0) > _SWELLS), numbers[share.argmax(axis=0)], of_vertex)
+        most = np.take_along_axis(faces, share.max(axis=0)[faces].argmax(axis=1)[:, None], axis=1)[:, 0]
+        self.owners = parts.of_face, of_vertex
+        self.movers = np.where(np.isin(parts.of_face, numbers), parts.of_face, movers[most]), movers

@@ -14,6 +14,7 @@ from warpjld.grasp.closing import ClosingHands, MovedSkin
 from warpjld.grasp.digits import digit_chains
 from warpjld.grasp.found import Status
 from warpjld.grasp.give_way import give_way
+from warpjld.grasp.kept import kept_with
 from warpjld.grasp.objects import GraspObject, Places
 from warpjld.grasp.posed_skins import PosedSkins
 from warpjld.grasp.separate import keep_apart
@@ -69,7 +70,7 @@ class Closer:
 
     def __init__(self, covering: Covering, thing: GraspObject) -> None:
         self.covering, self.thing, self.both = covering, thing, BothWays(covering, thing)
-        self._skin, self._posed = MovedSkin.of(covering), PosedSkins.of(covering)
+        self._skin, self._posed = kept_with(covering, MovedSkin), kept_with(covering, PosedSkins)
 
     def close(
         self,

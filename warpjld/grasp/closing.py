@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from functools import cached_property
 from typing import Any
-from weakref import WeakKeyDictionary
 
 import numpy as np
 from numpy.typing import NDArray
@@ -26,8 +25,6 @@ _MOST_JOINTS = 4
 _WIDEST = 0.35  # how far a base joint may open again for the sake of swelling skin [rad]
 _CUTS, _PIECES = 3, 8  # the opening is found to a 512th of that
 
-_kept: WeakKeyDictionary[Covering, MovedSkin] = WeakKeyDictionary()
-
 
 class MovedSkin:
     """The skin of one hand as searches want it, and which of it moves with which joint.
@@ -40,13 +37,6 @@ class MovedSkin:
         self.covering = covering
         self._beyond: dict[int, NDArray[np.int32]] = {}
         self._moving: dict[tuple[int, ...], NDArray[np.int32]] = {}
-
-    @staticmethod
-    def of(covering: Covering) -> MovedSkin:
-        """That of a covering, made once."""
-        if covering not in _kept:
-            _kept[covering] = MovedSkin(covering)
-        return _kept[covering]
 
     @cached_property
     def packed(self) -> Any:

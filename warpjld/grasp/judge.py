@@ -9,8 +9,10 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
+from warpjld.covering import Covering
 from warpjld.grasp.both_ways import BothWays
 from warpjld.grasp.finer import FinerSkin
+from warpjld.grasp.kept import kept_with
 from warpjld.grasp.quality.closure import force_closure
 from warpjld.grasp.quality.contacts import Contacts
 from warpjld.grasp.quality.touch import Patches, contact_patches
@@ -68,8 +70,7 @@ class Judge:
         self.both, self.friction = both, friction
         self._center, self._normals = thing.centroid, thing.normals
         self._radius = float(np.linalg.norm(thing.vertices - thing.centroid, axis=1).max())
-        self._skin = FinerSkin(covering.surface.vertices, covering.surface.faces, np.inf)
-        self._finer = FinerSkin(covering.surface.vertices, covering.surface.faces, _SPACING)
+        self._skin, self._finer = kept_with(covering, _skin), kept_with(covering, _finer_skin)
         self._segments = vertex_segments(covering, side)
         skeleton = covering.skeleton
         joints = [f"{side}.{name}" if name != "palm" else f"{side}.middle.base" for name in SEGMENTS]
@@ -143,3 +144,11 @@ class Judge:
         contacts = Contacts(patches.points[kept], patches.normals[kept], np.array(self.friction), spin[kept])
         names = [patches.digits[k] for k in kept]
         return contacts, tuple(dict.fromkeys(n for n in names if n != "palm")), "palm" in names
+
+
+def _skin(covering: Covering) -> FinerSkin:
+    return FinerSkin(covering.surface.vertices, covering.surface.faces, np.inf)
+
+
+def _finer_skin(covering: Covering) -> FinerSkin:
+    return FinerSkin(covering.surface.vertices, covering.surface.faces, _SPACING)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from typing import Any
-from weakref import WeakKeyDictionary
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,8 +19,6 @@ _WIDTH = 8
 _MARGIN = 4e-7  # of the largest coordinate, by which boxes are wider than what they hold
 _MEMORY = 64_000_000  # bytes that the poses of a block may take
 _MOST_PARTS = 64
-
-_kept: WeakKeyDictionary[Covering, PosedSkins] = WeakKeyDictionary()
 
 
 class PosedSkins:
@@ -62,13 +59,6 @@ class PosedSkins:
         leaves, nodes = len(self._tree.face), len(self._tree.child)
         self.most = max(1, _MEMORY // (4 * (80 * leaves + 49 * nodes + 3 * len(rest))))
         self._blocks: dict[int, Any] = {}
-
-    @staticmethod
-    def of(covering: Covering) -> PosedSkins:
-        """Those of a covering, made once."""
-        if covering not in _kept:
-            _kept[covering] = PosedSkins(covering)
-        return _kept[covering]
 
     def fitted(self, vertices: NDArray[np.floating], places: Places) -> Any:
         """``warpjld_kernels.posed_skin.PosedSkins`` of up to ``most`` deformed skins (P, V, 3) in frames (P,)."""
