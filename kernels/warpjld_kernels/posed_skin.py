@@ -224,6 +224,34 @@ def points_in_skins(
                         gaps[pose, part] = wp.min(gaps[pose, part], distance)
 
 
+@wp.kernel
+def distances_to_skin(
+    skins: PosedSkins,
+    pose: int,
+    # points in the frame of the trees
+    points: wp.array(dtype=wp.vec3d),
+    limit: wp.float64,
+    # out
+    distance_out: wp.array(dtype=wp.float64),
+    face_out: wp.array(dtype=wp.int32),
+):
+    """Signed distances of points to one pose, its fans included; beyond the limit infinite, and no triangle."""
+    n = wp.tid()
+    face = nearest_triangle(skins.tree, pose, points[n], limit)
+    distance = wp.float64(wp.inf)
+    if face >= 0:
+        found = nearest_on_triangle(
+            corner_of(skins, pose, face, 0) - points[n],
+            corner_of(skins, pose, face, 1) - points[n],
+            corner_of(skins, pose, face, 2) - points[n],
+        )
+        distance = wp.length(wp.vec3d(found[0], found[1], found[2]))
+    if winds_along_x(skins.tree, pose, points[n]) > 0:
+        distance = -distance
+    distance_out[n] = distance
+    face_out[n] = face
+
+
 @wp.func_native(
     f"""
     const int W = {WIDTH};

@@ -7,6 +7,7 @@ from warpjld.errors import InputError
 from warpjld.grasp import ObjectSet
 from warpjld.grasp.auto import find_grasp
 from warpjld.grasp.both_ways import BothWays
+from warpjld.grasp.close import Closer
 from warpjld.grasp.draws import WAY
 from warpjld.grasp.judge import Judge
 from warpjld.grasp.near_object import NearObject
@@ -50,15 +51,15 @@ def test_sampled_hands_are_next_to_the_object_and_not_in_it(covering) -> None:
 
 def test_finding_a_grasp(covering) -> None:
     thing = ball(0.06, subdivisions=3).placed((1.0, 0.5, 0.0))
-    found = find_grasp(covering, thing, count=8, seed=1)
+    found = find_grasp(Closer(covering, thing), count=8, seed=1)
     assert found.posture == "sphere"
     assert found.verdict.closed
     assert found.verdict.epsilon > 0.05
     assert len(found.touching) >= 3
     skin = covering.deform(found.poses(covering.skeleton))[0]
-    seen = penetration(covering, skin, thing)
+    seen = penetration(BothWays(covering, thing), skin)
     assert seen.depth <= 6e-4
-    again = find_grasp(covering, thing, count=8, seed=1)
+    again = find_grasp(Closer(covering, thing), count=8, seed=1)
     np.testing.assert_array_equal(found.angles, again.angles)
     np.testing.assert_array_equal(found.position, again.position)
 
@@ -82,7 +83,7 @@ def test_a_hand_does_not_reach_through_the_table(covering) -> None:
     obstacle = Obstacles(covering, [table])
     depths = []
     for obstacles in ([], [table]):
-        found = find_grasp(covering, thing, obstacles=obstacles, count=16, seed=1)
+        found = find_grasp(Closer(covering, thing), obstacles=obstacles, count=16, seed=1)
         assert found.verdict.closed
         poses = found.poses(covering.skeleton)
         depths.append(obstacle.depth(covering.deform(poses)))
@@ -99,7 +100,7 @@ def test_a_hand_does_not_reach_through_the_table(covering) -> None:
 def test_what_is_walled_in_is_told(covering) -> None:
     walls = box(0.2, 0.2, 0.2, name="crate")
     with pytest.raises(InputError, match="or out of reach: crate blocked 64 more"):
-        find_grasp(covering, ball(0.06, subdivisions=2), obstacles=[walls], count=8)
+        find_grasp(Closer(covering, ball(0.06, subdivisions=2)), obstacles=[walls], count=8)
 
 
 @pytest.mark.parametrize(
@@ -113,9 +114,9 @@ def test_what_is_walled_in_is_told(covering) -> None:
 )
 def test_wrong_wishes(covering, options: dict, says: str) -> None:
     with pytest.raises(InputError, match=says):
-        find_grasp(covering, ball(), **options)
+        find_grasp(Closer(covering, ball()), **options)
 
 
 def test_what_no_hand_can_hold_is_told(covering) -> None:
     with pytest.raises(InputError, match="none of 6 placements ends in a grasp"):
-        find_grasp(covering, ball(2.0, subdivisions=3), count=6)
+        find_grasp(Closer(covering, ball(2.0, subdivisions=3)), count=6)

@@ -76,8 +76,7 @@ class AutoGrasp:
 
 
 def find_grasp(
-    covering: Covering,
-    thing: GraspObject,
+    closer: Closer,
     *,
     obstacles: Sequence[GraspObject] = (),
     side: str | None = None,
@@ -101,8 +100,7 @@ def find_grasp(
     while they close. Placements that they are in the way of are drawn again.
 
     Args:
-        covering: The hand.
-        thing: The object where it stands.
+        closer: Of the hand on the object where it stands.
         obstacles: Other objects where they stand.
         side: ``left`` or ``right``; may be left out for a single hand.
         count: Placements at most.
@@ -114,6 +112,7 @@ def find_grasp(
     Raises:
         InputError: No hand, no such posture, or no placement ends in a grasp.
     """
+    covering, thing = closer.covering, closer.thing
     if count < 1:
         raise InputError(f"count: want 1 or more, got {count}")
     if not (np.isfinite(friction) and friction > 0.0):
@@ -126,7 +125,7 @@ def find_grasp(
     start = posture_angles(covering.skeleton, side, chosen)
     closing = [digit for digit in CLOSING.get(chosen, DIGITS) if f"{side}.{digit}" in digit_chains(covering.skeleton)]
     digits = [f"{side}.{digit}" for digit in closing]
-    closer, around = Closer(covering, thing), Obstacles(covering, obstacles)
+    around = Obstacles(covering, obstacles)
     judge = Judge(closer.both, side, friction)
     draws = Draws(covering, closer.both.near, around, side, chosen, start, closing, np.random.default_rng(seed))
     how = {"digits": digits, "coupling": coupling}

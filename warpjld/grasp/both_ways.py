@@ -71,6 +71,12 @@ class BothWays:
         """
         return -self._least(vertices, places, 0.0, self._movers if moved else self._owners)
 
+    def depth_of_object(self, vertices: NDArray[np.floating]) -> float:
+        """Depth of the object's deepest point in a deformed skin (V, 3) [m], 0 where none is, at its own place."""
+        skins, gaps = self._skins.fitted(vertices[None], self.thing.place), np.zeros((1, len(self.parts)))
+        self._skins.least_distances(skins, self._points, self._owners[0], gaps, near=_NEAR, limit=np.inf, outside=False)
+        return -float(gaps.min())
+
     def _least(
         self,
         vertices: NDArray[np.floating],

@@ -15,9 +15,10 @@ from warpjld.grasp.finer import FinerSkin
 from warpjld.grasp.kept import kept_with
 from warpjld.grasp.quality.closure import force_closure
 from warpjld.grasp.quality.contacts import Contacts
-from warpjld.grasp.quality.touch import Patches, contact_patches
+from warpjld.grasp.quality.touch import Patches
 from warpjld.grasp.quality.wrench_space import least_resistance
 from warpjld.grasp.segments import SEGMENTS, vertex_segments
+from warpjld.grasp.touching import touching_patches
 from warpjld.skeleton import Poses
 
 __all__ = ["Judge", "Verdict"]
@@ -68,7 +69,7 @@ class Judge:
     def __init__(self, both: BothWays, side: str, friction: float) -> None:
         covering, thing = both.covering, both.thing
         self.both, self.friction = both, friction
-        self._center, self._normals = thing.centroid, thing.normals
+        self._center = thing.centroid
         self._radius = float(np.linalg.norm(thing.vertices - thing.centroid, axis=1).max())
         self._skin, self._finer = kept_with(covering, _skin), kept_with(covering, _finer_skin)
         self._segments = vertex_segments(covering, side)
@@ -116,23 +117,7 @@ class Judge:
         place, parts = self.both.thing.place, self._segments[finer.parents]
         local = place.to_local(vertices.reshape(-1, 3))[0].reshape(vertices.shape)
         for skin in local:
-            points = finer.points(skin)
-            found = self.both.near.near(points, tolerance)
-            touching = np.flatnonzero((found.distance <= tolerance) & (parts >= 0))
-            faces = finer.faces[finer.faces_around(touching)]
-            used, corners = np.unique(faces, return_inverse=True)
-            patches = contact_patches(
-                points[used],
-                corners.reshape(-1, 3),
-                # those that only touch a triangle have not all their triangles here
-                np.where(np.isin(used, touching), parts[used], -1),
-                SEGMENTS,
-                found.distance[used],
-                found.point[used],
-                self._normals[found.face[used]],
-                tolerance=tolerance,
-            )
-            yield patches, max(0.0, -float(found.distance.min()))
+            yield touching_patches(finer, parts, self.both.near, skin, tolerance)
 
     def _pressing(self, patches: Patches, rotations: NDArray[np.float64]) -> tuple[Contacts, tuple[str, ...], bool]:
         rows = [SEGMENTS.index(name) for name in patches.names]

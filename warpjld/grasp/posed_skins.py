@@ -116,6 +116,25 @@ class PosedSkins:
             device="cpu",
         )
 
+    def distances(
+        self, skins: Any, points: NDArray[np.floating], limit: float
+    ) -> tuple[NDArray[np.float64], NDArray[np.int32]]:
+        """Signed distances of points (n, 3) to the first of fitted skins [m], infinite beyond the limit, shape (n,).
+
+        Returns:
+            Distances, and the nearest triangles: -1 beyond the limit, T and more in the fans that close holes.
+        """
+        import warp as wp
+        from warpjld_kernels.posed_skin import distances_to_skin
+
+        distance, face = np.empty(len(points)), np.empty(len(points), dtype=np.int32)
+        asked = wp.array(np.ascontiguousarray(points, np.float64), dtype=wp.vec3d, device="cpu", copy=False)
+        outs = [
+            wp.array(a, dtype=kind, device="cpu", copy=False) for a, kind in ((distance, wp.float64), (face, wp.int32))
+        ]
+        wp.launch(distances_to_skin, len(points), inputs=[skins, 0, asked, limit], outputs=outs, device="cpu")
+        return distance, face
+
     def crossings(self, vertices: NDArray[np.floating], part: NDArray[np.int32] | None = None) -> NDArray[np.int64]:
         """Pairs of triangles of different parts that pass through one another.
 
