@@ -12,9 +12,12 @@ from warpjld.grasp.near_object import NearObject
 from warpjld.grasp.objects import GraspObject
 from warpjld.grasp.obstacles import Obstacles
 from warpjld.grasp.opening import Opening, closing_in_air
-from warpjld.grasp.placements import Candidates, across_widths, sample_wrists
+from warpjld.grasp.placements import Candidates, across_widths, around, sample_wrists
+from warpjld.grasp.palm import palm_of
 from warpjld.grasp.postures import AHEAD
+from warpjld.grasp.ways import free_ways
 from warpjld.grasp.widths import Widths, sample_widths
+from warpjld.rotations import unit
 from warpjld.skeleton import CHANNELS
 
 __all__ = ["WAY", "Draws"]
@@ -82,16 +85,20 @@ class Draws:
         across = count - int(_PALM_FIRST * count) if len(widths) else 0
         some = []
         if across:
-            chosen = self.rng.choice(len(widths), size=across, p=_preference(widths, self.near.thing))
+            reach = float(np.mean([np.linalg.norm(one.between[0] - palm_of(self.covering.skeleton, self.side).middle) for one in openings]))
+            rows, ways = free_ways(self.near, widths, reach, self.rng)
+            if not len(rows):
+                rows, ways = np.arange(len(widths)), around(unit(widths.second - widths.first), self.rng)
+            chosen = self.rng.choice(len(rows), size=across, p=_preference(widths[rows], self.near.thing))
             turned = self.rng.random(across) < 0.5
-            picked = widths[chosen]
+            picked = widths[rows[chosen]]
             ends = (
                 np.where(turned[:, None], picked.second, picked.first),
                 np.where(turned[:, None], picked.first, picked.second),
             )
             into = 0.3 if self.posture == "pinch" else 1.0
             these = Widths(*ends, picked.slant)
-            some.append(across_widths(self.covering, openings, self.near, these, self.side, self.rng, into=into))
+            some.append(across_widths(self.covering, openings, self.near, these, ways[chosen], self.side, self.rng, into=into))
         if count > across:
             ahead = AHEAD.get(self.posture, 0.0)
             some.append(

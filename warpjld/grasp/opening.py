@@ -38,6 +38,11 @@ class Opening:
         """Between thumb and fingers [m], shape (S,)."""
         return np.asarray(np.linalg.norm(self.fingers - self.thumb, axis=1))
 
+    @property
+    def between(self) -> NDArray[np.float64]:
+        """Middles between thumb and fingers [m], shape (S, 3)."""
+        return 0.5 * (self.thumb + self.fingers)
+
     def step_for(self, width: float) -> int:
         """The last step at which the pads are at least this far apart; 0 where none is."""
         wide = np.flatnonzero(np.minimum.accumulate(self.width) >= width)

@@ -16,7 +16,7 @@ from warpjld.grasp.widths import Widths
 from warpjld.rotations import unit
 from warpjld.skeleton import Poses, Skeleton, poses_from_angles
 
-__all__ = ["Candidates", "across_widths", "sample_wrists"]
+__all__ = ["Candidates", "across_widths", "around", "sample_wrists"]
 
 _CLEARANCE = 3e-4  # between the open hand and the object [m]
 _SPARE = 0.02  # by which a hand opens wider than what it takes [m]
@@ -91,7 +91,7 @@ def sample_wrists(
     high = 1.0 - 2.0 * k / count
     out = np.stack([np.sqrt(1 - high**2) * np.cos(golden * k), high, np.sqrt(1 - high**2) * np.sin(golden * k)], axis=1)
     look = -(Rotation.random(rng=rng).apply(out))
-    fingers = _around(look, rng)
+    fingers = around(look, rng)
     rotation = Rotation.from_matrix(palm.turned_to(look, fingers))
     centre = thing.place.apply(thing.centroid[None])[0, 0]
     aim = centre + rng.uniform(-0.2, 0.2, size=(count, 3)) * thing.size
@@ -112,6 +112,7 @@ def across_widths(
     openings: list[Opening],
     near: NearObject,
     widths: Widths,
+    ways: NDArray[np.float64],
     side: str,
     rng: np.random.Generator,
     *,
@@ -119,8 +120,7 @@ def across_widths(
 ) -> Candidates:
     """Placements with the thumb at one end of a width and the fingers at the other, one for each width.
 
-    The hand opens so far that the width fits with 2 cm to spare and comes at right angles to it, the roll about it
-    even. At first the pads are to meet the ends: a precision grip. From there it goes on for a random part of the way
+    The hand opens so far that the width fits with 2 cm to spare and comes at right angles to it. At first the pads are to meet the ends: a precision grip. From there it goes on for a random part of the way
     on which the palm would reach the width, as far as it does not touch: towards a power grip.
 
     Args:
@@ -128,6 +128,7 @@ def across_widths(
         openings: Postures; every width takes one of them.
         near: The object.
         widths: N of them.
+        ways: Directions in which the hands come, at right angles to the widths, shape (N, 3).
         side: Which hand.
         rng: Source of randomness.
         into: Largest part of the way to the palm.
@@ -143,7 +144,7 @@ def across_widths(
     between = 0.5 * (thumb + fingers)
     own = _frame(fingers - thumb, between - middle)
     line = unit(widths.second - widths.first)
-    wanted = _frame(line, _around(line, rng))
+    wanted = _frame(line, ways)
     rotation = Rotation.from_matrix(np.einsum("gki,gkj->gij", wanted, own))
     root = skeleton.rest[0]
     position = 0.5 * (widths.first + widths.second) - (root + rotation.apply(between - root))
@@ -170,7 +171,7 @@ def _come(covering: Covering, hands: Candidates, near: NearObject, reach: NDArra
     return hands.moved(moved)
 
 
-def _around(axis: NDArray[np.float64], rng: np.random.Generator) -> NDArray[np.float64]:
+def around(axis: NDArray[np.float64], rng: np.random.Generator) -> NDArray[np.float64]:
     """Unit vectors normal to others (G, 3), the angle about them even."""
     aside = unit(np.cross(axis, np.eye(3)[np.abs(axis).argmin(axis=1)]))
     roll = rng.uniform(0.0, 2.0 * np.pi, size=(len(axis), 1))
