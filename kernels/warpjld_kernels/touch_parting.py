@@ -12,8 +12,11 @@ def fade_samples(
     samples: Samples,
     parts: Parts,
     deepest: wp.array2d(dtype=float),
+    # the same before anything was parted, or anything above ``just``
+    before: wp.array2d(dtype=float),
     full: float,
     none: float,
+    just: float,
     # out
     shown_out: wp.array(dtype=float),
     count_out: wp.array(dtype=wp.int32),
@@ -35,7 +38,9 @@ def fade_samples(
             if a >= 0 and b >= 0:
                 most = wp.max(most, wp.max(deepest[a, b], deepest[b, a]))
     t = wp.clamp((none - most) / (none - full), 0.0, 1.0)
-    shown_out[i] = t * t * (3.0 - 2.0 * t)
+    # what was no overlap before anything was parted is none now: what just was one counts for little
+    was = wp.max(before[own, other], before[other, own])
+    shown_out[i] = t * t * (3.0 - 2.0 * t) * wp.min(was / just, 1.0)
     reach = wp.vec3(samples.radius[i], samples.radius[i], samples.radius[i])
     for side in range(2):
         for k in range(width):

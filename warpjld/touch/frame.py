@@ -22,6 +22,7 @@ SHARE = 1.0 / 3.0
 _FULL, _NONE = 2.0, 2.75
 _SWEEPS = 3
 _SOFT = 0.05  # shares over which an overlap comes to count
+_JUST = 0.1  # shares that two parts must lie in one another for what parting makes of it to be parted again
 _CLEARANCE = 0.05  # shares by which both sides are moved beyond their meeting
 _STIFFNESS = 0.1  # of the fit of planes: samples that weigh less than that in all move nothing in full
 _SWELLS = 1.1  # times as far from its bones as at rest flesh may come by bending
@@ -178,7 +179,7 @@ class Bench:
             recorded(
                 touch_samples.find_samples,
                 count,
-                [points, normals, low, high, pairs, others, self.joints, *boxes, parts, SHARE, _SOFT],
+                [points, normals, low, high, pairs, others, self.joints, *boxes, parts, SHARE, _SOFT, _NONE],
                 [self._deepest, samples],
             ),
         ]
@@ -186,7 +187,7 @@ class Bench:
         self._fade = recorded(
             touch_parting.fade_samples,
             1,
-            [samples, parts, self._deepest, _FULL, _NONE],
+            [samples, parts, self._deepest, self._before, _FULL, _NONE, _JUST],
             [shown, heeded, heed, *boxes],
         )
         self._part = [
@@ -229,7 +230,9 @@ class Bench:
         self._start.numpy()[...] = there
         for sweep in range(_SWEEPS):
             if sweep:
-                self._before.numpy()[...] = self._deepest.numpy()
+                # depths only grow: what was parted a little is no less deep a pose, and would be parted ever more
+                if sweep == 1:
+                    self._before.numpy()[...] = self._deepest.numpy()
                 count = self._find()
             if not count:
                 break
@@ -250,16 +253,16 @@ class Bench:
         self.points.numpy()[...] = points
         self.joints.numpy()[...] = np.nan if joints is None else joints
         self._before.numpy()[...] = 1.0
+        self._deepest.numpy()[...] = 0.0
         for box, end in zip(self._everywhere, (-np.inf, np.inf), strict=True):
             box[...] = end
         return self._find()
 
     def _find(self) -> int:
         """Fill ``samples`` from ``points``; how many there are."""
-        wanted, active, deepest = self._wanted.numpy(), self._active.numpy(), self._deepest.numpy()
+        wanted, active = self._wanted.numpy(), self._active.numpy()
         wanted[...] = 0
         active[...] = 0
-        deepest[...] = 0.0
         self._count[...] = 0
         for command in self._find_pairs:
             command.launch()
