@@ -11,9 +11,8 @@ wp.set_module_options({"enable_backward": False})
 def fade_samples(
     samples: Samples,
     parts: Parts,
+    # by pairs of parts, before anything was parted
     deepest: wp.array2d(dtype=float),
-    # the same before anything was parted, or anything above ``just``
-    before: wp.array2d(dtype=float),
     full: float,
     none: float,
     just: float,
@@ -39,7 +38,7 @@ def fade_samples(
                 most = wp.max(most, wp.max(deepest[a, b], deepest[b, a]))
     t = wp.clamp((none - most) / (none - full), 0.0, 1.0)
     # what was no overlap before anything was parted is none now: what just was one counts for little
-    was = wp.max(before[own, other], before[other, own])
+    was = wp.max(deepest[own, other], deepest[other, own])
     shown_out[i] = t * t * (3.0 - 2.0 * t) * wp.min(was / just, 1.0)
     reach = wp.vec3(samples.radius[i], samples.radius[i], samples.radius[i])
     for side in range(2):

@@ -187,7 +187,7 @@ class Bench:
         self._fade = recorded(
             touch_parting.fade_samples,
             1,
-            [samples, parts, self._deepest, self._before, _FULL, _NONE, _JUST],
+            [samples, parts, self._before, _FULL, _NONE, _JUST],
             [shown, heeded, heed, *boxes],
         )
         self._part = [
@@ -230,10 +230,10 @@ class Bench:
         self._start.numpy()[...] = there
         for sweep in range(_SWEEPS):
             if sweep:
-                # depths only grow: what was parted a little is no less deep a pose, and would be parted ever more
-                if sweep == 1:
-                    self._before.numpy()[...] = self._deepest.numpy()
                 count = self._find()
+            else:
+                # as deep as the pose is, in every sweep: what is parted in part would be parted ever more
+                self._before.numpy()[...] = self._deepest.numpy()
             if not count:
                 break
             self._heed_nothing.launch()
