@@ -7,10 +7,12 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.sparse import csr_array
 from scipy.spatial import cKDTree
 
 from warpjld.rotations import rotate, unit
 from warpjld.skeleton.kinematics import Poses
+from warpjld.touch.frame import FULL, NONE, SHARE
 from warpjld.touch.patches import Patches, segment_distance
 from warpjld.touch.smoothing import edge_lengths
 
@@ -20,10 +22,14 @@ if TYPE_CHECKING:
 __all__ = ["Creases"]
 
 _KEPT = 0.25
-"""Of its rest distance from the plane that every vertex keeps. Without any, skin of both sides would lie in one plane
-and cross by rounding; at .1 more faces cross than at .25, and beyond that it moves what does not cross."""
+"""Of its rest distance from the plane that every vertex keeps at most. Without any, skin of both sides would lie in one
+plane and cross by rounding; more moves what does not cross."""
 
-_REACH = 3.0  # thicknesses from the joint, over the last of which it fades
+_LEAST_APART = 0.03  # thicknesses that a vertex keeps from the plane, where that is not more than its share
+_WIDER = 4.0  # times as far apart as both have passed through one another around
+_WIDEST = 1.0  # thicknesses that they are apart then at most
+_STEPS = 3  # of pushing and smoothing: one leaves a fifth more of what crosses, a fourth changes little
+_REACH = 6.0  # thicknesses from the joint, over the last of which it fades
 _WIDE = (0.9, 1.4)  # thicknesses along the axis between which it fades: what is beside a knuckle is another's skin
 _LEAST = 0.02  # of a vertex that both segments must hold for it to count
 
@@ -114,15 +120,16 @@ class Creases:
             np.array([p[3] for p in planes]),
         )
 
-    def part(self, points: Any, poses: Poses) -> None:
+    def part(self, points: Any, poses: Poses, smooth: csr_array) -> None:
         """Part frames in place.
 
         Args:
             points: Warp array of deformed vertices on the CPU, shape (F, V).
             poses: Their poses.
+            smooth: Rows that smooth a field over the surface, shape (V, V).
         """
         import warp as wp
-        from warpjld_kernels.touch_crease import part_creases
+        from warpjld_kernels.touch_crease import measure_creases, move_smoothly, push_creases
 
         if not len(self.vertex):
             return
@@ -130,26 +137,39 @@ class Creases:
         same = np.where((first * second).sum(axis=-1, keepdims=True) < 0.0, -1.0, 1.0)
         normal = rotate(unit(first + same * second), self.normal)
         turned = wp.array(np.ascontiguousarray(normal, dtype=np.float32), dtype=wp.vec3, device="cpu")
-        size = wp.array(self.size.astype(np.float32), dtype=float, device="cpu")
-        entries = [
-            wp.array(a, dtype=kind, device="cpu", copy=False)
-            for a, kind in (
-                (self.vertex, wp.int32),
-                (self.first, wp.int32),
-                (self.crease, wp.int32),
-                (self.height, float),
-                (self.weight, float),
-                (self.opposite, wp.vec3i),
-                (self.share, wp.vec3),
-            )
-        ]
+        creases, reached, *rows = self._arrays(smooth)
+        overlap = wp.zeros(points.shape, dtype=float, device="cpu")
+        deepest = wp.zeros((len(poses), len(self.joint)), dtype=float, device="cpu")
+        shift = wp.zeros(points.shape, dtype=wp.vec3, device="cpu")
+        size = (len(poses), len(self.vertex))
         wp.launch(
-            part_creases,
-            (len(poses), len(self.vertex)),
-            inputs=[*entries, size, turned, _KEPT, wp.clone(points)],
-            outputs=[points],
-            device="cpu",
+            measure_creases, size, inputs=[creases, turned, points, SHARE], outputs=[overlap, deepest], device="cpu"
         )
+        amounts = [_KEPT, _LEAST_APART, _WIDER, _WIDEST, FULL, NONE]
+        for _ in range(_STEPS):
+            inputs = [creases, turned, points, overlap, deepest, *rows, *amounts]
+            wp.launch(push_creases, size, inputs=inputs, outputs=[shift], device="cpu")
+            inputs = [reached, *rows, shift]
+            wp.launch(move_smoothly, (len(poses), len(reached)), inputs=inputs, outputs=[points], device="cpu")
+
+    def _arrays(self, smooth: csr_array) -> list[Any]:
+        """Of the kernels: the creases, the vertices that a smoothing reaches from them, and its rows."""
+        import warp as wp
+        from warpjld_kernels.touch_crease import Creases as Arrays
+
+        def array(values: NDArray, kind: Any) -> Any:
+            flat = np.float32 if values.dtype.kind == "f" else np.int32
+            return wp.array(np.ascontiguousarray(values, dtype=flat), dtype=kind, device="cpu")
+
+        out = Arrays()
+        for name, kind in Arrays.vars.items():
+            setattr(out, name, array(getattr(self, name), kind.type.dtype))
+        pushed = np.zeros(smooth.shape[0])
+        pushed[self.vertex] = 1.0
+        reached = np.flatnonzero(smooth @ pushed)
+        kinds = (wp.int32, wp.int32, wp.int32, float)
+        some = (reached, smooth.indptr, smooth.indices, smooth.data)
+        return [out, *(array(values, kind) for values, kind in zip(some, kinds, strict=True))]
 
 
 @dataclass(frozen=True, eq=False)

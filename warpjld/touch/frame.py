@@ -12,14 +12,14 @@ from scipy.sparse import csr_array
 from warpjld.covering.binding import smoothstep
 from warpjld.touch.patches import Patches
 
-__all__ = ["SHARE", "Bench", "Model", "Overlaps", "fade"]
+__all__ = ["FULL", "NONE", "SHARE", "Bench", "Model", "Overlaps", "fade"]
 
 SHARE = 1.0 / 3.0
 """Of the local thickness: overlaps up to it skin can give way to, deeper ones are poses that nobody can take."""
 
 # shares: what lies that deep at most is parted in full, what lies deeper than the second is left alone: at three, the
 # middle of the flesh, the nearest way out leaps to the other side
-_FULL, _NONE = 2.0, 2.75
+FULL, NONE = 2.0, 2.75
 _SWEEPS = 3
 _SOFT = 0.05  # shares over which an overlap comes to count
 _JUST = 0.1  # shares that two parts must lie in one another for what parting makes of it to be parted again
@@ -30,8 +30,8 @@ _BULGE = 0.5  # shares that a bulge is high at most
 
 
 def fade(ratio: NDArray[np.float64]) -> NDArray[np.float64]:
-    """How much of an overlap is parted whose deepest place is so many shares deep: 1 to ``_FULL``, 0 from ``_NONE``."""
-    return smoothstep((_NONE - ratio) / (_NONE - _FULL))
+    """How much of an overlap is parted whose deepest place is so many shares deep: 1 to ``FULL``, 0 from ``NONE``."""
+    return smoothstep((NONE - ratio) / (NONE - FULL))
 
 
 @dataclass(frozen=True, eq=False)
@@ -179,7 +179,7 @@ class Bench:
             recorded(
                 touch_samples.find_samples,
                 count,
-                [points, normals, low, high, pairs, others, self.joints, *boxes, parts, SHARE, _SOFT, _NONE],
+                [points, normals, low, high, pairs, others, self.joints, *boxes, parts, SHARE, _SOFT, NONE],
                 [self._deepest, samples],
             ),
         ]
@@ -187,7 +187,7 @@ class Bench:
         self._fade = recorded(
             touch_parting.fade_samples,
             1,
-            [samples, parts, self._before, _FULL, _NONE, _JUST],
+            [samples, parts, self._before, FULL, NONE, _JUST],
             [shown, heeded, heed, *boxes],
         )
         self._part = [

@@ -166,7 +166,7 @@ class Touch:
 
         moved = np.array(points, dtype=np.float32)
         if self.creases is not None and poses is not None:
-            self.creases.part(wp.array(moved, dtype=wp.vec3, device="cpu", copy=False), poses)
+            self.creases.part(wp.array(moved, dtype=wp.vec3, device="cpu", copy=False), poses, self.smooth)
         found: dict[int, Overlaps] = {}
         places = [None] * len(points) if poses is None else poses.positions
 
