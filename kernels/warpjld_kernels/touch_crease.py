@@ -4,6 +4,8 @@ import warp as wp
 
 wp.set_module_options({"enable_backward": False})
 
+ROOM = wp.constant(0.25)  # thicknesses
+
 
 @wp.struct
 class Creases:
@@ -47,23 +49,29 @@ def measure_creases(
     normal: wp.array2d(dtype=wp.vec3),
     points: wp.array2d(dtype=wp.vec3),
     share: float,
-    # out: how far every vertex has passed through what is opposite to it; and of every plane the farthest, in parts of
+    kept: float,
+    # out: whether a vertex may be pushed at all, with room for what pushing others makes of it; how far every vertex has passed through what is opposite to it; and of every plane the farthest, in parts of
     # what both sides can give
+    near_out: wp.array2d(dtype=wp.int32),
     overlap_out: wp.array2d(dtype=float),
     deepest_out: wp.array2d(dtype=float),
 ):
     frame, row = wp.tid()
     v = creases.vertex[row]
     most = float(0.0)
+    near = int(0)
     for entry in range(creases.first[row], creases.first[row + 1]):
         j = creases.crease[entry]
         n = normal[frame, j]
         r = points[frame, v] - across(creases, entry, frame, points)
         overlap = -wp.sign(creases.height[entry]) * wp.dot(r, n)
+        if -overlap < 2.0 * kept * wp.abs(creases.height[entry]) + ROOM * creases.size[j]:
+            near = 1
         if overlap > 0.0:
             overlap *= counts(creases, entry, r, n)
             most = wp.max(most, overlap)
             wp.atomic_max(deepest_out, frame, j, overlap / (2.0 * share * creases.size[j]))
+    near_out[frame, row] = near
     overlap_out[frame, v] = most
 
 
@@ -72,6 +80,7 @@ def push_creases(
     creases: Creases,
     normal: wp.array2d(dtype=wp.vec3),
     points: wp.array2d(dtype=wp.vec3),
+    near: wp.array2d(dtype=wp.int32),
     overlap: wp.array2d(dtype=float),
     deepest: wp.array2d(dtype=float),
     # rows of a smoothing
@@ -85,6 +94,7 @@ def push_creases(
     full: float,
     none: float,
     # out
+    pushed_out: wp.array(dtype=wp.int32),
     shift_out: wp.array2d(dtype=wp.vec3),
 ):
     """How far every vertex is pushed from what is opposite to it, each side by half.
@@ -96,10 +106,13 @@ def push_creases(
     v = creases.vertex[row]
     p = points[frame, v]
     around = float(0.0)
-    for i in range(row_first[v], row_first[v + 1]):
-        around += value[i] * overlap[frame, column[i]]
+    last = creases.first[row]
+    if near[frame, row] != 0:
+        last = creases.first[row + 1]
+        for i in range(row_first[v], row_first[v + 1]):
+            around += value[i] * overlap[frame, column[i]]
     shift = wp.vec3(0.0, 0.0, 0.0)
-    for entry in range(creases.first[row], creases.first[row + 1]):
+    for entry in range(creases.first[row], last):
         j = creases.crease[entry]
         n = normal[frame, j]
         r = p - across(creases, entry, frame, points)
@@ -111,6 +124,8 @@ def push_creases(
             shown = wp.smoothstep(0.0, 1.0, (none - deepest[frame, j]) / (none - full))
             shift += 0.5 * shown * counts(creases, entry, r, n) * missing * side * n
     shift_out[frame, v] = shift
+    if wp.length_sq(shift) > 0.0:
+        pushed_out[frame] = 1
 
 
 @wp.kernel
@@ -120,6 +135,7 @@ def move_smoothly(
     row_first: wp.array(dtype=wp.int32),
     column: wp.array(dtype=wp.int32),
     value: wp.array(dtype=float),
+    pushed: wp.array(dtype=wp.int32),
     shift: wp.array2d(dtype=wp.vec3),
     # in and out
     points: wp.array2d(dtype=wp.vec3),
@@ -128,7 +144,8 @@ def move_smoothly(
     frame, row = wp.tid()
     v = vertex[row]
     total = wp.vec3(0.0, 0.0, 0.0)
-    for i in range(row_first[v], row_first[v + 1]):
+    last = wp.where(pushed[frame] != 0, row_first[v + 1], row_first[v])
+    for i in range(row_first[v], last):
         total += value[i] * shift[frame, column[i]]
     if wp.length_sq(total) > 0.0:
         points[frame, v] = points[frame, v] + total

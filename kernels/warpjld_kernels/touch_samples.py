@@ -7,8 +7,8 @@ from warpjld_kernels.shells import nearest_weights
 wp.set_module_options({"enable_backward": False})
 
 FAR = wp.constant(1.0e30)
-NEARLY = wp.constant(0.5)  # of the nearest distance beyond it: faces that near have a say in where out is
-BESIDE = wp.constant(0.25)  # of a mesh's reach from its bones: outside its box by that nothing is inside it
+NEARLY = wp.constant(0.3)  # of the nearest distance beyond it: faces that near have a say in where out is
+BESIDE = wp.constant(0.1)  # of a mesh's reach from its bones: outside its box by that nothing is inside it
 UNSURE = wp.constant(0.3)  # length of the mean of the ways out that is none
 SURE = wp.constant(0.8)  # and that is one
 
@@ -90,8 +90,8 @@ def find_pairs(
     parts: Parts,
     lower: wp.array(dtype=wp.vec3),
     upper: wp.array(dtype=wp.vec3),
-    # overlaps found before in this frame, or anything above nought for all that may be
-    before: wp.array2d(dtype=float),
+    # how much of the overlaps of two parts is parted; anything above nought where that is not known
+    shown: wp.array2d(dtype=float),
     # out; ``wanted_out`` of parts whose mesh is asked, ``active_out`` of those that take part at all
     count_out: wp.array(dtype=wp.int32),
     other_out: wp.array2d(dtype=wp.int32),
@@ -102,7 +102,7 @@ def find_pairs(
     k = wp.tid()
     count = int(0)
     for other in range(parts.mesh.shape[0]):
-        if parts.apart[k, other] == 1 and wp.max(before[k, other], before[other, k]) > 0.0:
+        if parts.apart[k, other] == 1 and shown[k, other] > 0.0:
             margin = BESIDE * parts.around[other] * wp.vec3(1.0, 1.0, 1.0)
             low = wp.max(lower[k], lower[other] - margin)
             high = wp.min(upper[k], upper[other] + margin)
@@ -300,10 +300,13 @@ def find_samples(
         if near > 0.0:
             near *= beside_bones(joints, parts, k, p)
         if near > 0.0:
-            found = wp.mesh_query_point_no_sign(parts.mesh[k], p, FAR)
+            reach = wp.max(2.0 * parts.thickness[v], parts.around[k])
+            found = wp.mesh_query_point_no_sign(parts.mesh[k], p, reach)
             if found.result and may_be_behind(points, normals, parts, k, p, found.face, found.u, found.v):
                 foot = wp.mesh_eval_position(parts.mesh[k], found.face, found.u, found.v)
-                over = beneath(points, normals, parts, k, p, wp.length(p - foot))
+                least = wp.length(p - foot)
+                near *= wp.min(5.0 - 5.0 * least / reach, 1.0)
+                over = beneath(points, normals, parts, k, p, least)
                 if over.depth > 0.0:
                     n = over.normal
                     sure = wp.smoothstep(UNSURE, SURE, over.sure)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, fields
+from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -14,7 +15,7 @@ from warpjld.rotations import rotate, unit
 from warpjld.skeleton.kinematics import Poses
 from warpjld.touch.frame import FULL, NONE, SHARE
 from warpjld.touch.patches import Patches, segment_distance
-from warpjld.touch.smoothing import edge_lengths
+from warpjld.touch.smoothing import edge_lengths, skin_smoothing
 
 if TYPE_CHECKING:
     from warpjld.covering.covering import Covering
@@ -53,6 +54,7 @@ class Creases:
         opposite: Three vertices of the other side, where the plane mirrors this one to at rest, shape (entries, 3).
         share: Their shares, likewise.
         size: Thickness of the flesh at every crease [m], shape (C,).
+        smooth: Rows that smooth a field over the surface, shape (V, V).
     """
 
     joint: NDArray[np.int32]
@@ -66,6 +68,7 @@ class Creases:
     opposite: NDArray[np.int32]
     share: NDArray[np.float32]
     size: NDArray[np.float64]
+    smooth: csr_array
 
     @classmethod
     def of(cls, covering: Covering, patches: Patches) -> Creases:
@@ -98,10 +101,12 @@ class Creases:
                 if found is not None:
                     planes.append((joint, a, normal, size))
                     entries.append(found)
-        return cls._sorted(planes, entries)
+        return cls._sorted(planes, entries, skin_smoothing(vertices, patches))
 
     @classmethod
-    def _sorted(cls, planes: list[tuple[int, int, NDArray[np.float64], float]], entries: list[_Entries]) -> Creases:
+    def _sorted(
+        cls, planes: list[tuple[int, int, NDArray[np.float64], float]], entries: list[_Entries], smooth: csr_array
+    ) -> Creases:
         joined = _Entries.joined(entries)
         crease = np.repeat(np.arange(len(entries)), [len(e.rows) for e in entries])
         order = np.argsort(joined.rows, kind="stable")
@@ -118,15 +123,15 @@ class Creases:
             joined.opposite[order].astype(np.int32),
             joined.share[order].astype(np.float32),
             np.array([p[3] for p in planes]),
+            smooth,
         )
 
-    def part(self, points: Any, poses: Poses, smooth: csr_array) -> None:
+    def part(self, points: Any, poses: Poses) -> None:
         """Part frames in place.
 
         Args:
             points: Warp array of deformed vertices on the CPU, shape (F, V).
             poses: Their poses.
-            smooth: Rows that smooth a field over the surface, shape (V, V).
         """
         import warp as wp
         from warpjld_kernels.touch_crease import measure_creases, move_smoothly, push_creases
@@ -137,22 +142,25 @@ class Creases:
         same = np.where((first * second).sum(axis=-1, keepdims=True) < 0.0, -1.0, 1.0)
         normal = rotate(unit(first + same * second), self.normal)
         turned = wp.array(np.ascontiguousarray(normal, dtype=np.float32), dtype=wp.vec3, device="cpu")
-        creases, reached, *rows = self._arrays(smooth)
+        creases, reached, *rows = self._arrays
+        size = (len(poses), len(self.vertex))
+        near = wp.empty(size, dtype=wp.int32, device="cpu")
         overlap = wp.zeros(points.shape, dtype=float, device="cpu")
         deepest = wp.zeros((len(poses), len(self.joint)), dtype=float, device="cpu")
+        pushed = wp.zeros(len(poses), dtype=wp.int32, device="cpu")
         shift = wp.zeros(points.shape, dtype=wp.vec3, device="cpu")
-        size = (len(poses), len(self.vertex))
-        wp.launch(
-            measure_creases, size, inputs=[creases, turned, points, SHARE], outputs=[overlap, deepest], device="cpu"
-        )
+        measured = [near, overlap, deepest]
+        inputs = [creases, turned, points, SHARE, _KEPT]
+        wp.launch(measure_creases, size, inputs=inputs, outputs=measured, device="cpu")
         amounts = [_KEPT, _LEAST_APART, _WIDER, _WIDEST, FULL, NONE]
         for _ in range(_STEPS):
-            inputs = [creases, turned, points, overlap, deepest, *rows, *amounts]
-            wp.launch(push_creases, size, inputs=inputs, outputs=[shift], device="cpu")
-            inputs = [reached, *rows, shift]
+            inputs = [creases, turned, points, *measured, *rows, *amounts]
+            wp.launch(push_creases, size, inputs=inputs, outputs=[pushed, shift], device="cpu")
+            inputs = [reached, *rows, pushed, shift]
             wp.launch(move_smoothly, (len(poses), len(reached)), inputs=inputs, outputs=[points], device="cpu")
 
-    def _arrays(self, smooth: csr_array) -> list[Any]:
+    @cached_property
+    def _arrays(self) -> list[Any]:
         """Of the kernels: the creases, the vertices that a smoothing reaches from them, and its rows."""
         import warp as wp
         from warpjld_kernels.touch_crease import Creases as Arrays
@@ -164,11 +172,11 @@ class Creases:
         out = Arrays()
         for name, kind in Arrays.vars.items():
             setattr(out, name, array(getattr(self, name), kind.type.dtype))
-        pushed = np.zeros(smooth.shape[0])
+        pushed = np.zeros(self.smooth.shape[0])
         pushed[self.vertex] = 1.0
-        reached = np.flatnonzero(smooth @ pushed)
+        reached = np.flatnonzero(self.smooth @ pushed)
         kinds = (wp.int32, wp.int32, wp.int32, float)
-        some = (reached, smooth.indptr, smooth.indices, smooth.data)
+        some = (reached, self.smooth.indptr, self.smooth.indices, self.smooth.data)
         return [out, *(array(values, kind) for values, kind in zip(some, kinds, strict=True))]
 
 

@@ -101,7 +101,7 @@ class Bench:
         self._count = self.samples.count.numpy()
         self._wanted = wp.zeros(names, dtype=wp.int32, device="cpu")
         self._active = wp.zeros(names, dtype=wp.int32, device="cpu")
-        self._before = wp.zeros((names, names), dtype=float, device="cpu")
+        self._shown = wp.zeros((names, names), dtype=float, device="cpu")
         self._deepest = wp.zeros((names, names), dtype=float, device="cpu")
         self._normals, self._moved, self._start = (wp.zeros(count, dtype=wp.vec3, device="cpu") for _ in range(3))
         self._lost, self._room = (wp.zeros(names, dtype=float, device="cpu") for _ in range(2))
@@ -152,7 +152,7 @@ class Bench:
         import warp as wp
         from warpjld_kernels import touch_bulge, touch_parting, touch_samples
 
-        def recorded(kernel: Any, dim: int, inputs: list[Any], outputs: list[Any]) -> Any:
+        def recorded(kernel: Any, dim: int | tuple[int, int], inputs: list[Any], outputs: list[Any]) -> Any:
             return wp.launch(kernel, dim, inputs=inputs, outputs=outputs, device="cpu", record_cmd=True)
 
         count, names = len(self.points), len(self._meshes)
@@ -163,14 +163,13 @@ class Bench:
         pairs, heeded = (wp.zeros(names, dtype=wp.int32, device="cpu") for _ in range(2))
         others = wp.zeros((names, names), dtype=wp.int32, device="cpu")
         heed = wp.zeros((names, count), dtype=wp.int32, device="cpu")
-        shown = wp.zeros(2 * count, dtype=float, device="cpu")
         ring = wp.zeros(count, dtype=float, device="cpu")
         self._find_pairs = [
             recorded(touch_samples.find_boxes, names, [points, parts], [low, high]),
             recorded(
                 touch_samples.find_pairs,
                 names,
-                [parts, low, high, self._before],
+                [parts, low, high, self._shown],
                 [pairs, others, self._wanted, self._active],
             ),
         ]
@@ -184,17 +183,16 @@ class Bench:
             ),
         ]
         self._heed_nothing = recorded(touch_parting.heed_nothing, names, [], [heeded, *boxes])
+        # as deep as the pose is, in every sweep: what is parted in part would be parted ever more
         self._fade = recorded(
-            touch_parting.fade_samples,
-            1,
-            [samples, parts, self._before, FULL, NONE, _JUST],
-            [shown, heeded, heed, *boxes],
+            touch_parting.fade_pairs, (names, names), [parts, self._deepest, FULL, NONE, _JUST], [self._shown]
         )
+        self._heed = recorded(touch_parting.heed_samples, 1, [samples, parts], [heeded, heed, *boxes])
         self._part = [
             recorded(
                 touch_parting.part_surfaces,
                 count,
-                [points, normals, samples, shown, heeded, heed, *boxes, parts, _CLEARANCE, _SOFT, _STIFFNESS],
+                [points, normals, samples, self._shown, heeded, heed, *boxes, parts, _CLEARANCE, _SOFT, _STIFFNESS],
                 [self._moved],
             ),
             recorded(touch_parting.move, count, [self._moved], [points]),
@@ -232,13 +230,12 @@ class Bench:
             if sweep:
                 count = self._find()
             else:
-                # as deep as the pose is, in every sweep: what is parted in part would be parted ever more
-                self._before.numpy()[...] = self._deepest.numpy()
+                self._fade.launch()
             if not count:
                 break
             self._heed_nothing.launch()
-            self._fade.set_dim(count)
-            for command in (self._fade, *self._part):
+            self._heed.set_dim(count)
+            for command in (self._heed, *self._part):
                 command.launch()
             if sweep == 0:
                 self._lost.numpy()[...] = 0.0
@@ -252,7 +249,7 @@ class Bench:
     def _first(self, points: NDArray[np.floating], joints: NDArray[np.floating] | None) -> int:
         self.points.numpy()[...] = points
         self.joints.numpy()[...] = np.nan if joints is None else joints
-        self._before.numpy()[...] = 1.0
+        self._shown.numpy()[...] = 1.0
         self._deepest.numpy()[...] = 0.0
         for box, end in zip(self._everywhere, (-np.inf, np.inf), strict=True):
             box[...] = end
