@@ -121,7 +121,7 @@ def push_creases(
         apart = wp.min(apart, 2.0 * kept * wp.abs(creases.height[entry]))
         missing = apart - side * wp.dot(r + shift, n)
         if missing > 0.0:
-            shown = wp.smoothstep(0.0, 1.0, (none - deepest[frame, j]) / (none - full))
+            shown = wp.clamp((none - deepest[frame, j]) / (none - full), 0.0, 1.0)
             shift += 0.5 * shown * counts(creases, entry, r, n) * missing * side * n
     shift_out[frame, v] = shift
     if wp.length_sq(shift) > 0.0:

@@ -31,7 +31,7 @@ def fade_pairs(
                 b = parts.beside[other, i_other]
                 if a >= 0 and b >= 0:
                     most = wp.max(most, wp.max(deepest[a, b], deepest[b, a]))
-        shown = wp.smoothstep(0.0, 1.0, (none - most) / (none - full)) * wp.min(was / just, 1.0)
+        shown = wp.clamp((none - most) / (none - full), 0.0, 1.0) * wp.min(was / just, 1.0)
     shown_out[own, other] = shown
 
 
@@ -121,7 +121,7 @@ def part_surfaces(
                 limit = samples.depth[i] / samples.ratio[i]
                 # what is much farther beyond the plane than that vertex was is not beside it
                 gap = clearance * limit * wp.sqrt(samples.counts[i])
-                missing = wp.min(gap - wp.dot(r, n), gap + 1.5 * samples.depth[i])
+                missing = wp.min(gap - wp.dot(r, n), gap + 1.5 * samples.parted[i])
                 looks = wp.clamp(1.0 - 2.0 * wp.dot(facing, n), 0.0, 1.0)
                 if side != 0.0 and missing > 0.0 and looks > 0.0:
                     # a plane that is just being passed counts for nothing yet: else all would jump

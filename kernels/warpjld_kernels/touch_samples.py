@@ -7,10 +7,10 @@ from warpjld_kernels.shells import nearest_weights
 wp.set_module_options({"enable_backward": False})
 
 FAR = wp.constant(1.0e30)
-NEARLY = wp.constant(0.3)  # of the nearest distance beyond it: faces that near have a say in where out is
-BESIDE = wp.constant(0.1)  # of a mesh's reach from its bones: outside its box by that nothing is inside it
-UNSURE = wp.constant(0.3)  # length of the mean of the ways out that is none
-SURE = wp.constant(0.8)  # and that is one
+NEARLY = wp.constant(0.5)  # of the nearest distance beyond it: faces that near have a say in where out is
+BESIDE = wp.constant(0.03)  # of a mesh's reach from its bones: outside its box by that nothing is inside it
+UNSURE = wp.constant(0.0)  # length of the mean of the ways out that is none
+SURE = wp.constant(0.9)  # and that is one
 
 
 @wp.struct
@@ -49,8 +49,8 @@ class Samples:
     """Vertices that lie inside another part.
 
     Of each: its number, its part and the other; a point of the surface in which both are to meet and that surface's
-    normal, towards the vertex's own part; how deep it lies, how much it counts, the radius over which it does, and its
-    depth in parts of what skin can give.
+    normal, towards the vertex's own part; how deep it lies, how much of that is parted, how much it counts, the radius
+    over which it does, and its depth in parts of what skin can give.
     """
 
     count: wp.array(dtype=wp.int32)
@@ -60,6 +60,7 @@ class Samples:
     point: wp.array(dtype=wp.vec3)
     normal: wp.array(dtype=wp.vec3)
     depth: wp.array(dtype=float)
+    parted: wp.array(dtype=float)
     counts: wp.array(dtype=float)
     radius: wp.array(dtype=float)
     ratio: wp.array(dtype=float)
@@ -309,11 +310,12 @@ def find_samples(
                 over = beneath(points, normals, parts, k, p, least)
                 if over.depth > 0.0:
                     n = over.normal
-                    sure = wp.smoothstep(UNSURE, SURE, over.sure)
+                    sure = wp.clamp((over.sure - UNSURE) / (SURE - UNSURE), 0.0, 1.0)
                     facing = wp.clamp(-2.0 * wp.dot(n, looks), parts.facing, 1.0)
                     plain = wp.min(smooth_skin(normals[v], parts.area[v]), over.plain)
-                    inside = near * over.depth * plain * over.border
-                    depth = inside * facing * sure - parts.at_rest[v]
+                    inside = near * wp.min(over.depth, least) * plain * over.border
+                    depth = inside * facing - parts.at_rest[v]
+                    parted = wp.max(inside * facing * sure - parts.at_rest[v], 0.0)
                     limit = share * wp.min(over.thick, parts.thickness[v])
                     # whichever way the surfaces face, and sooner where the way out is not sure
                     if inside > parts.at_rest[v]:
@@ -326,9 +328,10 @@ def find_samples(
                             samples.vertex[at] = v
                             samples.own[at] = own
                             samples.other[at] = k
-                            samples.point[at] = p + yields * depth * n
+                            samples.point[at] = p + yields * parted * n
                             samples.normal[at] = n
                             samples.depth[at] = depth
-                            samples.counts[at] = wp.min(depth / (soft * limit), 1.0)
+                            samples.parted[at] = parted
+                            samples.counts[at] = wp.min(parted / (soft * limit), 1.0)
                             samples.radius[at] = wp.max(wp.min(over.thick, parts.thickness[v]), 1.2 * parts.edge[v])
                             samples.ratio[at] = depth / limit

@@ -19,8 +19,8 @@ SHARE = 1.0 / 3.0
 
 # shares: what lies that deep at most is parted in full, what lies deeper than the second is left alone: at three, the
 # middle of the flesh, the nearest way out leaps to the other side
-FULL, NONE = 2.0, 2.75
-_SWEEPS = 3
+FULL, NONE = 1.0, 2.75
+_SWEEPS = 2
 _SOFT = 0.05  # shares over which an overlap comes to count
 _JUST = 0.1  # shares that two parts must lie in one another for what parting makes of it to be parted again
 _CLEARANCE = 0.05  # shares by which both sides are moved beyond their meeting
