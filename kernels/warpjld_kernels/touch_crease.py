@@ -50,8 +50,8 @@ def measure_creases(
     points: wp.array2d(dtype=wp.vec3),
     share: float,
     kept: float,
-    # out: whether a vertex may be pushed at all, with room for what pushing others makes of it; how far every vertex has passed through what is opposite to it; and of every plane the farthest, in parts of
-    # what both sides can give
+    # out: whether a vertex may be pushed at all, with room for what pushing others makes of it; how far it has passed
+    # through what is opposite to it; and of every plane the farthest, in parts of what both sides can give
     near_out: wp.array2d(dtype=wp.int32),
     overlap_out: wp.array2d(dtype=float),
     deepest_out: wp.array2d(dtype=float),

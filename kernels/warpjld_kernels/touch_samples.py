@@ -144,7 +144,7 @@ def find_normals(
 
 @wp.func
 def beside_bones(joints: wp.array(dtype=wp.vec3), parts: Parts, k: int, p: wp.vec3) -> float:
-    """1 for a point as near to a part's bones as its mesh reaches, 0 for one a tenth farther; 1 where a part has none."""
+    """1 for a point as near to a part's bones as its mesh reaches, 0 a tenth farther; 1 where a part has none."""
     first = parts.first_bone[k]
     last = parts.first_bone[k + 1]
     least = wp.where(first == last, 0.0, FAR)

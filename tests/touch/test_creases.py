@@ -60,7 +60,7 @@ def test_what_does_not_overlap_stays_bit_for_bit() -> None:
 
 def test_an_overlap_far_from_the_joint_is_parted_where_it_is() -> None:
     """Both halves of the finger lie in one another along their whole length; near the joint there is room."""
-    poses = bent(COVERING, 156.0)
+    poses = bent(COVERING, 160.0)
     before = COVERING.deform(poses)
     rest = COVERING.surface.vertices[:, 2] + 0.05
     tall = np.abs(rest) > 0.03
