@@ -18,7 +18,7 @@ SHARE = 1.0 / 3.0
 """Of the local thickness: overlaps up to it skin can give way to, deeper ones are poses that nobody can take."""
 
 # shares: what lies that deep at most is parted in full, what lies deeper than the second is left alone: at three, the
-# middle of the flesh, the way out is on the other side. Parted in full up to two, a closing fist gave its skin up within
+# middle of the flesh, the way out is on the other side. Parted in full up to two, a closing fist gave its skin up in
 # a few frames: 3 mm in one of 240, now 1
 FULL, NONE = 1.0, 2.75
 _SWEEPS = 2  # a third parts hardly more and costs as much as the second
