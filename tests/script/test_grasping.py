@@ -12,6 +12,7 @@ from warpjld.grasp.digits import pad_vertex
 from warpjld.normals import vertex_normals
 from warpjld.script.binding import cover
 from warpjld.script.grasping import placed_at, posture
+from warpjld.script.props import prop_places
 from warpjld.script.runner import cast, run_scene
 from warpjld.script.staging import stage
 from warpjld.skeleton import poses_from_angles
@@ -50,7 +51,7 @@ def test_objects_as_printed_in_the_paper(run) -> None:
     scene = run("OBJECT APPLE BALL\nFINGER23 LEFT INDEX KNUCKLES2 AT 5 0\nFINGER23 LEFT INDEX KNUCKLES2 AT 10 60\n")
     run("MOVE LEFT 0 0 0 0\nMOVE LEFT 12 0.1 0 0\nOBJECTS APPLE INDEX LEFT KNUCKLES2 5 10")
     prop = scene.prop("apple")
-    places = scene.whereabouts(prop, np.array([0.0, 5.0, 7.0, 10.0, 12.0]))
+    places = prop_places(scene.actors, scene.rate, prop, np.array([0.0, 5.0, 7.0, 10.0, 12.0]))
     np.testing.assert_allclose(places.position[:2], 0, atol=1e-12)
     assert np.linalg.norm(places.position[2]) > 0.01
     np.testing.assert_allclose(places.position[3], places.position[4], atol=1e-12)

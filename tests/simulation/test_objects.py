@@ -11,6 +11,7 @@ import pytest
 from warpjld.fem import Status
 from warpjld.script import Scene
 from warpjld.script.contact import run_contact
+from warpjld.script.props import prop_places
 from warpjld.simulation.simulate import Simulation
 
 BLOCK = """
@@ -57,7 +58,7 @@ def test_held_points_go_where_the_object_goes(run: Callable[[str], Scene], tmp_p
     scene.contact.physical["BLOCK"] = type(scene.contact.physical["BLOCK"])(young=1e5, poisson=0.3, element=0.005)
     report = run_contact(scene, tmp_path)
     assert report.solved.status is Status.CONVERGED
-    place = scene.whereabouts(scene.prop("block"), np.array([2.0]))
+    place = prop_places(scene.actors, scene.rate, scene.prop("block"), np.array([2.0]))
     np.testing.assert_allclose(
         report.surfaces.object("BLOCK", 2.0), place.apply(scene.prop("block").thing.vertices)[0], atol=4e-5
     )

@@ -12,8 +12,8 @@ from warpjld.grasp.near_object import NearObject
 from warpjld.grasp.objects import GraspObject
 from warpjld.grasp.obstacles import Obstacles
 from warpjld.grasp.opening import Opening, closing_in_air
-from warpjld.grasp.placements import Candidates, across_widths, around, sample_wrists
 from warpjld.grasp.palm import palm_of
+from warpjld.grasp.placements import Candidates, across_widths, around, sample_wrists
 from warpjld.grasp.postures import AHEAD
 from warpjld.grasp.ways import free_ways
 from warpjld.grasp.widths import Widths, sample_widths

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from warpjld.errors import InputError
 from warpjld.script.binding import cover
+from warpjld.script.props import prop_places
 from warpjld.script.staging import stage
 from warpjld.skeleton import Poses
 
@@ -69,7 +70,7 @@ def posture(scene: Scene, actor: Actor, key: float) -> tuple[Poses, NDArray[np.f
 
 def placed_at(scene: Scene, prop: Prop, key: float) -> GraspObject:
     """An object where it is at a frame."""
-    there = scene.whereabouts(prop, np.array([key]))
+    there = prop_places(scene.actors, scene.rate, prop, np.array([key]))
     thing = replace(prop.thing, vertices=prop.shape(key)) if prop.deforms else prop.thing
     return thing.placed(there.position[0], there.rotation[0])
 
@@ -161,7 +162,7 @@ def collisions(scene: Scene, actor: Actor, held: Prop, first: float, last: float
             shapes = [BothWays(covering, placed_at(scene, prop, frame)) for frame in frames.tolist()]
             depths = np.concatenate([shape.depths(skin[None]) for shape, skin in zip(shapes, skins, strict=True)])
         else:
-            depths = both.depths(skins, scene.whereabouts(prop, frames))
+            depths = both.depths(skins, prop_places(scene.actors, scene.rate, prop, frames))
         frame, part = np.unravel_index(depths.argmax(), depths.shape)
         if depths[frame, part] > COLLIDES:
             depth = 1e3 * depths[frame, part]

@@ -6,7 +6,7 @@ from collections.abc import Iterator
 from typing import TYPE_CHECKING
 
 from warpjld.script.arguments import Arguments
-from warpjld.script.commands.animation import SIDES
+from warpjld.script.keys import SIDES
 from warpjld.script.scene import Scene
 from warpjld.skeleton import CHANNELS
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from contextlib import contextmanager
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -14,6 +15,7 @@ from warpjld.script.crowd import Crowd, role_of
 from warpjld.script.folder import OutputFolder
 from warpjld.script.outputs import Camera, ContactSheet, Film, Picture, Style
 from warpjld.script.pressure import PressureView
+from warpjld.script.props import prop_places
 from warpjld.script.scene import Scene
 
 __all__ = [
@@ -137,7 +139,7 @@ def sheet_frames(scene: Scene, frames: NDArray[np.float64]) -> tuple[float, ...]
 def preview(scene: Scene, frame: float, style: Style) -> Path:
     """A picture of any frame of the scene as it is, in the output folder (R5)."""
     roles = [role_of(a, np.array([frame]), scene.rate) for a in scene.actors.values()]
-    crowd = Crowd(roles, np.array([frame]), props=list(scene.props.values()), whereabouts=scene.whereabouts)
+    crowd = Crowd(roles, np.array([frame]), props=list(scene.props.values()), whereabouts=partial(prop_places, scene.actors, scene.rate))
     name = f"{style}-{frame:g}.png"
     with OutputFolder(scene.folder) as out:
         draw_picture(scene, crowd, Picture(name, frame, style, scene.camera), out.place(name))

@@ -29,7 +29,7 @@ from warpjld.script.motion_files import write_motions
 from warpjld.script.outputs import ContactSheet, Export, Film, Grips, MotionFile, Output, Picture, Table
 from warpjld.script.per_actor import actors_of, file_of
 from warpjld.script.pictures import FilmStudio, PressureStudio, draw_contact_sheet, draw_picture, film_studio
-from warpjld.script.props import Prop, prop_surface
+from warpjld.script.props import Prop, prop_places, prop_surface
 from warpjld.script.scene import Scene
 from warpjld.script.staging import frame_numbers, held, notes, stage
 from warpjld.script.summary import Summary
@@ -154,7 +154,7 @@ def cast(
     for number, actor in enumerate(scene.actors.values()):
         progress(f"binding {actor.name.lower()}", number, len(scene.actors))
         roles.append(role_of(actor, frames, scene.rate))
-    return Crowd(roles, frames, device, list(scene.props.values()), scene.whereabouts)
+    return Crowd(roles, frames, device, list(scene.props.values()), partial(prop_places, scene.actors, scene.rate))
 
 
 def _names(scene: Scene, outputs: Sequence[Output]) -> list[str]:

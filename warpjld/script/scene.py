@@ -8,9 +8,6 @@ from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Literal
 
-import numpy as np
-from numpy.typing import NDArray
-
 from warpjld.errors import InputError
 from warpjld.script.outputs import Camera, Output
 from warpjld.script.placement import Placement
@@ -19,7 +16,6 @@ from warpjld.suggest import did_you_mean
 
 if TYPE_CHECKING:
     from warpjld.covering import Covering, Parameters
-    from warpjld.grasp import Places
     from warpjld.motion import Motion
     from warpjld.rig import Rig
     from warpjld.script.grasping import Attempt
@@ -206,12 +202,6 @@ class Scene:
         if name.upper() in self.actors or not self.props:
             return self.actor(name).placement
         raise InputError(f"there is no actor or object {name}{did_you_mean(name, [*self.actors, *self.props])}")
-
-    def whereabouts(self, prop: Prop, frames: NDArray[np.float64]) -> Places:
-        """Where an object is at F frames."""
-        from warpjld.script.props import prop_places
-
-        return prop_places(self.actors, self.rate, prop, frames)
 
     def actor_with(self, side: str) -> Actor:
         """The actor whose left or right limbs are meant: the current one if it has any, else the only one that has.

@@ -10,8 +10,7 @@ import numpy as np
 
 from warpjld.io.placement import METRES
 from warpjld.script.arguments import Arguments
-from warpjld.script.commands.animation import SIDES
-from warpjld.script.keys import read_joint
+from warpjld.script.keys import SIDES, read_joint
 from warpjld.script.registry import command
 from warpjld.script.scene import Scene
 from warpjld.skeleton import CHANNELS

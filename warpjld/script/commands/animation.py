@@ -8,13 +8,11 @@ from dataclasses import asdict
 
 from warpjld.motion import Key
 from warpjld.script.arguments import Arguments
-from warpjld.script.keys import read_joint, set_keys
+from warpjld.script.keys import FINGERS, SIDES, read_joint, set_keys
 from warpjld.script.registry import command
 from warpjld.script.scene import Scene, SplineConstants
 from warpjld.skeleton import CHANNELS
 
-SIDES = ("LEFT", "RIGHT")
-FINGERS = ("THUMB", "INDEX", "MIDDLE", "RING", "PINKY")
 _KEYS = "<key1> <key2> <step> <degrees>"
 
 

@@ -7,8 +7,7 @@ from typing import Literal
 
 from warpjld.errors import InputError
 from warpjld.script.arguments import Arguments
-from warpjld.script.commands.animation import SIDES
-from warpjld.script.keys import read_joint
+from warpjld.script.keys import SIDES, read_joint
 from warpjld.script.registry import command
 from warpjld.script.scene import Scene
 

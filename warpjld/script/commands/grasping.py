@@ -7,10 +7,9 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING, cast
 
 from warpjld.script.arguments import Arguments
-from warpjld.script.commands.animation import FINGERS
 from warpjld.script.commands.physical import read_object
 from warpjld.script.grips import read_frames, read_side
-from warpjld.script.keys import named_joint
+from warpjld.script.keys import FINGERS, named_joint
 from warpjld.script.registry import command
 from warpjld.script.scene import Scene
 from warpjld.skeleton import CHANNELS

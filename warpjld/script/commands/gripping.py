@@ -7,10 +7,10 @@ from typing import TYPE_CHECKING, cast
 
 from warpjld.errors import InputError
 from warpjld.script.arguments import Arguments
-from warpjld.script.commands.animation import FINGERS
 from warpjld.script.commands.physical import place, read_object
 from warpjld.script.contact import REST
 from warpjld.script.grips import flexions_of_grip, gripping_actor, read_actor, read_frames
+from warpjld.script.keys import FINGERS
 from warpjld.script.registry import command
 from warpjld.script.scene import Scene
 from warpjld.simulation.specification import GripSpecification

@@ -9,9 +9,8 @@ import numpy as np
 from warpjld.errors import InputError
 from warpjld.lengths import check_size
 from warpjld.script.arguments import Arguments
-from warpjld.script.commands.animation import FINGERS, SIDES
 from warpjld.script.commands.physical import read_object
-from warpjld.script.keys import named_joint, read_joint
+from warpjld.script.keys import FINGERS, SIDES, named_joint, read_joint
 from warpjld.script.registry import command
 from warpjld.script.scene import Scene
 

@@ -5,8 +5,8 @@ from __future__ import annotations
 from typing import cast
 
 from warpjld.script.arguments import Arguments
-from warpjld.script.commands.animation import FINGERS
 from warpjld.script.formats import EXPORTS, FILMS, MOTIONS, PICTURES, VIEWS
+from warpjld.script.keys import FINGERS
 from warpjld.script.outputs import Camera, ContactSheet, Export, Film, MotionFile, Output, Picture, Style
 from warpjld.script.registry import command
 from warpjld.script.scene import Scene

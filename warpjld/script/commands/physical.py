@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, cast
 
 from warpjld.errors import InputError
 from warpjld.script.arguments import Arguments
-from warpjld.script.commands.animation import FINGERS
+from warpjld.script.keys import FINGERS
 from warpjld.script.registry import command
 from warpjld.script.scene import Scene
 from warpjld.simulation.specification import (

@@ -7,9 +7,9 @@ from typing import cast
 import numpy as np
 
 from warpjld.script.arguments import Arguments
-from warpjld.script.commands.animation import FINGERS
 from warpjld.script.commands.physical import read_object
 from warpjld.script.grips import read_frames, read_side
+from warpjld.script.keys import FINGERS
 from warpjld.script.registry import command
 from warpjld.script.scene import Scene
 
