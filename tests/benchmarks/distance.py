@@ -20,7 +20,7 @@ from rich.table import Table
 
 from warpjld.covering import bind
 from warpjld.grasp import NEAREST, FlexionSearch, GraspObject, ObjectSet, Searches, Status
-from warpjld.grasp.close import close_hand
+from warpjld.grasp.close import Closer
 from warpjld.grasp.judge import Judge
 from warpjld.grasp.shapes import ball, cylinder
 from warpjld.hand import build_hand
@@ -157,35 +157,32 @@ def grasps() -> Table:
     """Whole hands closed on a ball: at a first look, in full, and scored."""
     rig = build_hand("left", resolution=1500)
     covering = bind(rig.skeleton, rig.surface)
-    thing, count = ball(0.065), 32
-    objects, judge = ObjectSet(thing), Judge(covering, thing, "left", 0.6)
+    count = 32
+    closer = Closer(covering, ball(0.065))
+    judge = Judge(closer.both, "left", 0.6)
     rng = np.random.default_rng(0)
     shift = -np.array([0.004, -0.056, -0.062]) + rng.uniform(-0.004, 0.004, size=(count, 3)) * [1, 0, 1]
     _, angles = open_hands(rig.skeleton, count)
     poses = poses_from_angles(rig.skeleton, angles, root_position=shift)
-    few, held = 8, []
+    held = []
 
     def scored() -> None:
-        closed = close_hand(covering, poses[:few], angles[:few], objects, threads=1)
-        ended = poses_from_angles(rig.skeleton, closed.angles, root_position=shift[:few])
-        held[:] = [judge.judge(ended[g : g + 1], skin) for g, skin in enumerate(covering.deform(ended, threads=1))]
+        closed = closer.close(poses, angles)
+        ended = poses_from_angles(rig.skeleton, closed.angles, root_position=shift)
+        held[:] = judge.judge(ended, covering.deform(ended, threads=1), closed.penetration)
 
     methods: dict[str, Callable[[], object]] = {
-        "first look: a third of the vertices search": lambda: close_hand(
-            covering, poses, angles, objects, quick=True, threads=1
-        ),
-        "closed, edges kept out of the skin": lambda: close_hand(
-            covering, poses[:few], angles[:few], objects, apart=False, threads=1
-        ),
+        "first look: a third of the vertices search": lambda: closer.close(poses, angles, quick=True),
+        "closed, edges kept out of the skin": lambda: closer.close(poses, angles, apart=False),
         "complete: digits apart too, contacts, force closure, epsilon": scored,
     }
     times = in_turn(methods, 3)
     table = Table(title=f"hands of {len(covering.surface.vertices):,} vertices closed on a ball, one thread")
     for heading in ("", "grasps per second", "force closed"):
         table.add_column(heading, justify="left" if not heading else "right")
-    for name, each in zip(methods, (count, few, few), strict=True):
+    for name in methods:
         share = f"{np.mean([one.closed for one in held]):.0%}" if name.startswith("complete") else ""
-        table.add_row(name, f"{each / np.median(times[name]):.1f}", share)
+        table.add_row(name, f"{count / np.median(times[name]):.1f}", share)
     return table
 
 

@@ -11,11 +11,14 @@ from warpjld.grasp.close import Closer
 from warpjld.grasp.draws import WAY
 from warpjld.grasp.judge import Judge
 from warpjld.grasp.near_object import NearObject
+from warpjld.grasp.objects import make_object
 from warpjld.grasp.obstacles import COLLIDES, Obstacles
 from warpjld.grasp.placements import sample_wrists
 from warpjld.grasp.postures import POSTURES, posture_angles, posture_for
 from warpjld.grasp.quality import penetration
 from warpjld.grasp.shapes import ball, box, cylinder, glass, plate
+from warpjld.grasp.ways import free_ways
+from warpjld.grasp.widths import sample_widths
 from warpjld.skeleton import poses_from_angles
 
 
@@ -117,6 +120,66 @@ def test_wrong_wishes(covering, options: dict, says: str) -> None:
         find_grasp(Closer(covering, ball()), **options)
 
 
-def test_what_no_hand_can_hold_is_told(covering) -> None:
-    with pytest.raises(InputError, match="none of 6 placements ends in a grasp"):
-        find_grasp(Closer(covering, ball(2.0, subdivisions=3)), count=6)
+def test_what_no_hand_can_span_is_told_with_both_widths(covering) -> None:
+    with pytest.raises(InputError, match=r"narrower than 1\d{3} mm, and thumb and fingers open to 1?\d{2} mm"):
+        find_grasp(Closer(covering, ball(1.5, subdivisions=3)))
+    with pytest.raises(InputError, match="nowhere narrower than 250 mm"):
+        find_grasp(Closer(covering, box(0.25, 0.25, 0.25)))
+
+
+def test_what_does_not_hold_is_told(covering) -> None:
+    with pytest.raises(InputError, match="none of 6 placements ends in a grasp that holds at friction"):
+        find_grasp(Closer(covering, ball(0.06, subdivisions=2)), count=6, friction=0.01)
+
+
+def bowl(radius: float, wall: float):
+    """Half a hollow ball, open above; its only narrow part is its wall."""
+    turns = np.linspace(0.0, np.pi / 2.0, 12)
+    outside, inside = ([(r * np.sin(a), -r * np.cos(a)) for a in turns] for r in (radius, radius - wall))
+    return revolved([*outside, *inside[::-1]])
+
+
+def revolved(profile):
+    """A profile (radius, height) from axis to axis, turned about Y."""
+    rings, count = np.array(profile[1:-1]), 48
+    angle = 2.0 * np.pi * np.arange(count) / count
+    around = np.stack([np.cos(angle), np.zeros(count), -np.sin(angle)], axis=1)
+    points = rings[:, None, :1] * around + rings[:, None, 1:] * np.array([0.0, 1.0, 0.0])
+    number = np.arange(len(rings) * count).reshape(-1, count)
+    after = np.roll(number, -1, axis=1)
+    ends = len(rings) * count + np.arange(2)[:, None] + np.zeros((1, count), dtype=int)
+    faces = [
+        np.stack([number[:-1], after[:-1], after[1:]], axis=-1).reshape(-1, 3),
+        np.stack([number[:-1], after[1:], number[1:]], axis=-1).reshape(-1, 3),
+        np.stack([ends[0], after[0], number[0]], axis=-1),
+        np.stack([ends[1], number[-1], after[-1]], axis=-1),
+    ]
+    poles = [[0.0, profile[0][1], 0.0], [0.0, profile[-1][1], 0.0]]
+    return make_object("bowl", np.concatenate([points.reshape(-1, 3), poles]), np.concatenate(faces))
+
+
+def test_a_bowl_is_taken_by_its_rim(covering) -> None:
+    """Wider than the hand opens: thumb on one side of the wall, fingers on the other."""
+    thing = bowl(0.08, 0.004)
+    assert not thing.report.notes()
+    found = find_grasp(Closer(covering, thing), seed=1)
+    assert found.verdict.closed
+    assert found.penetration <= 6e-4
+    skin = covering.deform(found.poses(covering.skeleton))[0]
+    near = NearObject(thing).near(skin, 5e-4).point
+    touched = near[NearObject(thing).near(skin, 5e-4).distance <= 5e-4]
+    radius = np.linalg.norm(touched, axis=1)
+    assert (radius > 0.079).any()
+    assert (radius < 0.077).any()
+
+
+def test_ways_lead_in_over_the_edges_of_a_flat_box(covering) -> None:
+    """A board 3 cm thick and 30 cm wide: its middle is out of reach, and near its edges the way in is across them."""
+    near, rng = NearObject(box(0.3, 0.03, 0.3)), np.random.default_rng(0)
+    widths = sample_widths(near, 400, rng, widest=0.06)
+    rows, ways = free_ways(near, widths, 0.07, rng)
+    assert len(rows) > 20
+    middle = 0.5 * (widths.first + widths.second)[rows]
+    behind = middle - 0.07 * ways
+    assert (np.abs(behind) > [0.15, 0.015, 0.15]).any(axis=1).all()
+    assert np.abs(middle[:, [0, 2]]).max(axis=1).min() > 0.15 - 0.07

@@ -5,10 +5,11 @@ import numpy as np
 from warpjld.grasp.digits import pad_vertex
 from warpjld.grasp.near_object import NearObject
 from warpjld.grasp.opening import closing_in_air
-from warpjld.grasp.placements import across_widths
+from warpjld.grasp.placements import across_widths, around
 from warpjld.grasp.postures import posture_angles
 from warpjld.grasp.shapes import ball, box
 from warpjld.grasp.widths import sample_widths
+from warpjld.rotations import unit
 from warpjld.skeleton import DIGITS
 
 
@@ -39,7 +40,8 @@ def test_pads_meet_the_ends_of_a_width(covering) -> None:
     assert opening.step_for(1.0) == 0
     near, rng = NearObject(ball(0.02, subdivisions=3)), np.random.default_rng(1)
     widths = sample_widths(near, 12, rng, widest=0.05)
-    hands = across_widths(covering, [opening], near, widths, "left", rng, into=0.0)
+    ways = around(unit(widths.second - widths.first), rng)
+    hands = across_widths(covering, [opening], near, widths, ways, "left", rng, into=0.0)
     skin = covering.deform(hands.poses(covering.skeleton))
     assert near.least(skin).min() > 0.0
     closed = np.repeat(opening.angles[opening.step_for(0.02)][None], len(hands), axis=0)

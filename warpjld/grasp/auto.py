@@ -13,14 +13,14 @@ from numpy.typing import NDArray
 from warpjld.covering import Covering
 from warpjld.errors import InputError
 from warpjld.grasp.close import Closed, Closer
-from warpjld.grasp.digits import digit_chains
 from warpjld.grasp.draws import Draws
+from warpjld.grasp.hand_scale import doubt_of_size, hand_length
 from warpjld.grasp.judge import Judge, Verdict
 from warpjld.grasp.objects import GraspObject
 from warpjld.grasp.obstacles import COLLIDES, Obstacles
 from warpjld.grasp.placements import Candidates
-from warpjld.grasp.postures import CLOSING, posture_angles, posture_for
-from warpjld.skeleton import DIGITS, Poses, Skeleton
+from warpjld.grasp.postures import posture_for
+from warpjld.skeleton import Poses, Skeleton
 
 __all__ = ["AutoGrasp", "find_grasp"]
 
@@ -29,6 +29,8 @@ _FINALISTS = 6  # of a round, closed and judged in full
 _DEEPEST = 6e-4  # of hand and object in one another, above which a grasp is refused [m]
 _PRESSED = 3e-4  # depth from which an open hand goes back [m]
 _GOOD = 0.12  # score that ends the search early [N]
+_SLACK = 1.2  # times what thumb and fingers span: what is wider everywhere is not tried
+_OTHERS = ("plate", "cylinder", "sphere", "pinch")  # postures in turn while nothing is found
 _CLOSES = (0.0, 0.25, 0.5, 0.75, 1.0)  # parts of the digits' way at which the hand must not be in an obstacle
 
 
@@ -80,7 +82,7 @@ def find_grasp(
     *,
     obstacles: Sequence[GraspObject] = (),
     side: str | None = None,
-    count: int = 96,
+    count: int = 192,
     posture: str | None = None,
     coupling: tuple[float, float] | None = (1.0, 0.7),
     friction: float = 0.6,
@@ -88,13 +90,16 @@ def find_grasp(
 ) -> AutoGrasp:
     """Place open hands about the object, close them, judge them, keep the best.
 
-    A posture is chosen by the object's shape, and varied. Three quarters of the placements put thumb and fingers across
-    a part of the object that fits between them (``across_widths``), the others the palm on it (``sample_wrists``).
+    A posture is chosen by the object's shape, and varied; while nothing is found the others take every second round.
+    Three quarters of the placements put thumb and fingers across a part of the object that fits between them, such as
+    a rim, a handle or a narrow side, where the palm has room (``across_widths``, ``free_ways``), the others the palm on
+    it (``sample_wrists``).
     They are taken in rounds of 32: all are closed roughly and ranked by the force closure of what nearly touches; the
     best six are closed in full, without digits that pass through the object, and judged (``Judge``); those still in
     the running then without digits that pass through one another. A grasp that is not force closed, or in which hand
     and object are more than 0.6 mm in one another, is refused; of the others the best score is kept. A round that
-    leaves one with a score of 0.12 N and all digits but one (of a pinch all) ends the search.
+    leaves one with a score of 0.12 N and all digits but one (of a pinch all) ends the search, and once half of the
+    placements are tried any.
 
     Obstacles are stayed clear of by 0.1 mm of depth: by the open hand on the last 12 cm of its way, and by its digits
     while they close. Placements that they are in the way of are drawn again.
@@ -104,13 +109,13 @@ def find_grasp(
         obstacles: Other objects where they stand.
         side: ``left`` or ``right``; may be left out for a single hand.
         count: Placements at most.
-        posture: One of ``POSTURES``; by the object's shape if left out.
+        posture: The only one of ``POSTURES`` that is tried; by the object's shape if left out.
         coupling: See :meth:`~warpjld.grasp.close.Closer.close`.
         friction: Coulomb coefficient.
         seed: Of the sampling.
 
     Raises:
-        InputError: No hand, no such posture, or no placement ends in a grasp.
+        InputError: No hand, no such posture, an object nowhere narrow enough, or no placement ends in a grasp.
     """
     covering, thing = closer.covering, closer.thing
     if count < 1:
@@ -121,18 +126,20 @@ def find_grasp(
     side = side or (sides[0] if len(sides) == 1 else "")
     if side not in sides:
         raise InputError(f"side: want one of {', '.join(sides) or 'a hand'}, got '{side}'")
-    chosen = posture or posture_for(thing.size)
-    start = posture_angles(covering.skeleton, side, chosen)
-    closing = [digit for digit in CLOSING.get(chosen, DIGITS) if f"{side}.{digit}" in digit_chains(covering.skeleton)]
-    digits = [f"{side}.{digit}" for digit in closing]
-    around = Obstacles(covering, obstacles)
+    first = posture or posture_for(thing.size)
+    others = [kind for kind in _OTHERS if kind != first]
+    kinds = [first] if posture else [kind for other in others for kind in (first, other)]
+    around, rng = Obstacles(covering, obstacles), np.random.default_rng(seed)
     judge = Judge(closer.both, side, friction)
-    draws = Draws(covering, closer.both.near, around, side, chosen, start, closing, np.random.default_rng(seed))
-    how = {"digits": digits, "coupling": coupling}
+    draws = {kind: Draws(covering, closer.both.near, around, side, kind, rng) for kind in dict.fromkeys(kinds)}
+    _refuse_what_is_too_wide(draws[first], friction)
     best: AutoGrasp | None = None
     tried = 0
-    for first in range(0, count, _ROUND):
-        hands = draws.draw(min(_ROUND, count - first))
+    for number in range(-(-count // _ROUND)):
+        kind = best.posture if best else kinds[number % len(kinds)]
+        digits = [f"{side}.{digit}" for digit in draws[kind].closing]
+        how = {"digits": digits, "coupling": coupling}
+        hands = draws[kind].draw(min(_ROUND, count - number * _ROUND))
         tried += len(hands)
         finalists = _promising(judge, closer, side, hands, around, how)
         for hand, closed, verdict in _best_first(judge, closer, finalists, how):
@@ -148,7 +155,7 @@ def find_grasp(
                 continue
             touching = tuple(name for name in digits if name.removeprefix(f"{side}.") in verdict.digits)
             best = AutoGrasp(
-                chosen,
+                kind,
                 hand.position[0],
                 hand.rotation[0],
                 hand.approach[0],
@@ -158,15 +165,30 @@ def find_grasp(
                 touching,
                 tried,
             )
-        if best and best.score >= _GOOD and len(best.touching) >= len(digits) - (len(digits) > 3):
+        good = best and best.score >= _GOOD and len(best.touching) >= len(digits) - (len(digits) > 3)
+        if good or (best and 2 * tried >= count):
             break
     if best is None:
-        blocked = f", or out of reach: {', '.join(around.names)} blocked {draws.turned_down} more" if around else ""
+        turned_down = sum(one.turned_down for one in draws.values())
+        blocked = f", or out of reach: {', '.join(around.names)} blocked {turned_down} more" if around else ""
+        taken = ", ".join(dict.fromkeys(kinds[: -(-count // _ROUND)]))
         raise InputError(
-            f"object {thing.name}: none of {tried} placements ends in a grasp; it may be too large, too small or thin"
-            f"{blocked}"
+            f"object {thing.name}: none of {tried} placements ends in a grasp that holds at friction {friction:g} "
+            f"(postures {taken}): it may be too small, too smooth or too heavy to one side{blocked}"
         )
     return replace(best, tried=tried)
+
+
+def _refuse_what_is_too_wide(draws: Draws, friction: float) -> None:
+    """InputError where nothing of the object fits between thumb and fingers, with its width and theirs."""
+    narrowest, widest = draws.narrowest(friction), draws.widest
+    if narrowest > _SLACK * widest:
+        thing = draws.near.thing
+        doubt = doubt_of_size(thing, hand_length(draws.covering.skeleton), None)
+        raise InputError(
+            f"object {thing.name}: too wide for this hand: nowhere narrower than {1e3 * narrowest:.0f} mm, and thumb "
+            f"and fingers open to {1e3 * widest:.0f} mm{f'; it {doubt}' if doubt else ''}"
+        )
 
 
 def _best_first(

@@ -3,22 +3,24 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 
 from warpjld.covering import Covering
+from warpjld.grasp.digits import digit_chains
 from warpjld.grasp.near_object import NearObject
 from warpjld.grasp.objects import GraspObject
 from warpjld.grasp.obstacles import Obstacles
 from warpjld.grasp.opening import Opening, closing_in_air
 from warpjld.grasp.palm import palm_of
 from warpjld.grasp.placements import Candidates, across_widths, around, sample_wrists
-from warpjld.grasp.postures import AHEAD
+from warpjld.grasp.postures import AHEAD, CLOSING, POSTURES, posture_angles
 from warpjld.grasp.ways import free_ways
 from warpjld.grasp.widths import Widths, sample_widths
 from warpjld.rotations import unit
-from warpjld.skeleton import CHANNELS
+from warpjld.skeleton import CHANNELS, DIGITS
 
 __all__ = ["WAY", "Draws"]
 
@@ -42,8 +44,6 @@ class Draws:
         obstacles: What no hand may enter on its way to its placement.
         side: Which hand.
         posture: Name of the posture.
-        start: Its angles [rad], shape (J, 4).
-        closing: Digits that close.
         rng: Source of randomness.
         turned_down: Placements that obstacles were in the way of, so far.
     """
@@ -53,10 +53,32 @@ class Draws:
     obstacles: Obstacles
     side: str
     posture: str
-    start: NDArray[np.float64]
-    closing: list[str]
     rng: np.random.Generator
     turned_down: int = 0
+
+    @cached_property
+    def start(self) -> NDArray[np.float64]:
+        """Angles of the posture [rad], shape (J, 4)."""
+        return posture_angles(self.covering.skeleton, self.side, self.posture)
+
+    @cached_property
+    def closing(self) -> list[str]:
+        """Digits that close, without side."""
+        there = digit_chains(self.covering.skeleton)
+        return [digit for digit in CLOSING.get(self.posture, DIGITS) if f"{self.side}.{digit}" in there]
+
+    @cached_property
+    def widest(self) -> float:
+        """How far thumb and fingers open in any posture [m]."""
+        starts = np.array([posture_angles(self.covering.skeleton, self.side, posture) for posture in POSTURES])
+        return max(float(one.width[0]) for one in closing_in_air(self.covering, self.side, starts, self.closing))
+
+    def narrowest(self, friction: float) -> float:
+        """Least of some widths of the object that friction holds between two contacts [m]; its size without any."""
+        size = float(np.linalg.norm(self.near.thing.size))
+        # of its own randomness: what is drawn later does not depend on it
+        found = sample_widths(self.near, _LINES, np.random.default_rng(0), widest=size)
+        return float(found.width[found.slant >= np.cos(np.arctan(friction))].min(initial=size))
 
     def draw(self, count: int) -> Candidates:
         """``count`` placements, or fewer where obstacles leave little room."""
@@ -85,7 +107,8 @@ class Draws:
         across = count - int(_PALM_FIRST * count) if len(widths) else 0
         some = []
         if across:
-            reach = float(np.mean([np.linalg.norm(one.between[0] - palm_of(self.covering.skeleton, self.side).middle) for one in openings]))
+            middle = palm_of(self.covering.skeleton, self.side).middle
+            reach = float(np.mean([np.linalg.norm(one.between[0] - middle) for one in openings]))
             rows, ways = free_ways(self.near, widths, reach, self.rng)
             if not len(rows):
                 rows, ways = np.arange(len(widths)), around(unit(widths.second - widths.first), self.rng)
@@ -98,7 +121,9 @@ class Draws:
             )
             into = 0.3 if self.posture == "pinch" else 1.0
             these = Widths(*ends, picked.slant)
-            some.append(across_widths(self.covering, openings, self.near, these, ways[chosen], self.side, self.rng, into=into))
+            some.append(
+                across_widths(self.covering, openings, self.near, these, ways[chosen], self.side, self.rng, into=into)
+            )
         if count > across:
             ahead = AHEAD.get(self.posture, 0.0)
             some.append(

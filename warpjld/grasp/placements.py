@@ -120,8 +120,9 @@ def across_widths(
 ) -> Candidates:
     """Placements with the thumb at one end of a width and the fingers at the other, one for each width.
 
-    The hand opens so far that the width fits with 2 cm to spare and comes at right angles to it. At first the pads are to meet the ends: a precision grip. From there it goes on for a random part of the way
-    on which the palm would reach the width, as far as it does not touch: towards a power grip.
+    The hand opens so far that the width fits with 2 cm to spare and comes at right angles to it. At first the pads are
+    to meet the ends: a precision grip. From there it goes on for a random part of the way on which the palm would reach
+    the width, as far as it does not touch: towards a power grip.
 
     Args:
         covering: The hand.

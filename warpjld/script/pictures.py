@@ -139,7 +139,12 @@ def sheet_frames(scene: Scene, frames: NDArray[np.float64]) -> tuple[float, ...]
 def preview(scene: Scene, frame: float, style: Style) -> Path:
     """A picture of any frame of the scene as it is, in the output folder (R5)."""
     roles = [role_of(a, np.array([frame]), scene.rate) for a in scene.actors.values()]
-    crowd = Crowd(roles, np.array([frame]), props=list(scene.props.values()), whereabouts=partial(prop_places, scene.actors, scene.rate))
+    crowd = Crowd(
+        roles,
+        np.array([frame]),
+        props=list(scene.props.values()),
+        whereabouts=partial(prop_places, scene.actors, scene.rate),
+    )
     name = f"{style}-{frame:g}.png"
     with OutputFolder(scene.folder) as out:
         draw_picture(scene, crowd, Picture(name, frame, style, scene.camera), out.place(name))

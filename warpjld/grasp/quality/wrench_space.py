@@ -25,6 +25,7 @@ _MOST_POINTS = 6_000
 _SHAKE = 1e-9
 _GROWN = 1e-12  # of the largest coordinate: what is farther beyond a facet makes the hull grow
 _TOGETHER = 24  # facets that it grows at together
+_FIRST = 12  # and so many of the longest: a hull wants seven
 _STARTS = np.concatenate([np.eye(6), -np.eye(6)])  # directions whose farthest wrenches it begins with
 
 
@@ -115,6 +116,7 @@ def least_resistance(contacts: Contacts, center: ArrayLike, *, torque_scale: flo
     inside = np.zeros(len(points), dtype=bool)
     inside[0] = True
     inside[(points @ _STARTS.T).argmax(axis=0)] = True
+    inside[np.argsort(-np.linalg.norm(points, axis=1), kind="stable")[:_FIRST]] = True
     epsilon = 0.0
     while True:
         equations = _hull(points[inside]).equations
