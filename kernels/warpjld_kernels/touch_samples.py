@@ -7,7 +7,7 @@ from warpjld_kernels.shells import nearest_weights
 wp.set_module_options({"enable_backward": False})
 
 FAR = wp.constant(1.0e30)
-NEARLY = wp.constant(0.3)  # of the nearest distance beyond it: faces that near have a say in where out is
+NEARLY = wp.constant(0.5)  # of the nearest distance beyond it: faces that near have a say in where out is
 BESIDE = wp.constant(0.03)  # of a mesh's reach from its bones: outside its box by that nothing is inside it
 UNSURE = wp.constant(0.0)  # length of the mean of the ways out that is none
 SURE = wp.constant(0.9)  # and that is one
