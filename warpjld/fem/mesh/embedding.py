@@ -38,14 +38,6 @@ class Embedding:
         out: Array = np.einsum("pa,pai->pi", self.weights, displacement[self.corners])
         return out
 
-    def gather(self, forces: Array, count: int) -> Array:
-        """Nodal forces that do the work of forces on the points: the transpose of ``carry``, shape (count, 3)."""
-        out = np.zeros((count, 3))
-        for axis in range(3):
-            pushes = (self.weights * forces[:, axis : axis + 1]).ravel()
-            out[:, axis] = np.bincount(self.corners.ravel(), weights=pushes, minlength=count)
-        return out
-
 
 def embed(mesh: HexMesh, points: Array, *, reach: float = 1.0) -> Embedding:
     """Find the element and the place in it of every point; points beyond the boundary are extrapolated.

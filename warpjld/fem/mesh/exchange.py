@@ -1,25 +1,21 @@
-"""Volume meshes from and to the files of other programs (meshio)."""
+"""Volume meshes from the files of other programs (meshio)."""
 
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from warpjld.errors import InputError, MissingExtraError
 from warpjld.fem.mesh.hexmesh import HexMesh
-from warpjld.whole_file import whole_file
 
-__all__ = ["read_mesh", "write_mesh"]
+__all__ = ["read_mesh"]
 
 _CORNERS = {  # corners of our element, by the corners of theirs
     "hexahedron": [0, 1, 2, 3, 4, 5, 6, 7],
     "wedge": [0, 1, 2, 2, 3, 4, 5, 5],
     "tetra": [0, 1, 2, 2, 3, 3, 3, 3],
 }
-_SUFFIXES = (".vtk", ".vtu", ".msh", ".inp", ".med", ".xdmf", ".mesh", ".bdf", ".nas", ".unv", ".exo", ".e")
 
 
 def read_mesh(path: Path, *, scale: float = 1.0) -> HexMesh:
@@ -35,7 +31,10 @@ def read_mesh(path: Path, *, scale: float = 1.0) -> HexMesh:
         InputError: Unreadable, or without volume elements.
         MissingExtraError: meshio is not installed.
     """
-    meshio = _meshio()
+    try:
+        import meshio
+    except ImportError as error:
+        raise MissingExtraError("reading volume meshes", "mesh") from error
     if not path.is_file():
         raise InputError("no such file", path=path)
     try:
@@ -64,28 +63,3 @@ def read_mesh(path: Path, *, scale: float = 1.0) -> HexMesh:
         regions.astype(np.int32),
         tuple(names.get(int(v), "body" if len(values) == 1 else f"region{int(v)}") for v in values),
     )
-
-
-def write_mesh(path: Path, mesh: HexMesh, point_data: dict[str, NDArray[Any]] | None = None) -> None:
-    """Write a mesh in the format of the suffix, regions as cell data ``region``.
-
-    Raises:
-        InputError: A suffix meshio does not write.
-        MissingExtraError: meshio is not installed.
-    """
-    meshio = _meshio()
-    if path.suffix.lower() not in _SUFFIXES:
-        raise InputError(f"suffix '{path.suffix}': want one of {', '.join(_SUFFIXES)}", path=path)
-    out = meshio.Mesh(
-        mesh.nodes, [("hexahedron", mesh.elements)], point_data=point_data or {}, cell_data={"region": [mesh.regions]}
-    )
-    with whole_file(path) as part:
-        meshio.write(part, out)
-
-
-def _meshio() -> Any:
-    try:
-        import meshio
-    except ImportError as error:
-        raise MissingExtraError("reading and writing volume meshes", "mesh") from error
-    return meshio

@@ -135,12 +135,12 @@ def _begun(
 
 def _refuse(pairs: Sequence[Pair]) -> None:
     for what, asked in (
-        ("a surface that meets itself", any(pair.exclusion is not None for pair in pairs)),
-        ("friction or bonds", any(pair.friction > 0.0 or pair.bond is not None for pair in pairs)),
-        ("offsets", any(pair.offset is not None for pair in pairs)),
+        ("does not know a surface that meets itself", any(pair.exclusion is not None for pair in pairs)),
+        ("knows neither friction nor bonds", any(pair.friction > 0.0 or pair.bond is not None for pair in pairs)),
+        ("knows no offsets", any(pair.offset is not None for pair in pairs)),
     ):
         if asked:
-            raise InputError(f"pairs: the paper's loop does not know {what}; use method='augmented'")
+            raise InputError(f"pairs: the paper's loop {what}; use method='augmented'")
 
 
 def _missing(body: Body, loads: Loads, at: ContactInstant) -> Array:
