@@ -65,7 +65,7 @@ def test_what_cannot_be_is_refused_by_name(pressed: Simulation) -> None:
         SolveSpecification(3, 3)
     with pytest.raises(InputError, match=r"element: want a number above 0, got -1.0"):
         FleshMaterial(element=-1.0)
-    with pytest.raises(InputError, match=r"digits: want of thumb, .*, got \['toe'\]"):
+    with pytest.raises(InputError, match=r"digits: want of .* and palm, got \['toe'\]"):
         FleshMaterial(("toe",))
     nothing = RecordedAnimation()
     with pytest.raises(InputError, match=r"friction: want coefficients of 0 or more, got -0.5"):
