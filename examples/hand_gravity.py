@@ -13,7 +13,7 @@ import numpy as np
 
 from warpjld.cli.rig_argument import open_rig
 from warpjld.fem import Body, LinearElastic, Loads, solve
-from warpjld.fem.mesh.flesh import flesh_of
+from warpjld.fem.flesh import flesh_of
 from warpjld.fem.output.pictures import draw
 from warpjld.fem.output.vtk import write_vtu
 

@@ -49,6 +49,14 @@ def hands() -> dict[str, Rig]:
 
 
 @pytest.fixture(scope="session")
+def figure() -> Rig:
+    """The built-in body."""
+    from warpjld.hand.figure import build_body
+
+    return build_body()
+
+
+@pytest.fixture(scope="session")
 def bound(hands: dict[str, Rig]) -> Covering:
     """The coarse left hand, bound."""
     from warpjld.covering import bind

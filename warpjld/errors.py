@@ -7,6 +7,10 @@ from pathlib import Path
 __all__ = ["InputError", "MissingExtraError", "WarpjldError"]
 
 
+_LONGEST = 1000
+"""Characters of a message: whoever reads more reads the file itself."""
+
+
 class WarpjldError(Exception):
     """Base of all errors raised on purpose."""
 
@@ -29,6 +33,8 @@ class InputError(WarpjldError):
         line: int | None = None,
         column: int | None = None,
     ) -> None:
+        if len(message) > _LONGEST:  # it cites what a file holds
+            message = f"{message[: _LONGEST // 2]} … {message[-_LONGEST // 4 :]}"
         self.message = message
         self.path = None if path is None else Path(path)
         self.line = line

@@ -12,7 +12,7 @@ __all__ = ["reading"]
 
 
 @contextmanager
-def reading(path: str | Path, kind: str, *, but: type[Exception] | tuple[()] = ()) -> Iterator[None]:
+def reading(path: str | Path, kind: str, *, but: type[Exception] | tuple[type[Exception], ...] = ()) -> Iterator[None]:
     """While the statement lasts a file is read: its content may be anything, and libraries raise anything at it.
 
     Only what turns bytes into values belongs inside, so that a fault of the program's own is not taken for the file's.

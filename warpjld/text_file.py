@@ -7,11 +7,10 @@ import json
 from pathlib import Path
 from typing import Any, Literal
 
-import numpy as np
-
 from warpjld.errors import InputError
 from warpjld.input_file import read_bytes
 from warpjld.limits import check_limit
+from warpjld.nesting import nesting
 
 __all__ = ["parse_json", "read_json", "read_text"]
 
@@ -49,28 +48,13 @@ def read_json(path: str | Path) -> Any:
 
 def parse_json(text: str, path: str | Path) -> Any:
     """What a JSON text of a file holds; raises as ``read_json``."""
-    check_limit("depth", _nesting(text.encode("utf-8", "replace")), of="JSON", path=path)
+    check_limit("depth", nesting(text.encode("utf-8", "replace")), of="JSON", path=path)
     try:
         return json.loads(text, parse_int=_integer)
     except json.JSONDecodeError as error:
         raise InputError(f"is not JSON: {error.msg}", path=path, line=error.lineno, column=error.colno) from None
     except RecursionError:  # where the limit was raised beyond what Python's reader takes
         raise InputError("is not read: its JSON is nested more deeply than Python takes", path=path) from None
-
-
-def _nesting(raw: bytes) -> int:
-    """How many lists and objects of a JSON text lie inside one another at most."""
-    plain = raw.replace(b"\\\\", b"").replace(b'\\"', b"") if b"\\" in raw else raw  # escaped quotes end no text
-    marks = _STEP[np.frombuffer(plain.translate(None, _OTHERS), dtype=np.uint8)]
-    quotes = marks == _QUOTE
-    step = np.where(quotes | (np.cumsum(quotes) % 2 == 1), 0, marks)
-    return int(np.cumsum(step).max(initial=0))
-
-
-_QUOTE = 2
-_OTHERS = bytes(set(range(256)) - set(b'[]{}"'))
-_STEP = np.zeros(256, dtype=np.int8)
-_STEP[list(b"[{")], _STEP[list(b"]}")], _STEP[ord('"')] = 1, -1, _QUOTE
 
 
 def _integer(digits: str) -> int | float:

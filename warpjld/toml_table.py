@@ -48,7 +48,7 @@ def _plain(value: Any) -> Any:
     if isinstance(value, list):
         return [_plain(inner) for inner in value]
     if isinstance(value, int) and abs(value) >= 2**63:
-        return float(value) if abs(value) < 2**1000 else math.copysign(math.inf, value)
+        return float(value) if abs(value) < 2**1000 else math.inf if value > 0 else -math.inf
     return value
 
 

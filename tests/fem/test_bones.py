@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from functools import lru_cache
 
 import numpy as np
@@ -32,7 +33,13 @@ def forces(mesh: HexMesh, bone: NDArray[np.integer], skin: NDArray[np.int32]) ->
     rest = np.setdiff1d(np.arange(len(mesh.nodes)), bone)
     held = prescribe(mesh, bone, x=0.0, y=0.0, z=0.0) + prescribe(mesh, rest, z=0.0)
     plate = Plane((0.0, -RADIUS, 0.0), (0.0, 1.0, 0.0), motion=lambda way: ((0.0, way, 0.0), (0.0, 0.0, 0.0, 1.0)))
-    pressed = press(Body(mesh.with_faces(skin=skin), FLESH), held, [Pair("skin", plate)], times=list(DOWN), check=False)
+    pressed = press(
+        Body(replace(mesh, faces={**mesh.faces, "skin": skin}), FLESH),
+        held,
+        [Pair("skin", plate)],
+        times=list(DOWN),
+        check=False,
+    )
     thickness = float(np.ptp(mesh.nodes[:, 2]))
     return np.array([instant.touches[0].normal_force for instant in pressed.instants]) / thickness
 

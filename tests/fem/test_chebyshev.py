@@ -7,8 +7,8 @@ import pytest
 from numpy.polynomial.chebyshev import Chebyshev
 from scipy.linalg import block_diag, eigh
 
-from warpjld.fem.solver.block_matrix import BlockMatrix
-from warpjld.fem.solver.chebyshev import chebyshev_steps, highest_eigenvalue
+from warpjld.fem.assembly.block_matrix import BlockMatrix
+from warpjld.fem.solver.smoother import chebyshev_steps, highest_eigenvalue
 
 
 @pytest.mark.parametrize("degree", [1, 2, 3, 5])

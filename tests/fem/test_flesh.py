@@ -10,7 +10,7 @@ import pytest
 
 from warpjld.errors import InputError
 from warpjld.fem import Body, LinearElastic, Loads, solve
-from warpjld.fem.mesh.flesh import flesh_of
+from warpjld.fem.flesh import flesh_of
 from warpjld.io import load_rig
 from warpjld.skeleton import poses_from_angles
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from warpjld.fem import Status
-from warpjld.fem.solver.gmres import minimal_residuals
+from warpjld.fem.solver.krylov import minimal_residuals
 
 
 def matrix(count: int, seed: int) -> np.ndarray:

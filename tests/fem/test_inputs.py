@@ -145,7 +145,7 @@ def test_too_few_iterations_are_a_status() -> None:
 
 
 def test_indefinite_matrix_is_named() -> None:
-    from warpjld.fem.solver.conjugate import conjugate_gradients
+    from warpjld.fem.solver.krylov import conjugate_gradients
 
     matrix = np.diag(np.linspace(-1.0, 5.0, 40))
     found = conjugate_gradients(lambda x: matrix @ x, lambda r: r, np.ones(40))
@@ -153,7 +153,7 @@ def test_indefinite_matrix_is_named() -> None:
 
 
 def test_stagnation_is_named() -> None:
-    from warpjld.fem.solver.conjugate import conjugate_gradients
+    from warpjld.fem.solver.krylov import conjugate_gradients
 
     matrix = np.diag(np.logspace(0, 14, 60))
     found = conjugate_gradients(

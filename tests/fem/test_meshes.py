@@ -23,10 +23,10 @@ from warpjld.fem import (
     prescribe,
     solve,
 )
+from warpjld.fem.mesh.core import make_manifold
 from warpjld.fem.mesh.embedding import embed
 from warpjld.fem.mesh.envelope import Envelope
 from warpjld.fem.mesh.fit import fit_mesh
-from warpjld.fem.mesh.voxels import make_manifold
 
 
 def volume(mesh: HexMesh) -> float:

@@ -6,10 +6,9 @@ import numpy as np
 import pytest
 
 from warpjld.fem import Body, HexMesh, LinearElastic, ball_hexes, box_hexes, finger_hexes, prescribe
-from warpjld.fem.solver.galerkin import coarse_matrix
 from warpjld.fem.solver.hierarchy import hierarchy_of
 from warpjld.fem.solver.linear import LinearSolver
-from warpjld.fem.solver.multigrid import Multigrid
+from warpjld.fem.solver.multigrid import Multigrid, coarse_matrix
 
 
 def iterations(mesh: HexMesh, poisson: float, fixed: str, precision: str = "float64") -> int:

@@ -7,8 +7,7 @@ import pytest
 from scipy.sparse import csr_array, random_array
 
 from warpjld.fem import HexMesh, ball_hexes
-from warpjld.fem.solver.pattern import pattern_of
-from warpjld.fem.solver.product import product_pattern
+from warpjld.fem.assembly.pattern import pattern_of, triple_product
 
 
 def pattern(matrix: csr_array) -> tuple[np.ndarray, np.ndarray]:
@@ -21,7 +20,7 @@ def test_a_product_of_three_against_scipy(rows: int, threads: int) -> None:
     rng = np.random.default_rng(rows)
     shapes = ((rows, 50), (50, 70), (70, 90))
     factors = [csr_array(random_array(shape, density=0.05, format="csr", rng=rng)) for shape in shapes]
-    found = product_pattern(*(pattern(factor) for factor in factors), 90, threads=threads)
+    found = triple_product(*(pattern(factor) for factor in factors), 90, threads=threads)
     wanted = csr_array(factors[0] @ factors[1] @ factors[2])  # weights are positive: nothing cancels
     wanted.sort_indices()
     np.testing.assert_array_equal(found.rows, wanted.indptr)

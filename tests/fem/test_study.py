@@ -13,7 +13,7 @@ import trimesh
 
 from warpjld.cli import main
 from warpjld.errors import InputError
-from warpjld.fem.study_file import load_study
+from warpjld.fem.study.study_file import load_study
 
 EXAMPLE = Path(__file__).resolve().parents[2] / "examples" / "inflate_ball.toml"
 SMALL = """

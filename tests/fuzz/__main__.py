@@ -7,11 +7,9 @@ folder named at the end, and the exit code is 1 where there are any.
 from __future__ import annotations
 
 import argparse
-import json
 import os
 import shutil
 import signal
-import subprocess
 import sys
 import tempfile
 import time
@@ -20,11 +18,11 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from tests.fuzz.sound import KINDS
-from tests.fuzz.worker import SECONDS
+from tests.fuzz.worker import SECONDS, forked
 
 __all__ = ["Tally", "fuzz"]
 
-_AT_ONCE = 150  # inputs of one kind before the next has its turn
+_AT_ONCE = 100  # inputs of one kind before the next has its turn
 
 
 @dataclass
@@ -57,35 +55,24 @@ def fuzz(seconds: float, start: int, kinds: list[str], folder: Path, *, at_once:
 
 def _turn(tally: Tally, name: str, number: int, count: int, folder: Path) -> None:
     place = Path(tempfile.mkdtemp(prefix=f"{name}-", dir=folder))
-    arguments = [sys.executable, "-m", "tests.fuzz.worker", name, str(number), str(count), str(place)]
-    environment = os.environ | {"OMP_NUM_THREADS": "1", "WARPJLD_CACHE": "off", "PYTHONHASHSEED": "0"}
-    try:
-        done = subprocess.run(
-            arguments, capture_output=True, text=True, errors="replace", env=environment, timeout=count * SECONDS
-        )
-        code, out, err = done.returncode, done.stdout, done.stderr
-    except subprocess.TimeoutExpired as error:
-        code, out, err = -signal.SIGALRM, str(error.stdout or ""), ""
-    ended = False
-    for line in out.splitlines():
-        if not line.startswith('{"kind"'):  # libraries greet
-            continue
-        row = json.loads(line)
+    code, rows = forked(name, number, count, place)
+    found = 0
+    for row in rows:
         if "told" in row:
-            tally.found.append((name, row["told"], row["input"]))
+            tally.found.append((name, str(row["told"]), str(row["input"])))
+            found += 1
         else:
-            tally.tried[name] += row["tried"]
-            tally.memory = max(tally.memory, row["memory"])
-            ended = True
-    if ended and not code:
-        if not any(found[0] == name for found in tally.found):
-            shutil.rmtree(place, ignore_errors=True)
-        return
-    kept = place / f"ended-{number}-{name}"
-    if (place / name).exists():
-        shutil.copy(place / name, kept)
-    what = f"more than {SECONDS} s" if code == -signal.SIGALRM else f"the process ends with {code}"
-    tally.found.append((name, f"{what}\n{err.strip()[-800:]}", str(kept)))
+            tally.tried[name] += int(str(row["tried"]))
+            tally.memory = max(tally.memory, int(str(row["memory"])))
+    if code:
+        kept = place / f"ended-{number}-{name}"
+        if (place / name).exists():
+            shutil.copy(place / name, kept)
+        what = f"more than {SECONDS} s" if code == -signal.SIGALRM else f"the process ends with {code}"
+        said = (place / "stderr").read_text(errors="replace").strip() if (place / "stderr").exists() else ""
+        tally.found.append((name, f"{what}\n{said[-800:]}", str(kept)))
+    elif not found:
+        shutil.rmtree(place, ignore_errors=True)
 
 
 def main() -> int:
@@ -95,6 +82,7 @@ def main() -> int:
     parser.add_argument("--kinds", nargs="*", choices=list(KINDS), default=list(KINDS), help="only these")
     parser.add_argument("--at-once", type=int, default=_AT_ONCE, help="inputs of a kind before the next has its turn")
     given = parser.parse_args()
+    os.environ |= {"OMP_NUM_THREADS": "1", "WARPJLD_CACHE": "off"}
     folder = Path(tempfile.mkdtemp(prefix="warpjld-fuzz-"))
     tally = fuzz(60.0 * given.minutes, given.seed, given.kinds, folder, at_once=given.at_once)
     for kind, told, path in tally.found:

@@ -187,7 +187,11 @@ def _mano(path: Path) -> None:
 
 
 def _landmarks(path: Path) -> None:
-    np.save(path, 0.05 * np.random.default_rng(3).normal(size=(4, 21, 3)))
+    from tests.motion.hand_files import camera_landmarks, postures
+    from tests.motion.skeletons import hand
+
+    skeleton = hand("left")
+    np.save(path, camera_landmarks(skeleton, "left", postures(skeleton, "left", ("flat", "fist", "point"))))
 
 
 def _recording(kind: str) -> Callable[[Path], None]:

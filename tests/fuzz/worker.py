@@ -1,17 +1,16 @@
-"""A process that tries inputs of one kind, with limits on memory and time: a crash is a finding and not the end.
-
-``python -m tests.fuzz.worker KIND SEED COUNT FOLDER``: the input being tried lies in FOLDER, findings are printed as
-lines of JSON, the last line says how many were tried and the most memory they took.
-"""
+"""A process that tries inputs of one kind, with limits on memory and time: a crash is a finding and not the end."""
 
 from __future__ import annotations
 
 import json
+import os
 import random
 import resource
 import shutil
 import signal
 import sys
+import traceback
+from collections.abc import Callable
 from pathlib import Path
 
 from hypothesis import HealthCheck, Phase, given, seed, settings
@@ -22,16 +21,50 @@ from tests.fuzz.grammar import scripts
 from tests.fuzz.sound import KINDS, sound
 from tests.fuzz.trial import tried
 
-__all__ = ["MEMORY", "SECONDS"]
+__all__ = ["MEMORY", "SECONDS", "forked"]
 
 SECONDS = 20
 """That one input may take."""
 MEMORY = 3 << 30
 """Bytes that a process may come to hold."""
-_ADDRESSES = 24 << 30  # Warp's compiler maps more than it uses
+_ADDRESSES = 8 << 30  # Warp's compiler maps more than it uses
 
 
-def main(name: str, start: int, count: int, folder: Path) -> None:
+def forked(name: str, start: int, count: int, folder: Path) -> tuple[int, list[dict[str, object]]]:
+    """Try inputs in a child of this process, which has imported everything.
+
+    Args:
+        name: The kind.
+        start: Seed.
+        count: How many inputs.
+        folder: Where the input being tried lies, and those of findings.
+
+    Returns:
+        How the child ended, as ``os.waitstatus_to_exitcode`` tells it, and its rows: findings, and at the end how many
+        were tried and the most memory that was held.
+    """
+    told = folder / "told"
+    told.touch()
+    child = os.fork()
+    if child == 0:
+        code = 1
+        try:
+            with told.open("w", buffering=1) as out:
+                os.dup2(os.open(os.devnull, os.O_WRONLY), 1)
+                os.dup2(os.open(folder / "stderr", os.O_WRONLY | os.O_CREAT), 2)
+                _try_many(name, start, count, folder, lambda row: print(json.dumps(row), file=out))
+            code = 0
+        except BaseException:
+            traceback.print_exc()
+            sys.stderr.flush()
+        finally:
+            os._exit(code)
+    _, status = os.waitpid(child, 0)
+    rows = [json.loads(line) for line in told.read_text().splitlines() if line.endswith("}")]
+    return os.waitstatus_to_exitcode(status), rows
+
+
+def _try_many(name: str, start: int, count: int, folder: Path, tell: Callable[[dict[str, object]], None]) -> None:
     resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
     resource.setrlimit(resource.RLIMIT_AS, (_ADDRESSES, _ADDRESSES))
     path = sound(name, folder)
@@ -52,7 +85,7 @@ def main(name: str, start: int, count: int, folder: Path) -> None:
         if told:
             kept = folder / f"found-{start}-{tried_so_far}-{name}"
             shutil.copy(path, kept)
-            print(json.dumps({"kind": name, "input": str(kept), "told": told}), flush=True)
+            tell({"input": str(kept), "told": told})
 
     how = settings(
         max_examples=count,
@@ -73,13 +106,9 @@ def main(name: str, start: int, count: int, folder: Path) -> None:
 
     random.seed(start)
     run()
-    print(json.dumps({"kind": name, "tried": tried_so_far, "memory": _held()}), flush=True)
+    tell({"tried": tried_so_far, "memory": _held()})
 
 
 def _held() -> int:
     """The most memory that this process ever held [bytes]."""
     return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * 1024
-
-
-if __name__ == "__main__":
-    main(sys.argv[1], int(sys.argv[2]), int(sys.argv[3]), Path(sys.argv[4]))

@@ -102,7 +102,7 @@ def test_not_finite_vertices(rig: Rig, tmp_path: Path) -> None:
 
 def test_files_that_are_none(rig: Rig, tmp_path: Path) -> None:
     (tmp_path / "a.npz").write_bytes(b"nothing")
-    with pytest.raises(InputError, match="not a NumPy file"):
+    with pytest.raises(InputError, match="no archive of NumPy arrays"):
         read_targets(tmp_path / "a.npz", rig)
     with pytest.raises(InputError, match="cannot be read"):
         read_targets(tmp_path / "none.npz", rig)

@@ -126,3 +126,23 @@ except MissingExtraError as error:
     done = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=True)
     assert "warpjld[film]" in done.stdout
     assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize(("suffix", "rate"), [(".gif", 1e-7), (".gif", 1001.0), (".mp4", 0.009), (".webp", np.nan)])
+def test_rates_that_no_film_has(tmp_path: Path, suffix: str, rate: float) -> None:
+    with pytest.raises(InputError, match=r"a\..*: rate: want 0\.0.* to 1000 frames per second"):
+        Film(tmp_path / f"a{suffix}", rate=rate)
+
+
+def test_an_encoder_that_fails_leaves_the_old_film(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    imageio_ffmpeg = pytest.importorskip("imageio_ffmpeg")
+    program = tmp_path / "ffmpeg"
+    program.write_text("#!/bin/sh\ncat > /dev/null\necho 'the encoder: no' >&2\nexit 3\n")
+    program.chmod(0o755)
+    monkeypatch.setattr(imageio_ffmpeg, "get_ffmpeg_exe", lambda: str(program))
+    path = tmp_path / "a.mp4"
+    path.write_bytes(b"the old film")
+    with pytest.raises(InputError, match="cannot write: the encoder: no"), Film(path, rate=25.0) as film:
+        film.append(np.zeros((16, 16, 3), np.uint8))
+    assert path.read_bytes() == b"the old film"
+    assert sorted(file.name for file in tmp_path.iterdir()) == ["a.mp4", "ffmpeg"]

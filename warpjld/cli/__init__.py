@@ -26,6 +26,7 @@ _COMMANDS = {
     "run": "Run a script: animation, grasping, contact; pictures, films, exports.",
     "shell": "Type a script's commands one by one and look at the result.",
     "inspect": "Report what was recognised in a rig.",
+    "place": "Propose the named points of a body or hand in a bare surface.",
     "calibrate": "Fit the covering's parameters to a rig.",
     "bind": "Bind a rig once and keep the binding in a file.",
     "deform": "Deform a rig by a motion file.",

@@ -16,7 +16,7 @@ from warpjld.errors import WarpjldError
 if TYPE_CHECKING:
     from rich.console import Console
 
-    from warpjld.fem.output.study_results import Reaction
+    from warpjld.fem.study.study_results import Reaction
 
 __all__ = ["command"]
 
@@ -39,8 +39,8 @@ def command(study: Path, out: Path | None, no_pictures: bool, as_json: bool, qui
     from rich.console import Console
 
     from warpjld.cli.answer import answer
-    from warpjld.fem.output.study_results import StudyResults
-    from warpjld.fem.study_file import load_study
+    from warpjld.fem.study.study_file import load_study
+    from warpjld.fem.study.study_results import StudyResults
     from warpjld.quiet import silence_warp
     from warpjld.script.folder import OutputFolder
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -19,7 +20,7 @@ __all__ = ["command"]
 
 @click.command("inspect")
 @click.argument("rig")
-@options.rig
+@partial(options.rig, lists_points=True)
 @click.option("-o", "--out", type=click.Path(path_type=Path), help="Picture to write; the rig's name.png by default.")
 @click.option("--no-picture", is_flag=True, help="Write no picture.")
 @click.option("--write-skeleton", type=click.Path(path_type=Path), help="Skeleton file to write, for editing.")
@@ -47,9 +48,13 @@ def command(
     from warpjld.quiet import silence_warp
 
     silence_warp()
+    listed = how["points"] == options.LISTED
+    how["points"] = None if listed else how["points"]
     check_outputs([path for path in (out, write_skeleton, write_map) if path is not None], rig_files(rig, how))
     opened = open_rig(rig, **how)
     report = _report(opened)
+    if listed or how["points"] is not None:
+        report["points"] = _points(opened)
     if write_skeleton is not None:
         from warpjld.io.skeleton_file import write_skeleton_file
 
@@ -126,6 +131,20 @@ def _report(rig: Rig) -> dict[str, Any]:
     }
 
 
+def _points(rig: Rig) -> dict[str, Any]:
+    """The 87 points of a body, or 25 of each hand, that a rig holds (R12)."""
+    from warpjld.skeleton.actor import actor_skeleton, hand_points
+
+    if "pelvis" in rig.skeleton.names:
+        actor = actor_skeleton(rig.skeleton, rig.surface.vertices, rig.surface.faces)
+    else:
+        actor = hand_points(rig.skeleton)
+    return {
+        "placed": {name: _round(place, 6) for name, place in actor.points.items()},
+        "missing": list(actor.missing),
+    }
+
+
 def _domains(rig: Rig) -> NDArray[np.int64]:
     """Vertices in the domain of each segment, counted at the joint the segment ends at, shape (J,) (R16)."""
     from warpjld.covering import bind_rig
@@ -153,6 +172,8 @@ def _print(report: dict[str, Any], quiet: bool) -> None:
         click.echo()
         if report["animations"]:
             click.echo(f"animations: {', '.join(report['animations'])}")
+        if "points" in report:
+            _print_points(report["points"])
         for note in report["notes"]:
             click.echo(f"note: {note}")
     for finding in report["placing"]:
@@ -164,6 +185,18 @@ def _print(report: dict[str, Any], quiet: bool) -> None:
             click.echo("placing: nothing suspicious")
         if "picture" in report:
             click.echo(f"picture: {report['picture']}")
+
+
+def _print_points(points: dict[str, Any]) -> None:
+    from warpjld.skeleton.actor_points import ACTOR_POINTS
+
+    placed, missing = points["placed"], points["missing"]
+    click.echo(f"points: {len(placed)} of {len(placed) + len(missing)}, metres")
+    for name, (x, y, z) in placed.items():
+        click.echo(f"{name:<32}{x:9.4f}{y:9.4f}{z:9.4f}  {ACTOR_POINTS[name]}")
+    if missing:
+        click.echo(f"missing: {', '.join(missing)}")
+    click.echo()
 
 
 def _row(joint: dict[str, Any]) -> tuple[str, str, str, str]:

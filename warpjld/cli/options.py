@@ -36,12 +36,23 @@ json: Decorator = click.option("--json", "as_json", is_flag=True, help="Write th
 quiet: Decorator = click.option("-q", "--quiet", is_flag=True, help="Say nothing but errors.")
 
 
-RIG = ("skeleton", "side", "unit", "scale", "up", "joint_map", "centre_joints")
+RIG = ("skeleton", "points", "side", "unit", "scale", "up", "joint_map", "centre_joints")
 """Names of the options that ``rig`` adds: keyword arguments of ``load_rig``."""
 
 
-def rig(command: Callable[..., Any]) -> Callable[..., Any]:
-    """How to read a RIG that does not say everything itself: the keyword arguments of ``open_rig``."""
+LISTED = Path("-")
+"""What ``--points`` without a file gives where a command lists points."""
+
+
+def rig(command: Callable[..., Any], *, lists_points: bool = False) -> Callable[..., Any]:
+    """How to read a RIG that does not say everything itself: the keyword arguments of ``open_rig``.
+
+    Args:
+        command: The function to decorate.
+        lists_points: Whether ``--points`` may stand without a file, which then is ``LISTED``.
+    """
+    points: dict[str, Any] = {"is_flag": False, "flag_value": LISTED} if lists_points else {}
+    alone = "; alone: list the points that RIG holds" if lists_points else ""
     for option in (
         click.option(
             "--centre-joints",
@@ -60,6 +71,12 @@ def rig(command: Callable[..., Any]) -> Callable[..., Any]:
             "joint_map",
             type=click.Path(path_type=Path),
             help="JSON that states joints by hand: canonical name to RIG's own.",
+        ),
+        click.option(
+            "--points",
+            type=click.Path(path_type=Path),
+            help=f"Points file for a RIG without joints: 87 named points of a body, 25 of a hand (see place){alone}.",
+            **points,
         ),
         click.option("--skeleton", type=click.Path(path_type=Path), help="Skeleton file for a RIG without joints."),
     ):

@@ -1,4 +1,4 @@
-"""The RIG argument of commands: a file, or the built-in hand."""
+"""The RIG argument of commands: a file, a built-in hand, or the built-in body."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ _OPTIONS = {
 
 
 def open_rig(text: str, **how: Any) -> Rig:
-    """The rig a user named: a path, ``builtin:left`` or ``builtin:right``; what looks suspicious goes to stderr.
+    """The rig a user named: a path, ``builtin:left``, ``:right`` or ``:body``; what looks suspicious goes to stderr.
 
     Args:
         text: What stands on the command line.
@@ -36,11 +36,15 @@ def open_rig(text: str, **how: Any) -> Rig:
         rig = load_rig(text, **how)
         warn(rig.suspicious, "suspicious")
         return rig
-    if which not in ("left", "right"):
-        raise InputError(f"no built-in hand '{which}': want builtin:left or builtin:right")
+    if which not in ("left", "right", "body"):
+        raise InputError(f"nothing built in is called '{which}': want builtin:left, builtin:right or builtin:body")
     given = [f"--{_OPTIONS.get(name, name)}" for name, value in how.items() if value is not None]
     if given:
         raise InputError(f"{text}: {', '.join(given)} only work for files")
+    if which == "body":
+        from warpjld.hand.figure import build_body
+
+        return build_body()
     from warpjld.hand.kept import kept_hand
 
     return kept_hand(which)

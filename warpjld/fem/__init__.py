@@ -4,10 +4,9 @@ from warpjld.fem.body import Body
 from warpjld.fem.load.loads import Centrifugal, Loads
 from warpjld.fem.load.prescribed import FreeBodyError, Prescribed, prescribe
 from warpjld.fem.material.materials import Fung, LinearElastic, Material, MaterialWarning, MooneyRivlin, NeoHooke
-from warpjld.fem.mesh.ball import ball_hexes, cylinder_hexes, finger_hexes
-from warpjld.fem.mesh.box import box_hexes
+from warpjld.fem.mesh.generated import ball_hexes, box_hexes, cylinder_hexes, finger_hexes
 from warpjld.fem.mesh.hexmesh import HexMesh, merge
-from warpjld.fem.solver.conjugate import Status
+from warpjld.fem.solver.krylov import Status
 from warpjld.fem.solver.solution import Instant, Solution, SolveError
 from warpjld.fem.solver.static import solve
 

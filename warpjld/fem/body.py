@@ -4,17 +4,18 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from warpjld.errors import InputError
 from warpjld.fem.arrays import Array
+from warpjld.fem.assembly.block_matrix import BlockMatrix
+from warpjld.fem.assembly.pattern import Pattern, batches_of, pattern_of
 from warpjld.fem.launch import grouped, on_rows, threads_of
 from warpjld.fem.material.materials import NEO_HOOKE, Material, laws_of
 from warpjld.fem.mesh.hexmesh import HexMesh
-from warpjld.fem.solver.block_matrix import BlockMatrix
-from warpjld.fem.solver.pattern import Pattern, batches_of, pattern_of
 
 __all__ = ["Body", "Tangent"]
 
@@ -119,38 +120,36 @@ class Body:
             if stiffness and displacement is not None and self.large_strain:
                 pressures = self.at(u, stiffness=False).pressures
         step = np.zeros(self.degrees) if increment is None else np.ascontiguousarray(increment, np.float64).ravel()
-        blocks = len(self.pattern.columns) if stiffness else 0
         if stiffness and reuse is not None and reuse.stiffness is not None:
             values = reuse.stiffness.values
             values.fill(0.0)
         else:
-            values = np.zeros((max(blocks, 1), 3, 3))
-        forces = np.zeros(self.degrees)
-        lowest = np.empty(len(self._elements))
-        found = np.empty(len(self._elements))
-        b = self._batches
-        batches = grouped(
-            fem_element.Batches,
-            ranges=b.ranges,
-            first=b.range_batches,
-            elements=b.elements,
-            kinds=b.kinds,
-            counts=b.counts,
-        )
-        model = grouped(
-            fem_element.Model,
-            nodes=self._nodes,
-            elements=self._elements,
-            slots=self.pattern.slots,
-            laws=self.constants,
-            initial_stress=self.initial_stress,
-        )
+            values = np.zeros((max(len(self.pattern.columns) if stiffness else 0, 1), 3, 3))
+        forces, lowest, found = np.zeros(self.degrees), np.empty(len(pressures)), np.empty(len(pressures))
+        batches, model = self._arguments()
         state = grouped(fem_element.State, displacement=u, pressures=pressures, increment=step)
         out = grouped(fem_element.Sums, values=values.reshape(-1), forces=forces, lowest=lowest, pressures=found)
         arguments = [batches, model, state, stiffness, out]
-        on_rows(fem_element.assemble, len(b.ranges) - 1, arguments, threads=self.threads, least=2)
+        on_rows(fem_element.assemble, len(self._batches.ranges) - 1, arguments, threads=self.threads, least=2)
         matrix = BlockMatrix(self.pattern.rows, self.pattern.columns, values) if stiffness else None
         return Tangent(matrix, forces, lowest, found)
+
+    def _arguments(self) -> tuple[Any, Any]:
+        """Of the kernel: elements in batches, and the mesh with its laws."""
+        from warpjld_kernels import fem_element
+
+        b, model = self._batches, fem_element.Model
+        batches: dict[str, Any] = {
+            "ranges": b.ranges,
+            "first": b.range_batches,
+            "elements": b.elements,
+            "kinds": b.kinds,
+        }
+        mesh: dict[str, Any] = {"nodes": self._nodes, "elements": self._elements, "slots": self.pattern.slots}
+        return (
+            grouped(fem_element.Batches, **batches, counts=b.counts),
+            grouped(model, **mesh, laws=self.constants, initial_stress=self.initial_stress),
+        )
 
     def _check_jacobians(self) -> None:
         lowest = self.at(stiffness=False).lowest

@@ -1,4 +1,4 @@
-"""Launching a kernel over rows, shared between threads."""
+"""Kernel launches over rows that threads share."""
 
 from __future__ import annotations
 

@@ -85,6 +85,7 @@ def _assemble(
         side=side,
         axes=source.axes,
         limits=source.limits,
+        placed=source.placed,
     )
     skin, bare = None, 0
     if source.joints is not None and source.weights is not None:

@@ -23,6 +23,7 @@ def load_rig(
     path: str | Path,
     *,
     skeleton: str | Path | None = None,
+    points: str | Path | None = None,
     side: str | None = None,
     unit: str | None = None,
     scale: float | None = None,
@@ -35,6 +36,7 @@ def load_rig(
     Args:
         path: The file.
         skeleton: Skeleton file (JSON, see :mod:`warpjld.io.skeleton_file`); needed where the surface has no joints.
+        points: Points file (JSON, see :mod:`warpjld.io.points_file`) instead: an actor's 87 named points, or 25.
         side: ``left`` or ``right`` for a single hand, where the file leaves it open or is wrong.
         unit: ``m``, ``cm``, ``mm`` or ``in``; by default what the file says, else guessed from a hand's or body's
             plausible size, with a note.
@@ -66,7 +68,9 @@ def load_rig(
         from warpjld.io.joint_map_file import read_joint_map
 
         joint_map = read_joint_map(joint_map)
-    rig = assemble_rig(_read(Path(path), skeleton), side=side, unit=unit, scale=scale, up=up, joint_map=joint_map)
+    rig = assemble_rig(
+        _read(Path(path), skeleton, points), side=side, unit=unit, scale=scale, up=up, joint_map=joint_map
+    )
     if not centre_joints:
         return rig
     from warpjld.rig.centres import with_centred_joints
@@ -74,10 +78,19 @@ def load_rig(
     return with_centred_joints(rig)
 
 
-def _read(path: Path, skeleton: str | Path | None) -> SourceRig:
+def _read(path: Path, skeleton: str | Path | None, points: str | Path | None) -> SourceRig:
     if not path.exists():
         raise InputError("no such file", path=path)
     check_input(path)
+    if skeleton is not None and points is not None:
+        raise InputError("give a skeleton file or a points file, not both", path=path)
+    if points is not None:
+        from warpjld.io.mesh_file import read_mesh
+        from warpjld.io.points_file import read_points_file
+
+        surface = read_mesh(path)
+        with reading(points, "a points file"):
+            return read_points_file(points, surface)
     if skeleton is not None:
         from warpjld.io.mesh_file import read_mesh
         from warpjld.io.skeleton_file import read_skeleton_file
@@ -87,7 +100,7 @@ def _read(path: Path, skeleton: str | Path | None) -> SourceRig:
             return read_skeleton_file(skeleton, mesh)
     reader = _READERS.get(path.suffix.lower())
     if reader is None:
-        raise InputError("has no joints: give a skeleton file for this surface", path=path)
+        raise InputError("has no joints: give a skeleton file or a points file for this surface", path=path)
     read: Callable[[Path], SourceRig] = imported(reader)
     with reading(path, f"a rig ({path.suffix.lower()})"):
         return read(path)

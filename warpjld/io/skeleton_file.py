@@ -28,6 +28,7 @@ from warpjld.errors import InputError
 from warpjld.io.mesh_file import MeshFile
 from warpjld.io.source import SourceRig
 from warpjld.limits import check_limit
+from warpjld.skeleton.actor_points import CANONICAL
 from warpjld.skeleton.recognise.tree import SourceTree
 from warpjld.skeleton.tree import CHANNELS, Skeleton
 from warpjld.suggest import did_you_mean
@@ -89,6 +90,8 @@ def _rig(path: Path, content: Any, mesh: MeshFile) -> SourceRig:
         if entry.get("limits") is not None:
             limits[j] = _limits(entry["limits"], names[j])
     _check_loops(names, parents)
+    # the 87 by their own or their canonical names, other joints beside them
+    spelled = next((way for way in (list(CANONICAL), list(CANONICAL.values())) if number.keys() >= set(way)), None)
     return SourceRig(
         path=mesh.path,
         tree=SourceTree(tuple(names), parents, frames),
@@ -99,6 +102,8 @@ def _rig(path: Path, content: Any, mesh: MeshFile) -> SourceRig:
         parts=mesh.parts,
         axes=axes,
         limits=limits,
+        placed=spelled is not None,
+        stated={} if spelled is None else dict(zip(CANONICAL.values(), map(number.__getitem__, spelled), strict=True)),
         notes=(*mesh.notes, f"joints from {path.name}"),
     )
 

@@ -36,6 +36,7 @@ class SourceRig:
             (W,); None where all is flesh.
         metres: Metres a unit of length is, where the file says so.
         up: The file's up axis, ``y`` or ``z``, where it says so.
+        placed: Whether an animator placed the joints: they stay where they are, none is merged, moved or added.
         stated: Joints of ``tree`` by canonical name, where the file itself says which is which.
         notes: What was mended on the way.
         suspicious: What is probably wrong, and what to do about it.
@@ -56,6 +57,7 @@ class SourceRig:
     rigid: NDArray[np.int64] | None = None
     metres: float | None = None
     up: str | None = None
+    placed: bool = False
     stated: dict[str, int] = field(default_factory=dict)
     notes: tuple[str, ...] = ()
     suspicious: tuple[str, ...] = ()

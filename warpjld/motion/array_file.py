@@ -13,6 +13,7 @@ from warpjld.archive import check_archive
 from warpjld.errors import InputError
 from warpjld.input_file import check_input
 from warpjld.limits import check_limit
+from warpjld.reading import reading
 
 __all__ = ["read_arrays"]
 
@@ -26,26 +27,29 @@ def read_arrays(path: str | Path) -> dict[str, NDArray[Any]]:
     path = Path(path)
     check_input(path)
     try:
-        if path.suffix.lower() == ".npy":
-            check_limit("unpacked-bytes", path.stat().st_size, path=path)
-            # mapped, so that a header that announces more than there is allocates nothing
-            return {"": np.array(np.load(path, mmap_mode="r", allow_pickle=False))}
-        arrays = {}
-        check_archive(path, "archive of NumPy arrays (.npz)")
-        with zipfile.ZipFile(path) as file:
-            for member in file.infolist():
-                if member.filename.endswith(".npy"):
-                    arrays[member.filename[:-4]] = _member(file, member)
-        return arrays
-    except OSError as error:
-        raise InputError(f"cannot be read: {error.strerror or error}", path=path) from None
-    except (zipfile.BadZipFile, EOFError, MemoryError, NotImplementedError, RuntimeError, ValueError) as error:
+        with reading(path, "a NumPy file of arrays", but=(ValueError, RuntimeError)):
+            return _arrays(path)
+    except (ValueError, RuntimeError) as error:
         if "pickle" in str(error).lower() or "object" in str(error).lower():
             raise InputError(
                 "holds pickled Python objects, which may run any code: not read; save plain arrays of numbers or text",
                 path=path,
             ) from None
         raise InputError(f"is not a NumPy file of arrays ({error})", path=path) from None
+
+
+def _arrays(path: Path) -> dict[str, NDArray[Any]]:
+    if path.suffix.lower() == ".npy":
+        check_limit("unpacked-bytes", path.stat().st_size, path=path)
+        # mapped, so that a header that announces more than there is allocates nothing
+        return {"": np.array(np.load(path, mmap_mode="r", allow_pickle=False))}
+    arrays = {}
+    check_archive(path, "archive of NumPy arrays (.npz)")
+    with zipfile.ZipFile(path) as file:
+        for member in file.infolist():
+            if member.filename.endswith(".npy"):
+                arrays[member.filename[:-4]] = _member(file, member)
+    return arrays
 
 
 def _member(file: zipfile.ZipFile, member: zipfile.ZipInfo) -> NDArray[Any]:

@@ -23,6 +23,7 @@ from warpjld.motion.array_file import read_arrays
 from warpjld.motion.channels import ROOT_CHANNELS
 from warpjld.motion.load import open_motion
 from warpjld.motion.tracks import Motion
+from warpjld.reading import reading
 from warpjld.rig import Rig
 from warpjld.skeleton.kinematics import Poses
 
@@ -60,12 +61,10 @@ def read_targets(path: str | Path, rig: Rig, *, motion: str | Path | None = None
     if path.suffix.lower() != ".npz":
         raise InputError("targets: want a NumPy archive, .npz", path=path)
     arrays = read_arrays(path)
-    try:
+    with reading(path, "target shapes"):
         vertices = _vertices(arrays, rig)
         if motion is None:
             return Targets(_poses(arrays, len(vertices), rig), vertices)
-    except InputError as error:
-        raise InputError(error.message, path=error.path or path) from None
     if "channels" in arrays or "angles" in arrays:
         raise InputError(f"has poses of its own: no motion file is wanted beside them, got {motion}", path=path)
     loaded = open_motion(motion, rig)

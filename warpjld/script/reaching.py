@@ -28,7 +28,7 @@ REACHED = 0.002
 """Distance up to which a place is reached [m]."""
 _ROUNDS = 4  # solutions, each with the skin where the one before has it
 _SETTLED = 2e-4  # change of the skin's place on the hand that ends them [m]
-_LOOKS = 6  # frames on the way at which it is looked whether the arm passes through the body
+_LOOKS = 7  # frames on the way at which it is looked whether the arm passes through the body
 
 
 @dataclass(frozen=True, eq=False)
@@ -56,23 +56,26 @@ def reach_for(scene: Scene, actor: Actor, side: str, first: float, last: float, 
     Raises:
         InputError: No arm, or an actor that a motion file drives.
     """
-    from warpjld.grasp.arm_clearance import ArmClearance, pierced_faces
+    from warpjld.grasp.arm_clearance import ArmClearance
     from warpjld.skeleton.arm import arm_of
+    from warpjld.skeleton.reach import clear
 
     arm = arm_of(actor.skeleton, side)
     covering = cover(actor)
     poses, angles = posture(scene, actor, last)
-    found, at = _solved(scene, actor, covering, arm, poses, angles[0], last, goal, ArmClearance(covering, arm, poses))
-    for row in arm.free.tolist():
-        joint, column = arm.joints[row[0]], row[1]
-        channel = f"{actor.skeleton.names[joint]}.{CHANNELS[column]}"
-        before = float(actor.motion.value(channel, first)) if channel in actor.motion.tracks else 0.0
-        actor.set_keys(channel, [first], before, scene.spline)
-        actor.set_keys(channel, [last], float(found.angles[joint, column]), scene.spline)
+    clearance = ArmClearance(covering, arm, poses)
+    found, at = _solved(scene, actor, covering, arm, poses, angles[0], last, goal, clearance)
+    _, before = posture(scene, actor, first)
+    _key(scene, actor, arm, first, arm.values(before[0]))
+    _key(scene, actor, arm, last, arm.values(found.angles))
     short = float(np.linalg.norm(at - goal.place))
-    frames = np.linspace(first, last, _LOOKS)
-    skins = covering.deform(stage(actor, frames, scene.rate))
-    pierced = {f: len(pierced_faces(covering, arm, skin)) for f, skin in zip(frames.tolist(), skins, strict=True)}
+    pierced = _pierced(scene, actor, covering, arm, first, last)
+    if _on_the_way(pierced, last):
+        # round the body: half-way the arm goes where it would be, but clear of it
+        middle = 0.5 * (first + last)
+        poses, angles = posture(scene, actor, middle)
+        _key(scene, actor, arm, middle, clear(arm, angles[0], poses, arm.values(angles[0]), clearance))
+        pierced = _pierced(scene, actor, covering, arm, first, last)
     status = "CONVERGED" if short <= REACHED else "SHORT"
     if pierced[last]:
         status = "PIERCES"
@@ -85,6 +88,25 @@ def reach_for(scene: Scene, actor: Actor, side: str, first: float, last: float, 
     if status != "CONVERGED":
         scene.warned([f"{actor.name}: REACH {goal.name} at frame {last:g}: {message}"])
     return Attempt(f"REACH {goal.name}", last, actor.name, goal.object, status, message, values)
+
+
+def _key(scene: Scene, actor: Actor, arm: Arm, frame: float, values: NDArray[np.float64]) -> None:
+    """Set keys of all the angles that move an arm."""
+    for (k, column), value in zip(arm.free.tolist(), values.tolist(), strict=True):
+        actor.set_keys(f"{actor.skeleton.names[arm.joints[k]]}.{CHANNELS[column]}", [frame], value, scene.spline)
+
+
+def _pierced(scene: Scene, actor: Actor, covering: Covering, arm: Arm, first: float, last: float) -> dict[float, int]:
+    """How many faces of the body an arm passes through, by frame."""
+    from warpjld.grasp.arm_clearance import pierced_faces
+
+    frames = np.linspace(first, last, _LOOKS)
+    skins = covering.deform(stage(actor, frames, scene.rate))
+    return {f: len(pierced_faces(covering, arm, skin)) for f, skin in zip(frames.tolist(), skins, strict=True)}
+
+
+def _on_the_way(pierced: dict[float, int], last: float) -> list[float]:
+    return [frame for frame, count in pierced.items() if count and frame != last]
 
 
 def nearest_side(
@@ -157,7 +179,6 @@ def _told(goal: Goal, short: float, found: Reached, pierced: dict[float, int], l
         text += f"; the palm is turned {math.degrees(found.off):.0f}° from it"
     if pierced[last]:
         text += f"; the arm passes through {pierced[last]} faces of the body"
-    way = [frame for frame, count in pierced.items() if count and frame != last]
-    if way:
+    if way := _on_the_way(pierced, last):
         text += f"; on its way the arm passes through the body at frame {', '.join(f'{frame:.4g}' for frame in way)}"
     return text

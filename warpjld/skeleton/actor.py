@@ -1,7 +1,4 @@
-"""The 87-point actor skeleton (B §2.1, R12), reconstructed: the papers publish its count, not its points.
-
-Two hands of 25 points (wrists included), 11 points of trunk and head, per arm 4, per leg 9: 50 + 11 + 8 + 18 = 87.
-"""
+"""The 87-point actor skeleton of a body (B §2.1, R12): its joints, and what the surface tells of the rest."""
 
 from __future__ import annotations
 
@@ -13,51 +10,14 @@ from numpy.typing import NDArray
 
 from warpjld.errors import InputError
 from warpjld.rotations import unit
+from warpjld.skeleton.actor_points import ACTOR_POINTS, CANONICAL
 from warpjld.skeleton.hand import hand_joint_names
 from warpjld.skeleton.recognise.axes import perpendicular
 from warpjld.skeleton.recognise.extremity import find_extremity
 from warpjld.skeleton.recognise.section import nearby
 from warpjld.skeleton.tree import Skeleton
 
-__all__ = ["ACTOR_POINTS", "ActorSkeleton", "actor_skeleton", "body_facing", "face_points"]
-
-_TRUNK = {
-    "pelvis": "where spine and legs part",
-    "vertebra1": "lowest of five joints of the spine",
-    "vertebra2": "second",
-    "vertebra3": "third",
-    "vertebra4": "fourth",
-    "vertebra5": "fifth: the lowest of the neck where the trunk has four",
-    "skull_base": "where the head turns",
-    "head_top": "extremity of the head: the centre of its round top",
-    "chin": "foremost point of the midline below the lips",
-    "nose_tip": "foremost point of the head",
-    "sternum": "between the inner ends of the clavicles",
-}
-_ARM = {
-    "clavicle": "its inner end",
-    "shoulder": "head of the humerus",
-    "elbow": "joint",
-    "forearm_twist": "middle of the forearm, about which it twists",
-}
-_LEG = {
-    "pelvic_hip": "hip bone: half-way from the pelvis to the head of the femur",
-    "femoral_head": "hip joint",
-    "knee": "joint",
-    "ankle": "joint",
-    "heel": "centre of the heel",
-    "ball": "ball of the foot: among the bases of the toes",
-    "big_toe_tip": "extremity",
-    "middle_toe_tip": "extremity",
-    "little_toe_tip": "extremity",
-}
-
-ACTOR_POINTS: dict[str, str] = (
-    {name: f"hand joint, {side}" for side in ("left", "right") for name in hand_joint_names(side)}
-    | _TRUNK
-    | {f"{side}.{name}": what for side in ("left", "right") for name, what in (_ARM | _LEG).items()}
-)
-"""The 87 points and what each one is; hand points have the names of the hands' joints."""
+__all__ = ["ACTOR_POINTS", "ActorSkeleton", "actor_skeleton", "body_facing", "face_points", "hand_points"]
 
 
 @dataclass(frozen=True, eq=False)
@@ -93,11 +53,34 @@ def actor_skeleton(skeleton: Skeleton, vertices: NDArray[np.float64], faces: NDA
     points |= dict(_legs(joints))
     up, forward = body_facing(joints)
     if up is not None and forward is not None:
-        points |= dict(face_points(joints, vertices, up, forward))
+        points |= dict(_face(joints, vertices, up, forward))
         points |= dict(_heels(joints, vertices, faces, forward))
+    # what the skeleton holds as a joint of its own is where it stands
+    points |= {name: joints[own] for name, own in CANONICAL.items() if own in joints and own not in _NUMBERED}
+    if all(own in joints for own in _NUMBERED):
+        points |= {name: joints[own] for name, own in CANONICAL.items() if own in _NUMBERED}
     ordered = {name: points[name] for name in ACTOR_POINTS if name in points}
     return ActorSkeleton(ordered, tuple(name for name in ACTOR_POINTS if name not in points))
 
+
+def hand_points(skeleton: Skeleton) -> ActorSkeleton:
+    """The 25 points of each hand that a skeleton without a body holds.
+
+    Raises:
+        InputError: It has no hand.
+    """
+    joints = dict(zip(skeleton.names, skeleton.rest, strict=True))
+    sides = [side for side in ("left", "right") if f"{side}.index.base" in joints]
+    if not sides:
+        raise InputError("named points are a body's or a hand's: this skeleton is neither")
+    wanted = [name for side in sides for name in hand_joint_names(side)]
+    return ActorSkeleton(
+        {name: joints[name] for name in wanted if name in joints}, tuple(n for n in wanted if n not in joints)
+    )
+
+
+_BEHIND = 0.06  # of the height from skull base to crown: nose and chin lie that far inside, about 1 cm
+_NUMBERED = tuple(own for name, own in CANONICAL.items() if name.startswith("vertebra"))
 
 Joints = dict[str, NDArray[np.float64]]
 Placed = Iterator[tuple[str, NDArray[np.float64]]]
@@ -147,6 +130,14 @@ def body_facing(joints: Joints) -> tuple[NDArray[np.float64] | None, NDArray[np.
         return None, None
     up = unit(joints["head"] - joints["pelvis"])
     return up, perpendicular(np.cross(joints["left.hip"] - joints["right.hip"], up), up)
+
+
+def _face(
+    joints: Joints, vertices: NDArray[np.float64], up: NDArray[np.float64], forward: NDArray[np.float64]
+) -> Placed:
+    """Nose and chin inside the flesh, a little behind their foremost points."""
+    for name, point in face_points(joints, vertices, up, forward):
+        yield name, point - _BEHIND * float((joints["head.top"] - joints["head"]) @ up) * forward
 
 
 def face_points(

@@ -7,6 +7,8 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from warpjld.skeleton.actor_points import CARRIES_NOTHING
+
 __all__ = ["default_limits"]
 
 # role: (flexion, pivot, twisting, abduction), each (smallest, largest) in degrees; unnamed channels are closed
@@ -23,6 +25,8 @@ _ROLES: dict[str, tuple[tuple[float, float], ...]] = {
     "tip": (_CLOSED,) * 4,  # an extremity carries nothing
     "index.carpometacarpal": (_CLOSED,) * 4,
     "middle.carpometacarpal": (_CLOSED,) * 4,
+    **dict.fromkeys(CARRIES_NOTHING, (_CLOSED,) * 4),
+    "forearm_twist": (_CLOSED, _CLOSED, (-80, 80), _CLOSED),
     "elbow": ((0, 150), _CLOSED, (-80, 80), _CLOSED),
     "shoulder": ((-60, 180), (0, 180), (-90, 70), (-60, 180)),
     "hip": ((-30, 120), (0, 45), (-45, 45), (-30, 45)),

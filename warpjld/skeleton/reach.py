@@ -21,7 +21,7 @@ from warpjld.skeleton.arm import Arm
 from warpjld.skeleton.kinematics import Poses
 from warpjld.skeleton.tree import CHANNELS
 
-__all__ = ["Reached", "Target", "reach"]
+__all__ = ["Reached", "Target", "clear", "reach"]
 
 Depths = Callable[[NDArray[np.float64], NDArray[np.float64]], NDArray[np.float64]]
 """How deep samples along an arm lie in the body, none below 0: joints (B, K, 3) [m] and rotations (B, K, 4) → depths
@@ -125,6 +125,36 @@ def reach(
             least, best = float(solved.cost), np.asarray(solved.x)
     assert best is not None
     return costs.reached(best)
+
+
+def clear(
+    arm: Arm, angles: NDArray[np.float64], body: Poses, values: NDArray[np.float64], depths: Depths
+) -> NDArray[np.float64]:
+    """Angles of the arm (n,) [rad] nearest to the given ones with which it lies clear of the body.
+
+    Args:
+        arm: The arm.
+        angles: Of the skeleton, whose other joints stay [rad], shape (J, 4).
+        body: One pose that says where the body is.
+        values: Those to begin with [rad], shape (n,).
+        depths: How deep samples of the arm lie in what they are not to enter.
+    """
+    from scipy.optimize import least_squares
+
+    low, high = arm.limits.T
+
+    def costs(some: NDArray[np.float64]) -> NDArray[np.float64]:
+        positions, rotations = arm.chains(angles, some, body)
+        return np.concatenate([some - values, _DEEP * depths(positions, rotations) / arm.length], axis=1)
+
+    def slopes(x: NDArray[np.float64]) -> NDArray[np.float64]:
+        shifts = _STEP * np.eye(len(x))
+        both = costs(np.concatenate([x + shifts, x - shifts]))
+        return np.asarray((both[: len(x)] - both[len(x) :]).T / (2.0 * _STEP))
+
+    start = np.clip(values, low + 1e-9, high - 1e-9)
+    solved = least_squares(lambda x: costs(x[None])[0], start, jac=slopes, bounds=(low, high), max_nfev=100)
+    return np.asarray(solved.x)
 
 
 class _Costs:

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from tests.fem.contact.bodies import lid, named, together
 from warpjld.fem import Body, HexMesh, LinearElastic, Prescribed, box_hexes, prescribe
 from warpjld.fem.contact import ContactInstant, Pair, Touch, press
-from warpjld.fem.contact.interface.contact_border import beyond, held_beyond
+from warpjld.fem.contact.interface.contact_area import beyond, held_beyond
 
 YOUNG, POISSON = 1.0, 0.3
 MODULUS = YOUNG / (1.0 - POISSON**2)

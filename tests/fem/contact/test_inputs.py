@@ -8,11 +8,11 @@ import pytest
 from tests.fem.contact.bodies import FREE, lid, named, symmetric, together
 from warpjld.errors import InputError
 from warpjld.fem import Body, LinearElastic, Loads, NeoHooke, Status, ball_hexes, box_hexes, cylinder_hexes, prescribe
+from warpjld.fem.assembly.block_matrix import BlockMatrix, IndefiniteError
 from warpjld.fem.contact import Bond, ContactError, Exclusion, Pair, press
 from warpjld.fem.contact.obstacles.solids import Plane, Sphere
 from warpjld.fem.contact.solver.damping import Damping
 from warpjld.fem.contact.solver.lagged_solver import LaggedSolver
-from warpjld.fem.solver.block_matrix import BlockMatrix, IndefiniteError
 
 
 @pytest.fixture(scope="module")

@@ -10,15 +10,13 @@ from warpjld.errors import InputError
 from warpjld.fem.body import Body
 from warpjld.fem.contact.interface.pairs import Pair
 from warpjld.fem.contact.paper.loop import by_turns
-from warpjld.fem.contact.results.solution import ContactError, ContactInstant, ContactSolution
+from warpjld.fem.contact.results.contact_solution import ContactError, ContactInstant, ContactSolution
 from warpjld.fem.contact.solver.load_steps import Guess, LoadSteps
 from warpjld.fem.load.loads import Loads
 from warpjld.fem.load.prescribed import Prescribed
-from warpjld.fem.solver.conjugate import Status
+from warpjld.fem.solver.krylov import Status
 
 __all__ = ["press"]
-
-_METHODS = ("augmented", "paper")
 
 
 def press(
@@ -41,13 +39,11 @@ def press(
 ) -> ContactSolution:
     """Equilibria of bodies in contact at rising times.
 
-    Bodies that only contact holds need no other hold. Surfaces that overlap at the start are parted gradually up to
-    the first time (R112). A step that fails is taken in halves.
+    Surfaces that overlap at the start are parted gradually up to the first time (R112). Steps that fail are halved.
 
     Args:
         body: All bodies, merged into one mesh.
-        prescribed: Known displacements from rest at the last time, reached in proportion to time; or a function of
-            time.
+        prescribed: Known displacements from rest at the last time, reached in proportion to it; or a function of time.
         pairs: What may touch what.
         loads: Loads at the last time, reached in proportion to time; or a function of time.
         times: Rising times above 0 (above ``after``'s) to find equilibria at.
@@ -55,34 +51,24 @@ def press(
         method: ``augmented`` (Lagrangian, on bodies and contact together), or ``paper``: objects repelled by the skin
             and released, in turns (R113; ``contact.paper.loop`` says when it settles). The slave is repelled.
         aitken: Relax the paper's loop.
-        tolerance: Residual over the forces that balance.
-        penetration: Overlap left, as a share of an edge.
+        tolerance, penetration: Residual over the forces that balance; overlap left, as a share of an edge.
         guess: Where to begin to look.
         watch: Asked after each instant; a text ends the run there with ``Status.STOPPED`` (R118).
-        halvings: How often a step that fails may be halved, and its halves again; by default as long as it may help
-            (of the default method).
+        halvings: How often a step that fails may be halved, and its halves again; by default as long as it may help.
         check: Raise where the last time is not reached; otherwise return the status.
         progress: Called with a line of text after each instant.
 
     Raises:
-        InputError: Wrong arguments.
-        ContactError: The last time was not reached; its ``solution`` has what was.
+        InputError, ContactError: Wrong arguments; the last time not reached (``solution`` has what was).
     """
-    wanted = [float(t) for t in times]
-    first = 0.0 if after is None else after.last.time
-    if (
-        not wanted
-        or not np.isfinite(wanted).all()
-        or any(b <= a for a, b in zip([first, *wanted], wanted, strict=False))
-    ):
-        raise InputError(f"times: want rising times above {first:g}, got {list(times)}")
+    wanted = _rising(times, 0.0 if after is None else after.last.time)
     for name, value in (("tolerance", tolerance), ("penetration", penetration)):
         if not 0.0 < value < 1.0:
             raise InputError(f"{name}: want a share between 0 and 1, got {value}")
     if after is not None and len(after.states) != len(pairs):
         raise InputError(f"after: was found with {len(after.states)} pairs, not {len(pairs)}")
-    if method not in _METHODS:
-        raise InputError(f"method: want {' or '.join(_METHODS)}, got '{method}'")
+    if method not in ("augmented", "paper"):
+        raise InputError(f"method: want augmented or paper, got '{method}'")
     if halvings is not None and halvings < 0:
         raise InputError(f"halvings: want 0 or more, got {halvings}")
     if method == "paper":
@@ -93,3 +79,11 @@ def press(
     if check and not solution.converged and solution.status is not Status.STOPPED:
         raise ContactError(solution)
     return solution
+
+
+def _rising(times: Sequence[float], first: float) -> list[float]:
+    wanted = [float(t) for t in times]
+    rising = all(a < b for a, b in zip([first, *wanted], wanted, strict=False))
+    if not wanted or not np.isfinite(wanted).all() or not rising:
+        raise InputError(f"times: want rising times above {first:g}, got {list(times)}")
+    return wanted

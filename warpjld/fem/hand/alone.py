@@ -17,6 +17,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from warpjld.errors import InputError
+from warpjld.fem.arrays import norm
+from warpjld.fem.assembly.block_matrix import IndefiniteError
 from warpjld.fem.body import Body, Tangent
 from warpjld.fem.contact.solver.damping import Damping
 from warpjld.fem.contact.solver.elastic import Elastic
@@ -26,8 +28,7 @@ from warpjld.fem.hand.flesh_hand import FleshHand
 from warpjld.fem.hand.motion import halfway
 from warpjld.fem.load.loads import Loads
 from warpjld.fem.load.prescribed import Prescribed
-from warpjld.fem.solver.block_matrix import IndefiniteError, norm
-from warpjld.fem.solver.conjugate import Status
+from warpjld.fem.solver.krylov import Status
 from warpjld.skeleton.kinematics import Poses
 
 __all__ = ["FleshAlone", "Untouched"]

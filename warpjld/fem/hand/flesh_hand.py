@@ -10,12 +10,12 @@ from numpy.typing import NDArray
 
 from warpjld.errors import InputError
 from warpjld.fem.contact.interface.pairs import Exclusion
+from warpjld.fem.flesh import Flesh, flesh_of
 from warpjld.fem.hand.blend import Moves, moves_of
 from warpjld.fem.hand.labels import WEB, excluded_pairs, fringes, joined_pairs, segment_name, skin_labels
 from warpjld.fem.hand.regions import hand_regions
 from warpjld.fem.hand.weights import bone_weights
 from warpjld.fem.load.prescribed import Prescribed
-from warpjld.fem.mesh.flesh import Flesh, flesh_of
 from warpjld.fem.mesh.hexmesh import HexMesh
 from warpjld.rig import Rig
 from warpjld.skeleton.kinematics import Poses, rest_poses

@@ -9,11 +9,11 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from warpjld.errors import InputError
-from warpjld.fem.arrays import Array, Ints32
+from warpjld.fem.arrays import Array, Ints32, cross_matrix
+from warpjld.fem.assembly.block_matrix import BlockMatrix
 from warpjld.fem.body import Body
 from warpjld.fem.mesh.hexmesh import FACES, HexMesh
 from warpjld.fem.mesh.shape import POINTS, shape_at, slope_at
-from warpjld.fem.solver.block_matrix import BlockMatrix
 
 __all__ = ["Centrifugal", "Loads", "external_forces", "subtract_pressure_stiffness", "volumes"]
 
@@ -132,7 +132,7 @@ def subtract_pressure_stiffness(
         x = now[corners]
         tangent = np.zeros((len(corners), 4, 4, 3, 3))
         for n, along, across in _quad_points():
-            first, second = _cross_matrix(along @ x), _cross_matrix(across @ x)
+            first, second = cross_matrix(along @ x), cross_matrix(across @ x)
             for a in range(4):
                 for b in range(4):
                     tangent[:, a, b] -= factor * pressure * n[a] * (across[b] * first - along[b] * second)
@@ -163,12 +163,6 @@ def _area_vectors(x: Array) -> Array:
     for n, along, across in _quad_points():
         out += n[:, None] * np.cross(along @ x, across @ x)[:, None, :]
     return out
-
-
-def _cross_matrix(v: Array) -> Array:
-    out = np.zeros((len(v), 3, 3))
-    out[:, 0, 1], out[:, 0, 2], out[:, 1, 2] = -v[:, 2], v[:, 1], -v[:, 0]
-    return out - out.transpose(0, 2, 1)
 
 
 def _scatter(out: Array, corners: Ints32, values: Array) -> None:

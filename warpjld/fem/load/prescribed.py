@@ -6,6 +6,9 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike
+from scipy.linalg import qr
+from scipy.sparse import csr_array
+from scipy.sparse.csgraph import connected_components
 
 from warpjld.errors import InputError
 from warpjld.fem.arrays import Array, Ints, Ints32, Mask
@@ -124,9 +127,6 @@ def prescribe(
 
 def components(body: Body) -> Ints32:
     """Connected piece each node belongs to, shape (N,)."""
-    from scipy.sparse import csr_array
-    from scipy.sparse.csgraph import connected_components
-
     p = body.pattern
     n = len(p.rows) - 1
     graph = csr_array((np.ones(len(p.columns), np.int8), p.columns, p.rows), shape=(n, n))
@@ -195,8 +195,6 @@ def held_in_place(body: Body, prescribed: Prescribed) -> Prescribed:
     (pivoted QR of the rigid motions). Under loads in equilibrium their reactions are zero and the choice changes the
     solution by a rigid motion only; otherwise their reactions show what is missing.
     """
-    from scipy.linalg import qr
-
     for nodes, left in free_motions(body, prescribed):
         rows = rigid_modes(body.mesh.nodes[nodes]) @ left
         taken = prescribed.degrees[np.isin(prescribed.degrees // 3, nodes)]

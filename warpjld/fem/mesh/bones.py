@@ -12,6 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.spatial import cKDTree
 
 from warpjld.fem.arrays import Array, Ints, Ints32, Mask
 from warpjld.fem.mesh.hexmesh import HexMesh
@@ -74,8 +75,6 @@ class Bone:
 
     def threaded(self, mesh: HexMesh, chosen: NDArray[np.integer]) -> NDArray[np.integer]:
         """Of chosen elements, those nearest to the axis along the bone whose middles lie between its ends."""
-        from scipy.spatial import cKDTree
-
         middles = mesh.nodes[mesh.elements[chosen]].mean(axis=1)
         inside = np.isfinite(self.depth(middles))
         chosen, middles = chosen[inside], middles[inside]

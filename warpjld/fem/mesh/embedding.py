@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.spatial import cKDTree
 
 from warpjld.errors import InputError
 from warpjld.fem.arrays import Array, Ints32
@@ -57,8 +58,6 @@ def embed(mesh: HexMesh, points: Array, *, reach: float = 1.0) -> Embedding:
     Raises:
         InputError: A point further from the mesh than that.
     """
-    from scipy.spatial import cKDTree
-
     x = mesh.nodes[mesh.elements]
     _, near = cKDTree(x.mean(axis=1)).query(points, k=min(_NEAR, len(x)))
     near = near.reshape(len(points), -1)

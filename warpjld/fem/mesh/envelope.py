@@ -11,7 +11,7 @@ from warpjld.errors import InputError
 from warpjld.fem.arrays import Array, Ints, Ints32
 from warpjld.rotations import unit
 
-__all__ = ["Envelope"]
+__all__ = ["Envelope", "checked_surface"]
 
 
 @dataclass(frozen=True)
@@ -35,14 +35,7 @@ class Envelope:
     def __init__(self, vertices: ArrayLike, faces: ArrayLike) -> None:
         import warp as wp
 
-        points = np.ascontiguousarray(vertices, dtype=np.float64)
-        triangles = np.ascontiguousarray(faces, dtype=np.int32)
-        if points.ndim != 2 or points.shape[1] != 3 or not np.isfinite(points).all():
-            raise InputError("surface: want finite vertices of shape (n, 3)")
-        if triangles.ndim != 2 or triangles.shape[1] != 3 or len(triangles) == 0:
-            raise InputError(f"surface: want triangles of shape (n, 3) with n > 0, got {triangles.shape}")
-        if triangles.min() < 0 or triangles.max() >= len(points):
-            raise InputError(f"surface: triangle indices must lie in 0…{len(points) - 1}")
+        points, triangles = checked_surface(vertices, faces)
         edges = np.sort(triangles[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2), axis=1)
         _, uses = np.unique(edges, axis=0, return_counts=True)
         self.open_edges = int((uses == 1).sum())
@@ -96,6 +89,19 @@ class Envelope:
             closest.astype(np.float64) * self.size + self._origin,
             self.normals[np.maximum(face, 0)],
         )
+
+
+def checked_surface(vertices: ArrayLike, faces: ArrayLike) -> tuple[Array, Ints32]:
+    """Vertices (v, 3) and triangles (t, 3) as arrays; InputError where they are none, or indices out of range."""
+    points = np.ascontiguousarray(vertices, dtype=np.float64)
+    triangles = np.ascontiguousarray(faces, dtype=np.int32)
+    if points.ndim != 2 or points.shape[1] != 3 or not np.isfinite(points).all():
+        raise InputError(f"surface: want finite vertices of shape (n, 3), got {points.shape}")
+    if triangles.ndim != 2 or triangles.shape[1] != 3 or len(triangles) == 0:
+        raise InputError(f"surface: want triangles of shape (n, 3) with n > 0, got {triangles.shape}")
+    if triangles.min() < 0 or triangles.max() >= len(points):
+        raise InputError(f"surface: triangle indices must lie in 0…{len(points) - 1}")
+    return points, triangles
 
 
 def _capped(points: Array, triangles: Ints32) -> tuple[Array, Ints32]:

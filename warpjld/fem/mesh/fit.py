@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from scipy.sparse import csr_array
 
 from warpjld.errors import InputError
 from warpjld.fem.arrays import Array, Ints, Ints32, Mask
@@ -202,8 +203,6 @@ def _settled(
 
 def _links(quads: Ints32, boundary: Ints) -> Any:
     """Which boundary nodes share an edge, symmetric ``csr_array`` (B, B)."""
-    from scipy.sparse import csr_array
-
     row = np.searchsorted(boundary, quads)
     one, other = row.ravel(), np.roll(row, -1, axis=1).ravel()
     table = csr_array((np.ones(len(one)), (one, other)), shape=(len(boundary), len(boundary)))

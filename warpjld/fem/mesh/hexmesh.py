@@ -149,10 +149,6 @@ class HexMesh:
         """The same mesh with displaced nodes."""
         return replace(self, nodes=self.nodes + displacement.reshape(-1, 3))
 
-    def with_faces(self, **faces: Ints32) -> HexMesh:
-        """The same mesh with more named faces."""
-        return replace(self, faces={**self.faces, **faces})
-
     def with_nodes(self, **sets: Ints32) -> HexMesh:
         """The same mesh with more named nodes."""
         return replace(self, node_sets={**self.node_sets, **sets})

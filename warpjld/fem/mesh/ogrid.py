@@ -68,59 +68,67 @@ def ogrid_hexes(counts: tuple[int, int, int], layers: int, sides: tuple[str, ...
         axis, end, _, _ = _SIDES[side]
         carries |= place[:, axis] == end * counts[axis]
     feet = np.flatnonzero(carries)
-    column = np.full(len(place), -1)
-    column[feet] = np.arange(len(feet))
-    inside = len(place) if core else 0
-    first = 1 if core else 0
-    numbers = np.empty((layers + 1, len(place)), dtype=np.int32)
-    numbers[0] = np.arange(len(place))
-    for level in range(first, layers + 1):
-        numbers[level] = inside + (level - first) * len(feet) + column
-
+    inside, first = (len(place), 1) if core else (0, 0)
     grid = np.arange(len(place), dtype=np.int32).reshape(shape)
+    numbers = _numbers(len(place), feet, range(first, layers + 1), inside)
     blocks = [grid.astype(np.int32)] if core else []
-    elements = [elements_of(grid)] if core else []
-    total = len(elements[0]) if core else 0
-    core_elements = total
-    outer, inner = [], []
+    blocks += [_layers(grid, numbers, side) for side in sides]
+    elements = [elements_of(block) for block in blocks]
+    place = place.astype(np.int32)
+    levels = [np.full(len(feet), n, np.int32) for n in range(first, layers + 1)]
+    outer, inner, ends = _boundary([tuple(n - 1 for n in block.shape) for block in blocks], sides, core)
+    return Ogrid(
+        place=np.concatenate([place] * core + [place[feet]] * len(levels)),
+        layer=np.concatenate([np.zeros(inside, np.int32), *levels]),
+        elements=np.concatenate(elements).astype(np.int32),
+        core=len(elements[0]) if core else 0,
+        outer=outer,
+        inner=np.empty((0, 2), np.int32) if core else inner,
+        ends=ends,
+        blocks=tuple(blocks),
+    )
+
+
+def _numbers(count: int, feet: Ints, levels: range, inside: int) -> Ints32:
+    """Number of the node over each of the box's in every layer, the box's own first, shape (layers + 1, count)."""
+    column = np.full(count, -1)
+    column[feet] = np.arange(len(feet))
+    out = np.empty((levels.stop, count), dtype=np.int32)
+    out[0] = np.arange(count)
+    for level in levels:
+        out[level] = inside + (level - levels.start) * len(feet) + column
+    return out
+
+
+def _layers(grid: Ints32, numbers: Ints32, side: str) -> Ints32:
+    """The structured block over a side of the box."""
+    axis, end, u, v = _SIDES[side]
+    sheet = np.take(grid, -end, axis=axis)
+    sheet = sheet.T if u > v else sheet
+    return np.stack([level[sheet] for level in numbers], axis=-1).astype(np.int32)
+
+
+def _boundary(
+    shapes: list[tuple[int, ...]], sides: tuple[str, ...], core: bool
+) -> tuple[Ints32, Ints32, dict[str, Ints32]]:
+    """Faces of the last layer and of the first, and those left open by the name of the box's side."""
+    sizes = np.cumsum([0, *(int(np.prod(shape)) for shape in shapes)])
+    cells = [start + np.arange(np.prod(shape)).reshape(shape) for start, shape in zip(sizes[:-1], shapes, strict=True)]
     ends: dict[str, list[Ints32]] = {side: [] for side in _SIDES if side not in sides}
     if core:
-        cells = np.arange(total).reshape(counts)
-        for side in ends:
+        for side, found in ends.items():
             axis, end, _, _ = _SIDES[side]
-            chosen = np.take(cells, -end, axis=axis).ravel()
-            ends[side].append(np.stack([chosen, np.full_like(chosen, 2 * axis + end)], axis=1))
-    for side in sides:
-        axis, end, u, v = _SIDES[side]
-        sheet = np.take(grid, -end, axis=axis)
-        if u > v:
-            sheet = sheet.T
-        block = np.stack([numbers[level][sheet] for level in range(layers + 1)], axis=-1)
-        blocks.append(block.astype(np.int32))
-        elements.append(elements_of(block))
-        cells = total + np.arange(len(elements[-1])).reshape([n - 1 for n in block.shape])
-        total += cells.size
-        outer.append(_faces(cells[:, :, -1], 5))
-        inner.append(_faces(cells[:, :, 0], 4))
+            found.append(_faces(np.take(cells[0], -end, axis=axis), 2 * axis + end))
+    around = cells[core:]
+    for side, block in zip(sides, around, strict=True):
+        axis, _, u, _ = _SIDES[side]
         for open_side, found in ends.items():
             other, far, _, _ = _SIDES[open_side]
             if other != axis:
                 local = 0 if other == u else 1
-                found.append(_faces(np.take(cells, -far, axis=local), 2 * local + far))
-    place = place.astype(np.int32)
-    layered = [place[feet]] * (layers + 1 - first)
-    return Ogrid(
-        place=np.concatenate([place, *layered]) if core else np.concatenate(layered),
-        layer=np.concatenate(
-            [np.zeros(inside, np.int32), *(np.full(len(feet), n, np.int32) for n in range(first, layers + 1))]
-        ),
-        elements=np.concatenate(elements).astype(np.int32),
-        core=core_elements,
-        outer=np.concatenate(outer),
-        inner=np.empty((0, 2), np.int32) if core else np.concatenate(inner),
-        ends={side: np.concatenate(found).astype(np.int32) for side, found in ends.items()},
-        blocks=tuple(blocks),
-    )
+                found.append(_faces(np.take(block, -far, axis=local), 2 * local + far))
+    outer, inner = (np.concatenate([_faces(b[:, :, k], local) for b in around]) for k, local in ((-1, 5), (0, 4)))
+    return outer, inner, {side: np.concatenate(found).astype(np.int32) for side, found in ends.items()}
 
 
 def _faces(cells: Ints, local: int) -> Ints32:

@@ -7,16 +7,16 @@ doi:10.1016/S0045-7825(03)00299-8), and pulls boundary nodes to the tangent plan
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
 
-from warpjld.fem.arrays import Array, Ints, Ints32, Mask
+from warpjld.fem.arrays import Array, Ints, Ints32, Mask, dot, norm
 from warpjld.fem.launch import Launch, shared, threads_of
 from warpjld.fem.mesh.hexmesh import HexMesh
-from warpjld.fem.solver.lbfgs import minimise
 
-__all__ = ["as_far", "improve"]
+__all__ = ["as_far", "improve", "minimise"]
 
 
 def improve(
@@ -48,38 +48,15 @@ def improve(
         rounds: Iterations.
         still: Nodes that stay where they are, shape (N,).
     """
-    import warp as wp
-    from warpjld_kernels import fem_shape_measure
-
-    count = len(nodes)
     sliding = np.broadcast_to(np.asarray(slide, dtype=np.float64), (len(boundary),))
-    flat = elements.ravel()
-    x = np.ascontiguousarray(nodes / spacing)
-    costs = np.empty(len(elements))
-    slopes = np.empty((len(elements), 8, 3))
-    launch = Launch(
-        fem_shape_measure.measure,
-        len(elements),
-        [
-            shared(np.ascontiguousarray(elements)),
-            wp.float64(softness),
-            wp.array(x, dtype=wp.vec3d, device="cpu", copy=False),
-            shared(costs),
-            wp.array(slopes, dtype=wp.vec3d, device="cpu", copy=False),
-        ],
-        threads=threads_of(),
-    )
+    measure = _ShapeMeasure(nodes / spacing, elements, softness)
 
     def cost(vector: Array) -> tuple[float, Array]:
-        x[:] = vector.reshape(-1, 3)
-        launch()
-        gradient: Array = np.stack(
-            [np.bincount(flat, weights=slopes[:, :, k].ravel(), minlength=count) for k in range(3)], axis=1
-        )
-        away = x[boundary] - targets
+        value, gradient = measure.at(vector.reshape(-1, 3))
+        away = measure.x[boundary] - targets
         along = np.einsum("bi,bi->b", away, normals)
         squared = np.einsum("bi,bi->b", away, away)
-        value = float(costs.sum()) + float((pull * (along * along + sliding * squared)).sum())
+        value += float((pull * (along * along + sliding * squared)).sum())
         gradient[boundary] += 2.0 * pull[:, None] * (along[:, None] * normals + sliding[:, None] * away)
         if still is not None:
             gradient[still] = 0.0
@@ -89,6 +66,27 @@ def improve(
     start = (nodes / spacing).reshape(-1)
     improved: Array = minimise(cost, start, rounds=rounds, first_step=0.05).reshape(-1, 3) * spacing
     return improved
+
+
+class _ShapeMeasure:
+    """Sum of the corners' shape measures, and its gradient (n, 3), at nodes x (n, 3)."""
+
+    def __init__(self, x: Array, elements: Ints32, softness: float) -> None:
+        import warp as wp
+        from warpjld_kernels import fem_shape_measure
+
+        self.x = np.ascontiguousarray(x)
+        self._flat = elements.ravel()
+        self._costs, self._slopes = np.empty(len(elements)), np.empty((len(elements), 8, 3))
+        x_, slopes = (wp.array(a, dtype=wp.vec3d, device="cpu", copy=False) for a in (self.x, self._slopes))
+        inputs = [shared(np.ascontiguousarray(elements)), wp.float64(softness), x_, shared(self._costs), slopes]
+        self._launch = Launch(fem_shape_measure.measure, len(elements), inputs, threads=threads_of())
+
+    def at(self, x: Array) -> tuple[float, Array]:
+        self.x[:] = x
+        self._launch()
+        each = [np.bincount(self._flat, self._slopes[:, :, k].ravel(), minlength=len(x)) for k in range(3)]
+        return float(self._costs.sum()), np.stack(each, axis=1)
 
 
 def as_far(mesh: HexMesh, start: Array, goal: Array, least: float | Array, shorter: float) -> HexMesh:
@@ -109,3 +107,61 @@ def as_far(mesh: HexMesh, start: Array, goal: Array, least: float | Array, short
             break
         share[np.unique(mesh.elements[bad])] *= shorter
     return moved
+
+
+_MEMORY = 10
+_SHORTEST = 1e-10
+
+
+def minimise(cost: Callable[[Array], tuple[float, Array]], start: Array, *, rounds: int, first_step: float) -> Array:
+    """A lower point of ``cost``, after at most so many rounds (Nocedal & Wright, algorithm 7.5, Armijo steps).
+
+    SciPy's does the same through BLAS, whose threads wait for one another at every dot product of these sizes.
+
+    Args:
+        cost: Value and gradient at a point.
+        start: First point, shape (n,).
+        rounds: Steps at most.
+        first_step: Largest change of one variable in the first step.
+    """
+    x = start.copy()
+    value, slope = cost(x)
+    slope = slope.copy()
+    pairs: list[tuple[Array, Array, float]] = []
+    for _ in range(rounds):
+        direction = -slope
+        shares = []
+        for s, y, rho in reversed(pairs):
+            share = rho * dot(s, direction)
+            direction -= share * y
+            shares.append(share)
+        if pairs:
+            s, y, rho = pairs[-1]
+            direction *= 1.0 / (rho * dot(y, y))
+        else:
+            direction *= first_step / max(float(np.abs(slope).max()), 1e-300)
+        for (s, y, rho), share in zip(pairs, reversed(shares), strict=True):
+            direction += (share - rho * dot(y, direction)) * s
+        descent = dot(direction, slope)
+        if not descent < 0.0:
+            if not pairs:
+                break
+            pairs.clear()
+            continue
+        length = 1.0
+        while True:
+            there = x + length * direction
+            new, new_slope = cost(there)
+            if new <= value + 1e-4 * length * descent:
+                break
+            length *= 0.5
+            if length < _SHORTEST:
+                return x
+        s, y = there - x, new_slope - slope
+        curvature = dot(s, y)
+        if curvature > 1e-10 * norm(s) * norm(y):
+            pairs.append((s, y, 1.0 / curvature))
+            if len(pairs) > _MEMORY:
+                pairs.pop(0)
+        x, value, slope = there, new, new_slope.copy()
+    return x

@@ -1,1 +1,1 @@
-"""Stresses, files for ParaView, pictures, and tables of a solution."""
+"""Stresses, files for ParaView and pictures of a solution."""

@@ -1,1 +1,1 @@
-"""Sparse block matrices, linear solvers, Newton's method."""
+"""Linear solvers, and static equilibrium by Newton's method."""

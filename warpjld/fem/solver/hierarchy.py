@@ -1,4 +1,4 @@
-"""Coarser and coarser node sets of a mesh, and the weights that interpolate between them."""
+"""Geometric multigrid's levels: coarser and coarser node sets of a mesh, and the prolongations between them."""
 
 from __future__ import annotations
 
@@ -6,6 +6,7 @@ from functools import reduce
 from typing import Any
 
 import numpy as np
+from scipy.sparse import block_diag, csr_array, eye_array, kron
 
 from warpjld.fem.arrays import Array, Ints, Ints32
 from warpjld.fem.mesh.hexmesh import HexMesh
@@ -37,8 +38,6 @@ def hierarchy_of(mesh: HexMesh) -> list[Any]:
 
 
 def _from_blocks(blocks: tuple[Ints32, ...], count: int) -> list[Any]:
-    from scipy.sparse import csr_array, kron
-
     out = []
     while count > _COARSEST:
         kept = [[_kept_lines(n - 1) for n in grid.shape] for grid in blocks]
@@ -68,8 +67,6 @@ def _from_blocks(blocks: tuple[Ints32, ...], count: int) -> list[Any]:
 
 def _side_by_side(parts: list[list[Any]], counts: list[int]) -> list[Any]:
     """Levels of several bodies together; one that has no coarser level left is handed on as it is."""
-    from scipy.sparse import block_diag, eye_array
-
     out = []
     for level in range(max(map(len, parts))):
         weights = []
@@ -91,8 +88,6 @@ def _kept_lines(n: int) -> Ints:
 
 
 def _line_weights(n: int, lines: Ints) -> Any:
-    from scipy.sparse import csr_array
-
     fine = np.arange(n + 1)
     left = np.clip(np.searchsorted(lines, fine, side="right") - 1, 0, len(lines) - 2)
     share = (fine - lines[left]) / (lines[left + 1] - lines[left])
@@ -115,8 +110,6 @@ def _from_lattice(lattice: Ints32) -> list[Any]:
 
 def _trilinear(place: Array) -> tuple[Any, Ints32]:
     """Weights of points in a unit grid, and the integer coordinates of the grid nodes they use."""
-    from scipy.sparse import csr_array
-
     low = np.floor(place).astype(np.int64)
     share = place - low
     dims = low.max(axis=0) + 2

@@ -8,17 +8,17 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.sparse.linalg import splu
 
 from warpjld.errors import InputError
-from warpjld.fem.arrays import Array, Mask
+from warpjld.fem.arrays import Array, Mask, norm
+from warpjld.fem.assembly.block_matrix import BlockMatrix, IndefiniteError, padded
 from warpjld.fem.launch import Launch, shared, threads_of
 from warpjld.fem.mesh.hexmesh import HexMesh
-from warpjld.fem.solver.block_diagonal import block_inverse
-from warpjld.fem.solver.block_matrix import BlockMatrix, IndefiniteError, norm, padded
-from warpjld.fem.solver.conjugate import Iteration, Status, conjugate_gradients
-from warpjld.fem.solver.gmres import minimal_residuals
 from warpjld.fem.solver.hierarchy import hierarchy_of
+from warpjld.fem.solver.krylov import Iteration, Status, conjugate_gradients, minimal_residuals
 from warpjld.fem.solver.multigrid import Multigrid
+from warpjld.fem.solver.smoother import block_inverse
 
 __all__ = ["METHODS", "LinearSolver"]
 
@@ -89,7 +89,7 @@ class LinearSolver:
                 stiffness, free, self.hierarchy, degree=degree, spread=spread, threads=self.threads
             )
         elif method == "aggregation":
-            from warpjld.fem.solver.aggregation import Aggregation
+            from warpjld.fem.solver.multigrid import Aggregation
 
             self._precondition = Aggregation(stiffness, free, mesh.nodes)
         elif method == "jacobi":
@@ -221,8 +221,6 @@ class _Product:
 
 
 def _factor(stiffness: BlockMatrix, free: Mask, definite: bool) -> Any:
-    from scipy.sparse.linalg import splu
-
     inside = stiffness.to_scipy().tocsr()[free][:, free].tocsc()
     pivoting = 0.0 if definite else 0.1
     try:

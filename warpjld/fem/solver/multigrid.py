@@ -11,15 +11,55 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.linalg import LinAlgError, cho_solve_banded, cholesky_banded
+from scipy.sparse import bsr_matrix
+from scipy.sparse.csgraph import reverse_cuthill_mckee
 
 from warpjld.fem.arrays import Array, Mask
-from warpjld.fem.launch import Launch, shared, threads_of
-from warpjld.fem.solver.block_diagonal import block_inverse
-from warpjld.fem.solver.block_matrix import BlockMatrix, IndefiniteError, padded
-from warpjld.fem.solver.chebyshev import chebyshev_steps, highest_eigenvalue
-from warpjld.fem.solver.galerkin import coarse_matrix, restriction
+from warpjld.fem.assembly.block_matrix import BlockMatrix, IndefiniteError, padded
+from warpjld.fem.assembly.pattern import triple_product
+from warpjld.fem.launch import Launch, grouped, on_rows, shared, threads_of
+from warpjld.fem.solver.smoother import block_inverse, chebyshev_steps, highest_eigenvalue
 
-__all__ = ["Multigrid"]
+__all__ = ["Aggregation", "Multigrid", "coarse_matrix", "restriction"]
+
+
+def coarse_matrix(fine: BlockMatrix, free: Mask, weights: Any, transposed: Any, *, threads: int) -> BlockMatrix:
+    """Pᵀ K11 P, float64.
+
+    Args:
+        fine: Full matrix K, N blocks a side.
+        free: Free degrees of freedom, shape (3N,); the others do not take part.
+        weights: P, one weight for the three values of a node, ``csr_array`` (N, n).
+        transposed: Pᵀ, see ``restriction``.
+        threads: Threads.
+    """
+    from warpjld_kernels import fem_galerkin
+
+    down, up = (transposed.indptr, transposed.indices), (weights.indptr, weights.indices)
+    product = triple_product(down, (fine.rows, fine.columns), up, weights.shape[1], threads=threads)
+    values = np.zeros((len(product.columns), 3, 3))
+    arguments = [
+        shared(product.ranges),
+        grouped(fem_galerkin.Blocks, rows=fine.rows, columns=fine.columns, values=fine.values.reshape(-1)),
+        shared(free.astype(np.float64)),
+        *(
+            grouped(fem_galerkin.Weights, rows=w.indptr, columns=w.indices, weights=w.data)
+            for w in (weights, transposed)
+        ),
+        shared(product.marker),
+        grouped(fem_galerkin.Blocks, rows=product.rows, columns=product.columns, values=values.reshape(-1)),
+    ]
+    on_rows(fem_galerkin.coarse_values, len(product.ranges) - 1, arguments, threads=threads, least=2)
+    return BlockMatrix(product.rows, product.columns, values)
+
+
+def restriction(weights: Any) -> Any:
+    """Pᵀ in rows, with the indices that the kernels want."""
+    out = weights.T.tocsr()
+    out.indices = out.indices.astype(np.int32)
+    out.indptr = out.indptr.astype(np.int32)
+    return out
 
 
 @dataclass(frozen=True, eq=False)
@@ -153,9 +193,6 @@ class _Coarsest:
     """Banded Cholesky of the coarsest level, in the ordering of Cuthill and McKee."""
 
     def __init__(self, matrix: BlockMatrix, free: Mask) -> None:
-        from scipy.linalg import LinAlgError, cholesky_banded
-        from scipy.sparse.csgraph import reverse_cuthill_mckee
-
         self.size = matrix.size
         plain = matrix.masked(free).to_scipy().tocsr()
         diagonal = plain.diagonal()
@@ -176,8 +213,39 @@ class _Coarsest:
             raise IndefiniteError("the stiffness is not positive definite (found on the coarsest level)") from error
 
     def solve(self, b: NDArray[Any]) -> Array:
-        from scipy.linalg import cho_solve_banded
-
         out = np.empty(len(self._order))
         out[self._order] = cho_solve_banded((self._factor, True), b[self._order].astype(np.float64), check_finite=False)
         return out
+
+
+class Aggregation:
+    """One V-cycle of smoothed aggregation.
+
+    Args:
+        stiffness: Full K, float64.
+        free: Free degrees of freedom, shape (3N,).
+        nodes: Rest positions [m], shape (N, 3): what the rigid-body modes are made of.
+    """
+
+    def __init__(self, stiffness: BlockMatrix, free: Mask, nodes: Array) -> None:
+        import pyamg
+
+        from warpjld.fem.load.prescribed import rigid_modes
+
+        matrix = stiffness.masked(free)
+        diagonal = np.einsum("nii->ni", matrix.diagonal())
+        on = matrix.on_diagonal
+        # prescribed degrees of freedom stay in the blocks, uncoupled
+        matrix.values[on[:, None], [0, 1, 2], [0, 1, 2]] += ~free.reshape(-1, 3) * diagonal.max()
+        modes = rigid_modes(nodes) * free[:, None]
+        n = 3 * matrix.size
+        self._free = free
+        self._levels = pyamg.smoothed_aggregation_solver(
+            bsr_matrix((matrix.values, matrix.columns, matrix.rows), shape=(n, n)), B=modes, max_coarse=500
+        )
+        self._apply = self._levels.aspreconditioner(cycle="V")
+
+    def __call__(self, r: NDArray[Any]) -> NDArray[Any]:
+        """z = M r, shape (3N,)."""
+        result: NDArray[Any] = (self._apply @ r.astype(np.float64)) * self._free
+        return result.astype(r.dtype)

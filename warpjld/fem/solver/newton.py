@@ -6,10 +6,10 @@ from collections.abc import Callable
 
 import numpy as np
 
-from warpjld.fem.arrays import Array, Ints
+from warpjld.fem.arrays import Array, Ints, norm
+from warpjld.fem.assembly.block_matrix import BlockMatrix, IndefiniteError
 from warpjld.fem.body import Tangent
-from warpjld.fem.solver.block_matrix import BlockMatrix, IndefiniteError, norm
-from warpjld.fem.solver.conjugate import Iteration, Status
+from warpjld.fem.solver.krylov import Iteration, Status
 from warpjld.fem.solver.problem import Problem
 from warpjld.fem.solver.solution import Instant, Solution
 
@@ -19,7 +19,7 @@ _HALVINGS = 8
 _ITERATIONS, _CAUTIOUS = 16, 25
 _LINE_SEARCH = 8
 _ROUNDING, _PLACES = 1e-13, 0.03
-"""As in ``contact.walk``."""
+"""As in ``contact.solver.newton_state``."""
 _DIRECT = 40_000
 """Degrees of freedom up to which a step with an indefinite stiffness is solved directly."""
 

@@ -1,4 +1,4 @@
-"""A body at load instants: what is prescribed, what pulls, and the solver of its stiffness (B eq. 5, R107)."""
+"""Static problem of a body at load instants: prescribed displacements, loads, solver (B eq. 5, R107)."""
 
 from __future__ import annotations
 
@@ -7,10 +7,10 @@ from typing import Any
 import numpy as np
 
 from warpjld.fem.arrays import Array
+from warpjld.fem.assembly.block_matrix import BlockMatrix
 from warpjld.fem.body import Body
 from warpjld.fem.load.loads import Loads, external_forces, subtract_pressure_stiffness
 from warpjld.fem.load.prescribed import Prescribed
-from warpjld.fem.solver.block_matrix import BlockMatrix
 from warpjld.fem.solver.linear import LinearSolver
 from warpjld.fem.solver.solution import Instant, Solution
 

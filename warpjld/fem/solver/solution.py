@@ -1,4 +1,4 @@
-"""What a static solve gives back."""
+"""Results of a static solve: equilibria, and how it ended."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from warpjld.errors import WarpjldError
 from warpjld.fem.arrays import Array, Ints
 from warpjld.fem.load.loads import Loads
-from warpjld.fem.solver.conjugate import Status
+from warpjld.fem.solver.krylov import Status
 
 __all__ = ["Instant", "Solution", "SolveError"]
 

@@ -8,11 +8,11 @@ import numpy as np
 
 from warpjld.errors import InputError
 from warpjld.fem.arrays import Array, Ints
+from warpjld.fem.assembly.block_matrix import IndefiniteError
 from warpjld.fem.body import Body
 from warpjld.fem.load.loads import Loads
 from warpjld.fem.load.prescribed import Prescribed, held_in_place, refuse_free
-from warpjld.fem.solver.block_matrix import IndefiniteError
-from warpjld.fem.solver.conjugate import Status
+from warpjld.fem.solver.krylov import Status
 from warpjld.fem.solver.newton import Newton
 from warpjld.fem.solver.problem import Problem
 from warpjld.fem.solver.solution import Instant, Solution, SolveError
@@ -66,17 +66,9 @@ def solve(
     steps = _steps(instants)
     if after is not None and after.displacement.size != body.degrees:
         raise InputError(f"after: is of a body with {after.displacement.size} degrees of freedom, not {body.degrees}")
-    held = np.empty(0, np.int64)
-    if free == "hold":
-        wanted = prescribed.degrees
-        prescribed = held_in_place(body, prescribed)
-        held = np.setdiff1d(prescribed.degrees, wanted)
-        if after is not None:
-            prescribed.values[np.isin(prescribed.degrees, held)] = after.displacement.reshape(-1)[held]
-    else:
-        refuse_free(body, prescribed)
     if guess is not None and guess.size != body.degrees:
         raise InputError(f"guess: want {body.degrees} values, got {guess.size}")
+    prescribed, held = _held(body, prescribed, after, free)
     problem = Problem(body, prescribed, loads or Loads(), after, method=method, precision=precision)
     if body.large_strain:
         solution = Newton(problem, tolerance, guess).run(steps, held, progress)
@@ -85,6 +77,19 @@ def solve(
     if check and not solution.converged:
         raise SolveError(solution)
     return solution
+
+
+def _held(body: Body, prescribed: Prescribed, after: Solution | None, free: str) -> tuple[Prescribed, Ints]:
+    """Prescribed displacements with those that hold free bodies, and which these are; or free bodies refused."""
+    if free == "refuse":
+        refuse_free(body, prescribed)
+        return prescribed, np.empty(0, np.int64)
+    wanted = prescribed.degrees
+    prescribed = held_in_place(body, prescribed)
+    held = np.setdiff1d(prescribed.degrees, wanted)
+    if after is not None:
+        prescribed.values[np.isin(prescribed.degrees, held)] = after.displacement.reshape(-1)[held]
+    return prescribed, held
 
 
 def _linear(

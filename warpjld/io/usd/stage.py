@@ -12,7 +12,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from warpjld.archive import check_archive
 from warpjld.errors import InputError, MissingExtraError
+from warpjld.input_file import read_bytes
+from warpjld.limits import check_limit
+from warpjld.nesting import nesting
 
 __all__ = ["UsdFile", "matrices", "open_usd"]
 
@@ -45,6 +49,15 @@ class UsdFile:
         return list(Usd.PrimRange.Stage(self.stage, Usd.TraverseInstanceProxies()))
 
 
+def _check_content(path: Path) -> None:
+    """Refuse what OpenUSD takes for ever to refuse, or unpacks without end."""
+    raw = read_bytes(path)
+    if raw.startswith(b"#usda"):
+        check_limit("depth", nesting(raw, b"[{(", b"]})"), of="brackets", path=path)
+    elif raw.startswith(b"PK"):
+        check_archive(path, "USD package (.usdz)")
+
+
 @contextmanager
 def open_usd(path: str | Path) -> Iterator[UsdFile]:
     """A stage to read within the statement; OpenUSD's warnings become notes instead of text on stderr.
@@ -54,8 +67,9 @@ def open_usd(path: str | Path) -> Iterator[UsdFile]:
         MissingExtraError: OpenUSD is not installed.
     """
     path = Path(path)
-    if not path.is_file():
-        raise InputError("is a folder" if path.is_dir() else "no such file", path=path)
+    if not path.exists():
+        raise InputError("no such file", path=path)
+    _check_content(path)
     try:
         from pxr import Tf, Usd, UsdGeom, UsdUtils
     except ImportError as error:

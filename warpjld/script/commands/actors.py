@@ -56,12 +56,25 @@ def hand(scene: Scene, arguments: Arguments) -> None:
 
 @command(
     "BODY",
-    syntax='BODY "<rig file>" [UNIT <M/CM/MM or metres>] [SCALE <factor>] [MAP "<joint map>"] [NAME <actor>]',
-    help="Bring on a rig with any skeleton: a body, an animal. The actor is called BODY unless named.",
+    syntax=(
+        'BODY BUILTIN [HEIGHT <metres>] [NAME <actor>] or BODY "<rig file>" [UNIT <M/CM/MM or metres>]'
+        ' [SCALE <factor>] [MAP "<joint map>"] [NAME <actor>]'
+    ),
+    help="Bring on a rig with any skeleton: the built-in body, an animal. The actor is called BODY unless named.",
     group="Actors",
 )
 def body(scene: Scene, arguments: Arguments) -> None:
     """R12, R30."""
+    if arguments.keyword("BUILTIN"):
+        from warpjld.hand.figure import build_body
+
+        options = arguments.options(
+            height=lambda: arguments.number("the body's height in metres"),
+            name=lambda: arguments.new_name("the actor's name"),
+        )
+        name = str(options.pop("name", "body"))
+        scene.add(name, build_body(**options))  # type: ignore[arg-type]
+        return
     path = arguments.input_file("a rig file")
     options = _options(arguments)
     name = str(options.pop("name", "body"))
@@ -71,20 +84,20 @@ def body(scene: Scene, arguments: Arguments) -> None:
 @command(
     "MODEL",
     syntax=(
-        'MODEL "<surface file>" SKELETON "<skeleton file>" [UNIT <M/CM/MM or metres>] [SCALE <factor>]'
-        ' [MAP "<joint map>"] [NAME <actor>]'
+        'MODEL "<surface file>" <SKELETON/POINTS> "<skeleton or points file>" [UNIT <M/CM/MM or metres>]'
+        ' [SCALE <factor>] [MAP "<joint map>"] [NAME <actor>]'
     ),
-    help="Bring on a bare surface with a skeleton file. The actor is called MODEL unless named.",
+    help="Bring on a bare surface with a skeleton or named points. The actor is called MODEL unless named.",
     group="Actors",
 )
 def model(scene: Scene, arguments: Arguments) -> None:
-    """R17: a surface of any origin."""
+    """R12, R17: a surface of any origin."""
     path = arguments.input_file("a surface file")
-    arguments.choice("", ("SKELETON",))
-    skeleton = arguments.input_file("a skeleton file")
+    kind = arguments.choice("SKELETON or POINTS", ("SKELETON", "POINTS")).lower()
+    joints = arguments.input_file(f"a {kind} file")
     options = _options(arguments)
     name = str(options.pop("name", "model"))
-    scene.add(name, _load(path, skeleton=skeleton, **options))
+    scene.add(name, _load(path, **{kind: joints}, **options))
 
 
 @command(

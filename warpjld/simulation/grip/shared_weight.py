@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from warpjld.errors import InputError
 from warpjld.fem.body import Body
 from warpjld.fem.contact import ContactInstant, Pair
-from warpjld.fem.contact.results.solution import Touch
+from warpjld.fem.contact.results.contact_solution import Touch
 from warpjld.fem.load.loads import volumes
 from warpjld.fem.load.prescribed import Prescribed
 from warpjld.simulation.bodies.support import handle_of

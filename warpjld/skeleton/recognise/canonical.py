@@ -64,6 +64,7 @@ def canonical_skeleton(
     axes: Mapping[int, NDArray[np.float64]] | None = None,
     limits: Mapping[int, Mapping[str, tuple[float, float]]] | None = None,
     painted: Painted | None = None,
+    placed: bool = False,
 ) -> Canonical:
     """Recognise a tree inside its surface.
 
@@ -77,6 +78,7 @@ def canonical_skeleton(
         axes: Flexion axes the file states, by its joint numbers.
         limits: Channel limits [rad] the file states, likewise.
         painted: Whose skin is whose, by its joint numbers, where the file says.
+        placed: Whether an animator placed the joints: none is merged, moved or added.
     """
     if roles is None:
         roles = recognise(tree, shares)
@@ -88,11 +90,14 @@ def canonical_skeleton(
     for hand in roles.hands:
         found = {name: tree.positions[j] for name, j in hand.joints.items()}
         hand.side = _side(hand, found, side if len(roles.hands) == 1 else None, doubts)
-        points, added = complete_hand(found, _last_bones(tree, hand), vertices, faces, f"{hand.side} hand")
+        points: dict[str, NDArray[np.float64]] = dict(found)
+        added: list[str] = []
+        if not placed:
+            points, added = complete_hand(found, _last_bones(tree, hand), vertices, faces, f"{hand.side} hand")
         hand_points[hand.side] = points
         notes.append(f"{hand.side} hand: recognised by {roles.how}, {len(hand.joints)} of 25 joints in the file")
         notes.extend(added)
-    place = merge_pelvis(tree, roles)
+    place = None if placed else merge_pelvis(tree, roles)
     notes = [*roles.notes, *notes]
     flesh = Flesh(tree, shares)
     layout = lay_out(tree, roles, hand_points, flesh)
@@ -101,9 +106,10 @@ def canonical_skeleton(
         layout.positions[layout.names.index("pelvis")] = place
     if painted is not None:
         let_flesh_lead(layout, tree, painted)
-    if roles.body:
+    if roles.body and not placed:
         _extremities(layout, vertices, faces)
-    add_leaf_ends(layout, vertices, faces, painted, branches=not (roles.body or roles.hands))
+    if not placed:
+        add_leaf_ends(layout, vertices, faces, painted, branches=not (roles.body or roles.hands))
     skeleton = _skeleton(layout, hand_points, axes or {}, limits or {})
     return Canonical(skeleton, tuple(layout.sources), layout.owner, (*notes, *layout.notes), tuple(doubts))
 

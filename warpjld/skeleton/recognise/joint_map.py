@@ -7,6 +7,7 @@ from collections.abc import Mapping
 from typing import Any
 
 from warpjld.errors import InputError
+from warpjld.skeleton.actor_points import POINT_JOINTS
 from warpjld.skeleton.hand import HAND_PARENTS
 from warpjld.skeleton.recognise.roles import HandRoles, Roles
 from warpjld.skeleton.recognise.tree import SourceTree
@@ -25,6 +26,7 @@ _KNOWN = (
     "head.top",
     *(f"{side}.{name}" for side in ("left", "right") for name in (*_SIDED, *_TOES, *HAND_PARENTS)),
     *HAND_PARENTS,
+    *POINT_JOINTS,
 )
 _IGNORE = "ignore"
 

@@ -19,7 +19,9 @@ from warpjld.skeleton.recognise.section import nearby
 
 __all__ = ["add_leaf_ends"]
 
-_IS_END = re.compile(r"((left|right)\.)?(thumb|index|middle|ring|pinky|hand|toe\d*)\.tip|head\.top")
+_IS_END = re.compile(
+    r"((left|right)\.)?((thumb|index|middle|ring|pinky|hand|toe\d*)\.tip|heel)|head\.top|chin|nose_tip|sternum"
+)
 """Canonical extremities: they end a bone and carry nothing."""
 _OWN = 0.5  # weight from which a vertex is a joint's own
 _SMALLEST = 5e-3  # of the skeleton's size: flesh that reaches less far needs no bone

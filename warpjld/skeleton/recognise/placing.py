@@ -12,7 +12,7 @@ from warpjld.skeleton.recognise.section import first_hits
 from warpjld.skeleton.tree import Skeleton
 from warpjld.winding import winding_numbers
 
-__all__ = ["Finding", "check_placing", "in_trunk"]
+__all__ = ["Finding", "check_placing", "in_trunk", "outside_surface"]
 
 _OFF_CENTRE = 0.5  # |a − b| / (a + b) of the flesh on both sides: at 0.5 one side is three times the other
 _NARROW = 1.6  # a section wider than this times its depth is judged by its depth alone (palms)
@@ -78,7 +78,7 @@ def _coincident(skeleton: Skeleton, vertices: NDArray[np.float64]) -> list[Findi
     return out
 
 
-def _open_ends(vertices: NDArray[np.float64], faces: NDArray[np.int32]) -> list[tuple[NDArray[np.float64], float]]:
+def _open_ends(vertices: NDArray[np.float64], faces: NDArray[np.integer]) -> list[tuple[NDArray[np.float64], float]]:
     """Centre and radius of every hole's rim: wrists may be cut open there."""
     edges = np.sort(faces[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2), axis=1)
     unique, count = np.unique(edges, axis=0, return_counts=True)
@@ -94,9 +94,16 @@ def _open_ends(vertices: NDArray[np.float64], faces: NDArray[np.int32]) -> list[
     return out
 
 
+def outside_surface(
+    vertices: NDArray[np.float64], faces: NDArray[np.integer], points: NDArray[np.float64]
+) -> NDArray[np.bool_]:
+    """Which points lie outside a surface that may be open at its ends, shape (n,)."""
+    return ~_inside(vertices, faces, points, _open_ends(vertices, faces))
+
+
 def _inside(
     vertices: NDArray[np.float64],
-    faces: NDArray[np.int32],
+    faces: NDArray[np.integer],
     points: NDArray[np.float64],
     ends: list[tuple[NDArray[np.float64], float]],
 ) -> NDArray[np.bool_]:

@@ -1,4 +1,4 @@
-"""Contact points: what each of them weighs, where it looks, and how far it is from the other side."""
+"""Contact points of a pair at a configuration: mortar or node-to-surface weights, normals, areas and gaps."""
 
 from __future__ import annotations
 
@@ -6,6 +6,7 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
+from scipy.sparse import csr_array, eye_array
 
 from warpjld.errors import InputError
 from warpjld.fem.arrays import Array, Ints, Ints32
@@ -15,7 +16,7 @@ from warpjld.fem.contact.interface.surface import ContactSurface, surface_of
 from warpjld.fem.contact.obstacles.obstacle import ClosestPoints, Obstacle
 from warpjld.fem.mesh.hexmesh import HexMesh
 
-__all__ = ["ContactPoints", "Interface", "interfaces_of"]
+__all__ = ["ContactPoints", "Interface", "interfaces_of", "tangential"]
 
 _NEAR, _FAR = 0.5 * (1.0 + 1.0 / np.sqrt(3.0)), 0.5 * (1.0 - 1.0 / np.sqrt(3.0))
 _GAUSS = np.array(
@@ -90,8 +91,6 @@ class Interface:
     """
 
     def __init__(self, mesh: HexMesh, pair: Pair, threads: int) -> None:
-        from scipy.sparse import csr_array, eye_array
-
         self.pair = pair
         self.slave: ContactSurface = surface_of(mesh, pair.slave, f"{pair.title}: slave")
         self._count = len(mesh.nodes)
@@ -179,13 +178,16 @@ class Interface:
         return np.flatnonzero((found.distance < self.reach) & (against | (found.distance > 0.0)))
 
     def _against(self, probe: _Probe, before: float, time: float) -> ContactPoints:
-        from scipy.sparse import csr_array
-
         weights = csr_array((probe.values, probe.columns, probe.rows), shape=(len(probe.sites), self._count))
         weights.sum_duplicates()  # corners of a degenerate face coincide
         found = probe.found
         carried = found.closest - self._obstacle.carried(found.closest, time, before)
         return ContactPoints(probe.sites, weights, -found.normal, probe.area, found.distance, carried)
+
+
+def tangential(vectors: Array, normals: Array) -> Array:
+    """Vectors (m, 3) less their parts along unit normals (m, 3)."""
+    return np.asarray(vectors - np.einsum("mi,mi->m", vectors, normals)[:, None] * normals)
 
 
 @dataclass(frozen=True, eq=False)

@@ -1,10 +1,11 @@
-"""Mortar points between two surfaces that both deform."""
+"""Mortar integrals between two deformable surfaces: weighted gaps at slave nodes (Puso & Laursen 2004)."""
 
 from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from scipy.sparse import coo_array, csr_array
 
 from warpjld.errors import InputError
 from warpjld.fem.arrays import Array, Ints, Ints32
@@ -82,8 +83,6 @@ class Mortar:
 
         Of facets face to face, no farther apart than ``reach``, nor deeper.
         """
-        from scipy.sparse import coo_array, csr_array
-
         from warpjld.fem.contact.interface.contact_points import ContactPoints
 
         slave, master = self.slave, self.master

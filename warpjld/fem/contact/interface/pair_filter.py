@@ -1,4 +1,4 @@
-"""Facets that seem to overlap and do not.
+"""Filter of facet pairs: false overlaps, of facets that face each other through a thin body.
 
 Of two fingers side by side the back of one faces the palmar side of the other, as surfaces do that overlap, only a
 whole finger deep. Where their sides touch, slivers of such facets lie one before the other, and one finger would be

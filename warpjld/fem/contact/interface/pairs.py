@@ -1,4 +1,4 @@
-"""What may touch what, and with which friction."""
+"""Contact pairs: slave and master surfaces, friction, bonds, and what never meets."""
 
 from __future__ import annotations
 

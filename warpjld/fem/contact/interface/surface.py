@@ -1,4 +1,4 @@
-"""The faces of a body that may touch something."""
+"""Contact surfaces: boundary faces of a body, their nodes, normals and areas."""
 
 from __future__ import annotations
 

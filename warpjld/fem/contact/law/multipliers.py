@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from warpjld.fem.arrays import Array, Ints, Mask
-from warpjld.fem.contact.interface.contact_points import ContactPoints
+from warpjld.fem.contact.interface.contact_points import ContactPoints, tangential
 from warpjld.fem.contact.interface.pairs import Pair
 from warpjld.fem.contact.law.contact_state import ActiveSet, ContactState
 from warpjld.fem.contact.law.return_mapping import FRICTION_FROM, ContactTractions
@@ -38,8 +38,7 @@ def update_multipliers(
     sticking = np.ones(count, dtype=bool)
     pressure = np.where(known, tractions.pressure, 0.0)
     if pair.friction > 0.0 or state.bonded.any():
-        across = slip - state.slip_anchor[at]
-        across = across - np.einsum("mi,mi->m", across, points.normal)[:, None] * points.normal
+        across = tangential(slip - state.slip_anchor[at], points.normal)
         if decides is ActiveSet.TRIAL:
             friction[at], sticking[at] = _as_found(pair, state, at, tractions, pressure)
         else:

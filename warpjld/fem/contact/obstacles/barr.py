@@ -15,15 +15,7 @@ from numpy.typing import ArrayLike
 from warpjld.errors import InputError
 from warpjld.fem.arrays import Array, Ints32
 from warpjld.fem.contact.obstacles.facets import Facets
-from warpjld.fem.contact.obstacles.obstacle import (
-    ClosestPoints,
-    Motion,
-    Obstacle,
-    Points,
-    Rigid,
-    checked_points,
-    placement,
-)
+from warpjld.fem.contact.obstacles.obstacle import ClosestPoints, Motion, Moving, Points, Rigid
 
 __all__ = ["Barr"]
 
@@ -31,7 +23,7 @@ Amount = Callable[[float], float] | float
 """A constant, or a function of time."""
 
 
-class Barr(Obstacle):
+class Barr(Moving):
     """A shape that is tapered, then twisted, then bent along one of its axes, and moved as a whole.
 
     The amounts are those between the two ends of the shape along the axis. The next axis in the order x, y, z is where
@@ -82,26 +74,19 @@ class Barr(Obstacle):
         self._centre = np.zeros(3)
         self._centre[[k for k in range(3) if k != along]] = self._middle
         self._amounts = (taper, twist, bend)
-        self._motion = motion
+        self.motion = motion
         self._now: tuple[float, ...] | None = (0.0, 0.0, 0.0)
 
-    def project(self, points: Points, time: float) -> ClosestPoints:
-        """See `Obstacle.project`: to the facets of the deformed shape, with Barr's normals."""
-        turn, shift = placement(self._motion, time)
-        found = self._at(time).project((checked_points(points) - shift) @ turn)
-        return ClosestPoints(found.distance, found.closest @ turn.T + shift, found.normal @ turn.T)
+    def _project(self, points: Points, time: float) -> ClosestPoints:
+        """To the facets of the deformed shape, with Barr's normals."""
+        return self._at(time).project(points)
 
-    def carried(self, points: Points, time_from: float, time_to: float) -> Points:
-        """See `Obstacle.carried`: back through the maps of one time, and forth through those of the other."""
-        turn, shift = placement(self._motion, time_from)
-        then, there = placement(self._motion, time_to)
-        material = self._undeformed((checked_points(points) - shift) @ turn, self._values(time_from))
-        return np.asarray(self._deformed(material, self._values(time_to)) @ then.T + there)
+    def _carried(self, points: Points, time_from: float, time_to: float) -> Points:
+        """Back through the maps of one time, and forth through those of the other."""
+        return self._deformed(self._undeformed(points, self._values(time_from)), self._values(time_to))
 
-    def mesh(self, time: float) -> tuple[Points, Ints32]:
-        """See `Obstacle.mesh`."""
-        turn, shift = placement(self._motion, time)
-        return self._deformed(self._rest.vertices, self._values(time)) @ turn.T + shift, self._rest.faces
+    def _mesh(self, time: float) -> tuple[Points, Ints32]:
+        return self._deformed(self._rest.vertices, self._values(time)), self._rest.faces
 
     def _at(self, time: float) -> Facets:
         values = self._values(time)

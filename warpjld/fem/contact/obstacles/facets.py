@@ -7,10 +7,13 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
+from scipy.sparse import coo_array
+from scipy.sparse.csgraph import connected_components
 
 from warpjld.errors import InputError
 from warpjld.fem.arrays import Array, Ints, Ints32, Mask
 from warpjld.fem.contact.obstacles.obstacle import ClosestPoints, Points
+from warpjld.fem.mesh.envelope import checked_surface
 from warpjld.threads import in_threads, threads_for
 
 __all__ = ["CREASE", "Facets", "Place"]
@@ -55,7 +58,7 @@ class Facets:
     """
 
     def __init__(self, vertices: ArrayLike, faces: ArrayLike) -> None:
-        points, triangles = _checked(vertices, faces)
+        points, triangles = checked_surface(vertices, faces)
         corners = points[triangles]
         if np.einsum("ti,ti->", corners[:, 0], np.cross(corners[:, 1], corners[:, 2])) < 0.0:
             triangles = np.ascontiguousarray(triangles[:, ::-1])
@@ -190,18 +193,6 @@ class Facets:
         return np.asarray(((count == 1) & edge) | ((count == 2) & corner))
 
 
-def _checked(vertices: ArrayLike, faces: ArrayLike) -> tuple[Array, Ints32]:
-    points = np.ascontiguousarray(vertices, dtype=np.float64)
-    triangles = np.ascontiguousarray(faces, dtype=np.int32)
-    if points.ndim != 2 or points.shape[1] != 3 or not np.isfinite(points).all():
-        raise InputError(f"surface: want finite vertices of shape (n, 3), got {points.shape}")
-    if triangles.ndim != 2 or triangles.shape[1] != 3 or len(triangles) == 0:
-        raise InputError(f"surface: want triangles of shape (n, 3) with n > 0, got {triangles.shape}")
-    if triangles.min() < 0 or triangles.max() >= len(points):
-        raise InputError(f"surface: triangle indices must lie in 0…{len(points) - 1}")
-    return points, triangles
-
-
 def _neighbours(faces: Ints32) -> Ints:
     """Triangle across the edge opposite each corner, −1 where there is none or several, shape (t, 3)."""
     edges = np.sort(faces[:, [[1, 2], [2, 0], [0, 1]]].reshape(-1, 2), axis=1)
@@ -218,9 +209,6 @@ def _neighbours(faces: Ints32) -> Ints:
 def _smooth_corners(faces: Ints32, soft: Mask, neighbours: Ints) -> Ints:
     """A number for each corner of each triangle, shape (t, 3): the same where triangles around a vertex are reached
     from one another without crossing a crease."""
-    from scipy.sparse import coo_array
-    from scipy.sparse.csgraph import connected_components
-
     links = []
     for k in range(3):
         mine = np.flatnonzero(soft[:, k])

@@ -8,15 +8,7 @@ from numpy.typing import ArrayLike
 from warpjld.errors import InputError
 from warpjld.fem.arrays import Ints32
 from warpjld.fem.contact.obstacles.facets import Facets
-from warpjld.fem.contact.obstacles.obstacle import (
-    ClosestPoints,
-    Motion,
-    Obstacle,
-    Points,
-    Rigid,
-    checked_points,
-    placement,
-)
+from warpjld.fem.contact.obstacles.obstacle import ClosestPoints, Motion, Moving, Points, Rigid
 
 __all__ = ["Keyframed", "RigidMesh"]
 
@@ -37,14 +29,14 @@ class RigidMesh(Rigid):
         self._facets = Facets(vertices, faces)
         self.motion = motion
 
-    def _project(self, points: Points) -> ClosestPoints:
+    def _project(self, points: Points, time: float) -> ClosestPoints:
         return self._facets.project(points)
 
-    def _mesh(self) -> tuple[Points, Ints32]:
+    def _mesh(self, time: float) -> tuple[Points, Ints32]:
         return self._facets.vertices, self._facets.faces
 
 
-class Keyframed(Obstacle):
+class Keyframed(Moving):
     """A surface whose vertices are given at times; between them they go straight, outside they stay.
 
     Args:
@@ -58,7 +50,7 @@ class Keyframed(Obstacle):
     """
 
     def __init__(self, faces: ArrayLike, times: ArrayLike, vertices: ArrayLike, motion: Motion | None = None) -> None:
-        self._motion = motion
+        self.motion = motion
         self._times = np.asarray(times, dtype=np.float64)
         self._vertices = np.asarray(vertices, dtype=np.float64)
         if self._times.ndim != 1 or len(self._times) == 0 or not (np.diff(self._times) > 0.0).all():
@@ -71,28 +63,20 @@ class Keyframed(Obstacle):
         self._facets = Facets(self._vertices[0], faces)
         self._now = float(self._times[0])
 
-    def project(self, points: Points, time: float) -> ClosestPoints:
-        """See `Obstacle.project`."""
-        turn, shift = placement(self._motion, time)
-        found = self._at(time).project((checked_points(points) - shift) @ turn)
-        return ClosestPoints(found.distance, found.closest @ turn.T + shift, found.normal @ turn.T)
+    def _project(self, points: Points, time: float) -> ClosestPoints:
+        return self._at(time).project(points)
 
-    def carried(self, points: Points, time_from: float, time_to: float) -> Points:
-        """See `Obstacle.carried`: the offset from the nearest facet turns with it."""
-        turn, shift = placement(self._motion, time_from)
-        then, there = placement(self._motion, time_to)
-        points = (checked_points(points) - shift) @ turn
+    def _carried(self, points: Points, time_from: float, time_to: float) -> Points:
+        """The offset from the nearest facet turns with it."""
         facets = self._at(time_from)
         found, place = facets.locate(points)
         before, after = facets.vertices, self._shape(time_to)
         offset = np.einsum("nij,nj->ni", facets.frames(place, before), points - found.closest)
         turned = np.einsum("nij,ni->nj", facets.frames(place, after), offset)
-        return np.asarray((facets.at(place, after) + turned) @ then.T + there)
+        return facets.at(place, after) + turned
 
-    def mesh(self, time: float) -> tuple[Points, Ints32]:
-        """See `Obstacle.mesh`."""
-        turn, shift = placement(self._motion, time)
-        return self._shape(time) @ turn.T + shift, self._facets.faces
+    def _mesh(self, time: float) -> tuple[Points, Ints32]:
+        return self._shape(time), self._facets.faces
 
     def _at(self, time: float) -> Facets:
         moment = float(np.clip(time, self._times[0], self._times[-1]))

@@ -1,4 +1,4 @@
-"""What contact does not deform: the face every obstacle shows to the solver, and rigid motion (R94)."""
+"""Obstacles: surfaces in prescribed motion and their closest-point projection (R94)."""
 
 from __future__ import annotations
 
@@ -9,11 +9,22 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
+from scipy.spatial.transform import Rotation
 
 from warpjld.errors import InputError
 from warpjld.fem.arrays import Array, Ints32
 
-__all__ = ["ClosestPoints", "Motion", "Obstacle", "Rigid", "checked_points", "checked_vector", "placement", "standing"]
+__all__ = [
+    "ClosestPoints",
+    "Motion",
+    "Moving",
+    "Obstacle",
+    "Rigid",
+    "checked_points",
+    "checked_vector",
+    "placement",
+    "standing",
+]
 
 Motion = Callable[[float], tuple[ArrayLike, ArrayLike]]
 """Time → position [m] and quaternion x, y, z, w: a point x of the first placement lies at rotation · x + position."""
@@ -53,37 +64,45 @@ class Obstacle(ABC):
         """Vertices [m], shape (v, 3), and triangles, shape (t, 3), to draw it at a time."""
 
 
-class Rigid(Obstacle):
-    """An obstacle with a ``motion`` and a shape that is always the same in its own frame."""
+class Moving(Obstacle):
+    """An obstacle with a ``motion``, and a shape in its own frame that may be a function of time."""
 
     motion: Motion | None
 
     @abstractmethod
-    def _project(self, points: Points) -> ClosestPoints:
-        """Distances in the first placement."""
+    def _project(self, points: Points, time: float) -> ClosestPoints:
+        """Distances in its own frame."""
 
     @abstractmethod
-    def _mesh(self) -> tuple[Points, Ints32]:
-        """To draw it in the first placement."""
+    def _mesh(self, time: float) -> tuple[Points, Ints32]:
+        """To draw it in its own frame."""
+
+    def _carried(self, points: Points, time_from: float, time_to: float) -> Points:
+        """Material points in its own frame."""
+        return points
 
     def project(self, points: Points, time: float) -> ClosestPoints:
         """See `Obstacle.project`."""
         points = checked_points(points)
         turn, shift = placement(self.motion, time)
-        found = self._project((points - shift) @ turn)
+        found = self._project((points - shift) @ turn, time)
         return ClosestPoints(found.distance, found.closest @ turn.T + shift, found.normal @ turn.T)
 
     def carried(self, points: Points, time_from: float, time_to: float) -> Points:
         """See `Obstacle.carried`."""
         turn, shift = placement(self.motion, time_from)
         then, there = placement(self.motion, time_to)
-        return np.asarray((checked_points(points) - shift) @ turn @ then.T + there)
+        return np.asarray(self._carried((checked_points(points) - shift) @ turn, time_from, time_to) @ then.T + there)
 
     def mesh(self, time: float) -> tuple[Points, Ints32]:
         """See `Obstacle.mesh`."""
         turn, shift = placement(self.motion, time)
-        vertices, faces = self._mesh()
+        vertices, faces = self._mesh(time)
         return vertices @ turn.T + shift, faces
+
+
+class Rigid(Moving):
+    """An obstacle whose shape in its own frame is always the same."""
 
 
 def standing(position: ArrayLike = (0.0, 0.0, 0.0), rotation: ArrayLike = (0.0, 0.0, 0.0, 1.0)) -> Motion:
@@ -98,8 +117,6 @@ def placement(motion: Motion | None, time: float) -> tuple[Array, Array]:
     Raises:
         InputError: The motion gives something else than a finite position and a quaternion.
     """
-    from scipy.spatial.transform import Rotation
-
     if motion is None:
         return np.eye(3), np.zeros(3)
     position, rotation = (np.asarray(part, dtype=np.float64) for part in motion(time))

@@ -39,11 +39,11 @@ class Plane(Rigid):
         object.__setattr__(self, "_middle", checked_vector("plane point", self.point))
         object.__setattr__(self, "_out", _direction("plane normal", self.normal))
 
-    def _project(self, points: Points) -> ClosestPoints:
+    def _project(self, points: Points, time: float) -> ClosestPoints:
         distance = (points - self._middle) @ self._out
         return ClosestPoints(distance, points - distance[:, None] * self._out, np.tile(self._out, (len(points), 1)))
 
-    def _mesh(self) -> tuple[Points, Ints32]:
+    def _mesh(self, time: float) -> tuple[Points, Ints32]:
         along, across = _square(self._out)
         corners = [(-1, -1), (1, -1), (1, 1), (-1, 1)]
         vertices = [self._middle + 0.5 * self.extent * (a * along + b * across) for a, b in corners]
@@ -72,13 +72,13 @@ class Sphere(Rigid):
         object.__setattr__(self, "_middle", checked_vector("sphere centre", self.centre))
         _length("sphere radius", self.radius)
 
-    def _project(self, points: Points) -> ClosestPoints:
+    def _project(self, points: Points, time: float) -> ClosestPoints:
         away = points - self._middle
         reach = np.linalg.norm(away, axis=1)
         normal = np.divide(away, reach[:, None], out=np.tile([0.0, 1.0, 0.0], (len(away), 1)), where=reach[:, None] > 0)
         return ClosestPoints(reach - self.radius, self._middle + self.radius * normal, normal)
 
-    def _mesh(self) -> tuple[Points, Ints32]:
+    def _mesh(self, time: float) -> tuple[Points, Ints32]:
         import trimesh
 
         ball = trimesh.creation.icosphere(subdivisions=4, radius=self.radius)
@@ -111,11 +111,11 @@ class Box(Rigid):
         object.__setattr__(self, "_half", 0.5 * checked_vector("box size", self.size, above=0.0))
         _rounding("box", self.edge, float(self._half.min()))
 
-    def _project(self, points: Points) -> ClosestPoints:
+    def _project(self, points: Points, time: float) -> ClosestPoints:
         found = _round_box(points - self._middle, self._half, self.edge)
         return ClosestPoints(found.distance, found.closest + self._middle, found.normal)
 
-    def _mesh(self) -> tuple[Points, Ints32]:
+    def _mesh(self, time: float) -> tuple[Points, Ints32]:
         rim = self.edge * (1.0 - np.tan(np.linspace(0.0, 0.25 * np.pi, 6 if self.edge else 1)))
         vertices, faces = _box_surface([np.concatenate([rim - h, h - rim, [-h, h]]) for h in self._half])
         return _round_box(vertices, self._half, self.edge).closest + self._middle, faces
@@ -153,7 +153,7 @@ class Cylinder(Rigid):
         _length("cylinder length", self.length)
         _rounding("cylinder", self.edge, min(self.radius, 0.5 * self.length))
 
-    def _project(self, points: Points) -> ClosestPoints:
+    def _project(self, points: Points, time: float) -> ClosestPoints:
         # in the half-plane of the axis and the point it is a rectangle
         axis = self._along
         away = points - self._middle
@@ -166,7 +166,7 @@ class Cylinder(Rigid):
         closest, normal = (f[:, :1] * outwards + f[:, 1:] * axis for f in (flat.closest, flat.normal))
         return ClosestPoints(flat.distance, closest + self._middle, normal)
 
-    def _mesh(self) -> tuple[Points, Ints32]:
+    def _mesh(self, time: float) -> tuple[Points, Ints32]:
         around = 96
         rim = np.linspace(0.0, 0.5 * np.pi, 7 if self.edge else 1)
         r = self.radius - self.edge * (1.0 - np.sin(rim))

@@ -1,4 +1,4 @@
-"""The paper's loop: objects are repelled by the skin, then both are released under the forces found (B Fig. 9, R113).
+"""Staggered contact of the paper: objects are repelled by the skin, then both are released (B Fig. 9, R113).
 
 1. The bones are prescribed. 2. Slave nodes that overlap are put onto the master's polygons, the master's surface is
 held. 3. K11 U_u = R_k − K12 U_k and the reactions. 4. Each reaction goes, equal and opposite, to the three nodes of the
@@ -38,10 +38,10 @@ from warpjld.fem.body import Body
 from warpjld.fem.contact.interface.pairs import Pair
 from warpjld.fem.contact.paper.sides import Side
 from warpjld.fem.contact.paper.turns import Turns
-from warpjld.fem.contact.results.solution import ContactInstant, ContactSolution
+from warpjld.fem.contact.results.contact_solution import ContactInstant, ContactSolution
 from warpjld.fem.load.loads import Loads, external_forces
 from warpjld.fem.load.prescribed import Prescribed
-from warpjld.fem.solver.conjugate import Status
+from warpjld.fem.solver.krylov import Status
 from warpjld.fem.solver.solution import Instant, Solution
 
 __all__ = ["by_turns"]
@@ -70,9 +70,7 @@ def by_turns(
     watch: Callable[[ContactInstant], str | None] | None = None,
     progress: Callable[[str], None] | None = None,
 ) -> ContactSolution:
-    """Instants by the paper's loop; the arguments are those of ``press``, ``threshold`` the move of any point, over an
-    edge, below which it has settled.
-    """
+    """Instants by the paper's loop; arguments as in ``press``, ``threshold`` the move, over an edge, that is none."""
     _refuse(pairs)
 
     def load(time: float) -> Loads:
@@ -80,16 +78,12 @@ def by_turns(
 
     sides = [Side(body, pair) for pair in pairs]
     edge = min(float(side.slave.edge.min()) for side in sides)
-    now, last = 0.0, Solution(Status.CONVERGED, (_at_rest(body),), "", np.empty(0, np.int64), load(0.0))
-    forces, omega = np.zeros_like(body.mesh.nodes), _first_omega(body, sides) if aitken else 1.0
-    if after is not None:
-        now = after.last.time
-        last = replace(last, instants=(replace(_at_rest(body), displacement=after.last.displacement),))
-        forces = _missing(body, load(now), after.last)
-        for side, known in zip(sides, after.states, strict=True):
-            side.touching = known.pressure > 0.0
+    omega = _first_omega(body, sides) if aitken else 1.0
+    now = 0.0 if after is None else after.last.time
+    last, forces = _begun(body, sides, load, after)
     reached: list[ContactInstant] = []
     steps: list[int] = []
+    tell = progress or (lambda text: None)
     begun = last.last
     status, message = Status.CONVERGED, Status.CONVERGED.value
     todo, halvings = list(times), 0
@@ -100,8 +94,7 @@ def by_turns(
         touched = [side.touching.copy() for side in sides]
         turns = Turns(body, held, sides, load(time), time, forces, omega if aitken else None, edge * threshold)
         status = turns.through(last, first, _REPEL * edge if halvings < _HALVINGS else np.inf)
-        if progress:
-            progress(f"time {time:.3g}: {turns.report}")
+        tell(f"time {time:.3g}: {turns.report}")
         if status is not Status.CONVERGED:
             halvings += 1
             if halvings > _HALVINGS or turns.diverged:  # that, shorter steps do not change
@@ -126,6 +119,20 @@ def by_turns(
     return ContactSolution(status, tuple(reached), message, states, tuple(steps), load(reached[-1].time))
 
 
+def _begun(
+    body: Body, sides: list[Side], loads: Callable[[float], Loads], after: ContactSolution | None
+) -> tuple[Solution, Array]:
+    """Where the first step starts from, and the contact forces there [N], shape (N, 3)."""
+    nothing = np.zeros_like(body.mesh.nodes)
+    at, forces = Instant(1.0, nothing, nothing, 0, 0, 0.0), np.zeros_like(nothing)
+    if after is not None:
+        at = replace(at, displacement=after.last.displacement)
+        forces = _missing(body, loads(after.last.time), after.last)
+        for side, known in zip(sides, after.states, strict=True):
+            side.touching = known.pressure > 0.0
+    return Solution(Status.CONVERGED, (at,), "", np.empty(0, np.int64), loads(0.0)), forces
+
+
 def _refuse(pairs: Sequence[Pair]) -> None:
     for what, asked in (
         ("a surface that meets itself", any(pair.exclusion is not None for pair in pairs)),
@@ -134,11 +141,6 @@ def _refuse(pairs: Sequence[Pair]) -> None:
     ):
         if asked:
             raise InputError(f"pairs: the paper's loop does not know {what}; use method='augmented'")
-
-
-def _at_rest(body: Body) -> Instant:
-    nothing = np.zeros_like(body.mesh.nodes)
-    return Instant(1.0, nothing, nothing, 0, 0, 0.0)
 
 
 def _missing(body: Body, loads: Loads, at: ContactInstant) -> Array:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
+from scipy.sparse import csr_array
 
 from warpjld.fem.arrays import Array, Ints
 from warpjld.fem.body import Body
@@ -13,8 +14,8 @@ from warpjld.fem.contact.interface.surface import ContactSurface, surface_of
 from warpjld.fem.contact.law.contact_state import ContactState, initial_state
 from warpjld.fem.contact.obstacles.facets import Facets, Place
 from warpjld.fem.contact.obstacles.obstacle import Obstacle
+from warpjld.fem.contact.results.contact_solution import Touch
 from warpjld.fem.contact.results.nodal_contact import to_nodes
-from warpjld.fem.contact.results.solution import Touch
 
 __all__ = ["Meeting", "Side"]
 
@@ -86,8 +87,6 @@ class Side:
 
     def touch(self, meeting: Meeting, forces: Array, x: Array) -> Touch:
         """What a pair says of forces on its slave nodes (m, 3) at positions x (N, 3)."""
-        from scipy.sparse import csr_array
-
         surface = self.slave
         nodes = surface.nodes[meeting.rows]
         area = surface.at_nodes(np.linalg.norm(surface.area_vectors(x), axis=1))[meeting.rows]

@@ -9,10 +9,10 @@ import numpy as np
 from warpjld.fem.arrays import Array, Ints
 from warpjld.fem.body import Body
 from warpjld.fem.contact.paper.sides import Meeting, Side
-from warpjld.fem.contact.results.solution import ContactInstant, Touch
+from warpjld.fem.contact.results.contact_solution import ContactInstant, Touch
 from warpjld.fem.load.loads import Loads
 from warpjld.fem.load.prescribed import Prescribed
-from warpjld.fem.solver.conjugate import Status
+from warpjld.fem.solver.krylov import Status
 from warpjld.fem.solver.solution import Solution
 from warpjld.fem.solver.static import solve
 

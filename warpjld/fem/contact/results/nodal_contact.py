@@ -1,4 +1,4 @@
-"""What contact leaves on the nodes of both its sides, whichever of them carries the multipliers (R95).
+"""Contact on the nodes of both sides of a pair, whichever of them carries the multipliers (R95).
 
 A slave's points press on its own nodes with shape functions, and on the other side's with those there; areas and slips
 are handed over with the same weights. Sums over the nodes of either side are therefore the pair's own.

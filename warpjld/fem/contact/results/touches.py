@@ -1,4 +1,4 @@
-"""What a pair's contact points say, node by node."""
+"""Contact of a pair on its slave nodes, from its contact points."""
 
 from __future__ import annotations
 
@@ -7,11 +7,11 @@ from typing import Any
 import numpy as np
 
 from warpjld.fem.arrays import Array, Ints, Mask
-from warpjld.fem.contact.interface.contact_area import Inside
-from warpjld.fem.contact.interface.contact_points import ContactPoints, Interface
+from warpjld.fem.contact.interface.contact_area import ContactArea
+from warpjld.fem.contact.interface.contact_points import ContactPoints, Interface, tangential
 from warpjld.fem.contact.law.return_mapping import ContactTractions
+from warpjld.fem.contact.results.contact_solution import Touch
 from warpjld.fem.contact.results.nodal_contact import to_nodes
-from warpjld.fem.contact.results.solution import Touch
 from warpjld.rotations import unit
 
 __all__ = ["touch_of"]
@@ -33,12 +33,10 @@ def touch_of(
     surface (between two meshes the multipliers themselves swing from node to node).
 
     Args:
-        interface: The pair.
-        points: Its points.
-        tractions: Theirs.
+        interface, points, tractions: The pair, its points, theirs.
         slip: Relative displacement in the step [m], shape (m, 3).
         bonded: Whether the bond holds, one for each site.
-        modulus: E* at all slave nodes [Pa], for the border of contact (see ``border``).
+        modulus: E* at all slave nodes [Pa], for the border of contact (see ``ContactArea``).
         x: Positions of the body's nodes [m], shape (N, 3).
     """
     share = points.weights[:, interface.slave.nodes].maximum(0.0)  # of what a point stands for, the slave's side
@@ -48,7 +46,6 @@ def touch_of(
     area = area[near]
     mean = (weight[near] / area[:, None]).tocsr()
     traction = tractions.traction(points)
-    across = slip - np.einsum("mi,mi->m", slip, points.normal)[:, None] * points.normal
     normal = unit(mean @ points.normal)
     nodes = interface.slave.nodes[near]
     pressure, pushed = mean @ tractions.pressure, mean @ traction
@@ -56,13 +53,13 @@ def touch_of(
     holds = mean @ bonded[points.sites].astype(float) > 0.0
     active = mean @ tractions.active.astype(float)
     sticking = mean @ (tractions.sticking & tractions.active).astype(float) > 0.5 * active
-    friction = np.linalg.norm(pushed - np.einsum("mi,mi->m", pushed, normal)[:, None] * normal, axis=1)
+    friction = np.linalg.norm(tangential(pushed, normal), axis=1)
     limit = interface.pair.friction * pressure
     spare = np.where(sticking, np.maximum(limit - friction, _LEAST * limit), 0.0)
-    inside = Inside(interface, near, area, x)
+    inside = ContactArea(interface, near, area, x)
     pressed, held = inside.areas(pressure, mean @ points.gap if interface.averages else apart, modulus, spare)
     pressed, held = np.where(holds, area, pressed), np.where(holds, area, held)
-    slipped = mean @ across
+    slipped = mean @ tangential(slip, points.normal)
     push = area * (mean @ np.maximum(tractions.pressure, 0.0))
     there = mean @ (-points.weights).maximum(0.0)
     return Touch(

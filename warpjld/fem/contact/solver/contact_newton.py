@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from warpjld.fem.arrays import Array
+from warpjld.fem.assembly.block_matrix import IndefiniteError
 from warpjld.fem.body import Body
 from warpjld.fem.contact.interface.contact_points import Interface
 from warpjld.fem.contact.law.contact_state import ContactState
@@ -14,11 +15,10 @@ from warpjld.fem.contact.solver.elastic import Elastic
 from warpjld.fem.contact.solver.lagged_solver import LaggedSolver
 from warpjld.fem.contact.solver.line_search import length_by_residual, length_by_work, length_upright
 from warpjld.fem.contact.solver.newton_state import Equilibrium, NewtonState
-from warpjld.fem.contact.solver.stiffness import with_contact
+from warpjld.fem.contact.solver.tangent import with_contact
 from warpjld.fem.contact.solver.unconstrained import UnconstrainedBodies
 from warpjld.fem.load.prescribed import Prescribed
-from warpjld.fem.solver.block_matrix import IndefiniteError
-from warpjld.fem.solver.conjugate import Iteration, Status
+from warpjld.fem.solver.krylov import Iteration, Status
 
 __all__ = ["ContactNewton"]
 

@@ -1,4 +1,4 @@
-"""Newton steps held back where flesh gives way: between a step that is too long and one that is lost.
+"""Levenberg–Marquardt damping of Newton steps, in the metric of the stiffness at rest.
 
 Flesh that folds in a crease has a tangent that is nearly singular there, or not positive definite, on the way to its
 fold. A share of the stiffness at rest is then lent to the matrix, not to the forces: it holds back what deforms without
@@ -9,8 +9,8 @@ with the metric of the elements).
 from __future__ import annotations
 
 from warpjld.fem.arrays import Array
+from warpjld.fem.assembly.block_matrix import BlockMatrix
 from warpjld.fem.body import Body
-from warpjld.fem.solver.block_matrix import BlockMatrix
 
 __all__ = ["Damping"]
 

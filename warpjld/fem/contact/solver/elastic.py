@@ -1,4 +1,4 @@
-"""The bodies without their contact: forces, stiffness and loads at a displacement."""
+"""Bodies without their contact: internal and external forces, and tangent stiffness."""
 
 from __future__ import annotations
 

@@ -6,9 +6,9 @@ from dataclasses import replace
 from typing import Any
 
 from warpjld.fem.arrays import Array, Mask
+from warpjld.fem.assembly.block_matrix import BlockMatrix
 from warpjld.fem.body import Body
-from warpjld.fem.solver.block_matrix import BlockMatrix
-from warpjld.fem.solver.conjugate import Iteration, Status
+from warpjld.fem.solver.krylov import Iteration, Status
 from warpjld.fem.solver.linear import LinearSolver
 
 __all__ = ["LaggedSolver"]

@@ -6,11 +6,10 @@ from collections.abc import Callable
 
 import numpy as np
 
-from warpjld.fem.arrays import Array, Mask
+from warpjld.fem.arrays import Array, Mask, dot, norm
 from warpjld.fem.contact.law.contact_state import ActiveSet
 from warpjld.fem.contact.solver.elastic import Elastic
 from warpjld.fem.contact.solver.newton_state import NewtonState
-from warpjld.fem.solver.block_matrix import dot, norm
 
 __all__ = ["length_by_residual", "length_by_work", "length_upright"]
 

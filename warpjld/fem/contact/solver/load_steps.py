@@ -1,4 +1,4 @@
-"""Load steps one after another: each begun where the one before leads to, and taken in halves where it fails."""
+"""Load stepping: an equilibrium at each time from a predictor, steps halved where they fail."""
 
 from __future__ import annotations
 
@@ -9,12 +9,12 @@ import numpy as np
 from warpjld.errors import InputError
 from warpjld.fem.arrays import Array
 from warpjld.fem.body import Body
-from warpjld.fem.contact.interface.contact_border import contact_modulus
+from warpjld.fem.contact.interface.contact_area import contact_modulus
 from warpjld.fem.contact.interface.contact_points import Interface, interfaces_of
 from warpjld.fem.contact.interface.pairs import Pair
 from warpjld.fem.contact.law.contact_state import ContactState, initial_state, without_bonds
 from warpjld.fem.contact.law.return_mapping import overstrained
-from warpjld.fem.contact.results.solution import ContactInstant, ContactSolution
+from warpjld.fem.contact.results.contact_solution import ContactInstant, ContactSolution
 from warpjld.fem.contact.results.touches import touch_of
 from warpjld.fem.contact.solver.contact_newton import ContactNewton
 from warpjld.fem.contact.solver.contact_system import LoadStep
@@ -22,7 +22,7 @@ from warpjld.fem.contact.solver.newton_state import Equilibrium
 from warpjld.fem.contact.solver.unconstrained import blocked
 from warpjld.fem.load.loads import Loads
 from warpjld.fem.load.prescribed import Prescribed
-from warpjld.fem.solver.conjugate import Status
+from warpjld.fem.solver.krylov import Status
 
 __all__ = ["Guess", "LoadSteps"]
 

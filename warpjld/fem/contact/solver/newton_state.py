@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from warpjld.fem.arrays import Array
+from warpjld.fem.arrays import Array, norm
 from warpjld.fem.body import Tangent
 from warpjld.fem.contact.interface.contact_points import ContactPoints
 from warpjld.fem.contact.law.contact_state import ActiveSet, ContactState
@@ -20,7 +20,6 @@ from warpjld.fem.contact.solver.contact_system import (
     shifted,
 )
 from warpjld.fem.contact.solver.elastic import Elastic
-from warpjld.fem.solver.block_matrix import norm
 
 __all__ = ["Equilibrium", "NewtonState"]
 

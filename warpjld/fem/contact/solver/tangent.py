@@ -1,4 +1,4 @@
-"""How contact between two surfaces that both deform changes as they move: what a symmetric stiffness leaves out.
+"""Tangent of contact: its symmetric part in the bodies' stiffness, and what a symmetric stiffness leaves out.
 
 The points' weights and normals change too. With pressure as high as the flesh is stiff that is no small matter: pads of
 fingers roll and slide on each other, each facet then presses on other nodes, and Newton's method without these
@@ -9,20 +9,96 @@ them in closed form); those of the normals are exact.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
+from scipy.sparse import coo_array, csr_array, diags_array, eye_array, kron, vstack
 
-from warpjld.fem.arrays import Array, Ints
+from warpjld.fem.arrays import Array, Ints, Ints32, cross_matrix
+from warpjld.fem.assembly.block_matrix import BlockMatrix
+from warpjld.fem.contact.interface.contact_points import ContactPoints
+from warpjld.fem.contact.interface.mortar import Mortar
 from warpjld.fem.contact.interface.surface import ContactSurface
+from warpjld.fem.contact.law.contact_state import ContactState
+from warpjld.fem.contact.law.return_mapping import ContactTractions
+from warpjld.fem.launch import on_rows, shared
 
-if TYPE_CHECKING:
-    from warpjld.fem.contact.interface.contact_points import ContactPoints
-    from warpjld.fem.contact.interface.mortar import Mortar
-    from warpjld.fem.contact.law.contact_state import ContactState
-    from warpjld.fem.contact.law.return_mapping import ContactTractions
+__all__ = ["MortarTangent", "friction_coupling", "linearise_mortar", "with_contact"]
 
-__all__ = ["MortarTangent", "friction_coupling", "linearise_mortar"]
+
+def with_contact(
+    stiffness: BlockMatrix, points: list[ContactPoints], blocks: list[Array], *, threads: int
+) -> BlockMatrix:
+    """K + Σ_a c_ai c_aj H_a in a new matrix; its pattern is K's, or wider where contact joins bodies.
+
+    Args:
+        stiffness: K.
+        points: Contact points of each interface.
+        blocks: H of each interface's points [N/m], shape (m, 3, 3).
+        threads: Threads.
+    """
+    import warp as wp
+    from warpjld_kernels import contact_stiffness
+
+    tables, rows_of = [], []
+    for point, block in zip(points, blocks, strict=True):
+        used = np.flatnonzero(block.any(axis=(1, 2)))
+        if len(used):
+            tables.append(point.weights[used])
+            rows_of.append(block[used])
+    if not tables:
+        return stiffness
+    table = vstack(tables, format="csr") if len(tables) > 1 else tables[0]
+    rows, columns, values = _widened(stiffness, table, threads)
+    transposed = table.T.tocsr()
+    nodes = np.flatnonzero(np.diff(transposed.indptr)).astype(np.int32)
+    kept = [
+        np.ascontiguousarray(a)
+        for a in (
+            *(part for m in (table, transposed) for part in (_int(m.indptr), _int(m.indices), m.data)),
+            np.concatenate(rows_of),
+        )
+    ]
+    arguments: list[Any] = [shared(a) for a in (nodes, *kept[:6])]
+    arguments += [wp.array(kept[6], dtype=wp.mat33d, device="cpu", copy=False)]
+    arguments += [shared(rows), shared(columns), wp.array(values, dtype=wp.mat33d, device="cpu", copy=False)]
+    on_rows(contact_stiffness.add_rows, len(nodes), arguments, threads=threads, least=100)
+    return BlockMatrix(rows, columns, values)
+
+
+def _widened(stiffness: BlockMatrix, table: Any, threads: int) -> tuple[Ints32, Ints32, Array]:
+    """A copy of K with room for every pair of nodes that a row of the table joins."""
+    import warp as wp
+    from warpjld_kernels import contact_stiffness
+
+    if int(np.diff(table.indptr).max()) == 1:  # each point is a node: the diagonal
+        return stiffness.rows, stiffness.columns, stiffness.values.copy()
+    n = stiffness.size
+    touched = csr_array((np.ones(len(table.indices), np.int32), table.indices, table.indptr), shape=table.shape)
+    joined = touched.T @ touched
+    pattern = csr_array((np.ones(len(stiffness.columns), np.int32), stiffness.columns, stiffness.rows), shape=(n, n))
+    wide = csr_array(pattern + joined)
+    wide.sort_indices()
+    rows, columns = _int(wide.indptr), _int(wide.indices)
+    if len(columns) == len(stiffness.columns):
+        return stiffness.rows, stiffness.columns, stiffness.values.copy()
+    values = np.empty((len(columns), 3, 3))
+    arguments = [
+        shared(stiffness.rows),
+        shared(stiffness.columns),
+        wp.array(stiffness.values, dtype=wp.mat33d, device="cpu", copy=False),
+        shared(rows),
+        shared(columns),
+        wp.array(values, dtype=wp.mat33d, device="cpu", copy=False),
+    ]
+    on_rows(contact_stiffness.copy_rows, n, arguments, threads=threads)
+    return rows, columns, values
+
+
+def _int(values: NDArray[Any]) -> Ints32:
+    return np.ascontiguousarray(values, dtype=np.int32)
+
 
 _STEP = 1e-6
 """Of the differences, over an edge."""
@@ -68,8 +144,6 @@ def linearise_mortar(
         x: [m]
         reach: How far the points look ahead [m].
     """
-    from scipy.sparse import csr_array, diags_array
-
     if not tractions.active.any():
         return None
     edge = mortar.slave.edge[points.sites]
@@ -104,8 +178,6 @@ def friction_coupling(points: ContactPoints, tractions: ContactTractions, fricti
         friction: Coulomb's μ.
         penalty: ε [Pa/m], shape (m,).
     """
-    from scipy.sparse import csr_array, diags_array
-
     size = np.linalg.norm(tractions.friction, axis=1)
     slides = tractions.active & ~tractions.sticking & (size > 0.0)
     if not slides.any():
@@ -149,8 +221,6 @@ class _Pairs:
 
     def gaps(self) -> Any:
         """How the points' gaps change with their weights, ``csr_array`` (m, 3N)."""
-        from scipy.sparse import coo_array, csr_array
-
         points, corner, at = self._points, self.corner, self._at
         spread = np.einsum("pkab,pbi->pkai", self.own, at[:, :4]) - np.einsum("pkab,pbi->pkai", self.far, at[:, 4:])
         off, per_area = self._mortar.sliver_offset(points.sites, points.area)
@@ -168,8 +238,6 @@ class _Pairs:
 
     def forces(self, traction: Array) -> Any:
         """How nodal forces of tractions (m, 3) change with the points' weights [N/m], ``csr_array`` (3N, 3N)."""
-        from scipy.sparse import coo_array, csr_array
-
         known = np.where(self.corner[:, :, None] >= 0, traction[self.corner], 0.0)
         pushed = [np.einsum("pkab,pai->pkbi", part, known) for part in (self.own, -self.far)]
         block = np.concatenate(pushed, axis=2).reshape(-1, 24, 24)  # by what moves, then by what is pushed
@@ -194,8 +262,6 @@ def _differences(mortar: Mortar, at: Array, reach: float, step: float) -> Array:
 
 def _normal_derivatives(surface: ContactSurface, x: Array, sites: Ints, rows: Ints) -> Any:
     """Derivatives of the nodes' normals, ``csr_array`` (3m, 3N), zero but at ``rows``."""
-    from scipy.sparse import coo_array, csr_array
-
     number = np.full(len(surface.nodes), -1)
     number[sites[rows]] = rows
     some = np.flatnonzero((number[surface.corners] >= 0).any(axis=1))
@@ -204,7 +270,7 @@ def _normal_derivatives(surface: ContactSurface, x: Array, sites: Ints, rows: In
     length = np.where(length > 0.0, length, 1.0)
     a, b, c, d = (x[quads[:, k]] for k in range(4))
     # of (c − a) × (d − b) / 8: to each corner a quarter of the face's area vector
-    along, across = _cross(c - a), _cross(d - b)
+    along, across = cross_matrix(c - a), cross_matrix(d - b)
     each = 0.125 * np.stack([across, -along, -across, along], axis=1)  # face, node, 3, 3
     n = surface.normals(x)[surface.corners[some]]
     plane = np.eye(3) - n[:, :, :, None] * n[:, :, None, :]
@@ -216,23 +282,12 @@ def _normal_derivatives(surface: ContactSurface, x: Array, sites: Ints, rows: In
     return csr_array(coo_array((block[known], (row[known], column[known])), shape=shape))
 
 
-def _cross(v: Array) -> Array:
-    """[v]× of vectors (n, 3), shape (n, 3, 3)."""
-    out = np.zeros((len(v), 3, 3))
-    out[:, 0, 1], out[:, 0, 2], out[:, 1, 2] = -v[:, 2], v[:, 1], -v[:, 0]
-    return out - out.transpose(0, 2, 1)
-
-
 def _inner(vectors: Array) -> Any:
     """Rows that take the inner product of each point's vector (m, 3) with three values of it, (m, 3m)."""
-    from scipy.sparse import csr_array
-
     count = len(vectors)
     return csr_array((vectors.ravel(), np.arange(3 * count), 3 * np.arange(count + 1)), shape=(count, 3 * count))
 
 
 def _blocks(weights: Any) -> Any:
     """A table of scalars (n, m) as one of 3 × 3 diagonal blocks."""
-    from scipy.sparse import csr_array, eye_array, kron
-
     return csr_array(kron(weights, eye_array(3), format="csr"))

@@ -5,13 +5,13 @@ from __future__ import annotations
 import numpy as np
 
 from warpjld.fem.arrays import Array, Mask
+from warpjld.fem.assembly.block_matrix import BlockMatrix
 from warpjld.fem.body import Body
 from warpjld.fem.contact.interface.contact_points import ContactPoints, Interface
 from warpjld.fem.contact.law.contact_state import ContactState
 from warpjld.fem.contact.solver.contact_system import ContactForces
 from warpjld.fem.load.prescribed import Prescribed, free_motions
-from warpjld.fem.solver.block_matrix import BlockMatrix
-from warpjld.fem.solver.conjugate import Status
+from warpjld.fem.solver.krylov import Status
 
 __all__ = ["UnconstrainedBodies", "blocked"]
 

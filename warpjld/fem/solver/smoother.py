@@ -1,4 +1,4 @@
-"""Chebyshev smoothing: its coefficients, and the highest eigenvalue they are made for."""
+"""Smoothing: inverted diagonal blocks, Chebyshev's coefficients, and the highest eigenvalue they are made for."""
 
 from __future__ import annotations
 
@@ -6,10 +6,34 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.linalg import eigh_tridiagonal
 
-from warpjld.fem.solver.block_matrix import BlockMatrix, dot
+from warpjld.fem.arrays import Array, Mask, dot
+from warpjld.fem.assembly.block_matrix import BlockMatrix, IndefiniteError
 
-__all__ = ["chebyshev_steps", "highest_eigenvalue"]
+__all__ = ["block_inverse", "chebyshev_steps", "highest_eigenvalue"]
+
+
+def block_inverse(matrix: BlockMatrix, free: Mask | None = None) -> Array:
+    """Inverses of the diagonal blocks, zero where a degree of freedom is prescribed or has no stiffness, (N, 3, 3).
+
+    Raises:
+        IndefiniteError: A diagonal block with a negative stiffness.
+    """
+    blocks = matrix.diagonal().astype(np.float64)
+    diagonal = np.einsum("nii->ni", blocks)
+    if (diagonal < 0).any():
+        node, axis = np.argwhere(diagonal < 0)[0]
+        raise IndefiniteError(
+            f"node {node} has the negative stiffness {diagonal[node, axis]:.3g} N/m along {'xyz'[axis]}"
+        )
+    on = diagonal > 1e-13 * diagonal.max(initial=0.0)
+    if free is not None:
+        on &= free.reshape(-1, 3)
+    blocks = blocks * (on[:, :, None] & on[:, None, :])
+    blocks[:, [0, 1, 2], [0, 1, 2]] += ~on
+    inverse: Array = np.linalg.inv(blocks)
+    return inverse * (on[:, :, None] & on[:, None, :])
 
 
 def chebyshev_steps(degree: int, low: float, high: float) -> list[tuple[float, float]]:
@@ -67,6 +91,4 @@ def highest_eigenvalue(matrix: BlockMatrix, inverse: NDArray[Any], threads: int,
         before = alpha
     if not diagonal:
         return 1.0
-    from scipy.linalg import eigh_tridiagonal
-
     return float(eigh_tridiagonal(np.array(diagonal), np.array(beside[:-1]), eigvals_only=True)[-1])

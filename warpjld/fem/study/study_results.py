@@ -11,7 +11,7 @@ import numpy as np
 
 from warpjld.fem.arrays import Array
 from warpjld.fem.output.vtk import Series
-from warpjld.fem.study import Reached, Study
+from warpjld.fem.study.study import Study, StudyInstant
 from warpjld.whole_file import whole_file
 
 __all__ = ["Reaction", "StudyResults"]
@@ -49,11 +49,11 @@ class StudyResults:
         self.folder = folder
         self.reactions: list[Reaction] = []
         self.files: list[Path] = []
-        self.last: Reached | None = None
+        self.last: StudyInstant | None = None
         self._series = Series(folder / f"{name}.pvd")
         self._pictures = pictures
 
-    def add(self, reached: Reached) -> None:
+    def add(self, reached: StudyInstant) -> None:
         """Keep an equilibrium; the first of a new step has the step before drawn."""
         if self.last is not None and self.last.step is not reached.step:
             self._draw(self.last)
@@ -89,7 +89,7 @@ class StudyResults:
             "files": [str(file) for file in self.files],
         }
 
-    def _draw(self, reached: Reached) -> None:
+    def _draw(self, reached: StudyInstant) -> None:
         if not self._pictures:
             return
         from warpjld.fem.output.pictures import QUANTITIES, draw

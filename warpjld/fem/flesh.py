@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
+from scipy.spatial.transform import Rotation
 
 from warpjld.errors import InputError
 from warpjld.fem.arrays import Array, Ints, Ints32
@@ -46,8 +47,6 @@ class Flesh:
 
     def held(self, poses: Poses | None = None, frame: int = 0) -> Prescribed:
         """Bones prescribed: at rest, or moved by a pose of the skeleton (R110)."""
-        from scipy.spatial.transform import Rotation
-
         out = Prescribed(np.empty(0, np.int64), np.empty(0))
         for name, parent in zip(self.names, self.parents, strict=True):
             nodes = self.mesh.node_sets[name]
@@ -105,28 +104,20 @@ def flesh_of(
     quality = mesh.scaled_jacobian()
     names = tuple(f"bone.{skeleton.names[j]}" for j in joints)
     sets = {n: np.unique(mesh.elements[owner == j]).astype(np.int32) for n, j in zip(names, joints, strict=True)}
-    mesh = replace(
-        mesh,
-        regions=(owner >= 0).astype(np.int32),
-        region_names=("flesh", "bone"),
-        node_sets={**mesh.node_sets, **sets},
-    )
+    regions = (owner >= 0).astype(np.int32)
+    mesh = replace(mesh, regions=regions, region_names=("flesh", "bone"), node_sets={**mesh.node_sets, **sets})
+    parents = tuple(int(skeleton.parents[j]) if skeleton.parents[j] >= 0 else j for j in joints)
+    fit = replace(fit, mesh=mesh, least=float(quality.min()), mean=float(quality.mean()))
+    used = tuple(shafts[j] for j in joints)
+    return Flesh(mesh, tuple(joints), parents, names, used, _skin(mesh, rig, spacing), fit, skeleton.rest.copy())
+
+
+def _skin(mesh: HexMesh, rig: Rig, spacing: float) -> Embedding:
     try:
-        skin = embed(mesh, rig.surface.vertices, reach=3.0)
+        return embed(mesh, rig.surface.vertices, reach=3.0)
     except InputError as error:
-        raise InputError(
-            f"spacing: {spacing:g} m is too coarse, thin parts are not meshed ({error.message})"
-        ) from error
-    return Flesh(
-        mesh,
-        tuple(joints),
-        tuple(int(skeleton.parents[j]) if skeleton.parents[j] >= 0 else j for j in joints),
-        names,
-        tuple(shafts[j] for j in joints),
-        skin,
-        replace(fit, mesh=mesh, least=float(quality.min()), mean=float(quality.mean())),
-        skeleton.rest.copy(),
-    )
+        text = f"spacing: {spacing:g} m is too coarse, thin parts are not meshed ({error.message})"
+        raise InputError(text) from error
 
 
 def _shafts(rig: Rig, envelope: Envelope, bone: float, flush: float, gap: float, head: float) -> dict[int, Bone]:

@@ -15,12 +15,11 @@ from warpjld.fem.arrays import Ints32
 from warpjld.fem.body import Body
 from warpjld.fem.load.loads import Centrifugal, Loads, external_forces
 from warpjld.fem.material.materials import Fung, LinearElastic, Material, MooneyRivlin, NeoHooke
-from warpjld.fem.mesh.ball import ball_hexes, cylinder_hexes, finger_hexes
-from warpjld.fem.mesh.box import box_hexes
+from warpjld.fem.mesh.generated import ball_hexes, box_hexes, cylinder_hexes, finger_hexes
 from warpjld.fem.mesh.hexmesh import HexMesh
 from warpjld.fem.solver.linear import METHODS, PRECISIONS
 from warpjld.fem.solver.static import FREE
-from warpjld.fem.study import Step, Study, Support
+from warpjld.fem.study.study import Step, Study, Support
 from warpjld.limits import check_limit
 from warpjld.names import check_name, clash
 from warpjld.toml_table import TomlTable, read_toml

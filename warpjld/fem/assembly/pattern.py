@@ -1,4 +1,4 @@
-"""Which blocks a mesh fills and where each element adds to them: found once, used by every assembly."""
+"""Sparsity patterns: of a mesh's stiffness, found once, and of products of three sparse matrices."""
 
 from __future__ import annotations
 
@@ -9,11 +9,56 @@ import numpy as np
 
 from warpjld.errors import InputError
 from warpjld.fem.arrays import Ints32
-from warpjld.fem.launch import on_rows, shared, threads_of
+from warpjld.fem.launch import grouped, on_rows, shared, threads_of
 from warpjld.fem.mesh.hexmesh import HexMesh
-from warpjld.fem.solver.product import product_pattern
 
-__all__ = ["Batches", "Pattern", "batches_of", "pattern_of"]
+__all__ = ["Batches", "Pattern", "ProductPattern", "batches_of", "pattern_of", "triple_product"]
+
+_LEAST_ROWS = 64
+"""Rows below which one thread does all."""
+
+Rows = tuple[Ints32, Ints32]
+"""A pattern: where each row begins, and its columns."""
+
+
+@dataclass(frozen=True, eq=False)
+class ProductPattern:
+    """Rows of a product, n columns wide.
+
+    Attributes:
+        rows: Where each of R rows begins, shape (R + 1,).
+        columns: Ascending in each row.
+        ranges: Rows with like work, for ``parts`` threads, shape (parts + 1,).
+        marker: Scratch of as many ranges, shape (parts, n).
+    """
+
+    rows: Ints32
+    columns: Ints32
+    ranges: Ints32
+    marker: Ints32
+
+
+def triple_product(first: Rows, second: Rows, third: Rows, width: int, *, threads: int) -> ProductPattern:
+    """Where first · second · third, ``width`` columns wide, may differ from zero."""
+    from warpjld_kernels import fem_pattern
+
+    count = len(first[0]) - 1
+    parts = threads if count >= _LEAST_ROWS else 1
+    ranges = np.searchsorted(first[0], np.linspace(0, first[0][-1], parts + 1)).astype(np.int32)
+    ranges[0], ranges[-1] = 0, count
+    factors = [grouped(fem_pattern.Rows, rows=rows, columns=columns) for rows, columns in (first, second, third)]
+    marker = np.full((parts, width), -1, np.int32)
+    rows, columns = np.zeros(count + 1, np.int32), np.zeros(1, np.int32)
+    for fill in (False, True):
+        product = grouped(fem_pattern.Rows, rows=rows, columns=columns)
+        arguments = [shared(ranges), fill, *factors, shared(marker), product]
+        on_rows(fem_pattern.product_pattern, parts, arguments, threads=threads, least=2)
+        if not fill:
+            np.cumsum(rows, out=rows)
+            columns = np.empty(rows[-1], np.int32)
+            marker.fill(-1)
+    return ProductPattern(rows, columns, ranges, marker)
+
 
 _LANES = 8  # as in warpjld_kernels.fem_element
 
@@ -67,7 +112,7 @@ def pattern_of(mesh: HexMesh, *, threads: int | None = None) -> Pattern:
     incident = (np.argsort(flat, kind="stable") // 8).astype(np.int32)
     numbers = np.arange(len(elements) + 1, dtype=np.int32)
     # node → its elements → themselves → their nodes
-    product = product_pattern((starts, incident), (numbers, numbers[:-1]), (8 * numbers, flat), count, threads=workers)
+    product = triple_product((starts, incident), (numbers, numbers[:-1]), (8 * numbers, flat), count, threads=workers)
     slots = np.empty((len(elements), 64), np.int32)
     on_rows(
         fem_pattern.element_slots,

@@ -15,7 +15,7 @@ from warpjld.fem.mesh.hexmesh import HexMesh
 from warpjld.fem.solver.solution import Instant, Solution
 from warpjld.fem.solver.static import solve
 
-__all__ = ["Reached", "Step", "Study", "Support"]
+__all__ = ["Step", "Study", "StudyInstant", "Support"]
 
 
 @dataclass(frozen=True)
@@ -67,7 +67,7 @@ class Step:
 
 
 @dataclass(frozen=True, eq=False)
-class Reached:
+class StudyInstant:
     """An equilibrium of a study.
 
     Attributes:
@@ -105,7 +105,7 @@ class Study:
     precision: str = "float64"
     notes: tuple[str, ...] = ()
 
-    def run(self, progress: Callable[[str], None] | None = None) -> Iterator[Reached]:
+    def run(self, progress: Callable[[str], None] | None = None) -> Iterator[StudyInstant]:
         """Equilibria in order, as whole steps are done; the last one's solution may not have converged."""
         after: Solution | None = None
         for number, step in enumerate(self.steps):
@@ -130,7 +130,7 @@ class Study:
             if len(solution.held):
                 held["held because free"] = solution.held
             for instant in solution.instants:
-                yield Reached(step, number + instant.factor, instant, solution, held)
+                yield StudyInstant(step, number + instant.factor, instant, solution, held)
             if not solution.converged:
                 return
             after = solution

@@ -1,4 +1,4 @@
-"""What a contact solve gives back."""
+"""Results of a contact solve: equilibria, each pair's contact in them, and the state to go on from."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from warpjld.fem.arrays import Array, Ints32, Mask
 from warpjld.fem.contact.law.contact_state import ContactState
 from warpjld.fem.contact.results.nodal_contact import NodalContact
 from warpjld.fem.load.loads import Loads
-from warpjld.fem.solver.conjugate import Status
+from warpjld.fem.solver.krylov import Status
 
 __all__ = ["ContactError", "ContactInstant", "ContactSolution", "Touch"]
 

@@ -1,37 +1,23 @@
-"""Sparse matrices of 3×3 blocks, three degrees of freedom a node, and dot products of their vectors."""
+"""Sparse matrices of 3×3 blocks, three degrees of freedom a node."""
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.sparse import bsr_array
 
 from warpjld.errors import WarpjldError
 from warpjld.fem.arrays import Ints, Ints32, Mask
 from warpjld.fem.launch import on_rows, shared, threads_of
 
-__all__ = ["BlockMatrix", "IndefiniteError", "dot", "norm", "padded"]
+__all__ = ["BlockMatrix", "IndefiniteError", "padded"]
 
 
 class IndefiniteError(WarpjldError):
     """A matrix that should be positive definite is not."""
-
-
-def dot(a: NDArray[Any], b: NDArray[Any]) -> float:
-    """a · b of two vectors, the same bits every run: one thread, one order of summation.
-
-    BLAS shares a dot product of 50,000 numbers between threads, which costs more than the product where other work
-    waits for the same cores, and sums in an order that depends on how many there are.
-    """
-    return float(np.einsum("i,i->", a, b))
-
-
-def norm(a: NDArray[Any]) -> float:
-    """Euclidean length of a vector; NaN or infinity where it holds one."""
-    return math.sqrt(dot(a, a))
 
 
 def padded(count: int, dtype: Any = np.float64) -> NDArray[Any]:
@@ -108,7 +94,5 @@ class BlockMatrix:
 
     def to_scipy(self) -> Any:
         """The same matrix as ``scipy.sparse.bsr_array``."""
-        from scipy.sparse import bsr_array
-
         n = 3 * self.size
         return bsr_array((self.values, self.columns, self.rows), shape=(n, n))

@@ -1,0 +1,124 @@
+"""Points proposed from surfaces alone (R12, R13): on bodies and hands made in code, and on those of others."""
+
+from __future__ import annotations
+
+import json
+
+import numpy as np
+import pytest
+import trimesh
+from click.testing import CliRunner
+
+from warpjld.cli.place import command
+from warpjld.errors import InputError
+from warpjld.io import load_rig
+from warpjld.rotations import unit
+from warpjld.skeleton.actor import actor_skeleton
+from warpjld.skeleton.actor_points import ACTOR_POINTS
+from warpjld.skeleton.hand import hand_joint_names
+from warpjld.skeleton.place.place import propose_points
+
+
+@pytest.fixture(scope="module")
+def placed(figure):
+    return propose_points(figure.surface.vertices, figure.surface.faces)
+
+
+def test_a_body_gets_all_87_points_inside_and_near_their_joints(figure, placed):
+    assert list(placed) == list(ACTOR_POINTS)
+    mesh = trimesh.Trimesh(figure.surface.vertices, figure.surface.faces, process=False)
+    assert mesh.contains(np.array(list(placed.values()))).all()
+    truth = actor_skeleton(figure.skeleton, figure.surface.vertices, figure.surface.faces).points
+    off = {name: np.linalg.norm(placed[name] - truth[name]) for name in placed}
+    assert np.mean(list(off.values())) < 0.02
+    assert max(off, key=off.get) not in hand_joint_names("left")
+    assert max(off.values()) < 0.06
+
+
+@pytest.mark.slow
+def test_points_turn_and_scale_with_the_surface(figure, placed):
+    """Lying along z, in centimetres, facing another way."""
+    turn = np.array([[0.0, 0, 1], [1, 0, 0], [0, 1, 0]])  # up becomes z
+    moved = propose_points(100.0 * figure.surface.vertices @ turn.T + 30.0, figure.surface.faces)
+    for name, place in placed.items():
+        np.testing.assert_allclose(moved[name], 100.0 * turn @ place + 30.0, atol=3.0, err_msg=name)
+
+
+@pytest.mark.parametrize("side", ["left", "right"])
+def test_a_hand_gets_its_25_points_and_its_side(hands, side):
+    rig = hands[side]
+    points = propose_points(rig.surface.vertices, rig.surface.faces)
+    assert tuple(points) == hand_joint_names(side)
+    off = [np.linalg.norm(p - rig.skeleton.rest[rig.skeleton.names.index(name)]) for name, p in points.items()]
+    assert np.mean(off) < 0.008
+    assert max(off) < 0.02
+
+
+@pytest.mark.parametrize(
+    "name",
+    [
+        "hand_webxr_generic/left.glb",
+        "hand_webxr_generic/right.glb",
+        "hand_anny/left.glb",
+        "hand_godot_low/Hand_low_R.gltf",
+    ],
+)
+def test_hands_of_others(data, name):
+    rig = load_rig(data / name)
+    points = propose_points(rig.surface.vertices, rig.surface.faces)
+    rest = dict(zip(rig.skeleton.names, rig.skeleton.rest, strict=True))
+    assert set(points) <= set(rest)
+    off = [np.linalg.norm(place - rest[joint]) for joint, place in points.items()]
+    assert np.mean(off) < 0.012
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    "name",
+    [
+        "body_anny/body_104joints.glb",
+        "body_anny/body_lowpoly_163joints.glb",
+        "body_mesh2motion_mannequin/human-male.glb",
+    ],
+)
+def test_bodies_of_others(data, name):
+    rig = load_rig(data / name)
+    points = propose_points(rig.surface.vertices, rig.surface.faces)
+    truth = actor_skeleton(rig.skeleton, rig.surface.vertices, rig.surface.faces).points
+    off = [np.linalg.norm(points[joint] - truth[joint]) for joint in truth]
+    assert np.mean(off) < 0.025
+
+
+def test_what_is_placed_is_written_and_loads_as_it_is(hands, tmp_path):
+    surface, file = tmp_path / "hand.obj", tmp_path / "points.json"
+    hand = hands["right"].surface
+    trimesh.Trimesh(hand.vertices, hand.faces, process=False).export(surface)
+    result = CliRunner().invoke(command, [str(surface), "-o", str(file)])
+    assert result.exit_code == 0, result.output
+    rig = load_rig(surface, points=file)
+    wanted = json.loads(file.read_text())["points"]
+    assert sorted(rig.skeleton.names) == sorted(wanted)
+    for name, place in zip(rig.skeleton.names, rig.skeleton.rest, strict=True):
+        np.testing.assert_allclose(place, wanted[name], atol=1e-6)
+
+
+def test_what_is_neither_body_nor_hand_is_refused(tmp_path):
+    ball = trimesh.creation.icosphere(subdivisions=3)
+    with pytest.raises(InputError, match=r"no upright body .*; and no hand"):
+        propose_points(ball.vertices, ball.faces)
+    flat = np.array([[0.0, 0, 0], [0, 0, 0], [0, 0, 0]])
+    with pytest.raises(InputError, match="encloses nothing"):
+        propose_points(flat, np.array([[0, 1, 2]]))
+    mitten = trimesh.creation.capsule(height=0.1, radius=0.04)
+    with pytest.raises(InputError, match="spread the fingers"):
+        propose_points(mitten.vertices, mitten.faces, side="left")
+
+
+def test_units_of_length_mean_nothing(hands):
+    rig = hands["left"]
+    small = propose_points(rig.surface.vertices * 1e-3, rig.surface.faces)
+    whole = propose_points(rig.surface.vertices, rig.surface.faces)
+    for name in whole:
+        np.testing.assert_allclose(1e3 * small[name], whole[name], atol=3e-3)
+    forward = unit(whole["left.middle.tip"] - whole["left.wrist"])
+    assert forward @ (0, 0, -1) > 0.9

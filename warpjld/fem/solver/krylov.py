@@ -1,0 +1,202 @@
+"""Krylov methods that say how they ended: conjugate gradients, and generalised minimal residuals (Saad 1993)."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from enum import Enum
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from warpjld.fem.arrays import Array, dot, norm
+
+__all__ = ["Iteration", "Status", "conjugate_gradients", "minimal_residuals"]
+
+_Operator = Callable[[NDArray[Any]], NDArray[Any]]
+
+
+class Status(Enum):
+    """How a solve ended; the value is the message for people."""
+
+    CONVERGED = "converged"
+    STAGNATED = "the residual stopped falling before the tolerance was reached"
+    INDEFINITE = "the stiffness is not positive definite: a body is free, unstable, or an element is turned inside out"
+    NOT_FINITE = "a number became infinite or undefined"
+    MAX_ITERATIONS = "the iterations allowed were not enough"
+    INVERTED = "elements were turned inside out, however small the step"
+    SLIDING = "slides: friction is not enough to hold it"
+    UNHELD = "nothing holds it"
+    BLOCKED = "bodies overlap where all that meets is prescribed"
+    STOPPED = "stopped as asked"
+
+
+@dataclass(frozen=True, eq=False)
+class Iteration:
+    """Result of an iterative solve.
+
+    Attributes:
+        x: Solution, shape (n,).
+        status: How it ended.
+        iterations: Iterations done.
+        residual: True residual |b − A x| / |b|, computed afresh at the end in the type of ``x``.
+        history: Recursive residual after each iteration.
+    """
+
+    x: NDArray[Any]
+    status: Status
+    iterations: int
+    residual: float
+    history: Array
+
+
+def conjugate_gradients(
+    product: _Operator,
+    precondition: _Operator,
+    b: NDArray[Any],
+    *,
+    start: NDArray[Any] | None = None,
+    tolerance: float = 1e-8,
+    iterations: int = 2000,
+    patience: int = 300,
+) -> Iteration:
+    """Solve A x = b, A symmetric positive definite, to |b − A x| ≤ tolerance |b|.
+
+    The flexible (Polak–Ribière) form: the preconditioner may be rounded to float32. When the recursive residual claims
+    convergence the true one is computed, and the iteration starts again from it where they differ.
+
+    Args:
+        product: x → A x.
+        precondition: r → M r.
+        b: Right side, shape (n,).
+        start: First guess, zero by default.
+        tolerance: Relative to |b|.
+        iterations: At most so many.
+        patience: Iterations without a lower residual after which it has stagnated.
+    """
+    size = norm(b)
+    x = np.zeros_like(b) if start is None else start.copy()
+    if not np.isfinite(size):
+        return Iteration(x, Status.NOT_FINITE, 0, float("nan"), np.empty(0))
+    if size == 0.0:
+        return Iteration(np.zeros_like(b), Status.CONVERGED, 0, 0.0, np.empty(0))
+    r = b - product(x) if start is not None else b.copy()
+    history: list[float] = []
+    status = _cg(product, precondition, b, x, r, size, history, tolerance, iterations, patience)
+    true = norm(b - product(x)) / size
+    return Iteration(x, status, len(history), true, np.array(history))
+
+
+def _cg(
+    product: _Operator,
+    precondition: _Operator,
+    b: NDArray[Any],
+    x: NDArray[Any],
+    r: NDArray[Any],
+    size: float,
+    history: list[float],
+    tolerance: float,
+    iterations: int,
+    patience: int,
+) -> Status:
+    """Iterations from x with the residual r, both written over; the history grows by one each."""
+    best, since, last_true, fresh = np.inf, 0, np.inf, True
+    p = q = r
+    alpha = rz = 0.0
+    now = norm(r) / size
+    while True:
+        if not np.isfinite(now):
+            return Status.NOT_FINITE
+        if now <= tolerance:
+            r = b - product(x)
+            now = norm(r) / size
+            if now <= tolerance * 1.0000001:
+                return Status.CONVERGED
+            if now > 0.5 * last_true:
+                return Status.STAGNATED
+            last_true, fresh = now, True
+        if len(history) >= iterations:
+            return Status.MAX_ITERATIONS
+        best, since = (now, 0) if now < 0.999 * best else (best, since + 1)
+        if since > patience:
+            return Status.STAGNATED
+        z = precondition(r)
+        before, rz = rz, dot(r, z)
+        if not rz > 0.0:
+            return Status.INDEFINITE if np.isfinite(rz) else Status.NOT_FINITE
+        if fresh:
+            p, fresh = z.copy(), False
+        else:
+            p *= p.dtype.type(-alpha * dot(z, q) / before)
+            p += z
+        q = product(p)
+        curvature = dot(p, q)
+        if not curvature > 0.0:
+            return Status.INDEFINITE if np.isfinite(curvature) else Status.NOT_FINITE
+        alpha = dot(r, p) / curvature
+        x += x.dtype.type(alpha) * p
+        r -= r.dtype.type(alpha) * q
+        now = norm(r) / size
+        history.append(now)
+
+
+_Vector = Array
+_RESTART = 80
+
+
+def minimal_residuals(
+    product: Callable[[_Vector], _Vector],
+    precondition: Callable[[_Vector], _Vector],
+    b: _Vector,
+    *,
+    tolerance: float = 1e-8,
+    iterations: int = 400,
+) -> Iteration:
+    """Solve A x = b.
+
+    Args:
+        product: x → A x.
+        precondition: r → M⁻¹ r; need not be the same map every time (flexible).
+        b: Right side, shape (n,).
+        tolerance: Of |b − A x| / |b|.
+        iterations: At most.
+    """
+    x, size = np.zeros_like(b), norm(b)
+    history: list[float] = []
+    if not np.isfinite(size):
+        return Iteration(x, Status.NOT_FINITE, 0, float("nan"), np.array(history))
+    residual, now = b, 1.0
+    while size > 0.0 and len(history) < iterations:
+        steps = min(_RESTART, iterations - len(history))
+        basis, ahead = [residual / norm(residual)], []
+        table = np.zeros((steps + 1, steps))
+        right = np.zeros(steps + 1)
+        right[0] = now
+        for k in range(steps):
+            ahead.append(precondition(basis[k]))
+            new = product(ahead[k])
+            for _ in range(2):  # twice is enough (Parlett)
+                along = np.array([v @ new for v in basis])
+                table[: k + 1, k] += along
+                for part, v in zip(along, basis, strict=True):
+                    new = new - part * v
+            table[k + 1, k] = norm(new)
+            weights, *_ = np.linalg.lstsq(table[: k + 2, : k + 1], right[: k + 2], rcond=None)
+            left = float(np.linalg.norm(right[: k + 2] - table[: k + 2, : k + 1] @ weights))
+            history.append(left)
+            if not np.isfinite(left):
+                return Iteration(x, Status.NOT_FINITE, len(history), left, np.array(history))
+            if left <= tolerance or table[k + 1, k] <= 1e-14 * table[0, 0]:
+                break
+            basis.append(new / table[k + 1, k])
+        for weight, direction in zip(weights, ahead, strict=True):
+            x = x + size * weight * direction
+        residual = b - product(x)
+        before, now = now, norm(residual) / size
+        if now <= 2.0 * tolerance:
+            return Iteration(x, Status.CONVERGED, len(history), now, np.array(history))
+        if now > 0.9 * before:
+            return Iteration(x, Status.STAGNATED, len(history), now, np.array(history))
+    status = Status.CONVERGED if now <= tolerance or size == 0.0 else Status.MAX_ITERATIONS
+    return Iteration(x, status, len(history), 0.0 if size == 0.0 else now, np.array(history))

@@ -1,0 +1,255 @@
+"""The 87 points of a body, proposed from its flesh alone.
+
+Where the legs part, where the arms leave the trunk, where neck and wrists are narrowest is seen; joints between lie
+where bodies have them on average (Drillis, Contini 1966: shares of the height), in the middle of the flesh there.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial import cKDTree
+
+from warpjld.errors import InputError
+from warpjld.rotations import unit
+from warpjld.skeleton.actor import face_points
+from warpjld.skeleton.actor_points import ACTOR_POINTS
+from warpjld.skeleton.place.branches import centre_line, find_branches
+from warpjld.skeleton.place.hand import place_hand
+from warpjld.skeleton.place.solid import Solid, solid_of
+from warpjld.skeleton.place.stance import find_stance, pieces
+
+__all__ = ["place_body"]
+
+Array = NDArray[np.float64]
+Points = dict[str, Array]
+
+_GRID = 170  # voxels in a body's height
+_HAND_GRID = 110  # voxels in a hand's length
+_CROTCH = (0.40, 0.55)  # heights between which legs part
+_USUAL_CROTCH = 0.47
+_HIP = 0.055  # of the height: the hip joint above where the legs part
+_ANKLE = 0.043
+_KNEE = 0.5  # from ankle to hip
+_SPINE = (0.14, 0.28, 0.45, 0.72)  # vertebrae from pelvis to the lowest of the neck
+_NECK = (0.80, 0.92)  # where the narrowest place of the neck is looked for
+_ELBOW = 0.48  # from wrist to shoulder
+_SHOULDER = 0.1  # head of the humerus from the midline
+_WIDER = 1.35  # an arm ends where it is that much wider than it is on average
+_REACH = 1.4  # of the way from fingertip to wrist: how much of an arm is looked at as a hand
+_BALL = 0.72  # of the foot's length from the heel
+_HEEL = 0.13
+
+
+def place_body(vertices: Array, faces: NDArray[np.integer], label: str = "the body") -> Points:
+    """Propose a body's points.
+
+    Args:
+        vertices: Its surface in any unit and axes, shape (V, 3).
+        faces: Its triangles, shape (T, 3).
+        label: What messages call it.
+
+    Returns:
+        The 87 points in the surface's own unit and axes.
+
+    Raises:
+        InputError: It is no upright body with legs, arms and fingers apart.
+    """
+    solid = solid_of(vertices, faces, float(np.ptp(vertices, axis=0).max()) / _GRID).main_piece()
+    stance = find_stance(solid, label)
+    solid = Solid(stance.inward(solid.points), solid.depth / stance.height, solid.size / stance.height, solid.ways)
+    # distances of the ways scale, too
+    solid.ways.data /= stance.height
+    points: Points = {}
+    legs = _legs(solid, points)
+    _trunk(solid, points)
+    surface = stance.inward(vertices)
+    _head(solid, surface, points)
+    for side, tip in zip(("left", "right"), _hands(solid, points, legs, label), strict=True):
+        _arm(solid, surface, faces, side, tip, points, f"{label}, {side} hand")
+    nearest = {name: solid.nearest(place) for name, place in points.items()}
+    for name, voxel in nearest.items():  # what a mean of hollow sections put outside comes back
+        if "." in name and name.split(".", 1)[1].partition(".")[0] in _DIGITS:
+            continue
+        if np.linalg.norm(solid.points[voxel] - points[name]) > 1.5 * solid.size:
+            points[name] = solid.points[voxel]
+    return {name: stance.outward(points[name]) for name in ACTOR_POINTS}
+
+
+_DIGITS = ("thumb", "index", "middle", "ring", "pinky")
+
+
+def _slab(solid: Solid, height: float) -> NDArray[np.bool_]:
+    return np.asarray(np.abs(solid.points[:, 1] - height) < 1.2 * solid.size)
+
+
+def _beside(solid: Solid, height: float, sign: float, place: float | None = None) -> NDArray[np.int64]:
+    """Voxels of the leg on one side at a height."""
+    found = [p for p in pieces(solid, _slab(solid, height)) if sign * solid.points[p, 0].mean() > 0 and len(p) > 8]
+    if not found:
+        return np.zeros(0, dtype=np.int64)
+    # of several, as where a hand hangs beside the leg, the one nearest to the middle
+    large = [p for p in found if len(p) > 0.4 * len(found[0])]
+    return min(large, key=lambda p: abs(float(solid.points[p, 0].mean()) - (place or 0.0)))
+
+
+def _crotch(solid: Solid) -> float:
+    """Where the legs part: the lowest height at which what carries the middle is one."""
+    for height in np.arange(*_CROTCH, 1.5 * solid.size):
+        for piece in pieces(solid, _slab(solid, float(height)))[:3]:
+            x = solid.points[piece, 0]
+            if x.min() < -0.02 and x.max() > 0.02 and abs(x.mean()) < 0.02:
+                return float(height) if height > _CROTCH[0] + solid.size else _USUAL_CROTCH
+    return _USUAL_CROTCH
+
+
+def _legs(solid: Solid, points: Points) -> NDArray[np.bool_]:
+    """Hips to toes; which voxels are the legs'."""
+    crotch = _crotch(solid)
+    high = crotch + _HIP
+    legs = solid.points[:, 1] < crotch
+    middle = solid.points[_slab(solid, high) & (np.abs(solid.points[:, 0]) < 0.12)].mean(axis=0)
+    for side, sign in (("left", 1.0), ("right", -1.0)):
+        thigh = solid.points[_beside(solid, crotch - 3.0 * solid.size, sign)].mean(axis=0)
+        hip = np.array([thigh[0], high, (thigh[2] + middle[2]) / 2])
+        shin = [solid.points[_beside(solid, y, sign)].mean(axis=0) for y in (0.075, 0.14)]
+        ankle = shin[0] + (shin[0] - shin[1]) * (0.075 - _ANKLE) / 0.065
+        knee_height = ankle[1] + _KNEE * (hip[1] - ankle[1])
+        points[f"{side}.femoral_head"] = hip
+        points[f"{side}.knee"] = solid.points[_beside(solid, knee_height, sign)].mean(axis=0)
+        points[f"{side}.ankle"] = ankle
+        _foot(solid, side, sign, points)
+    hips = (points["left.femoral_head"] + points["right.femoral_head"]) / 2
+    points["pelvis"] = np.array([0.0, hips[1] + 0.01, middle[2]])
+    for side in ("left", "right"):
+        points[f"{side}.pelvic_hip"] = (points["pelvis"] + points[f"{side}.femoral_head"]) / 2
+    return legs
+
+
+def _foot(solid: Solid, side: str, sign: float, points: Points) -> None:
+    ankle = points[f"{side}.ankle"]
+    foot = solid.points[(solid.points[:, 1] < _ANKLE + 0.01) & (sign * solid.points[:, 0] > 0)]
+    foot = foot[np.linalg.norm((foot - ankle)[:, [0, 2]], axis=1) < 0.2]
+    ahead = foot[foot[:, 2] > np.quantile(foot[:, 2], 0.9)].mean(axis=0) - ankle
+    forward = unit(np.array([ahead[0], 0.0, ahead[2]]))
+    outward = np.cross((0.0, 1.0, 0.0), forward) * sign
+    along, across = (foot - ankle) @ forward, (foot - ankle) @ outward
+    back, length = float(along.min()), float(np.ptp(along))
+
+    def slice_at(share: float) -> Array:
+        near = np.abs(along - (back + share * length)) < 1.2 * solid.size
+        return np.asarray(foot[near].mean(axis=0))
+
+    points[f"{side}.heel"] = slice_at(_HEEL)
+    points[f"{side}.ball"] = slice_at(_BALL)
+    front = along > back + 0.8 * length
+    low, width = float(across[front].min()), float(np.ptp(across[front]))
+    for name, share in (("big", 0.22), ("middle", 0.52), ("little", 0.85)):
+        strip = (np.abs(across - (low + share * width)) < 0.13 * width + 0.5 * solid.size) & (
+            along > back + 0.5 * length
+        )
+        end = float(along[strip].max())
+        column = strip & (along > end - 3.0 * solid.size)
+        points[f"{side}.{name}_toe_tip"] = foot[column].mean(axis=0)
+
+
+def _trunk(solid: Solid, points: Points) -> None:
+    """Spine, neck and sternum."""
+    pelvis = points["pelvis"]
+    heights = np.arange(*_NECK, 1.5 * solid.size)
+    widths = [float((_slab(solid, y) & (np.abs(solid.points[:, 0]) < 0.12)).sum()) for y in heights]
+    # slabs hold a varying number of layers
+    widths = [
+        w / max(1, len(np.unique(np.round(solid.points[_slab(solid, y), 1] / solid.size))))
+        for w, y in zip(widths, heights, strict=True)
+    ]
+    neck = float(heights[int(np.argmin(widths))])
+    lowest, base = neck - 0.02, neck + 0.035
+    spine = {"vertebra5": lowest, "skull_base": base}
+    spine |= {f"vertebra{k}": pelvis[1] + s * (lowest - pelvis[1]) for k, s in enumerate(_SPINE, start=1)}
+    for name, height in spine.items():
+        back, front = _depths(solid, height)
+        points[name] = np.array([0.0, height, back + 0.42 * (front - back)])
+    height = lowest - 0.035
+    back, front = _depths(solid, height)
+    points["sternum"] = np.array([0.0, height, back + 0.75 * (front - back)])
+    for side, sign in (("left", 1.0), ("right", -1.0)):
+        points[f"{side}.clavicle"] = points["sternum"] + np.array([sign * 0.014, 0.0, 0.0])
+
+
+def _depths(solid: Solid, height: float) -> tuple[float, float]:
+    """Back and front of the trunk on its midline."""
+    z = solid.points[_slab(solid, height) & (np.abs(solid.points[:, 0]) < 0.02), 2]
+    return (float(z.min()), float(z.max())) if len(z) else (0.0, 0.0)
+
+
+def _head(solid: Solid, surface: Array, points: Points) -> None:
+    base = points["skull_base"]
+    skull = (solid.points[:, 1] > base[1]) & (np.abs(solid.points[:, 0]) < 0.09)
+    crown = float(solid.points[skull, 1].max())
+    radius = min(float(solid.depth[skull].max()), 0.6 * (crown - base[1]))
+    top = solid.points[skull & (np.abs(solid.points[:, 1] - (crown - radius)) < 1.2 * solid.size)].mean(axis=0)
+    points["head_top"] = top * (0.0, 1.0, 1.0)
+    joints = {"head": base, "head.top": np.array([base[0], crown, base[2]])}
+    up, forward = np.eye(3)[1], np.eye(3)[2]
+    found = dict(face_points(joints, surface[surface[:, 1] > points["sternum"][1]], up, forward))
+    reach = {"nose_tip": 0.38, "chin": 0.0}
+    for name, share in reach.items():
+        place = found.get(name)
+        if place is None:
+            place = np.array([0.0, base[1] + share * (crown - base[1]) - 0.02, _depths(solid, base[1])[1]])
+        points[name] = place * (0.0, 1.0, 1.0) - 0.012 * forward
+
+
+def _hands(solid: Solid, points: Points, legs: NDArray[np.bool_], label: str) -> list[int]:
+    """The furthest voxels of both arms."""
+    distance = solid.distances(solid.nearest(points["pelvis"]))
+    ends = [b for b in find_branches(solid, distance, 0.12) if abs(solid.points[b.tip, 0]) > 0.06]
+    feet = [(points[f"{side}.ball"]) for side in ("left", "right")]
+    ends = [b for b in ends if min(np.linalg.norm(solid.points[b.tip] - f) for f in feet) > 0.12]
+    out = []
+    for sign in (1.0, -1.0):
+        own = [b for b in ends if sign * solid.points[b.tip, 0] > 0]
+        if not own:
+            raise InputError(f"{label}: no {'left' if sign > 0 else 'right'} arm stands apart from trunk and legs")
+        out.append(max(own, key=lambda b: float(distance[b.tip])).tip)
+    return out
+
+
+def _arm(
+    solid: Solid, surface: Array, faces: NDArray[np.integer], side: str, tip: int, points: Points, label: str
+) -> None:
+    from_tip = solid.distances(tip)
+    step = 2.0 * solid.size
+    line, areas = centre_line(solid, np.flatnonzero(np.isfinite(from_tip)), from_tip, step)
+    widths = np.sqrt(areas)
+    at = (np.arange(len(widths)) + 0.5) * step
+    usual = float(np.median(widths[(at > 0.26) & (at < 0.34)]))
+    wide = np.flatnonzero((at > 0.25) & (widths > _WIDER * usual))
+    # the arm's flesh ends at the armpit; its joint is as far aside as shoulders are
+    beside = np.flatnonzero((at > 0.25) & (np.abs(line[:, 0]) < _SHOULDER))
+    ends = [float(at[found[0]]) for found in (wide, beside) if len(found)]
+    end = float(np.mean(ends)) if ends else 0.39
+    near = (at > 0.2 * end) & (at < 0.38 * end)
+    wrist = float(at[near][int(np.argmin(widths[near]))])
+    place = dict(zip(("wrist", "elbow", "shoulder"), (wrist, wrist + _ELBOW * (end - wrist), end), strict=True))
+    there = {name: np.stack([np.interp(s, at, line[:, k]) for k in range(3)]) for name, s in place.items()}
+    hand = place_hand(*_fine(solid, surface, faces, line, from_tip, wrist), label)
+    points |= {f"{side}.{name}": point for name, point in hand.items()}
+    points[f"{side}.elbow"], points[f"{side}.shoulder"] = there["elbow"], there["shoulder"]
+    middle = (place["wrist"] + place["elbow"]) / 2
+    points[f"{side}.forearm_twist"] = np.stack([np.interp(middle, at, line[:, k]) for k in range(3)])
+
+
+def _fine(
+    solid: Solid, surface: Array, faces: NDArray[np.integer], line: Array, from_tip: Array, wrist: float
+) -> tuple[Solid, Array]:
+    """A hand with a piece of forearm in finer voxels, and a point at its arm's end."""
+    own = solid.points[from_tip < _REACH * wrist]
+    low, high = own.min(axis=0) - 2.0 * solid.size, own.max(axis=0) + 2.0 * solid.size
+    fine = solid_of(surface, faces, wrist / _HAND_GRID, low=low, high=high, within=solid)
+    # of what else lies in the box, as the rest of the arm or a thigh, nothing is looked at
+    _, nearest = cKDTree(solid.points).query(fine.points)
+    fine = fine.part(from_tip[nearest] < _REACH * wrist).main_piece()
+    step = 2.0 * solid.size
+    return fine, line[min(int((_REACH - 0.12) * wrist / step), len(line) - 1)]

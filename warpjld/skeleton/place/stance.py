@@ -1,0 +1,103 @@
+"""How a digitised body stands: its up, its left and forward, found from its two legs and its feet."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.sparse.csgraph import connected_components
+
+from warpjld.errors import InputError
+from warpjld.rotations import unit
+from warpjld.skeleton.place.solid import Solid
+
+__all__ = ["Stance", "find_stance", "pieces"]
+
+Array = NDArray[np.float64]
+
+_UPS = ((1, 1.0), (2, 1.0), (0, 1.0), (1, -1.0), (2, -1.0), (0, -1.0))
+"""Axes and signs that may be up, the usual ones first."""
+_LEGS = (0.12, 0.2, 0.28, 0.36)  # heights at which there are two legs
+_ALIKE = 1.6  # flesh of one leg per the other's
+_TRUNK = (0.56, 0.64)  # heights at which there is one trunk
+
+
+@dataclass(frozen=True)
+class Stance:
+    """A body's frame.
+
+    Attributes:
+        frame: Rows left, up and forward, shape (3, 3).
+        origin: On the floor between the feet, below the trunk, shape (3,).
+        height: From the floor to the crown.
+    """
+
+    frame: Array
+    origin: Array
+    height: float
+
+    def inward(self, points: Array) -> Array:
+        """Points in the body's frame, heights as shares of one: x left, y up, z forward."""
+        return (points - self.origin) @ self.frame.T / self.height
+
+    def outward(self, points: Array) -> Array:
+        """Back from the body's frame."""
+        return points * self.height @ self.frame + self.origin
+
+
+def pieces(solid: Solid, chosen: NDArray[np.bool_]) -> list[NDArray[np.int64]]:
+    """Connected pieces of some voxels, the largest first."""
+    numbers = np.flatnonzero(chosen)
+    _, label = connected_components(solid.part(chosen).ways, directed=False)
+    found = [numbers[label == k] for k in range(label.max(initial=-1) + 1)]
+    return sorted(found, key=len, reverse=True)
+
+
+def find_stance(solid: Solid, label: str) -> Stance:
+    """The first axis along which two legs carry one trunk.
+
+    Raises:
+        InputError: There is none.
+    """
+    for axis, sign in _UPS:
+        up = np.zeros(3)
+        up[axis] = sign
+        found = _stands(solid, up)
+        if found is not None:
+            return found
+    raise InputError(f"{label}: no upright body with two legs apart from one another")
+
+
+def _stands(solid: Solid, up: Array) -> Stance | None:
+    high = solid.points @ up
+    low, height = float(high.min()), float(np.ptp(high))
+    share = (high - low) / height
+    slab = 1.2 * solid.size / height
+    legs = []
+    for at in _LEGS:
+        found = [p for p in pieces(solid, np.abs(share - at) < slab) if len(p) > 20]
+        if len(found) < 2 or len(found[0]) > _ALIKE * len(found[1]):
+            return None
+        if len(found) > 2 and len(found[2]) > 0.5 * len(found[1]):
+            return None
+        legs.append([solid.points[p].mean(axis=0) for p in found[:2]])
+    trunk = []
+    for at in _TRUNK:
+        found = pieces(solid, np.abs(share - at) < slab)
+        if not found:
+            return None
+        trunk.append(solid.points[found[0]].mean(axis=0))
+    apart = np.array([a - b if (a - b) @ (legs[0][0] - legs[0][1]) > 0 else b - a for a, b in legs]).mean(axis=0)
+    left = unit(apart - up * (up @ apart))
+    middle = np.mean([np.mean(pair, axis=0) for pair in legs], axis=0)
+    centre = np.mean(trunk, axis=0)
+    if abs(float((centre - middle) @ left)) > 0.35 * float(apart @ left):  # the trunk stands between the legs
+        return None
+    forward = np.cross(left, up)
+    feet = solid.points[share < 0.03] @ forward
+    ankles = solid.points[(share > 0.05) & (share < 0.1)] @ forward
+    if (feet.max() - np.median(ankles)) < (np.median(ankles) - feet.min()):
+        left, forward = -left, -forward
+    origin = centre + up * (low - float(centre @ up))
+    return Stance(np.stack([left, up, forward]), origin, height)
