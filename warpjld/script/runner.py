@@ -259,7 +259,7 @@ def _take(studio: FilmStudio | PressureStudio, frame: int, vertices: NDArray[np.
 def _check_lengths(scene: Scene, outputs: Sequence[Output], frames: int) -> None:
     """Refuse clips and rates that a format does not take."""
     from warpjld.io.caches import open_cache
-    from warpjld.press.where import placed
+    from warpjld.simulation.specification import located
 
     for output in outputs:
         try:
@@ -268,7 +268,7 @@ def _check_lengths(scene: Scene, outputs: Sequence[Output], frames: int) -> None
             for actor in actors_of(output, scene) if isinstance(output, Export) else ():
                 open_cache(output.name, actor.rig.surface, frames=frames, rate=scene.rate)
         except InputError as error:
-            raise placed(InputError(f"'{output.name}': {error.message}"), scene.asked.get(output.name)) from None
+            raise located(InputError(f"'{output.name}': {error.message}"), scene.asked.get(output.name)) from None
 
 
 def _size(scene: Scene, outputs: Sequence[Output], frames: int) -> float:
