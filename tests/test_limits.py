@@ -12,7 +12,7 @@ import pytest
 from tests.finger import finger
 from warpjld.cli import main
 from warpjld.errors import InputError
-from warpjld.fem.study_file import load_study
+from warpjld.fem.study.study_file import load_study
 from warpjld.input_file import open_input
 from warpjld.io import load_rig
 from warpjld.lengths import LARGEST, SMALLEST, check_size

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from tests.io.test_mutations import sound
+from tests.fuzz.sound import sound
 from warpjld.cli import main
 from warpjld.errors import InputError
 from warpjld.overwriting import check_outputs

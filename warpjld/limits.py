@@ -39,7 +39,7 @@ LIMITS = {
     "vertices": Limit(5_000_000, "vertices", "a surface"),
     "faces": Limit(10_000_000, "triangles", "a surface"),
     "nodes": Limit(100_000, "nodes", "a scene"),
-    "joints": Limit(2_048, "joints", "a skeleton"),
+    "joints": Limit(1_024, "joints", "a skeleton"),
     "frames": Limit(2_000_000, "frames", "a motion or a scene"),
     "transforms": Limit(50_000_000, "transforms", "a motion: frames times joints"),
     "depth": Limit(200, "levels", "JSON and arithmetic, one inside the other"),

@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+import atexit
 import os
+import shutil
 import sys
+import tempfile
 
 __all__ = ["silence_warp"]
 
@@ -24,7 +27,30 @@ def silence_warp() -> None:
     with open(os.devnull, "w") as nowhere:
         os.dup2(nowhere.fileno(), 2)
     try:
-        warp.init()
+        moved = _initialised()
     finally:
         os.dup2(kept, 2)
         os.close(kept)
+    if moved is not None and sys.stderr is not None:
+        print(f"warning: {moved}", file=sys.stderr)
+
+
+def _initialised() -> str | None:
+    """Start Warp; where its kernel cache cannot be written, with one of this process alone, which is told."""
+    import warp
+
+    problem = ""
+    try:
+        warp.init()
+        folder = warp.config.kernel_cache_dir
+        if os.access(folder, os.W_OK | os.X_OK):
+            return None
+        problem = f"{folder}: permission denied"
+    except OSError as error:
+        problem = f"{error.filename or 'the cache'}: {error.strerror or error}"
+    folder = tempfile.mkdtemp(prefix="warpjld-kernels-")
+    atexit.register(shutil.rmtree, folder, ignore_errors=True)
+    os.environ["WARP_CACHE_PATH"] = folder  # for the processes that this one starts
+    warp.config.kernel_cache_dir = folder
+    warp.init()
+    return f"kernels cannot be kept ({problem}): they are compiled anew; WARP_CACHE_PATH names another folder"

@@ -190,7 +190,12 @@ def palm_share(skin: Skin, posture: Posture, drives: Drives, chain: Chain, r: in
 @wp.func
 def mapped(skin: Skin, posture: Posture, drives: Drives, r: int, v: int, s: float) -> wp.vec3:
     """The covering formula at one vertex when the chain has closed by s."""
-    chain = chain_at(posture, drives, r, s)
+    return mapped_by(skin, posture, drives, chain_at(posture, drives, r, s), r, v)
+
+
+@wp.func
+def mapped_by(skin: Skin, posture: Posture, drives: Drives, chain: Chain, r: int, v: int) -> wp.vec3:
+    """The covering formula at one vertex when the chain has turned what lies beyond its joints."""
     f = drives.frame[r]
     foot = wp.vec3(0.0)
     for k in range(skin.position.shape[1]):

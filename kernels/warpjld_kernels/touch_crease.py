@@ -4,44 +4,148 @@ import warp as wp
 
 wp.set_module_options({"enable_backward": False})
 
+ROOM = wp.constant(0.25)  # thicknesses
+
+
+@wp.struct
+class Creases:
+    """Vertices near the planes of joints, and how thick the flesh is at each plane.
+
+    Of every vertex that a joint may press its number and its first entry, one more at the end. Of every entry the
+    plane, the distance from it at rest, how much it counts, and what is opposite: three vertices and their shares.
+    """
+
+    vertex: wp.array(dtype=wp.int32)
+    first: wp.array(dtype=wp.int32)
+    crease: wp.array(dtype=wp.int32)
+    height: wp.array(dtype=float)
+    weight: wp.array(dtype=float)
+    opposite: wp.array(dtype=wp.vec3i)
+    share: wp.array(dtype=wp.vec3)
+    size: wp.array(dtype=float)
+
+
+@wp.func
+def across(creases: Creases, entry: int, frame: int, points: wp.array2d(dtype=wp.vec3)) -> wp.vec3:
+    """What is opposite."""
+    out = wp.vec3(0.0, 0.0, 0.0)
+    for k in range(3):
+        out += creases.share[entry][k] * points[frame, creases.opposite[entry][k]]
+    return out
+
+
+@wp.func
+def counts(creases: Creases, entry: int, r: wp.vec3, n: wp.vec3) -> float:
+    """How much an entry counts that is so far from what is opposite to it: they have passed through one another only
+    where they are still beside one another."""
+    beside = wp.length(r - wp.dot(r, n) * n) / creases.size[creases.crease[entry]]
+    return creases.weight[entry] * wp.clamp(2.0 - 2.0 * beside, 0.0, 1.0)
+
 
 @wp.kernel
-def part_creases(
-    # of every vertex that a joint may press: its number and its first entry; one more at the end
-    vertex: wp.array(dtype=wp.int32),
-    first: wp.array(dtype=wp.int32),
-    # entries: which joint, distance from its plane at rest, how much it counts; what is opposite: three vertices and
-    # their shares
-    joint: wp.array(dtype=wp.int32),
-    height: wp.array(dtype=float),
-    weight: wp.array(dtype=float),
-    opposite: wp.array(dtype=wp.vec3i),
-    share: wp.array(dtype=wp.vec3),
-    # joints: how thick the flesh is; normals of their planes in every frame
-    size: wp.array(dtype=float),
+def measure_creases(
+    creases: Creases,
+    # normals of the planes in every frame
     normal: wp.array2d(dtype=wp.vec3),
-    kept: float,
     points: wp.array2d(dtype=wp.vec3),
-    # out
-    points_out: wp.array2d(dtype=wp.vec3),
+    share: float,
+    kept: float,
+    # out: whether a vertex may be pushed at all, with room for what pushing others makes of it; how far it has passed
+    # through what is opposite to it; and of every plane the farthest, in parts of what both sides can give
+    near_out: wp.array2d(dtype=wp.int32),
+    overlap_out: wp.array2d(dtype=float),
+    deepest_out: wp.array2d(dtype=float),
 ):
-    """Every vertex keeps at least a share of its rest distance from what is opposite to it, each giving way by half."""
+    frame, row = wp.tid()
+    v = creases.vertex[row]
+    most = float(0.0)
+    near = int(0)
+    for entry in range(creases.first[row], creases.first[row + 1]):
+        j = creases.crease[entry]
+        n = normal[frame, j]
+        r = points[frame, v] - across(creases, entry, frame, points)
+        overlap = -wp.sign(creases.height[entry]) * wp.dot(r, n)
+        if -overlap < 2.0 * kept * wp.abs(creases.height[entry]) + ROOM * creases.size[j]:
+            near = 1
+        if overlap > 0.0:
+            overlap *= counts(creases, entry, r, n)
+            most = wp.max(most, overlap)
+            wp.atomic_max(deepest_out, frame, j, overlap / (2.0 * share * creases.size[j]))
+    near_out[frame, row] = near
+    overlap_out[frame, v] = most
+
+
+@wp.kernel
+def push_creases(
+    creases: Creases,
+    normal: wp.array2d(dtype=wp.vec3),
+    points: wp.array2d(dtype=wp.vec3),
+    near: wp.array2d(dtype=wp.int32),
+    overlap: wp.array2d(dtype=float),
+    deepest: wp.array2d(dtype=float),
+    # rows of a smoothing
+    row_first: wp.array(dtype=wp.int32),
+    column: wp.array(dtype=wp.int32),
+    value: wp.array(dtype=float),
+    kept: float,
+    least: float,
+    wider: float,
+    widest: float,
+    full: float,
+    none: float,
+    # out
+    pushed_out: wp.array(dtype=wp.int32),
+    shift_out: wp.array2d(dtype=wp.vec3),
+):
+    """How far every vertex is pushed from what is opposite to it, each side by half.
+
+    They are to be apart by a little, and as far again as they have passed through one another around, but by no more
+    than a share of how far they are at rest.
+    """
+    frame, row = wp.tid()
+    v = creases.vertex[row]
+    p = points[frame, v]
+    around = float(0.0)
+    last = creases.first[row]
+    if near[frame, row] != 0:
+        last = creases.first[row + 1]
+        for i in range(row_first[v], row_first[v + 1]):
+            around += value[i] * overlap[frame, column[i]]
+    shift = wp.vec3(0.0, 0.0, 0.0)
+    for entry in range(creases.first[row], last):
+        j = creases.crease[entry]
+        n = normal[frame, j]
+        r = p - across(creases, entry, frame, points)
+        side = wp.sign(creases.height[entry])
+        apart = 2.0 * least * creases.size[j] + wp.min(wider * around, widest * creases.size[j])
+        apart = wp.min(apart, 2.0 * kept * wp.abs(creases.height[entry]))
+        missing = apart - side * wp.dot(r + shift, n)
+        if missing > 0.0:
+            shown = wp.clamp((none - deepest[frame, j]) / (none - full), 0.0, 1.0)
+            shift += 0.5 * shown * counts(creases, entry, r, n) * missing * side * n
+    shift_out[frame, v] = shift
+    if wp.length_sq(shift) > 0.0:
+        pushed_out[frame] = 1
+
+
+@wp.kernel
+def move_smoothly(
+    # vertices that a smoothing reaches from those that are pushed
+    vertex: wp.array(dtype=wp.int32),
+    row_first: wp.array(dtype=wp.int32),
+    column: wp.array(dtype=wp.int32),
+    value: wp.array(dtype=float),
+    pushed: wp.array(dtype=wp.int32),
+    shift: wp.array2d(dtype=wp.vec3),
+    # in and out
+    points: wp.array2d(dtype=wp.vec3),
+):
+    """Add smoothed shifts; what has none stays bit for bit."""
     frame, row = wp.tid()
     v = vertex[row]
-    p = points[frame, v]
-    shift = wp.vec3(0.0, 0.0, 0.0)
-    for entry in range(first[row], first[row + 1]):
-        j = joint[entry]
-        n = normal[frame, j]
-        across = wp.vec3(0.0, 0.0, 0.0)
-        for k in range(3):
-            across += share[entry][k] * points[frame, opposite[entry][k]]
-        r = p - across
-        apart = wp.dot(r, n)
-        n = wp.sign(height[entry]) * n
-        missing = 2.0 * kept * wp.abs(height[entry]) - wp.dot(r + shift, n)
-        if missing > 0.0:
-            # they have passed through one another only where they are still beside one another
-            beside = wp.length(r - apart * normal[frame, j]) / size[j]
-            shift += 0.5 * weight[entry] * wp.clamp(2.0 - 2.0 * beside, 0.0, 1.0) * missing * n
-    points_out[frame, v] = p + shift
+    total = wp.vec3(0.0, 0.0, 0.0)
+    last = wp.where(pushed[frame] != 0, row_first[v + 1], row_first[v])
+    for i in range(row_first[v], last):
+        total += value[i] * shift[frame, column[i]]
+    if wp.length_sq(total) > 0.0:
+        points[frame, v] = points[frame, v] + total

@@ -8,37 +8,50 @@ wp.set_module_options({"enable_backward": False})
 
 
 @wp.kernel
-def fade_samples(
-    samples: Samples,
+def fade_pairs(
     parts: Parts,
+    # by pairs of parts, before anything was parted
     deepest: wp.array2d(dtype=float),
     full: float,
     none: float,
+    just: float,
     # out
-    shown_out: wp.array(dtype=float),
+    shown_out: wp.array2d(dtype=float),
+):
+    """How much of the overlaps of two parts is parted, by how deep they and those next to them lie in one another at
+    most. What was no overlap before anything was parted is none later: what just was one counts for little."""
+    own, other = wp.tid()
+    was = wp.max(deepest[own, other], deepest[other, own])
+    shown = float(0.0)
+    if was > 0.0:
+        most = float(0.0)
+        for i_own in range(parts.beside.shape[1]):
+            a = parts.beside[own, i_own]
+            for i_other in range(parts.beside.shape[1]):
+                b = parts.beside[other, i_other]
+                if a >= 0 and b >= 0:
+                    most = wp.max(most, wp.max(deepest[a, b], deepest[b, a]))
+        shown = wp.clamp((none - most) / (none - full), 0.0, 1.0) * wp.min(was / just, 1.0)
+    shown_out[own, other] = shown
+
+
+@wp.kernel
+def heed_samples(
+    samples: Samples,
+    parts: Parts,
+    # out
     count_out: wp.array(dtype=wp.int32),
     list_out: wp.array2d(dtype=wp.int32),
     lower_out: wp.array(dtype=wp.vec3),
     upper_out: wp.array(dtype=wp.vec3),
 ):
-    """How much of an overlap is parted, by how deep two parts and those next to them lie in one another at most; and
-    of every part the samples that its vertices may heed, and the box in which they do."""
+    """Of every part the samples that its vertices may heed, and the box in which they do."""
     i = wp.tid()
     own = samples.own[i]
     other = samples.other[i]
-    most = float(0.0)
-    width = parts.beside.shape[1]
-    for i_own in range(width):
-        a = parts.beside[own, i_own]
-        for i_other in range(width):
-            b = parts.beside[other, i_other]
-            if a >= 0 and b >= 0:
-                most = wp.max(most, wp.max(deepest[a, b], deepest[b, a]))
-    t = wp.clamp((none - most) / (none - full), 0.0, 1.0)
-    shown_out[i] = t * t * (3.0 - 2.0 * t)
     reach = wp.vec3(samples.radius[i], samples.radius[i], samples.radius[i])
     for side in range(2):
-        for k in range(width):
+        for k in range(parts.beside.shape[1]):
             a = parts.beside[wp.where(side == 0, own, other), k]
             # what is beside both heeds it once
             if a >= 0 and (side == 0 or parts.apart[own, a] != 2):
@@ -55,7 +68,8 @@ def part_surfaces(
     points: wp.array(dtype=wp.vec3),
     normals: wp.array(dtype=wp.vec3),
     samples: Samples,
-    shown: wp.array(dtype=float),
+    # by pairs of parts: how much of their overlaps is parted
+    shown: wp.array2d(dtype=float),
     # of every part
     count: wp.array(dtype=wp.int32),
     heeded: wp.array2d(dtype=wp.int32),
@@ -107,14 +121,14 @@ def part_surfaces(
                 limit = samples.depth[i] / samples.ratio[i]
                 # what is much farther beyond the plane than that vertex was is not beside it
                 gap = clearance * limit * wp.sqrt(samples.counts[i])
-                missing = wp.min(gap - wp.dot(r, n), gap + 1.5 * samples.depth[i])
+                missing = wp.min(gap - wp.dot(r, n), gap + 1.5 * samples.parted[i])
                 looks = wp.clamp(1.0 - 2.0 * wp.dot(facing, n), 0.0, 1.0)
                 if side != 0.0 and missing > 0.0 and looks > 0.0:
                     # a plane that is just being passed counts for nothing yet: else all would jump
                     passing = wp.min(missing / (soft * limit), 1.0)
                     weight = near * near * sure * looks * passing * samples.counts[i]
                     matrix += weight * wp.outer(n, n)
-                    right += weight * shown[i] * missing * n
+                    right += weight * shown[samples.own[i], samples.other[i]] * missing * n
         matrix += stiffness * wp.identity(n=3, dtype=float)
         d = wp.inverse(matrix) * right
     moved_out[v] = d

@@ -2,9 +2,15 @@
 
 import warp as wp
 
+from warpjld_kernels.shells import nearest_weights
+
 wp.set_module_options({"enable_backward": False})
 
 FAR = wp.constant(1.0e30)
+NEARLY = wp.constant(0.5)  # of the nearest distance beyond it: faces that near have a say in where out is
+BESIDE = wp.constant(0.03)  # of a mesh's reach from its bones: outside its box by that nothing is inside it
+UNSURE = wp.constant(0.0)  # length of the mean of the ways out that is none
+SURE = wp.constant(0.9)  # and that is one
 
 
 @wp.struct
@@ -43,8 +49,8 @@ class Samples:
     """Vertices that lie inside another part.
 
     Of each: its number, its part and the other; a point of the surface in which both are to meet and that surface's
-    normal, towards the vertex's own part; how deep it lies, how much it counts, the radius over which it does, and its
-    depth in parts of what skin can give.
+    normal, towards the vertex's own part; how deep it lies, how much of that is parted, how much it counts, the radius
+    over which it does, and its depth in parts of what skin can give.
     """
 
     count: wp.array(dtype=wp.int32)
@@ -54,6 +60,7 @@ class Samples:
     point: wp.array(dtype=wp.vec3)
     normal: wp.array(dtype=wp.vec3)
     depth: wp.array(dtype=float)
+    parted: wp.array(dtype=float)
     counts: wp.array(dtype=float)
     radius: wp.array(dtype=float)
     ratio: wp.array(dtype=float)
@@ -84,8 +91,8 @@ def find_pairs(
     parts: Parts,
     lower: wp.array(dtype=wp.vec3),
     upper: wp.array(dtype=wp.vec3),
-    # overlaps found before in this frame, or anything above nought for all that may be
-    before: wp.array2d(dtype=float),
+    # how much of the overlaps of two parts is parted; anything above nought where that is not known
+    shown: wp.array2d(dtype=float),
     # out; ``wanted_out`` of parts whose mesh is asked, ``active_out`` of those that take part at all
     count_out: wp.array(dtype=wp.int32),
     other_out: wp.array2d(dtype=wp.int32),
@@ -96,9 +103,10 @@ def find_pairs(
     k = wp.tid()
     count = int(0)
     for other in range(parts.mesh.shape[0]):
-        if parts.apart[k, other] == 1 and wp.max(before[k, other], before[other, k]) > 0.0:
-            low = wp.max(lower[k], lower[other])
-            high = wp.min(upper[k], upper[other])
+        if parts.apart[k, other] == 1 and shown[k, other] > 0.0:
+            margin = BESIDE * parts.around[other] * wp.vec3(1.0, 1.0, 1.0)
+            low = wp.max(lower[k], lower[other] - margin)
+            high = wp.min(upper[k], upper[other] + margin)
             if low[0] < high[0] and low[1] < high[1] and low[2] < high[2]:
                 other_out[k, count] = other
                 wanted_out[other] = 1
@@ -135,29 +143,115 @@ def find_normals(
 
 
 @wp.func
-def may_be_inside(joints: wp.array(dtype=wp.vec3), parts: Parts, k: int, p: wp.vec3, normal: wp.vec3) -> bool:
-    """Whether a point is as near to a part's bones as its mesh reaches, on skin that does not look away from all of
-    those; always where a part has none."""
+def beside_bones(joints: wp.array(dtype=wp.vec3), parts: Parts, k: int, p: wp.vec3) -> float:
+    """1 for a point as near to a part's bones as its mesh reaches, 0 a tenth farther; 1 where a part has none."""
     first = parts.first_bone[k]
     last = parts.first_bone[k + 1]
-    reach = parts.around[k] * parts.around[k]
-    near = first == last
+    least = wp.where(first == last, 0.0, FAR)
     for i in range(first, last):
-        if not near:
-            a = joints[parts.bone[i][0]]
-            along = joints[parts.bone[i][1]] - a
-            r = p - a
-            t = wp.clamp(wp.dot(r, along) / wp.max(wp.length_sq(along), 1.0e-30), 0.0, 1.0)
-            r = r - t * along
-            # written so that joints that are not known, not numbers, rule out nothing
-            near = not (wp.length_sq(r) >= reach)
-    return near
+        a = joints[parts.bone[i][0]]
+        along = joints[parts.bone[i][1]] - a
+        r = p - a
+        t = wp.clamp(wp.dot(r, along) / wp.max(wp.length_sq(along), 1.0e-30), 0.0, 1.0)
+        # joints that are not known, not numbers, rule out nothing
+        square = wp.length_sq(r - t * along)
+        least = wp.where(wp.isfinite(square), wp.min(least, wp.sqrt(square)), 0.0)
+    return wp.clamp(11.0 - 10.0 * least / wp.max(parts.around[k], 1.0e-30), 0.0, 1.0)
 
 
 @wp.func
 def smooth_skin(normal: wp.vec3, area: float) -> float:
     """1 where a vertex has its faces side by side, 0 where they are folded: there is no inside and no outside."""
     return wp.clamp(4.0 * wp.length(normal) / wp.max(area, 1.0e-30) - 0.6, 0.0, 1.0)
+
+
+@wp.func
+def may_be_behind(
+    points: wp.array(dtype=wp.vec3),
+    normals: wp.array(dtype=wp.vec3),
+    parts: Parts,
+    k: int,
+    p: wp.vec3,
+    face: int,
+    u: float,
+    v: float,
+) -> bool:
+    """Whether a point is behind the nearest one of a mesh, or that is next to the mesh's border and tells nothing."""
+    mesh = wp.mesh_get(parts.mesh[k])
+    a = mesh.indices[3 * face]
+    b = mesh.indices[3 * face + 1]
+    c = mesh.indices[3 * face + 2]
+    w = 1.0 - u - v
+    n = u * wp.normalize(normals[a]) + v * wp.normalize(normals[b]) + w * wp.normalize(normals[c])
+    at = 3 * (parts.first_face[k] + face)
+    border = u * parts.border[at] + v * parts.border[at + 1] + w * parts.border[at + 2]
+    foot = u * points[a] + v * points[b] + w * points[c]
+    return wp.dot(p - foot, n) < 0.0 or border < 0.5
+
+
+@wp.struct
+class Beneath:
+    """What a point has over it of a mesh: how deep it is, the way out, how sure that is, and where it is nearest the
+    flesh's thickness, how plain the skin is and how far from a border."""
+
+    depth: float
+    normal: wp.vec3
+    sure: float
+    thick: float
+    plain: float
+    border: float
+
+
+@wp.func
+def beneath(
+    points: wp.array(dtype=wp.vec3), normals: wp.array(dtype=wp.vec3), parts: Parts, k: int, p: wp.vec3, least: float
+) -> Beneath:
+    """Means over the faces that are nearly as near as the nearest, at a distance of ``least``.
+
+    The nearest face alone leaps where another becomes it, and with it the way out; a mean does not. In the middle of
+    the flesh the ways out point apart: their mean is short there, and says how sure the way is.
+    """
+    out = Beneath()
+    mesh = wp.mesh_get(parts.mesh[k])
+    width = NEARLY * least + 1.0e-3 * parts.around[k] + 1.0e-9
+    reach = least + width
+    box = wp.vec3(reach, reach, reach)
+    total = float(0.0)
+    query = wp.mesh_query_aabb(parts.mesh[k], p - box, p + box)
+    face = int(0)
+    while wp.mesh_query_aabb_next(query, face):
+        a = mesh.indices[3 * face]
+        b = mesh.indices[3 * face + 1]
+        c = mesh.indices[3 * face + 2]
+        bary = nearest_weights(p, points[a], points[b], points[c])
+        u = bary[0]
+        v = bary[1]
+        w = bary[2]
+        r = p - (u * points[a] + v * points[b] + w * points[c])
+        near = 1.0 - (wp.length(r) - least) / width
+        if near > 0.0:
+            area = wp.length(wp.cross(points[b] - points[a], points[c] - points[a]))
+            weight = area * near * near
+            n = wp.normalize(u * wp.normalize(normals[a]) + v * wp.normalize(normals[b]) + w * wp.normalize(normals[c]))
+            total += weight
+            out.normal += weight * n
+            out.depth -= weight * wp.dot(r, n)
+            out.thick += weight * (u * parts.thickness[a] + v * parts.thickness[b] + w * parts.thickness[c])
+            plain = smooth_skin(normals[a], parts.area[a])
+            plain = wp.min(plain, smooth_skin(normals[b], parts.area[b]))
+            out.plain += weight * wp.min(plain, smooth_skin(normals[c], parts.area[c]))
+            at = 3 * (parts.first_face[k] + face)
+            border = u * parts.border[at] + v * parts.border[at + 1] + w * parts.border[at + 2]
+            out.border += weight * wp.min(2.0 * border, 1.0)
+    total = wp.max(total, 1.0e-30)
+    out.depth /= total
+    out.thick /= total
+    out.plain /= total
+    out.border /= total
+    out.normal /= total
+    out.sure = wp.length(out.normal)
+    out.normal = wp.normalize(out.normal)
+    return out
 
 
 @wp.kernel
@@ -177,11 +271,12 @@ def find_samples(
     parts: Parts,
     share: float,
     soft: float,
+    none: float,
     # out
     deepest_out: wp.array2d(dtype=float),
     samples: Samples,
 ):
-    """Inside is behind the interpolated normal at the nearest point of the other part's mesh.
+    """Inside is behind the interpolated normals at the nearest points of the other part's mesh.
 
     Surfaces that face the same way do not press on one another, nor does what is nearest to the border of a mesh,
     where it is open.
@@ -200,39 +295,32 @@ def find_samples(
         k = others[own, i]
         low = lower[k]
         high = upper[k]
-        outside = p[0] < low[0] or p[1] < low[1] or p[2] < low[2] or p[0] > high[0] or p[1] > high[1] or p[2] > high[2]
-        if not outside and may_be_inside(joints, parts, k, p, looks):
-            found = wp.mesh_query_point_no_sign(parts.mesh[k], p, wp.max(2.0 * parts.thickness[v], parts.around[k]))
-            if found.result:
-                mesh = wp.mesh_get(parts.mesh[k])
-                a = mesh.indices[3 * found.face]
-                b = mesh.indices[3 * found.face + 1]
-                c = mesh.indices[3 * found.face + 2]
-                w = 1.0 - found.u - found.v
-                foot = found.u * points[a] + found.v * points[b] + w * points[c]
-                n = (
-                    found.u * wp.normalize(normals[a])
-                    + found.v * wp.normalize(normals[b])
-                    + w * wp.normalize(normals[c])
-                )
-                n = wp.normalize(n)
-                behind = -wp.dot(p - foot, n)
-                if behind > 0.0:
-                    at = 3 * (parts.first_face[k] + found.face)
-                    border = found.u * parts.border[at] + found.v * parts.border[at + 1] + w * parts.border[at + 2]
+        # what is under the open end of a mesh may be outside its box: that fades out, lest it leap
+        beyond = wp.length(wp.max(wp.max(low - p, p - high), wp.vec3(0.0, 0.0, 0.0)))
+        near = 1.0 - beyond / wp.max(BESIDE * parts.around[k], 1.0e-30)
+        if near > 0.0:
+            near *= beside_bones(joints, parts, k, p)
+        if near > 0.0:
+            reach = wp.max(2.0 * parts.thickness[v], parts.around[k])
+            found = wp.mesh_query_point_no_sign(parts.mesh[k], p, reach)
+            if found.result and may_be_behind(points, normals, parts, k, p, found.face, found.u, found.v):
+                foot = wp.mesh_eval_position(parts.mesh[k], found.face, found.u, found.v)
+                least = wp.length(p - foot)
+                near *= wp.min(5.0 - 5.0 * least / reach, 1.0)
+                over = beneath(points, normals, parts, k, p, least)
+                if over.depth > 0.0:
+                    n = over.normal
+                    sure = wp.clamp((over.sure - UNSURE) / (SURE - UNSURE), 0.0, 1.0)
                     facing = wp.clamp(-2.0 * wp.dot(n, looks), parts.facing, 1.0)
-                    plain = smooth_skin(normals[v], parts.area[v])
-                    plain = wp.min(plain, smooth_skin(normals[a], parts.area[a]))
-                    plain = wp.min(plain, smooth_skin(normals[b], parts.area[b]))
-                    plain = wp.min(plain, smooth_skin(normals[c], parts.area[c]))
-                    inside = behind * plain * wp.min(2.0 * border, 1.0)
+                    plain = wp.min(smooth_skin(normals[v], parts.area[v]), over.plain)
+                    inside = near * wp.min(over.depth, least) * plain * over.border
                     depth = inside * facing - parts.at_rest[v]
-                    thick = found.u * parts.thickness[a] + found.v * parts.thickness[b] + w * parts.thickness[c]
-                    thick = wp.min(thick, parts.thickness[v])
-                    limit = share * thick
-                    # whichever way the surfaces face: that changes at a leap where the nearest point does, deep inside
+                    parted = wp.max(inside * facing * sure - parts.at_rest[v], 0.0)
+                    limit = share * wp.min(over.thick, parts.thickness[v])
+                    # whichever way the surfaces face, and sooner where the way out is not sure
                     if inside > parts.at_rest[v]:
-                        wp.atomic_max(deepest_out, own, k, (inside - parts.at_rest[v]) / limit)
+                        ratio = (inside - parts.at_rest[v]) / limit
+                        wp.atomic_max(deepest_out, own, k, ratio + (1.0 - sure) * none * wp.min(ratio, 1.0))
                     if depth > 0.0:
                         yields = parts.give[v] / wp.max(parts.give[v] + parts.give_of[k], 1.0e-12)
                         at = wp.atomic_add(samples.count, 0, 1)
@@ -240,9 +328,10 @@ def find_samples(
                             samples.vertex[at] = v
                             samples.own[at] = own
                             samples.other[at] = k
-                            samples.point[at] = p + yields * depth * n
+                            samples.point[at] = p + yields * parted * n
                             samples.normal[at] = n
                             samples.depth[at] = depth
-                            samples.counts[at] = wp.min(depth / (soft * limit), 1.0)
-                            samples.radius[at] = wp.max(thick, 1.2 * parts.edge[v])
+                            samples.parted[at] = parted
+                            samples.counts[at] = wp.min(parted / (soft * limit), 1.0)
+                            samples.radius[at] = wp.max(wp.min(over.thick, parts.thickness[v]), 1.2 * parts.edge[v])
                             samples.ratio[at] = depth / limit

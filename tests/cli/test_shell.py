@@ -109,3 +109,34 @@ def test_quit(session) -> None:
     assert not session.type("quit")
     with pytest.raises(InputError, match="RUN stands alone"):
         session.type("RUN 3")
+
+
+def test_a_line_that_fails_half_way_changes_nothing(session) -> None:
+    session.type(HAND)
+    for line in ("MACRO TWO", "WRIST LEFT FLEXION AT 3 10", "WRIST LEFT FLEXION AT 4 1e300", "END"):
+        session.type(line)
+    with pytest.raises(InputError, match="or less"):
+        session.type("TWO")
+    assert not session.scene.actor().keyed
+
+
+def test_undo_takes_no_hand_apart(session, monkeypatch) -> None:
+    session.type(HAND)
+    rig = session.scene.actor().rig
+    for frame in range(3):
+        session.type(f"WRIST LEFT FLEXION AT {frame} 10")
+    monkeypatch.setattr("warpjld.hand.kept.kept_hand", None)  # whoever builds it again fails
+    for frame in (2, 1, 0):
+        assert session.scene.actor().key_frames == [float(k) for k in range(frame + 1)]
+        session.type("UNDO")
+    assert session.scene.actor().rig is rig
+    assert not session.scene.actor().keyed
+
+
+def test_what_was_typed_is_kept_when_the_program_itself_fails(session) -> None:
+    assert session.autosave() is None
+    session.type("RATE 25")
+    session.type("SIZE 64 48")
+    kept = session.autosave()
+    assert kept is not None
+    assert kept.read_text() == "RATE 25\nSIZE 64 48\n"

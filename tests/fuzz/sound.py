@@ -9,26 +9,26 @@ from pathlib import Path
 
 import numpy as np
 from scipy.spatial.transform import Rotation
-from warpjld.io.target_file import read_targets
 
 from tests.finger import finger
 from tests.io import fbx_text
 from tests.motion import skinned_files
 from warpjld.covering import bind_rig, default_parameters, load_parameters, save_parameters
-from warpjld.fem.study_file import load_study
+from warpjld.fem.study.study_file import load_study
 from warpjld.grasp.keyframes import load_keyframes
 from warpjld.grasp.object_file import load_object
 from warpjld.io import load_rig
 from warpjld.motion.hand_file import read_hands
 from warpjld.motion.load import open_motion
+from warpjld.motion.target_file import read_targets
 from warpjld.script import Interpreter, Scene
 from warpjld.script.runner import run_scene
 from warpjld.script.staging import frame_numbers, stage
 from warpjld.skeleton import poses_from_angles
-from warpjld.study.columns import Column
 from warpjld.study.grasping import load_plan
 from warpjld.study.run import opened
 from warpjld.study.shards import Shard, Shards
+from warpjld.tables.columns import Column
 
 RIG = finger()
 NAMES = ["one", "two", "three"]

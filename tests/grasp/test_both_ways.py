@@ -4,10 +4,11 @@ import numpy as np
 import pytest
 
 from warpjld.grasp import ObjectSet
-from warpjld.grasp.both_ways import BothWays, give_way
-from warpjld.grasp.close import close_hand
+from warpjld.grasp.both_ways import BothWays
+from warpjld.grasp.close import Closer
 from warpjld.grasp.digits import digit_chains
 from warpjld.grasp.finer import FinerSkin
+from warpjld.grasp.give_way import give_way
 from warpjld.grasp.intersection import contacts
 from warpjld.grasp.outline import outline
 from warpjld.grasp.quality import vertex_areas
@@ -52,12 +53,12 @@ def test_a_blade_between_the_vertices_of_a_finger_is_seen(covering) -> None:
     below = own[np.linalg.norm((own - bone)[:, [0, 2]], axis=1) < 0.006][:, 1].min()
     blade = box(0.0004, 0.04, 0.004).placed([bone[0], below - 0.02 + 0.002, bone[2]])
     assert ObjectSet(blade).distances(skin).distance.min() > 0.0
-    depth = BothWays(covering, blade).depths(skin)[index]
+    depth = BothWays(covering, blade).depths(skin[None])[0, index]
     assert 5e-4 < depth < 2.1e-3  # the skin is rounded: nearest at its side
     told = {c.part: c.deepest for c in contacts(covering, skin, blade)}
     assert told["left.index"] == pytest.approx(depth)
     far = blade.placed([0.0, 1.0, 0.0]).place
-    assert BothWays(covering, blade).depths(skin, far).max() == 0.0
+    assert BothWays(covering, blade).depths(skin[None], far).max() == 0.0
 
 
 def test_digits_give_way_to_an_edge_and_do_not_pass_through(covering) -> None:
@@ -70,15 +71,16 @@ def test_digits_give_way_to_an_edge_and_do_not_pass_through(covering) -> None:
     post = box(0.2, 0.004, 0.004).placed(tip + np.array([0.0, -0.03, 0.01]))  # across the finger's way
     both = BothWays(covering, post)
 
-    def gaps(angles: np.ndarray) -> np.ndarray:
-        return both.gaps(covering.deform(poses_from_angles(skeleton, angles[None]))[0], moved=True)
+    def depths(hands: np.ndarray, angles: np.ndarray) -> np.ndarray:
+        return both.depths(covering.deform(poses_from_angles(skeleton, angles)), moved=True)
 
-    apart, opened = give_way(gaps, both.parts, start, closed, chains, allowed=5e-4, on_the_way=1e-3)
-    assert 0.0 < opened["left.index"] < 1.0
-    index = both.parts.index("left.index")
-    assert gaps(apart)[index] >= -5e-4
-    for part in np.linspace(0.0, 1.0, 9):
-        assert gaps(start + part * (apart - start))[index] > -1.2e-3
+    way = {"allowed": 5e-4, "on_the_way": 1e-3}
+    (apart,), gone = give_way(depths, both.parts, start[None], closed[None], chains, **way)
+    assert 0.0 < gone[0, 0] < 1.0
+    parts = np.linspace(0.0, 1.0, 9)[:, None, None]
+    index = depths(np.arange(9), start + parts * (apart - start))[:, both.parts.index("left.index")]
+    assert index[-1] <= 5e-4
+    assert index.max() < 1.2e-3
 
 
 def test_a_first_look_is_near_the_whole(covering) -> None:
@@ -86,8 +88,7 @@ def test_a_first_look_is_near_the_whole(covering) -> None:
     angles = np.zeros((1, len(covering.skeleton), len(CHANNELS)))
     poses = poses_from_angles(covering.skeleton, angles)
     quick, whole = (
-        close_hand(covering, poses, angles, ObjectSet(thing), digits=["middle"], apart=False, quick=q)
-        for q in (True, False)
+        Closer(covering, thing).close(poses, angles, digits=["middle"], apart=False, quick=q) for q in (True, False)
     )
     assert np.abs(quick.angles - whole.angles).max() < np.radians(8)
     assert whole.touching().all()

@@ -5,14 +5,15 @@ import pytest
 
 from warpjld.covering.intersections import crossing_faces, surface_parts
 from warpjld.errors import InputError
-from warpjld.grasp import ObjectSet, Places, Status
+from warpjld.grasp import Places, Status
 from warpjld.grasp.both_ways import BothWays
-from warpjld.grasp.close import close_hand
+from warpjld.grasp.close import Closer
 from warpjld.grasp.digits import digit_chains, pad_vertex
 from warpjld.grasp.intersection import contacts, intersection, part_vertices
+from warpjld.grasp.posed_skins import PosedSkins
 from warpjld.grasp.separate import keep_apart
 from warpjld.grasp.shapes import ball, box, cylinder
-from warpjld.skeleton import CHANNELS, poses_from_angles
+from warpjld.skeleton import CHANNELS, Poses, poses_from_angles
 
 ENTERS = 2.5e-5  # metres: twice the tolerance of a touch, and rounding
 PRESSED = 6e-4  # metres that an edge may stay in the skin between its vertices; a neighbour that opens adds a little
@@ -42,7 +43,7 @@ def below_the_palm(covering, poses, thing) -> Places:
     low, high = 0.0, 0.3
     for _ in range(16):
         middle = (low + high) / 2
-        near = both.gaps(skin, Places.of(under - [0, middle, 0])).min() < 2e-4
+        near = both.gaps(skin[None], Places.of(under - [0, middle, 0])).min() < 2e-4
         low, high = (middle, high) if near else (low, middle)
     return Places.of(under - [0, high, 0])
 
@@ -53,13 +54,13 @@ def test_digits_touch_and_do_not_enter(covering, open_hand, make, coupling) -> N
     poses, angles = open_hand
     thing = make()
     place = below_the_palm(covering, poses, thing)
-    closed = close_hand(covering, poses, angles, ObjectSet(thing), places=place, coupling=coupling, apart=False)
+    closed = Closer(covering, thing).close(poses, angles, places=place, coupling=coupling, apart=False)
     assert closed.touching().sum() >= 4
     assert closed.penetration[0] <= PRESSED
     skin = covering.deform(poses_from_angles(covering.skeleton, closed.angles))[0]
     inside = intersection(covering, skin, thing, place=place)
     assert inside.deepest < ENTERS
-    assert BothWays(covering, thing).depths(skin, place).max() <= PRESSED
+    assert BothWays(covering, thing).depths(skin[None], place).max() <= PRESSED
     touched = {c.part for c in contacts(covering, skin, thing, place=place)}
     digits = {name for name, touch in zip(closed.digits, closed.touching()[0], strict=True) if touch}
     assert digits <= touched
@@ -69,27 +70,32 @@ def test_digits_touch_and_do_not_enter(covering, open_hand, make, coupling) -> N
     assert ((closed.angles[0, :, 0] >= low - 1e-9) & (closed.angles[0, :, 0] <= high + 1e-9)).all()
 
 
-def test_batches_are_single_hands(covering, open_hand) -> None:
+@pytest.mark.parametrize("make", [lambda: ball(0.065, subdivisions=3), lambda: box(0.05, 0.07, 0.03)])
+def test_batches_are_single_hands(covering, open_hand, make) -> None:
+    """Bit for bit, whatever a hand is closed beside, and whatever the closer closed before."""
     poses, angles = open_hand
-    things = ObjectSet([ball(0.065, subdivisions=3), ball(0.05, subdivisions=3)])
-    places = [below_the_palm(covering, poses, thing) for thing in things.objects]
-    both = Places.of(np.concatenate([p.position for p in places]))
-    from warpjld.skeleton import Poses
-
-    two = Poses(*(np.repeat(a, 2, axis=0) for a in (poses.positions, poses.rotations, poses.flexion)))
-    together = close_hand(
-        covering, two, np.repeat(angles, 2, axis=0), things, which=np.array([0, 1]), places=both, apart=False
-    )
-    for k in range(2):
-        alone = close_hand(covering, poses, angles, things, which=k, places=places[k], apart=False)
-        np.testing.assert_array_equal(alone.angles[0], together.angles[k])
-        np.testing.assert_array_equal(alone.status[0], together.status[k])
+    thing = make()
+    (under,) = below_the_palm(covering, poses, thing).position
+    places = Places.of(under + np.array([[0, 0, 0], [0.003, -0.001, 0.004], [-0.005, -0.002, 0], [0, 5, 0]]))
+    several = Poses(*(np.repeat(a, 4, axis=0) for a in (poses.positions, poses.rotations, poses.flexion)))
+    how = {"coupling": (1.0, 0.7)}
+    closer = Closer(covering, thing)
+    together = closer.close(several, np.repeat(angles, 4, axis=0), places=places, **how)
+    for k in (2, 0, 3, 1):
+        for fresh in (closer, Closer(covering, thing)):
+            alone = fresh.close(poses, angles, places=places[k], **how)
+            for name in ("angles", "status", "gap", "penetration"):
+                np.testing.assert_array_equal(getattr(alone, name)[0], getattr(together, name)[k])
+    loose = closer.close(several, np.repeat(angles, 4, axis=0), places=places, apart=False, **how)
+    parted = closer.parted(several, np.repeat(angles, 4, axis=0), loose, places=places)
+    np.testing.assert_array_equal(parted.angles, together.angles)
+    np.testing.assert_array_equal(parted.status, together.status)
 
 
 def test_nothing_to_touch_closes_to_the_limits(covering, open_hand) -> None:
     poses, angles = open_hand
-    far = ObjectSet(ball(0.05).placed((0, 5, 0)))
-    closed = close_hand(covering, poses, angles, far, digits=["index"], apart=False)
+    far = ball(0.05).placed((0, 5, 0))
+    closed = Closer(covering, far).close(poses, angles, digits=["index"], apart=False)
     assert (closed.status == Status.NO_CONTACT).all()
     joints = list(digit_chains(covering.skeleton, ["index"])["left.index"])
     np.testing.assert_allclose(closed.angles[0, joints, 0], covering.skeleton.limits[joints, 0, 1])
@@ -98,7 +104,7 @@ def test_nothing_to_touch_closes_to_the_limits(covering, open_hand) -> None:
 def test_a_digit_that_begins_inside_is_told(covering, open_hand) -> None:
     poses, angles = open_hand
     tip = poses.positions[0, covering.skeleton.index("ring.tip")]
-    closed = close_hand(covering, poses, angles, ObjectSet(ball(0.03).placed(tip)), digits=["ring"], apart=False)
+    closed = Closer(covering, ball(0.03).placed(tip)).close(poses, angles, digits=["ring"], apart=False)
     assert closed.status[0, 0, 0] == Status.INSIDE
     assert closed.penetration[0] > 5e-3
 
@@ -121,9 +127,13 @@ def test_digits_do_not_pass_through_one_another(covering) -> None:
 
     assert between(start) == 0
     assert between(closed) > 0
-    apart, stopped = keep_apart(covering, lambda a: poses_from_angles(skeleton, a), start, closed, chains)
-    assert stopped
-    assert between(apart) == 0
+
+    def deformed(hands, angles):
+        return covering.deform(poses_from_angles(skeleton, angles))
+
+    apart, gone = keep_apart(PosedSkins(covering), deformed, start[None], closed[None], chains)
+    assert (gone < 1.0).any()
+    assert between(apart[0]) == 0
 
 
 def test_the_volume_of_a_known_overlap(covering) -> None:

@@ -44,16 +44,31 @@ def test_both_sides_stay_on_their_own() -> None:
     assert (near & (own_after < -1e-4)).sum() < 0.6 * crossed.sum()
 
 
-def test_a_straight_finger_and_what_is_far_from_the_joint_stay_bit_for_bit() -> None:
-    for degrees in (0.0, 20.0, 90.0):
+def test_what_does_not_overlap_stays_bit_for_bit() -> None:
+    for degrees in (0.0, 20.0, 90.0, 145.0):
         poses = bent(COVERING, degrees)
         before = COVERING.deform(poses)
         np.testing.assert_array_equal(TOUCH.apply(before, poses)[0], before)
     poses = bent(COVERING, 160.0)
     before = COVERING.deform(poses)
-    far = np.abs(COVERING.surface.vertices[:, 2] + 0.05) > 0.025
-    assert far.sum() > 50
-    np.testing.assert_array_equal(TOUCH.apply(before, poses)[0][0, far], before[0, far])
+    back = COVERING.surface.vertices[:, 1] > 1e-3
+    assert back.sum() > 50
+    after = TOUCH.apply(before, poses)[0]
+    assert (after != before).any()
+    np.testing.assert_array_equal(after[0, back], before[0, back])
+
+
+def test_an_overlap_far_from_the_joint_is_parted_where_it_is() -> None:
+    """Both halves of the finger lie in one another along their whole length; near the joint there is room."""
+    poses = bent(COVERING, 160.0)
+    before = COVERING.deform(poses)
+    rest = COVERING.surface.vertices[:, 2] + 0.05
+    tall = np.abs(rest) > 0.03
+    own = np.sign(-rest) * height(before[0], poses)
+    crossed = tall & (own < -5e-4)
+    assert crossed.sum() >= 10
+    own_after = np.sign(-rest) * height(TOUCH.apply(before, poses)[0][0], poses)
+    assert own_after[crossed].mean() > 0.3 * own[crossed].mean()
 
 
 def test_it_moves_with_the_finger() -> None:

@@ -10,6 +10,7 @@ import pytest
 from numpy.typing import NDArray
 
 from tests.benchmarks.skin.measures import fold_kinds
+from tests.benchmarks.touch import crossing_before_and_after, largest_leap, random_angles
 from warpjld.covering import bind_rig
 from warpjld.covering.covering import Covering
 from warpjld.covering.intersections import crossing_faces, surface_parts
@@ -101,19 +102,23 @@ def test_threads_and_batches_change_no_bit() -> None:
     np.testing.assert_array_equal(touch.apply(points[3:4], poses[3:4])[0][0], one[3])
 
 
-@pytest.mark.parametrize(("name", "begin", "end"), [("webxr", 0.86, 0.91), ("anny", 0.66, 0.72), ("godot", 0.46, 0.5)])
-def test_a_closing_hand_has_no_leaps(name: str, begin: float, end: float) -> None:
-    """While contact begins and grows, the largest step is looked at ever closer: one that is steep shrinks."""
+@pytest.mark.parametrize("name", HANDS)
+@pytest.mark.parametrize("kind", ["single", "curls", "fist"])
+def test_random_poses_cross_no_more_than_before(name: str, kind: str) -> None:
+    """Poses that nothing was chosen by: no more crossing faces in all, and hardly more in any. Where a finger is in the
+    palm too deep to be parted, opening its own joint moves the line of their crossing to other faces."""
     covering, touch = bound(name)
-    largest = []
-    for _ in range(4):
-        amounts = np.linspace(begin, end, 17)
-        poses = curled(covering.skeleton, amounts)
-        points = covering.deform(poses)
-        shift = touch.apply(points, poses)[0] - points
-        steps = np.linalg.norm(np.diff(shift, axis=0), axis=2).max(axis=1)
-        largest.append(float(steps.max()))
-        k = int(steps.argmax())
-        begin, end = amounts[k], amounts[k + 1]
-    assert largest[0] > 1e-5
-    assert largest[-1] < 0.05 * largest[0], largest
+    before, after = crossing_before_and_after(covering, touch, random_angles(covering.skeleton, kind, 12, seed=7)).T
+    assert after.sum() <= before.sum()
+    assert (after <= before + np.maximum(3, before / 20)).all(), (before, after)
+    assert (after > before).sum() <= 2
+
+
+@pytest.mark.parametrize("name", HANDS)
+@pytest.mark.parametrize("kind", ["single", "curls", "fist"])
+def test_a_closing_hand_has_no_leaps(name: str, kind: str) -> None:
+    """However deep it closes: the largest steps are halved ten times, and what is steep shrinks."""
+    covering, touch = bound(name)
+    for angles in random_angles(covering.skeleton, kind, 2, seed=3):
+        step, left = largest_leap(covering, touch, angles)
+        assert left < max(0.1 * step, 5e-5), (step, left)

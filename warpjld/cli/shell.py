@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 import sys
 from collections.abc import Callable, Iterator
 from pathlib import Path
@@ -9,6 +10,7 @@ from pathlib import Path
 import click
 
 from warpjld.cli import options
+from warpjld.cli.warn import one_line
 from warpjld.errors import WarpjldError
 
 __all__ = ["command"]
@@ -32,7 +34,7 @@ def command(script: Path | None, out: Path, device: str, threads: int | None, co
     from warpjld.script.session import Session
 
     silence_warp()
-    at_terminal = sys.stdin.isatty()
+    at_terminal = sys.stdin is not None and sys.stdin.isatty()
     for path in commands:
         load_commands(path)
     session = Session(out, device=device, threads=threads, say=click.echo)
@@ -47,14 +49,26 @@ def command(script: Path | None, out: Path, device: str, threads: int | None, co
         except WarpjldError as error:
             if not at_terminal:
                 raise
-            click.echo(f"error: {error}", err=True)
+            click.echo(f"error: {one_line(str(error))}", err=True)
+        except KeyboardInterrupt:
+            if not at_terminal:
+                raise
+            click.echo("stopped; what was typed before is as it was", err=True)
+        except Exception as error:  # a fault of the program's own is no reason to lose an afternoon's lines
+            kept = session.autosave()
+            where = "" if kept is None else f"; the lines before it are in {kept}"
+            if not at_terminal:
+                raise WarpjldError(f"unexpected {type(error).__name__}: {error}{where}") from error
+            click.echo(f"error: unexpected {one_line(f'{type(error).__name__}: {error}')}{where}", err=True)
     session.end()
 
 
 def _lines(names: Callable[[], list[str]], prompt: Callable[[], str], at_terminal: bool) -> Iterator[str]:
     """Lines from the terminal with history and completion, or plainly from a pipe."""
     if not at_terminal:
-        yield from (line.rstrip("\r\n") for line in sys.stdin)
+        if isinstance(sys.stdin, io.TextIOWrapper):
+            sys.stdin.reconfigure(errors="replace")
+        yield from (line.rstrip("\r\n") for line in sys.stdin or ())
         return
     read = _reader(names)
     while True:

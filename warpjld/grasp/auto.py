@@ -3,17 +3,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from warpjld.covering import Covering
 from warpjld.errors import InputError
-from warpjld.grasp.close import Closed, close_hand
+from warpjld.grasp.close import Closed, Closer
 from warpjld.grasp.digits import digit_chains
-from warpjld.grasp.distance import ObjectSet
 from warpjld.grasp.draws import Draws
 from warpjld.grasp.judge import Judge, Verdict
 from warpjld.grasp.objects import GraspObject
@@ -26,7 +26,7 @@ __all__ = ["AutoGrasp", "find_grasp"]
 
 _ROUND = 32  # placements looked at together
 _FINALISTS = 6  # of a round, closed and judged in full
-_DEEPEST = 1e-3  # of hand and object in one another, above which a grasp is refused [m]
+_DEEPEST = 6e-4  # of hand and object in one another, above which a grasp is refused [m]
 _PRESSED = 3e-4  # depth from which an open hand goes back [m]
 _GOOD = 0.12  # score that ends the search early [N]
 _CLOSES = (0.0, 0.25, 0.5, 0.75, 1.0)  # parts of the digits' way at which the hand must not be in an obstacle
@@ -76,8 +76,7 @@ class AutoGrasp:
 
 
 def find_grasp(
-    covering: Covering,
-    thing: GraspObject,
+    closer: Closer,
     *,
     obstacles: Sequence[GraspObject] = (),
     side: str | None = None,
@@ -92,27 +91,28 @@ def find_grasp(
     A posture is chosen by the object's shape, and varied. Three quarters of the placements put thumb and fingers across
     a part of the object that fits between them (``across_widths``), the others the palm on it (``sample_wrists``).
     They are taken in rounds of 32: all are closed roughly and ranked by the force closure of what nearly touches; the
-    best six are closed in full, without digits that pass through the object or one another, and judged (``Judge``). A
-    grasp that is not force closed, or in which hand and object are more than 1 mm in one another, is refused; of the
-    others the best score is kept. One with a score of 0.12 N and all digits but one (of a pinch all) ends the search.
+    best six are closed in full, without digits that pass through the object, and judged (``Judge``); those still in
+    the running then without digits that pass through one another. A grasp that is not force closed, or in which hand
+    and object are more than 0.6 mm in one another, is refused; of the others the best score is kept. A round that
+    leaves one with a score of 0.12 N and all digits but one (of a pinch all) ends the search.
 
     Obstacles are stayed clear of by 0.1 mm of depth: by the open hand on the last 12 cm of its way, and by its digits
     while they close. Placements that they are in the way of are drawn again.
 
     Args:
-        covering: The hand.
-        thing: The object where it stands.
+        closer: Of the hand on the object where it stands.
         obstacles: Other objects where they stand.
         side: ``left`` or ``right``; may be left out for a single hand.
         count: Placements at most.
         posture: One of ``POSTURES``; by the object's shape if left out.
-        coupling: See :func:`~warpjld.grasp.close.close_hand`.
+        coupling: See :meth:`~warpjld.grasp.close.Closer.close`.
         friction: Coulomb coefficient.
         seed: Of the sampling.
 
     Raises:
         InputError: No hand, no such posture, or no placement ends in a grasp.
     """
+    covering, thing = closer.covering, closer.thing
     if count < 1:
         raise InputError(f"count: want 1 or more, got {count}")
     if not (np.isfinite(friction) and friction > 0.0):
@@ -125,19 +125,27 @@ def find_grasp(
     start = posture_angles(covering.skeleton, side, chosen)
     closing = [digit for digit in CLOSING.get(chosen, DIGITS) if f"{side}.{digit}" in digit_chains(covering.skeleton)]
     digits = [f"{side}.{digit}" for digit in closing]
-    objects, around = ObjectSet(thing), Obstacles(covering, obstacles)
-    judge = Judge(covering, thing, side, friction)
-    draws = Draws(covering, objects, around, side, chosen, start, closing, np.random.default_rng(seed))
+    around = Obstacles(covering, obstacles)
+    judge = Judge(closer.both, side, friction)
+    draws = Draws(covering, closer.both.near, around, side, chosen, start, closing, np.random.default_rng(seed))
+    how = {"digits": digits, "coupling": coupling}
     best: AutoGrasp | None = None
     tried = 0
     for first in range(0, count, _ROUND):
         hands = draws.draw(min(_ROUND, count - first))
         tried += len(hands)
-        for hand in _promising(judge, side, hands, objects, around, digits, coupling):
-            found = _closed(judge, hand, objects, around, digits, coupling, best.score if best else 0.0)
-            if found is None:
+        finalists = _promising(judge, closer, side, hands, around, how)
+        for hand, closed, verdict in _best_first(judge, closer, finalists, how):
+            least = best.score if best else 0.0
+            if verdict.score <= least:
+                break
+            # whether digits cross is looked at last: it costs
+            there = closer.parted(hand.poses(covering.skeleton), hand.angles, closed)
+            (verdict,) = _verdicts(judge, covering, hand, there)
+            if verdict.depth > _DEEPEST or verdict.score <= least:
                 continue
-            closed, verdict = found
+            if around and _runs_into(covering, hand, there.angles, around):
+                continue
             touching = tuple(name for name in digits if name.removeprefix(f"{side}.") in verdict.digits)
             best = AutoGrasp(
                 chosen,
@@ -145,13 +153,13 @@ def find_grasp(
                 hand.rotation[0],
                 hand.approach[0],
                 hand.angles[0],
-                closed.angles[0],
+                there.angles[0],
                 verdict,
                 touching,
                 tried,
             )
-            if verdict.score >= _GOOD and len(touching) >= len(digits) - (len(digits) > 3):
-                return best
+        if best and best.score >= _GOOD and len(best.touching) >= len(digits) - (len(digits) > 3):
+            break
     if best is None:
         blocked = f", or out of reach: {', '.join(around.names)} blocked {draws.turned_down} more" if around else ""
         raise InputError(
@@ -161,77 +169,66 @@ def find_grasp(
     return replace(best, tried=tried)
 
 
+def _best_first(
+    judge: Judge, closer: Closer, hands: Candidates, how: dict[str, Any]
+) -> list[tuple[Candidates, Closed, Verdict]]:
+    """Hands closed and judged, digits not yet kept apart, the best score first; without those that are too deep."""
+    if not len(hands):
+        return []
+    closed = closer.close(hands.poses(closer.covering.skeleton), hands.angles, apart=False, **how)
+    verdicts = _verdicts(judge, closer.covering, hands, closed)
+    order = np.argsort([-verdict.score for verdict in verdicts], kind="stable")
+    rows = [int(g) for g in order if verdicts[g].depth <= _DEEPEST]
+    return [(hands[g : g + 1], closed[g : g + 1], verdicts[g]) for g in rows]
+
+
+def _verdicts(judge: Judge, covering: Covering, hands: Candidates, closed: Closed) -> list[Verdict]:
+    poses = hands.poses(covering.skeleton, closed.angles)
+    return judge.judge(poses, covering.deform(poses, threads=1), closed.penetration)
+
+
 def _promising(
     judge: Judge,
+    closer: Closer,
     side: str,
     hands: Candidates,
-    objects: ObjectSet,
     obstacles: Obstacles,
-    digits: list[str],
-    coupling: tuple[float, float] | None,
-) -> Iterator[Candidates]:
+    how: dict[str, Any],
+) -> Candidates:
     """Open hands that do best when closed roughly, best first, moved out of what they would press into."""
     if not len(hands):
-        return
-    covering = judge.covering
-    open_hands = hands.poses(covering.skeleton)
-    quick = close_hand(covering, open_hands, hands.angles, objects, digits=digits, coupling=coupling, quick=True)
+        return hands
+    covering = closer.covering
+    quick = closer.close(hands.poses(covering.skeleton), hands.angles, quick=True, **how)
     poses = hands.poses(covering.skeleton, quick.angles)
-    skins = covering.deform(poses)
+    skins = covering.deform(poses, threads=1)
     ranks = np.where(obstacles.missed(skins), judge.first_look(poses, skins), 0.0)
-    for row in np.argsort(-ranks, kind="stable")[:_FINALISTS].tolist():
-        if ranks[row] > 0.0:
-            one = slice(row, row + 1)
-            yield _clear_of(judge, side, hands[one], quick.angles[one])
-
-
-def _closed(
-    judge: Judge,
-    hand: Candidates,
-    objects: ObjectSet,
-    obstacles: Obstacles,
-    digits: list[str],
-    coupling: tuple[float, float] | None,
-    least: float,
-) -> tuple[Closed, Verdict] | None:
-    """Close a hand; None where it scores no more than ``least``. Whether digits cross is looked at last: it costs."""
-    covering, verdict = judge.covering, None
-    for apart in (False, True):
-        closed = close_hand(
-            covering,
-            hand.poses(covering.skeleton),
-            hand.angles,
-            objects,
-            digits=digits,
-            coupling=coupling,
-            apart=apart,
-        )
-        there = hand.poses(covering.skeleton, closed.angles)
-        verdict = judge.judge(there, covering.deform(there)[0])
-        if verdict.depth > _DEEPEST or verdict.score <= least:
-            return None
-    if obstacles and _runs_into(covering, hand, closed.angles, obstacles):
-        return None
-    assert verdict is not None
-    return closed, verdict
+    best = np.argsort(-ranks, kind="stable")[:_FINALISTS]
+    best = best[ranks[best] > 0.0]
+    return _clear_of(closer, side, hands[best], quick.angles[best])
 
 
 def _runs_into(covering: Covering, hand: Candidates, closed: NDArray[np.float64], obstacles: Obstacles) -> bool:
     """Whether a hand enters an obstacle while its digits close."""
     angles = hand.angles + np.array(_CLOSES)[:, None, None] * (closed - hand.angles)
     skins = covering.deform(hand[np.zeros(len(angles), dtype=int)].poses(covering.skeleton, angles))
-    return any(obstacles.depth(skin) > COLLIDES for skin in skins)
+    return obstacles.depth(skins) > COLLIDES
 
 
-def _clear_of(judge: Judge, side: str, hand: Candidates, closed: NDArray[np.float64]) -> Candidates:
-    """One open hand, moved back while the object presses into it, or will into the palm that swells as it closes."""
-    skeleton, both = judge.covering.skeleton, judge.both
+def _clear_of(closer: Closer, side: str, hands: Candidates, closed: NDArray[np.float64]) -> Candidates:
+    """Open hands, moved back while the object presses into them, or will into the palm that swells as they close."""
+    covering, both = closer.covering, closer.both
     palm = both.parts.index(f"{side}.palm")
+    going, back = np.arange(len(hands)), np.zeros(len(hands))
     for _ in range(4):
-        opened = judge.covering.deform(hand.poses(skeleton))[0]
-        swollen = judge.covering.deform(hand.poses(skeleton, closed))[0]
-        depth = max(both.depths(opened).max(), both.depths(swollen)[palm])
-        if depth < _PRESSED:
+        if not len(going):
             break
-        hand = hand.moved(np.array([-1.2 * depth]))
-    return hand
+        some = hands[going].moved(-back[going])
+        opened, swollen = (
+            both.depths(covering.deform(some.poses(covering.skeleton, angles), threads=1))
+            for angles in (None, closed[going])
+        )
+        depth = np.maximum(opened.max(axis=1), swollen[:, palm])
+        back[going] += np.where(depth < _PRESSED, 0.0, 1.2 * depth)
+        going = going[depth >= _PRESSED]
+    return hands.moved(-back)

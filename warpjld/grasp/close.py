@@ -1,25 +1,26 @@
-"""Closing a hand: its digits bend until their skin touches the object (A §7, R76; R90)."""
+"""Closing hands: their digits bend until their skin touches the object (A §7, R76; R90)."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
 
 from warpjld.covering import Covering
-from warpjld.grasp.both_ways import BothWays, give_way
-from warpjld.grasp.closing import ClosingHands
+from warpjld.grasp.both_ways import BothWays
+from warpjld.grasp.closing import ClosingHands, MovedSkin
 from warpjld.grasp.digits import digit_chains
-from warpjld.grasp.distance import ObjectSet
 from warpjld.grasp.found import Status
-from warpjld.grasp.objects import Places
+from warpjld.grasp.give_way import give_way
+from warpjld.grasp.kept import kept_with
+from warpjld.grasp.objects import GraspObject, Places
+from warpjld.grasp.posed_skins import PosedSkins
 from warpjld.grasp.separate import keep_apart
 from warpjld.skeleton import Poses
 
-__all__ = ["Closed", "close_hand"]
+__all__ = ["Closed", "Closer"]
 
 _ROUNDS = 4  # of bending and opening again
 _TOUCH = 1e-4  # skin this near touches [m]
@@ -48,100 +49,130 @@ class Closed:
     gap: NDArray[np.float64]
     penetration: NDArray[np.float64]
 
+    def __getitem__(self, hands: slice) -> Closed:
+        return Closed(self.angles[hands], self.digits, self.status[hands], self.gap[hands], self.penetration[hands])
+
     def touching(self) -> NDArray[np.bool_]:
         """Digits within a tenth of a millimetre of the object, shape (G, D)."""
         return np.asarray(self.gap < _TOUCH)
 
 
-def close_hand(
-    covering: Covering,
-    poses: Poses,
-    angles: NDArray[np.float64],
-    objects: ObjectSet,
-    *,
-    which: NDArray[np.int32] | int = 0,
-    places: Places | None = None,
-    digits: Sequence[str] = (),
-    coupling: tuple[float, float] | None = None,
-    apart: bool = True,
-    quick: bool = False,
-    tolerance: float = 1e-5,
-    threads: int | None = None,
-) -> Closed:
-    """Close the digits of G hands, each on its object, in a few launches.
-
-    Every digit bends at its base until a vertex beyond touches, then at its second joint, then at its third; a joint
-    whose skin touches already stays. With ``coupling`` all three bend together until the first touch, the others at
-    these times the base's rate; joints beyond the touch then go on together. Skin that swells as a finger bends may
-    enter the object beside a touch: the base then opens as far as it must, and the joints beyond close again. What of
-    the object, an edge or a corner, then is deeper than half a millimetre in the skin between its vertices, opens the
-    digit it is in (``give_way``).
+class Closer:
+    """Closes one hand on one object, many postures at a time; what it knows of both it keeps.
 
     Args:
         covering: The hand, smooth method.
-        poses: G postures to start from, open.
-        angles: Their joint angles [rad], shape (G, J, 4).
-        objects: Search structures.
-        which: Object of every hand.
-        places: Place of every hand's object; the objects' own if left out.
-        digits: Names of digits; all if left out.
-        coupling: Rates of the second and third joint relative to the base.
-        apart: Stop digits that would pass through one another or the palm; the costliest part.
-        quick: For a first look at many hands: a third of the vertices search, and nothing opens again; ``apart`` is
-            left out.
-        tolerance: Distance that counts as a touch [m].
-        threads: CPU threads.
+        thing: The object.
 
-    Raises:
-        InputError: No such digit, or postures of another skeleton.
+    Attributes:
+        both: How deep the two are in one another.
     """
-    chains = digit_chains(covering.skeleton, digits)
-    count = len(poses)
-    which = np.broadcast_to(objects.check(which), count)
-    if places is None:
-        places = objects.places(which)
-    elif len(places) == 1:
-        places = places[np.zeros(count, dtype=int)]
-    hands = ClosingHands(
-        covering,
-        poses,
-        angles,
-        objects,
-        which,
-        places,
-        every=_QUICK if quick else 1,
-        tolerance=tolerance,
-        threads=threads,
-    )
-    joints = np.array(list(chains.values()))
-    if coupling is not None:
-        hands.bend(joints, np.array([1.0, *coupling]))
-    status = _bend_in_turn(hands, joints, rounds=1 if quick else _ROUNDS)
-    names = tuple(chains)
-    if quick:
-        gap, depth = hands.skin_gaps(joints[:, 0].tolist())
-        return Closed(hands.angles, names, status, gap, depth)
-    both = [BothWays(covering, thing) for thing in objects.objects]
 
-    def gaps(g: int, wanted: NDArray[np.float64], moved: bool = True) -> NDArray[np.float64]:
-        skin = covering.deform(hands.poses_of(g, wanted[None]), threads=threads)[0]
-        return both[which[g]].gaps(skin, places[g], moved=moved)
+    def __init__(self, covering: Covering, thing: GraspObject) -> None:
+        self.covering, self.thing, self.both = covering, thing, BothWays(covering, thing)
+        self._skin, self._posed = kept_with(covering, MovedSkin), kept_with(covering, PosedSkins)
 
-    gap, depth = np.empty((count, len(names))), np.empty(count)
-    for g in range(count):
-        parts = both[which[g]].parts
-        hands.angles[g], _ = give_way(
-            partial(gaps, g), parts, angles[g], hands.angles[g], chains, allowed=_PRESSED, on_the_way=_THROUGH
-        )
+    def close(
+        self,
+        poses: Poses,
+        angles: NDArray[np.float64],
+        *,
+        places: Places | None = None,
+        digits: Sequence[str] = (),
+        coupling: tuple[float, float] | None = None,
+        apart: bool = True,
+        quick: bool = False,
+        tolerance: float = 1e-5,
+    ) -> Closed:
+        """Close the digits of G hands. Each ends bit for bit as it does alone.
+
+        Every digit bends at its base until a vertex beyond touches, then at its second joint, then at its third; a
+        joint whose skin touches already stays. With ``coupling`` all three bend together until the first touch, the
+        others at these times the base's rate; joints beyond the touch then go on together. Skin that swells as a finger
+        bends may enter the object beside a touch: the base then opens as far as it must, and the joints beyond close
+        again. What of the object, an edge or a corner, then is deeper than half a millimetre in the skin between its
+        vertices, opens the digit it is in (``give_way``).
+
+        Args:
+            poses: G postures to start from, open.
+            angles: Their joint angles [rad], shape (G, J, 4).
+            places: Place of every hand's object, or one for all; the object's own if left out.
+            digits: Names of digits; all if left out.
+            coupling: Rates of the second and third joint relative to the base.
+            apart: Stop digits that would pass through one another or the palm.
+            quick: For a first look at many hands: a third of the vertices search, and nothing opens again; ``apart`` is
+                left out.
+            tolerance: Distance that counts as a touch [m].
+
+        Raises:
+            InputError: No such digit, or postures of another skeleton.
+        """
+        chains = digit_chains(self.covering.skeleton, digits)
+        where = self._places(places, len(poses))
+        hands = self._hands(poses, angles, where, every=_QUICK if quick else 1, tolerance=tolerance)
+        joints = np.array(list(chains.values()))
+        if coupling is not None:
+            hands.bend(np.arange(len(hands)), joints, np.array([1.0, *coupling]))
+        status = _bend_in_turn(hands, joints, rounds=1 if quick else _ROUNDS)
+        if quick:
+            return Closed(hands.angles, tuple(chains), status, *hands.skin_gaps(joints[:, 0].tolist()))
+
+        def depths(rows: NDArray[np.int64], wanted: NDArray[np.float64]) -> NDArray[np.float64]:
+            return self.both.depths(hands.skins_of(rows, wanted), where[rows], moved=True)
+
+        way = {"allowed": _PRESSED, "on_the_way": _THROUGH}
+        given, _ = give_way(depths, self.both.parts, angles, hands.angles, chains, **way)
         if apart:
-            hands.angles[g], stopped = keep_apart(
-                covering, partial(hands.poses_of, g), angles[g], hands.angles[g], chains
-            )
-            status[g, [names.index(name) for name in stopped]] = int(Status.BLOCKED)
-        now = gaps(g, hands.angles[g], moved=False)
-        gap[g] = now[[parts.index(name) for name in names]]
-        depth[g] = max(0.0, -float(now.min()))
-    return Closed(hands.angles, names, status, gap, depth)
+            return self._parted(hands, angles, given, status, chains, where)
+        return self._closed(hands, given, status, chains, where)
+
+    def parted(
+        self, poses: Poses, angles: NDArray[np.float64], closed: Closed, *, places: Places | None = None
+    ) -> Closed:
+        """What hands would have closed to with ``apart``, from what they closed to without.
+
+        Args:
+            poses: The open hands, as given to ``close``; likewise ``angles`` and ``places``.
+            closed: The answer.
+        """
+        where = self._places(places, len(poses))
+        hands = self._hands(poses, angles, where, every=1, tolerance=0.0)
+        chains = digit_chains(self.covering.skeleton, closed.digits)
+        return self._parted(hands, angles, closed.angles, closed.status.copy(), chains, where)
+
+    def _places(self, places: Places | None, count: int) -> Places:
+        where = self.thing.place if places is None else places
+        return where[np.zeros(count, dtype=int)] if len(where) == 1 else where
+
+    def _hands(
+        self, poses: Poses, angles: NDArray[np.float64], places: Places, *, every: int, tolerance: float
+    ) -> ClosingHands:
+        return ClosingHands(self._skin, poses, angles, self.both.near, places, every=every, tolerance=tolerance)
+
+    def _parted(
+        self,
+        hands: ClosingHands,
+        start: NDArray[np.float64],
+        given: NDArray[np.float64],
+        status: NDArray[np.int32],
+        chains: dict[str, tuple[int, ...]],
+        places: Places,
+    ) -> Closed:
+        angles, gone = keep_apart(self._posed, hands.skins_of, start, given, chains)
+        status[gone < 1.0] = int(Status.BLOCKED)
+        return self._closed(hands, angles, status, chains, places)
+
+    def _closed(
+        self,
+        hands: ClosingHands,
+        angles: NDArray[np.float64],
+        status: NDArray[np.int32],
+        chains: dict[str, tuple[int, ...]],
+        places: Places,
+    ) -> Closed:
+        gaps = self.both.gaps(hands.skins_of(np.arange(len(hands)), angles), places)
+        of_digits = gaps[:, [self.both.parts.index(name) for name in chains]]
+        return Closed(angles, tuple(chains), status, of_digits, np.maximum(0.0, -gaps.min(axis=1)))
 
 
 def _bend_in_turn(hands: ClosingHands, joints: NDArray[np.int64], rounds: int) -> NDArray[np.int32]:
@@ -151,20 +182,17 @@ def _bend_in_turn(hands: ClosingHands, joints: NDArray[np.int64], rounds: int) -
         How the joints' searches ended, shape (G, D, 3).
     """
     status = np.full((len(hands), *joints.shape), int(Status.NO_CONTACT), dtype=np.int32)
-    going = np.ones(len(hands), dtype=bool)
+    going = np.arange(len(hands))
     for again in range(rounds):
-        before = hands.angles.copy()
         for k in range(1 if again else 0, 3):
             # a joint with a touch at or beyond its segment finds it at once and stays
-            ended = hands.bend(joints[:, k:], np.array([1.0, 0.0, 0.0])[: 3 - k])
+            ended = hands.bend(going, joints[:, k:], np.array([1.0, 0.0, 0.0])[: 3 - k])
             # skin left inside by less than twice the tolerance is a touch
             ended = np.where(ended == int(Status.INSIDE), int(Status.CONVERGED), ended) if again else ended
-            status[going, :, k] = ended[going]
-        # what has settled stays, or a hand would end otherwise beside others than alone
-        hands.angles[~going] = before[~going]
+            status[going, :, k] = ended
         if rounds == 1:
             break
-        going &= hands.settle(joints[:, 0].tolist())
-        if not going.any():
+        going = going[hands.settle(going, joints[:, 0].tolist())]
+        if not len(going):
             break
     return status

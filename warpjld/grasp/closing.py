@@ -2,41 +2,71 @@
 
 from __future__ import annotations
 
-from functools import cache, partial
+from functools import cached_property
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from warpjld.covering import Covering
-from warpjld.grasp.distance import ObjectSet
+from warpjld.covering.device import array_on
 from warpjld.grasp.found import Status
 from warpjld.grasp.moved import skin_beyond, skin_that_moves
+from warpjld.grasp.near_object import NearObject
 from warpjld.grasp.objects import Places
-from warpjld.grasp.search import FlexionSearch
-from warpjld.grasp.searches import Searches
+from warpjld.grasp.packing import Chains, drives_on, posture_on, skin_on
 from warpjld.skeleton import CHANNELS, Poses, poses_from_angles
 
-__all__ = ["ClosingHands"]
+__all__ = ["ClosingHands", "MovedSkin"]
 
 _FLEXION = CHANNELS.index("flexion")
+_MOST_JOINTS = 4
 _WIDEST = 0.35  # how far a base joint may open again for the sake of swelling skin [rad]
 _CUTS, _PIECES = 3, 8  # the opening is found to a 512th of that
 
 
-class ClosingHands:
-    """G hands, each with its object.
+class MovedSkin:
+    """The skin of one hand as searches want it, and which of it moves with which joint.
 
     Args:
         covering: The hand, smooth method.
+    """
+
+    def __init__(self, covering: Covering) -> None:
+        self.covering = covering
+        self._beyond: dict[int, NDArray[np.int32]] = {}
+        self._moving: dict[tuple[int, ...], NDArray[np.int32]] = {}
+
+    @cached_property
+    def packed(self) -> Any:
+        """``warpjld_kernels.closing_chain.Skin``."""
+        return skin_on("cpu", [self.covering])
+
+    def beyond(self, joint: int) -> NDArray[np.int32]:
+        """Vertices at or beyond a joint, see ``skin_beyond``."""
+        if joint not in self._beyond:
+            self._beyond[joint] = skin_beyond(self.covering, joint)
+        return self._beyond[joint]
+
+    def moving(self, joints: tuple[int, ...]) -> NDArray[np.int32]:
+        """Vertices that move when joints bend, see ``skin_that_moves``."""
+        if joints not in self._moving:
+            self._moving[joints] = skin_that_moves(self.covering, joints)
+        return self._moving[joints]
+
+
+class ClosingHands:
+    """G hands on one object. What becomes of a hand does not depend on those beside it.
+
+    Args:
+        skin: The hand's.
         poses: G postures to start from, open.
         angles: Their joint angles [rad], shape (G, J, 4).
-        objects: Search structures.
-        which: Object of every hand, shape (G,).
-        places: Place of every hand's object.
+        near: The object.
+        places: Its place for every hand.
         every: Every so many vertices search for a touch.
         tolerance: Distance that counts as a touch [m].
-        threads: CPU threads.
 
     Attributes:
         angles: As they are now, shape (G, J, 4).
@@ -47,39 +77,38 @@ class ClosingHands:
 
     def __init__(
         self,
-        covering: Covering,
+        skin: MovedSkin,
         poses: Poses,
         angles: NDArray[np.float64],
-        objects: ObjectSet,
-        which: NDArray[np.int32],
+        near: NearObject,
         places: Places,
         *,
         every: int,
         tolerance: float,
-        threads: int | None,
     ) -> None:
-        covering.check(poses)
+        skin.covering.check(poses)
         self.angles = angles.copy()
-        self._covering, self._open = covering, angles
-        self._objects, self._which, self._places = objects, which, places
-        self._every, self._tolerance, self._threads = every, tolerance, threads
-        self._search = FlexionSearch(covering, objects)
-        self._skin_beyond = cache(partial(skin_beyond, covering))
+        self._skin, self._open, self._near, self._places = skin, angles, near, places
+        self._skeleton = skin.covering.skeleton
+        self._every, self._tolerance = every, tolerance
         self._floor: NDArray[np.float64] | None = None
-        rest = poses_from_angles(covering.skeleton, angles)
+        rest = poses_from_angles(self._skeleton, angles)
         turn = Rotation.from_quat(poses.rotations[:, 0]) * Rotation.from_quat(rest.rotations[:, 0]).inv()
         self._turn = turn.as_quat()
-        self._shift = poses.positions[:, 0] - covering.skeleton.rest[0]
+        self._shift = poses.positions[:, 0] - self._skeleton.rest[0]
 
     def __len__(self) -> int:
         return len(self.angles)
 
-    def poses_of(self, hands: NDArray[np.int64] | int, angles: NDArray[np.float64]) -> Poses:
-        """Poses with angles (n, J, 4) of n hands, or of one hand n times, each placed as it was at the start."""
-        chosen = np.broadcast_to(hands, len(angles))
+    def poses_of(self, hands: NDArray[np.int64], angles: NDArray[np.float64]) -> Poses:
+        """Poses with angles (n, J, 4) of n hands, each placed as it was at the start."""
         return poses_from_angles(
-            self._covering.skeleton, angles, root_position=self._shift[chosen], root_rotation=self._turn[chosen]
+            self._skeleton, angles, root_position=self._shift[hands], root_rotation=self._turn[hands]
         )
+
+    def skins_of(self, hands: NDArray[np.int64], angles: NDArray[np.float64]) -> NDArray[np.float32]:
+        """Deformed skins with angles (n, J, 4) of n hands [m], shape (n, V, 3)."""
+        return self._skin.covering.deform(self.poses_of(hands, angles), threads=1)
 
     def skin_gaps(self, bases: list[int]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """How far the skin is from the object, the object's edges left aside.
@@ -90,105 +119,186 @@ class ClosingHands:
         Returns:
             Smallest signed distance of every digit [m], shape (G, D), and depth of all skin that moves, shape (G,).
         """
-        gap = np.stack([self._distances(self._skin_beyond(base)).min(axis=1) for base in bases], axis=1)
-        depth = -self._distances(skin_that_moves(self._covering, bases)).min(axis=1)
-        return gap, np.maximum(0.0, depth)
+        hands = np.arange(len(self))
+        skins = self.skins_of(hands, self.angles)
+        groups = [*map(self._skin.beyond, bases), self._skin.moving(tuple(bases))]
+        owner = np.repeat(np.arange(len(groups), dtype=np.int32), [len(group) for group in groups])
+        gaps = np.full((len(self), len(groups)), np.inf)
+        gaps[:, -1] = 0.0
+        self._near.least_by_part(self._seen(hands, skins), np.concatenate(groups), owner, gaps)
+        return gaps[:, :-1], -gaps[:, -1]
 
-    def bend(self, joints: NDArray[np.int64], rates: NDArray[np.float64]) -> NDArray[np.int32]:
-        """Bend the joints of every digit (D, k) at these rates until the first touch; how each ended, shape (G, D)."""
-        count = len(self)
-        vertices = [self._skin_beyond(int(chain[0]))[:: self._every] for chain in joints]
-        owner = np.repeat(np.arange(len(joints)), [len(v) for v in vertices])
-        moving = rates != 0.0
-        frame = np.repeat(np.arange(count), len(owner))
-        used = joints[:, moving][np.tile(owner, count)]
-        found = self._search.run(
-            self.poses_of(np.arange(count), self.angles),
-            self.angles,
-            Searches(
-                vertex=np.tile(np.concatenate(vertices), count),
-                joint=used,
-                frame=frame,
-                thing=self._which[frame],
-                place=frame,
-                rate=np.broadcast_to(rates[moving], used.shape),
-                distance=self._tolerance,
-            ),
-            places=self._places,
-            tolerance=self._tolerance,
-            threads=self._threads,
-        )
-        status = found.status.reshape(count, -1)
-        free = (status == Status.NO_CONTACT) | (status == Status.AT_LIMIT)
-        closing = np.where(free, np.inf, found.closing.reshape(count, -1))
-        ended = np.empty((count, len(joints)), dtype=np.int32)
-        rows = np.arange(count)
-        for d, chain in enumerate(joints):
-            own = owner == d
-            first = closing[:, own].argmin(axis=1)
-            best = closing[:, own][rows, first]
-            ended[:, d] = np.where(np.isfinite(best), status[:, own][rows, first], int(Status.NO_CONTACT))
-            for joint, rate in zip(chain[moving], rates[moving], strict=True):
-                low, high = self._covering.skeleton.limits[joint, _FLEXION]
-                now = self.angles[:, joint, _FLEXION]
-                far = np.where(np.isfinite(best), now + rate * best, high)
-                self.angles[:, joint, _FLEXION] = np.maximum(now, np.clip(far, low, high))
-        return ended
+    def bend(
+        self, hands: NDArray[np.int64], joints: NDArray[np.int64], rates: NDArray[np.float64]
+    ) -> NDArray[np.int32]:
+        """Bend the joints of every digit (D, k) of n hands at these rates until the first touch.
 
-    def settle(self, bases: list[int]) -> NDArray[np.bool_]:
-        """Open base joints where skin that swelled has entered the object; which hands had to, shape (G,).
-
-        What was inside before the hand closed does not count.
+        Returns:
+            How each ended, shape (n, D).
         """
-        vertices = skin_that_moves(self._covering, bases)
-        now = self._distances(vertices)
+        import warp as wp
+        from warpjld_kernels.first_touch import first_touch
+
+        count, moving = len(hands), rates != 0.0
+        vertices = [self._skin.beyond(int(chain[0]))[:: self._every] for chain in joints]
+        first = np.cumsum([0, *map(len, vertices)])
+        frames, used = np.repeat(np.arange(count), len(joints)), np.tile(joints[:, moving], (count, 1))
+        packed = self._on_object(hands, frames, used, rates[moving])
+        status = np.empty((count, len(joints)), dtype=np.int32)
+        closing = np.empty(status.shape, dtype=np.float32)
+        earliest = np.empty((status.size, max(map(len, vertices))), dtype=np.float32)
+        inputs = [
+            array_on("cpu", np.concatenate(vertices), wp.int32),
+            array_on("cpu", first, wp.int32),
+            self._tolerance,
+            self._tolerance,
+            wp.array(earliest, dtype=float, device="cpu", copy=False),
+            wp.array(np.empty_like(earliest, dtype=np.int32), dtype=wp.int32, device="cpu", copy=False),
+        ]
+        outs = [
+            wp.array(a.reshape(-1), dtype=kind, device="cpu", copy=False)
+            for a, kind in ((status, wp.int32), (closing, float))
+        ]
+        wp.launch(first_touch, status.size, inputs=[packed, *inputs], outputs=outs, device="cpu")
+        touched = status != int(Status.NO_CONTACT)
+        by = closing.astype(np.float64)
+        for d, chain in enumerate(joints):
+            for joint, rate in zip(chain[moving], rates[moving], strict=True):
+                low, high = self._skeleton.limits[joint, _FLEXION]
+                now = self.angles[hands, joint, _FLEXION]
+                far = np.where(touched[:, d], now + rate * by[:, d], high)
+                self.angles[hands, joint, _FLEXION] = np.maximum(now, np.clip(far, low, high))
+        return status
+
+    def settle(self, hands: NDArray[np.int64], bases: list[int]) -> NDArray[np.bool_]:
+        """Open base joints of n hands where skin that swelled has entered the object; which had to, shape (n,).
+
+        Skin that an open hand already had inside need not come out farther than it was. Where two digits press the
+        same skin in, such as the fold between two fingers, the one whose opening moves it most gives way.
+        """
+        vertices = self._skin.moving(tuple(bases))
         if self._floor is None:
-            self._floor = np.minimum(-2.0 * self._tolerance, self._distances(vertices, self._open) - 1e-6)
-        some = (now < self._floor).any(axis=0)
-        if not some.any():
-            return np.zeros(len(self), dtype=bool)
-        vertices, now, allowed = vertices[some], now[:, some], self._floor[:, some]
-        deep = now < allowed
-        widest = np.full(len(self), _WIDEST)
-        at_widest = np.stack([self._distances(vertices, self._opened(base, widest)) for base in bases])
+            opened = self._depths(np.arange(len(self)), vertices, self._open)
+            self._floor = np.minimum(-2.0 * self._tolerance, opened - 1e-6)
+        now = self._depths(hands, vertices, self.angles[hands])
+        rows, columns = np.nonzero(now < self._floor[hands])
+        if not len(rows):
+            return np.zeros(len(hands), dtype=bool)
+        pressed, deep, allowed = vertices[columns], now[rows, columns], self._floor[hands][rows, columns]
+        at_widest = self._opened_distances(hands, bases, rows, pressed)
         # a vertex is brought out by the digit whose opening moves it most
-        culprit = np.where((at_widest - now).max(axis=0) > 1e-6, (at_widest - now).argmax(axis=0), -1)
+        gain = at_widest - deep
+        culprit = np.where(gain.max(axis=0) > 1e-6, gain.argmax(axis=0), -1)
         for d, base in enumerate(bases):
-            own = deep & (culprit == d)
+            own = culprit == d
             if own.any():
-                some = own.any(axis=0)
-                floor = np.where(own, np.minimum(allowed, at_widest[d] - 1e-7), -np.inf)[:, some]
-                enough = self._least_opening(base, vertices[some], floor)
-                self.angles = self._opened(base, np.where(own.any(axis=1), enough, 0.0))
-        return np.asarray(deep.any(axis=1))
+                floor = np.minimum(allowed[own], at_widest[d, own] - 1e-7)
+                self._open_enough(hands, base, rows[own], pressed[own], floor)
+        return np.asarray(np.bincount(rows, minlength=len(hands)) > 0)
 
-    def _least_opening(self, base: int, vertices: NDArray[np.int32], floor: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Least opening of a base joint [rad] that brings vertices to their least distances (G, n), shape (G,)."""
-        short, enough, rows = np.zeros(len(self)), np.full(len(self), _WIDEST), np.arange(len(self))
-        for _ in range(_CUTS):
-            parts = np.linspace(0.0, 1.0, _PIECES + 1)[1:, None]
-            by = short + parts * (enough - short)
-            angles = np.concatenate([self._opened(base, row) for row in by])
-            gap = self._distances(vertices, angles).reshape(_PIECES, len(self), -1)
-            good = (gap >= floor).all(axis=2)
-            first = np.where(good.any(axis=0), good.argmax(axis=0), _PIECES - 1)
-            before = np.where(first > 0, by[first - 1, rows], short)
-            enough, short = by[first, rows], before
-        return enough
+    def _open_enough(
+        self,
+        hands: NDArray[np.int64],
+        base: int,
+        rows: NDArray[np.int64],
+        vertices: NDArray[np.int32],
+        floor: NDArray[np.float64],
+    ) -> None:
+        """Open a base joint as far as brings vertices (n,) of hands (n,) to their least distances (n,)."""
+        import warp as wp
+        from warpjld_kernels.first_touch import least_opening
 
-    def _opened(self, base: int, by: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Angles (G, J, 4) with a base joint opened by some more (G,) [rad], no farther than it began."""
-        angles = self.angles.copy()
-        now, start = angles[:, base, _FLEXION], self._open[:, base, _FLEXION]
-        angles[:, base, _FLEXION] = np.maximum(now - by, np.minimum(start, now))
-        return angles
+        some, first = np.unique(rows, return_index=True)
+        packed = self._opening(hands[some], [base])
+        by = np.zeros(len(some), dtype=np.float32)
+        inputs = [
+            array_on("cpu", vertices, wp.int32),
+            array_on("cpu", floor, float),
+            array_on("cpu", np.append(first, len(rows)), wp.int32),
+            _WIDEST,
+            _CUTS,
+            _PIECES,
+        ]
+        outs = [wp.array(by, dtype=float, device="cpu", copy=False)]
+        wp.launch(least_opening, len(some), inputs=[packed, *inputs], outputs=outs, device="cpu")
+        now, start = self.angles[hands[some], base, _FLEXION], self._open[hands[some], base, _FLEXION]
+        self.angles[hands[some], base, _FLEXION] = np.maximum(now - by, np.minimum(start, now))
 
-    def _distances(self, vertices: NDArray[np.int32], angles: NDArray[np.float64] | None = None) -> NDArray[np.float64]:
-        """Signed distances of some vertices to the object [m], shape (k · G, n), with angles (k · G, J, 4)."""
-        wanted = self.angles if angles is None else angles
-        hands = np.arange(len(wanted)) % len(self)
-        points = self._covering.points(self.poses_of(hands, wanted), vertices)
-        found = self._objects.distances(
-            points, which=self._which[hands], places=self._places[hands], threads=self._threads
+    def _opened_distances(
+        self, hands: NDArray[np.int64], bases: list[int], rows: NDArray[np.int64], vertices: NDArray[np.int32]
+    ) -> NDArray[np.float64]:
+        """Signed distances of vertices (n,) of hands (n,) with each base joint opened as far as it may [m], (D, n)."""
+        import warp as wp
+        from warpjld_kernels.first_touch import distances_at
+
+        some, row = np.unique(rows, return_inverse=True)
+        packed = self._opening(hands[some], bases)
+        chain = np.arange(len(bases))[:, None] * len(some) + row
+        out = np.empty(chain.shape, dtype=np.float32)
+        inputs = [
+            array_on("cpu", chain.ravel(), wp.int32),
+            array_on("cpu", np.tile(vertices, len(bases)), wp.int32),
+            _WIDEST,
+        ]
+        outs = [wp.array(out.reshape(-1), dtype=float, device="cpu", copy=False)]
+        wp.launch(distances_at, out.size, inputs=[packed, *inputs], outputs=outs, device="cpu")
+        return out.astype(np.float64)
+
+    def _opening(self, hands: NDArray[np.int64], bases: list[int]) -> Any:
+        """Hands of which base joints open, row d · n + i joint d of hand i, no farther than it began."""
+        count = len(hands)
+        frames, joints = np.tile(np.arange(count), len(bases)), np.repeat(bases, count)
+        own = hands[frames], joints, _FLEXION
+        stops = np.minimum(self._open[own], self.angles[own])
+        return self._on_object(hands, frames, joints[:, None], np.array([-1.0]), stops[:, None])
+
+    def _on_object(
+        self,
+        hands: NDArray[np.int64],
+        frames: NDArray[np.int64],
+        joints: NDArray[np.int64],
+        rates: NDArray[np.float64],
+        stops: NDArray[np.float64] | None = None,
+    ) -> Any:
+        """``warpjld_kernels.first_touch.Hands`` with chains (R, k) in frames (R,) of n hands."""
+        import warp as wp
+        from warpjld_kernels.first_touch import Hands
+
+        angles, skeleton = self.angles[hands], self._skeleton
+        starts = angles[frames[:, None], joints, _FLEXION]
+        if stops is None:  # a joint that begins beyond its limit stays where it is
+            stops = np.maximum(skeleton.limits[joints, _FLEXION, 1], starts)
+        fill = ((0, 0), (0, _MOST_JOINTS - joints.shape[1]))
+        chains = Chains(
+            frames.astype(np.int32),
+            np.pad(joints, fill, constant_values=-1).astype(np.int32),
+            np.pad(np.broadcast_to(rates, joints.shape), fill),
+            np.pad(stops, fill),
+            np.pad(starts, fill),
         )
-        return found.distance.astype(np.float64)
+        poses = self.poses_of(hands, angles)
+        origin = poses.positions[:, 0]
+        out = Hands()
+        out.solids, out.grid, out.skin = self._near.objects.solids, self._near.grid, self._skin.packed
+        out.posture = posture_on("cpu", skeleton, poses, origin)
+        out.drives = drives_on("cpu", skeleton, poses, angles, chains)
+        out.position = array_on("cpu", self._places.position[hands] - origin, wp.vec3)
+        out.rotation = array_on("cpu", self._places.rotation[hands], wp.quat)
+        return out
+
+    def _depths(
+        self, hands: NDArray[np.int64], vertices: NDArray[np.int32], angles: NDArray[np.float64]
+    ) -> NDArray[np.float64]:
+        """Signed distances of some vertices of n hands where they are in the object [m], +inf where surely not, shape
+        (n, vertices)."""
+        points = self._skin.covering.points(self.poses_of(hands, angles), vertices)
+        local = np.stack([self._places[h].to_local(own)[0] for h, own in zip(hands, points, strict=True)])
+        found = self._near.near(local.reshape(-1, 3), 0.0)
+        return found.distance.reshape(local.shape[:2]).astype(np.float64)
+
+    def _seen(self, hands: NDArray[np.int64], skins: NDArray[np.float32]) -> Any:
+        """Skins of n hands in the object's frame, ``wp.array`` of vec3 (n, V)."""
+        import warp as wp
+
+        local = [self._places[h].to_local(own)[0] for h, own in zip(hands, skins, strict=True)]
+        return wp.array(np.array(local, dtype=np.float32), dtype=wp.vec3, device="cpu")

@@ -8,13 +8,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from warpjld.covering import Covering
-from warpjld.grasp.distance import ObjectSet
+from warpjld.grasp.near_object import NearObject
 from warpjld.grasp.objects import GraspObject
 from warpjld.grasp.obstacles import Obstacles
 from warpjld.grasp.opening import Opening, closing_in_air
-from warpjld.grasp.placements import Candidates, across_widths, sample_wrists
+from warpjld.grasp.placements import Candidates, across_widths, around, sample_wrists
+from warpjld.grasp.palm import palm_of
 from warpjld.grasp.postures import AHEAD
+from warpjld.grasp.ways import free_ways
 from warpjld.grasp.widths import Widths, sample_widths
+from warpjld.rotations import unit
 from warpjld.skeleton import CHANNELS
 
 __all__ = ["WAY", "Draws"]
@@ -35,7 +38,7 @@ class Draws:
 
     Attributes:
         covering: The hand.
-        objects: The object.
+        near: The object.
         obstacles: What no hand may enter on its way to its placement.
         side: Which hand.
         posture: Name of the posture.
@@ -46,7 +49,7 @@ class Draws:
     """
 
     covering: Covering
-    objects: ObjectSet
+    near: NearObject
     obstacles: Obstacles
     side: str
     posture: str
@@ -76,33 +79,36 @@ class Draws:
         return hands[np.flatnonzero(clear)]
 
     def _both_kinds(self, count: int) -> Candidates:
-        (thing,) = self.objects.objects
         openings = self._variants()
         most = max(one.width[0] for one in openings)
-        widths = sample_widths(self.objects, _LINES, self.rng, widest=float(most))
+        widths = sample_widths(self.near, _LINES, self.rng, widest=float(most))
         across = count - int(_PALM_FIRST * count) if len(widths) else 0
         some = []
         if across:
-            chosen = self.rng.choice(len(widths), size=across, p=_preference(widths, thing))
+            reach = float(np.mean([np.linalg.norm(one.between[0] - palm_of(self.covering.skeleton, self.side).middle) for one in openings]))
+            rows, ways = free_ways(self.near, widths, reach, self.rng)
+            if not len(rows):
+                rows, ways = np.arange(len(widths)), around(unit(widths.second - widths.first), self.rng)
+            chosen = self.rng.choice(len(rows), size=across, p=_preference(widths[rows], self.near.thing))
             turned = self.rng.random(across) < 0.5
-            picked = widths[chosen]
+            picked = widths[rows[chosen]]
             ends = (
                 np.where(turned[:, None], picked.second, picked.first),
                 np.where(turned[:, None], picked.first, picked.second),
             )
             into = 0.3 if self.posture == "pinch" else 1.0
             these = Widths(*ends, picked.slant)
-            some.append(across_widths(self.covering, openings, self.objects, these, self.side, self.rng, into=into))
+            some.append(across_widths(self.covering, openings, self.near, these, ways[chosen], self.side, self.rng, into=into))
         if count > across:
             ahead = AHEAD.get(self.posture, 0.0)
             some.append(
-                sample_wrists(self.covering, self.start, thing, self.side, count - across, self.rng, ahead=ahead)
+                sample_wrists(self.covering, self.start, self.near, self.side, count - across, self.rng, ahead=ahead)
             )
         return Candidates.joined(some)
 
     def _variants(self) -> list[Opening]:
         """The posture as it is, and with thumb and fingers a little elsewhere."""
-        skeleton, rng, found = self.covering.skeleton, self.rng, []
+        skeleton, rng, starts = self.covering.skeleton, self.rng, []
         for variant in range(_VARIANTS):
             angles = self.start.copy()
             if variant:
@@ -115,8 +121,8 @@ class Draws:
                         column = CHANNELS.index(channel)
                         turned = angles[row, column] + np.radians(degrees)
                         angles[row, column] = np.clip(turned, *skeleton.limits[row, column])
-            found.append(closing_in_air(self.covering, self.side, angles, self.closing))
-        return found
+            starts.append(angles)
+        return closing_in_air(self.covering, self.side, np.array(starts), self.closing)
 
 
 def _preference(widths: Widths, thing: GraspObject) -> NDArray[np.float64]:

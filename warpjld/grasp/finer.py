@@ -16,7 +16,7 @@ class FinerSkin:
     Args:
         vertices: At rest [m], shape (V, 3).
         faces: Triangles, shape (T, 3).
-        spacing: Length asked for [m].
+        spacing: Length asked for [m]; infinite leaves the skin as it is.
 
     Attributes:
         faces: Finer triangles, shape (T·4ⁿ, 3).
@@ -25,7 +25,7 @@ class FinerSkin:
 
     def __init__(self, vertices: NDArray[np.floating], faces: NDArray[np.int32], spacing: float) -> None:
         edge = float(np.median(np.linalg.norm(vertices[faces[:, 0]] - vertices[faces[:, 1]], axis=1)))
-        rounds = int(np.clip(np.ceil(np.log2(edge / spacing)), 0, _MOST))
+        rounds = int(np.clip(np.ceil(np.log2(edge / spacing)), 0, _MOST)) if spacing < edge else 0
         self.faces, self.parents = faces.astype(np.int32), np.arange(len(vertices))
         self._middles: list[NDArray[np.integer]] = []
         for _ in range(rounds):
@@ -38,9 +38,25 @@ class FinerSkin:
             self.parents = np.concatenate([self.parents, self.parents[edges[:, 0]]])
             self._middles.append(edges)
 
+        order = np.argsort(self.faces.ravel(), kind="stable")
+        self._around = order // 3
+        self._first = np.searchsorted(self.faces.ravel()[order], np.arange(len(self.parents) + 1))
+
     def points(self, vertices: NDArray[np.floating]) -> NDArray[np.float32]:
-        """Finer points of a deformed skin (V, 3) [m], shape (n, 3)."""
-        out = np.asarray(vertices, dtype=np.float32)
+        """Finer points of deformed skins (…, V, 3) [m], shape (…, n, 3)."""
+        coarse = np.asarray(vertices, dtype=np.float32)
+        out = np.empty((*coarse.shape[:-2], len(self.parents), 3), dtype=np.float32)
+        done = coarse.shape[-2]
+        out[..., :done, :] = coarse
         for edges in self._middles:
-            out = np.concatenate([out, 0.5 * (out[edges[:, 0]] + out[edges[:, 1]])])
+            middles = out[..., done : done + len(edges), :]
+            np.add(out[..., edges[:, 0], :], out[..., edges[:, 1], :], out=middles)
+            middles *= np.float32(0.5)
+            done += len(edges)
         return out
+
+    def faces_around(self, points: NDArray[np.integer]) -> NDArray[np.int64]:
+        """Triangles that have one of some points as a corner, ascending."""
+        counts = self._first[points + 1] - self._first[points]
+        within = np.arange(counts.sum()) - np.repeat(np.cumsum(counts) - counts, counts)
+        return np.unique(self._around[np.repeat(self._first[points], counts) + within])

@@ -9,12 +9,13 @@ from numpy.typing import NDArray
 
 from warpjld.covering import Covering
 from warpjld.errors import InputError
-from warpjld.grasp.distance import ObjectSet
+from warpjld.grasp.kept import kept_with
+from warpjld.grasp.near_object import NearObject
 from warpjld.grasp.objects import GraspObject, Places
-from warpjld.grasp.validation import MeshReport
+from warpjld.grasp.posed_skins import PosedSkins
 from warpjld.suggest import did_you_mean
 
-__all__ = ["Contact", "Intersection", "contacts", "intersection", "part_vertices"]
+__all__ = ["Contact", "Intersection", "contacts", "intersection", "intersection_beside", "part_vertices"]
 
 _CELLS = 48  # grid cells along the longest side of the overlap
 _FINEST = 2e-4  # their smallest edge [m]
@@ -117,11 +118,22 @@ def intersection(
     if vertices.shape != (len(covering.surface.vertices), 3):
         raise InputError(f"vertices: want shape {(len(covering.surface.vertices), 3)}, got {vertices.shape}")
     where = thing.place if place is None else place
-    objects = ObjectSet(thing.placed(where.position[0], where.rotation[0]))
+    return intersection_beside(covering, where.to_local(vertices)[0], NearObject(thing), part=part, spacing=spacing)
+
+
+def intersection_beside(
+    covering: Covering,
+    local: NDArray[np.float64],
+    near: NearObject,
+    *,
+    part: str | None = None,
+    spacing: float | None = None,
+) -> Intersection:
+    """The same of a surface (V, 3) in the object's frame [m], with what is known of the object."""
     chosen = part_vertices(covering, part)
-    distance = objects.distances(vertices[chosen]).distance[0].astype(np.float64)
+    distance = near.near(local[chosen], 0.0).distance.astype(np.float64)
     inside = distance < 0.0
-    volume, h = _common_volume(covering, vertices, objects, chosen, distance, spacing)
+    volume, h = _common_volume(covering, local, near, chosen, inside, spacing)
     return Intersection(chosen[inside], -distance[inside], volume, h)
 
 
@@ -138,10 +150,9 @@ def contacts(
 
     where = thing.place if place is None else place
     both = BothWays(covering, thing)
-    gaps = both.gaps(vertices, where)
-    objects = ObjectSet(thing.placed(where.position[0], where.rotation[0]))
-    near = objects.distances(vertices, limit=2.0 * tolerance).distance[0] < tolerance
-    counts = np.bincount(both.part_of_vertex[near], minlength=len(gaps))
+    (gaps,) = both.gaps(vertices[None], where)
+    close = both.near.near(where.to_local(vertices)[0], tolerance).distance < tolerance
+    counts = np.bincount(both.part_of_vertex[close], minlength=len(gaps))
     return [
         Contact(name, int(count), max(0.0, -float(gap)), float(gap))
         for name, count, gap in zip(both.parts, counts, gaps, strict=True)
@@ -151,19 +162,18 @@ def contacts(
 
 def _common_volume(
     covering: Covering,
-    vertices: NDArray[np.floating],
-    objects: ObjectSet,
+    local: NDArray[np.float64],
+    near: NearObject,
     chosen: NDArray[np.int32],
-    distance: NDArray[np.float64],
+    inside: NDArray[np.bool_],
     spacing: float | None,
 ) -> tuple[float, float]:
-    thing = objects.objects[0]
-    stage = thing.place.apply(thing.vertices)[0]
-    # surfaces may be open or pass through themselves: the winding number decides
-    report = MeshReport(open_edges=1, solid=False)
-    skin = ObjectSet(GraspObject("skin", np.asarray(vertices, dtype=np.float64), covering.surface.faces, report))
-    swallowed = skin.distances(stage).distance[0] < 0.0
-    seen = np.concatenate([vertices[chosen][distance < 0.0], stage[swallowed]])
+    posed = kept_with(covering, PosedSkins)
+    skin = posed.fitted(local[None], Places.of())
+    corners = near.thing.vertices
+    within = ((corners >= local.min(axis=0)) & (corners <= local.max(axis=0))).all(axis=1)
+    swallowed = posed.distances(skin, corners[within], _FINEST)[0] < 0.0
+    seen = np.concatenate([local[chosen][inside], corners[within][swallowed]])
     if not len(seen):
         return 0.0, 0.0
     low, high = seen.min(axis=0), seen.max(axis=0)
@@ -171,13 +181,14 @@ def _common_volume(
     low, high = low - 2.0 * h, high + 2.0 * h
     axes = [np.arange(a + h / 2.0, b, h) for a, b in zip(low, high, strict=True)]
     points = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 3)
-    share = np.clip(0.5 - objects.distances(points).distance[0] / h, 0.0, 1.0)
+    share = np.clip(0.5 - near.near(points, h).distance.astype(np.float64) / h, 0.0, 1.0)
     points, share = points[share > 0.0], share[share > 0.0]
-    to_skin = skin.distances(points)
-    share = share * np.clip(0.5 - to_skin.distance[0] / h, 0.0, 1.0)
-    if len(chosen) < len(vertices):  # of a part: what is nearest to its skin
+    part = len(chosen) < len(local)  # of a part: what is nearest to its skin
+    to_skin, face = posed.distances(skin, points, np.inf if part else h)
+    share = share * np.clip(0.5 - to_skin / h, 0.0, 1.0)
+    if part:
         own = np.isin(covering.surface.faces, chosen).sum(axis=1) >= 2
-        share = share * own[to_skin.face[0]]
+        share = share * np.where(face < len(own), own[np.minimum(face, len(own) - 1)], False)
     return float(share.sum(dtype=np.float64) * h**3), h
 
 

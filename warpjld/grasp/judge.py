@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -10,14 +11,14 @@ from scipy.spatial.transform import Rotation
 
 from warpjld.covering import Covering
 from warpjld.grasp.both_ways import BothWays
-from warpjld.grasp.distance import ObjectSet
 from warpjld.grasp.finer import FinerSkin
-from warpjld.grasp.objects import GraspObject
+from warpjld.grasp.kept import kept_with
 from warpjld.grasp.quality.closure import force_closure
 from warpjld.grasp.quality.contacts import Contacts
-from warpjld.grasp.quality.touch import Patches, contact_patches
-from warpjld.grasp.quality.wrench_space import wrench_space
+from warpjld.grasp.quality.touch import Patches
+from warpjld.grasp.quality.wrench_space import least_resistance
 from warpjld.grasp.segments import SEGMENTS, vertex_segments
+from warpjld.grasp.touching import touching_patches
 from warpjld.skeleton import Poses
 
 __all__ = ["Judge", "Verdict"]
@@ -60,19 +61,17 @@ class Judge:
     normal does not point to the back of the hand. A digit that merely leans on the object with its back holds nothing.
 
     Args:
-        covering: The hand.
-        thing: The object where it stands.
+        both: Hand and object, which stands at its own place.
         side: Which hand of the covering.
         friction: Coulomb coefficient.
     """
 
-    def __init__(self, covering: Covering, thing: GraspObject, side: str, friction: float) -> None:
-        self.covering, self.friction, self.both = covering, friction, BothWays(covering, thing)
-        self._objects = ObjectSet(thing)
-        self._normals = Rotation.from_quat(thing.place.rotation[0]).apply(thing.normals)
-        self._center = thing.place.apply(thing.centroid[None])[0, 0]
+    def __init__(self, both: BothWays, side: str, friction: float) -> None:
+        covering, thing = both.covering, both.thing
+        self.both, self.friction = both, friction
+        self._center = thing.centroid
         self._radius = float(np.linalg.norm(thing.vertices - thing.centroid, axis=1).max())
-        self._finer = FinerSkin(covering.surface.vertices, covering.surface.faces, _SPACING)
+        self._skin, self._finer = kept_with(covering, _skin), kept_with(covering, _finer_skin)
         self._segments = vertex_segments(covering, side)
         skeleton = covering.skeleton
         joints = [f"{side}.{name}" if name != "palm" else f"{side}.middle.base" for name in SEGMENTS]
@@ -84,22 +83,10 @@ class Judge:
 
     def first_look(self, poses: Poses, vertices: NDArray[np.floating]) -> NDArray[np.float64]:
         """Rank hands that closed roughly; larger is better, shape (G,), 0 and below for what will hardly do."""
-        found = self._objects.distances(vertices, which=np.zeros(len(vertices), int), nearest=True)
-        assert found.point is not None
         ranks = np.zeros(len(vertices))
-        for g, skin in enumerate(vertices):
-            patches = contact_patches(
-                skin,
-                self.covering.surface.faces,
-                self._segments,
-                SEGMENTS,
-                found.distance[g],
-                found.point[g],
-                self._normals[found.face[g]],
-                tolerance=_NEARLY,
-            )
-            contacts, digits, palm = self._pressing(patches, poses[g : g + 1])
-            deep = max(0.0, -float(found.distance[g].min()) - 1e-3)
+        for g, (patches, depth) in enumerate(self._patches(self._skin, vertices, _NEARLY)):
+            contacts, digits, palm = self._pressing(patches, poses.rotations[g])
+            deep = max(0.0, depth - 1e-3)
             if ("thumb" not in digits and not palm) or len(digits) < 2:
                 ranks[g] = -1.0
                 continue
@@ -107,35 +94,46 @@ class Judge:
             ranks[g] = closure.margin + 0.04 * len(digits) + 0.1 * closure.closed - 50.0 * deep
         return ranks
 
-    def judge(self, poses: Poses, vertices: NDArray[np.floating]) -> Verdict:
-        """Judge one hand: its pose, and its deformed skin (V, 3) [m]."""
-        points = self._finer.points(vertices)
-        found = self._objects.distances(points, nearest=True)
-        assert found.point is not None
-        patches = contact_patches(
-            points,
-            self._finer.faces,
-            self._segments[self._finer.parents],
-            SEGMENTS,
-            found.distance[0],
-            found.point[0],
-            self._normals[found.face[0]],
-            tolerance=_TOUCH,
-        )
-        contacts, digits, palm = self._pressing(patches, poses)
-        depth = max(float(self.both.depths(vertices).max()), -float(found.distance[0].min()))
-        closed = force_closure(contacts, self._center, torque_scale=self._radius, edges=_EDGES).closed
-        epsilon = 0.0
-        if closed:
-            epsilon = wrench_space(contacts, self._center, torque_scale=self._radius, edges=_EDGES).epsilon
-        return Verdict(closed and epsilon > 0.0, epsilon, digits, palm, depth)
+    def judge(self, poses: Poses, vertices: NDArray[np.floating], depths: NDArray[np.float64]) -> list[Verdict]:
+        """Judge G hands.
 
-    def _pressing(self, patches: Patches, poses: Poses) -> tuple[Contacts, tuple[str, ...], bool]:
+        Args:
+            poses: Of the closed hands.
+            vertices: Their deformed skins [m], shape (G, V, 3).
+            depths: Of hands and object in one another [m], see ``BothWays``, shape (G,).
+        """
+        found = []
+        for g, (patches, depth) in enumerate(self._patches(self._finer, vertices, _TOUCH)):
+            contacts, digits, palm = self._pressing(patches, poses.rotations[g])
+            epsilon = least_resistance(contacts, self._center, torque_scale=self._radius, edges=_EDGES)
+            # a ball about the origin inside the wrench space is force closure
+            found.append(Verdict(epsilon > 0.0, epsilon, digits, palm, max(float(depths[g]), depth)))
+        return found
+
+    def _patches(
+        self, finer: FinerSkin, vertices: NDArray[np.floating], tolerance: float
+    ) -> Iterator[tuple[Patches, float]]:
+        """Patches of contact in the object's frame, and depth of the skin's points, of every hand."""
+        place, parts = self.both.thing.place, self._segments[finer.parents]
+        local = place.to_local(vertices.reshape(-1, 3))[0].reshape(vertices.shape)
+        for skin in local:
+            yield touching_patches(finer, parts, self.both.near, skin, tolerance)
+
+    def _pressing(self, patches: Patches, rotations: NDArray[np.float64]) -> tuple[Contacts, tuple[str, ...], bool]:
         rows = [SEGMENTS.index(name) for name in patches.names]
-        turns = Rotation.from_quat(poses.rotations[0, self._joints[rows]]) if rows else None
+        own = Rotation.from_quat(self.both.thing.place.rotation[0]).inv()
+        turns = own * Rotation.from_quat(rotations[self._joints[rows]]) if rows else None
         inner = turns.apply(self._inner[rows]) if turns is not None else np.zeros((0, 3))
         kept = np.flatnonzero((inner * patches.skin_normals).sum(axis=1) > 0.0)
         spin = patches.contacts(self.friction).spin
         contacts = Contacts(patches.points[kept], patches.normals[kept], np.array(self.friction), spin[kept])
         names = [patches.digits[k] for k in kept]
         return contacts, tuple(dict.fromkeys(n for n in names if n != "palm")), "palm" in names
+
+
+def _skin(covering: Covering) -> FinerSkin:
+    return FinerSkin(covering.surface.vertices, covering.surface.faces, np.inf)
+
+
+def _finer_skin(covering: Covering) -> FinerSkin:
+    return FinerSkin(covering.surface.vertices, covering.surface.faces, _SPACING)

@@ -45,10 +45,10 @@ class Obstacles:
         nearest = found.distance.min(axis=1).reshape(len(skins), -1)
         return np.asarray(nearest.min(axis=1) > -COLLIDES)
 
-    def depth(self, skin: NDArray[np.floating]) -> float:
-        """Depth of the deepest point of hand and obstacles in one another [m], looked at from both sides, 0 for none.
+    def depth(self, skins: NDArray[np.floating]) -> float:
+        """Depth of the deepest point of hands and obstacles in one another [m], looked at from both sides, 0 for none.
 
         Args:
-            skin: A deformed skin [m], shape (V, 3).
+            skins: Deformed skins [m], shape (S, V, 3).
         """
-        return max((float(both.depths(skin).max()) for both in self._both), default=0.0)
+        return max((float(both.depths(skins).max()) for both in self._both), default=0.0)

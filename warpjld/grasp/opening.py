@@ -38,30 +38,36 @@ class Opening:
         """Between thumb and fingers [m], shape (S,)."""
         return np.asarray(np.linalg.norm(self.fingers - self.thumb, axis=1))
 
+    @property
+    def between(self) -> NDArray[np.float64]:
+        """Middles between thumb and fingers [m], shape (S, 3)."""
+        return 0.5 * (self.thumb + self.fingers)
+
     def step_for(self, width: float) -> int:
         """The last step at which the pads are at least this far apart; 0 where none is."""
         wide = np.flatnonzero(np.minimum.accumulate(self.width) >= width)
         return int(wide[-1]) if len(wide) else 0
 
 
-def closing_in_air(covering: Covering, side: str, start: NDArray[np.float64], digits: Sequence[str]) -> Opening:
-    """Curl digits from a posture.
+def closing_in_air(covering: Covering, side: str, starts: NDArray[np.float64], digits: Sequence[str]) -> list[Opening]:
+    """Curl digits from postures.
 
     Args:
         covering: The hand.
         side: Which hand of it.
-        start: Angles of the open hand [rad], shape (J, 4).
+        starts: Angles of open hands [rad], shape (N, J, 4).
         digits: Names of those that close, without side.
     """
     skeleton = covering.skeleton
-    angles = np.repeat(start[None], _STEPS, axis=0)
+    angles = np.repeat(starts[:, None], _STEPS, axis=1)
     share = np.linspace(0.0, 1.0, _STEPS)
     for digit in digits:
         (chain,) = digit_chains(skeleton, [f"{side}.{digit}"]).values()
         for joint, curl in zip(chain, _CURL["thumb" if digit == "thumb" else "finger"], strict=True):
-            bent = start[joint, _FLEXION] + share * np.radians(curl)
-            angles[:, joint, _FLEXION] = np.clip(bent, *skeleton.limits[joint, _FLEXION])
+            bent = starts[:, None, joint, _FLEXION] + share * np.radians(curl)
+            angles[:, :, joint, _FLEXION] = np.clip(bent, *skeleton.limits[joint, _FLEXION])
     opposed = [digit for digit in ("index", "middle", "ring") if digit in digits]
     pads = np.array([pad_vertex(covering, f"{side}.{digit}") for digit in ("thumb", *opposed)], dtype=np.int32)
-    points = covering.points(poses_from_angles(skeleton, angles), pads).astype(np.float64)
-    return Opening(angles, points[:, 0], points[:, 1:].mean(axis=1))
+    poses = poses_from_angles(skeleton, angles.reshape(-1, *angles.shape[2:]))
+    points = covering.points(poses, pads).astype(np.float64).reshape(len(starts), _STEPS, len(pads), 3)
+    return [Opening(own, at[:, 0], at[:, 1:].mean(axis=1)) for own, at in zip(angles, points, strict=True)]

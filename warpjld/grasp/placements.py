@@ -9,20 +9,19 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from warpjld.covering import Covering
-from warpjld.grasp.distance import ObjectSet
-from warpjld.grasp.objects import GraspObject
+from warpjld.grasp.near_object import NearObject
 from warpjld.grasp.opening import Opening
 from warpjld.grasp.palm import palm_of
 from warpjld.grasp.widths import Widths
 from warpjld.rotations import unit
 from warpjld.skeleton import Poses, Skeleton, poses_from_angles
 
-__all__ = ["Candidates", "across_widths", "sample_wrists"]
+__all__ = ["Candidates", "across_widths", "around", "sample_wrists"]
 
 _CLEARANCE = 3e-4  # between the open hand and the object [m]
 _SPARE = 0.02  # by which a hand opens wider than what it takes [m]
 _STEPS = 32
-_COARSE = 4  # at first every fourth vertex keeps the hand away
+_NEXT = 1e-5  # a step shorter than this is none [m]
 
 
 @dataclass(frozen=True, eq=False)
@@ -70,7 +69,7 @@ class Candidates:
 def sample_wrists(
     covering: Covering,
     angles: NDArray[np.float64],
-    thing: GraspObject,
+    near: NearObject,
     side: str,
     count: int,
     rng: np.random.Generator,
@@ -84,7 +83,7 @@ def sample_wrists(
     then comes as near as it can without touching: its skin's distance bounds each step. With ``ahead`` [m] the object
     is met up to that far before the palm's middle towards the fingers, and the palm stays as far away from it.
     """
-    palm = palm_of(covering.skeleton, side)
+    palm, thing = palm_of(covering.skeleton, side), near.thing
     part = rng.uniform(0.0, 1.0, size=(count, 1)) if ahead else np.zeros((count, 1))
     middle = palm.middle + ahead * part * palm.fingers
     golden = np.pi * (3.0 - 5.0**0.5)
@@ -92,7 +91,7 @@ def sample_wrists(
     high = 1.0 - 2.0 * k / count
     out = np.stack([np.sqrt(1 - high**2) * np.cos(golden * k), high, np.sqrt(1 - high**2) * np.sin(golden * k)], axis=1)
     look = -(Rotation.random(rng=rng).apply(out))
-    fingers = _around(look, rng)
+    fingers = around(look, rng)
     rotation = Rotation.from_matrix(palm.turned_to(look, fingers))
     centre = thing.place.apply(thing.centroid[None])[0, 0]
     aim = centre + rng.uniform(-0.2, 0.2, size=(count, 3)) * thing.size
@@ -104,15 +103,16 @@ def sample_wrists(
         np.repeat(angles[None], count, axis=0),
     )
     back = np.full(count, float(np.linalg.norm(thing.size)) + 0.1)
-    near = _come(covering, there.moved(-back), ObjectSet(thing), 2.0 * back)
-    return near.moved(-ahead * part[:, 0])
+    beside = _come(covering, there.moved(-back), near, 2.0 * back)
+    return beside.moved(-ahead * part[:, 0])
 
 
 def across_widths(
     covering: Covering,
     openings: list[Opening],
-    objects: ObjectSet,
+    near: NearObject,
     widths: Widths,
+    ways: NDArray[np.float64],
     side: str,
     rng: np.random.Generator,
     *,
@@ -120,15 +120,15 @@ def across_widths(
 ) -> Candidates:
     """Placements with the thumb at one end of a width and the fingers at the other, one for each width.
 
-    The hand opens so far that the width fits with 2 cm to spare and comes at right angles to it, the roll about it
-    even. At first the pads are to meet the ends: a precision grip. From there it goes on for a random part of the way
+    The hand opens so far that the width fits with 2 cm to spare and comes at right angles to it. At first the pads are to meet the ends: a precision grip. From there it goes on for a random part of the way
     on which the palm would reach the width, as far as it does not touch: towards a power grip.
 
     Args:
         covering: The hand.
         openings: Postures; every width takes one of them.
-        objects: The object.
+        near: The object.
         widths: N of them.
+        ways: Directions in which the hands come, at right angles to the widths, shape (N, 3).
         side: Which hand.
         rng: Source of randomness.
         into: Largest part of the way to the palm.
@@ -144,40 +144,34 @@ def across_widths(
     between = 0.5 * (thumb + fingers)
     own = _frame(fingers - thumb, between - middle)
     line = unit(widths.second - widths.first)
-    wanted = _frame(line, _around(line, rng))
+    wanted = _frame(line, ways)
     rotation = Rotation.from_matrix(np.einsum("gki,gkj->gij", wanted, own))
     root = skeleton.rest[0]
     position = 0.5 * (widths.first + widths.second) - (root + rotation.apply(between - root))
     angles = np.stack([one.angles[k] for one, k in zip(rows, loose, strict=True)])
     there = Candidates(position, rotation.as_quat(), wanted[:, 1], angles)
     deeper = ((between - middle) * own[:, 1]).sum(axis=1) * rng.uniform(0.0, into, size=count)
-    (thing,) = objects.objects
-    back = np.full(count, float(np.linalg.norm(thing.size)) + 0.15)
-    return _come(covering, there.moved(-back), objects, back + deeper)
+    back = np.full(count, float(np.linalg.norm(near.thing.size)) + 0.15)
+    return _come(covering, there.moved(-back), near, back + deeper)
 
 
-def _come(covering: Covering, hands: Candidates, objects: ObjectSet, reach: NDArray[np.float64]) -> Candidates:
+def _come(covering: Covering, hands: Candidates, near: NearObject, reach: NDArray[np.float64]) -> Candidates:
     """Move hands along their approach, as far as ``reach`` (G,) or until their skin is next to the object."""
-    skin = covering.deform(hands.poses(covering.skeleton))
-    moved, which = np.zeros(len(hands)), np.zeros(len(hands), dtype=int)
-    some = skin[:, ::_COARSE]
-    for step in range(_STEPS):
-        going = np.flatnonzero(moved < reach)
-        if not len(going):
-            break
+    skin = covering.deform(hands.poses(covering.skeleton), threads=1)
+    moved, going = np.zeros(len(hands)), np.arange(len(hands))
+    for _ in range(_STEPS):
         shift = (hands.approach[going] * moved[going, None])[:, None].astype(np.float32)
-        gap = objects.distances(some[going] + shift, which=which[going]).distance.min(axis=1)
-        # with all vertices a hand may have come too near: it goes back by as much
+        gap = near.least(skin[going] + shift)
+        # a hand that has come too near goes back by as much
         ahead = np.minimum(gap - _CLEARANCE, reach[going] - moved[going])
         moved[going] += np.where(ahead > 0.0, ahead, 1.05 * ahead - 1e-5)
-        if len(some[0]) < len(skin[0]) and (step > _STEPS // 2 or (ahead < 1e-3).all()):
-            some = skin
-        elif (np.abs(ahead) < 1e-5).all():
+        going = going[(np.abs(ahead) >= _NEXT) & (moved[going] < reach[going])]
+        if not len(going):
             break
     return hands.moved(moved)
 
 
-def _around(axis: NDArray[np.float64], rng: np.random.Generator) -> NDArray[np.float64]:
+def around(axis: NDArray[np.float64], rng: np.random.Generator) -> NDArray[np.float64]:
     """Unit vectors normal to others (G, 3), the angle about them even."""
     aside = unit(np.cross(axis, np.eye(3)[np.abs(axis).argmin(axis=1)]))
     roll = rng.uniform(0.0, 2.0 * np.pi, size=(len(axis), 1))

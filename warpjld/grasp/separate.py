@@ -7,9 +7,7 @@ from collections.abc import Callable, Mapping
 import numpy as np
 from numpy.typing import NDArray
 
-from warpjld.covering import Covering
-from warpjld.covering.intersections import crossing_faces, surface_parts
-from warpjld.skeleton import Poses
+from warpjld.grasp.posed_skins import PosedSkins
 
 __all__ = ["keep_apart"]
 
@@ -18,63 +16,75 @@ _HALVINGS = 6
 
 
 def keep_apart(
-    covering: Covering,
-    poses: Callable[[NDArray[np.float64]], Poses],
+    skin: PosedSkins,
+    deformed: Callable[[NDArray[np.int64], NDArray[np.float64]], NDArray[np.floating]],
     start: NDArray[np.float64],
     closed: NDArray[np.float64],
     chains: Mapping[str, tuple[int, ...]],
-) -> tuple[NDArray[np.float64], dict[str, float]]:
-    """Close all digits at once, each only as far as its skin crosses no other digit's and not the palm's.
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Close all digits of G hands at once, each only as far as its skin crosses no other digit's and not the palm's.
 
     Triangles of different parts are tested for crossing at the end of the way and at places on it. Of two digits that
     cross one is stopped where it is clear of all others: a thumb rather than a finger, since thumbs close last. What
     crosses already at the start does not count.
 
     Args:
-        covering: The hand.
-        poses: Poses of joint angles (n, J, 4).
-        start: Angles of the open hand, shape (J, 4).
-        closed: Angles wanted, shape (J, 4).
-        chains: Joints of the digits, see ``digit_chains``.
+        skin: The hand's.
+        deformed: Skins of some of the hands (n,) with joint angles (n, J, 4) [m], shape (n, V, 3).
+        start: Angles of the open hands, shape (G, J, 4).
+        closed: Angles wanted, shape (G, J, 4).
+        chains: Joints of D digits, see ``digit_chains``.
 
     Returns:
-        Angles, shape (J, 4), and the part of their way that digits went which were stopped.
+        Angles, shape (G, J, 4), and the part of their way that digits went, shape (G, D).
     """
-    parts = surface_parts(covering)
-    order = sorted((d for d in chains if d in parts.names), key=lambda digit: digit.endswith("thumb"))
-    label = {digit: parts.names.index(digit) for digit in order}
+    names = skin.parts.names
+    digits = np.array([d for d, digit in enumerate(chains) if digit in names], dtype=np.int64)
+    thumbs = np.array([list(chains)[d].endswith("thumb") for d in digits], dtype=bool)
+    order = np.concatenate([digits[~thumbs], digits[thumbs]])
+    label = np.array([names.index(list(chains)[d]) for d in order], dtype=np.int32)
+    joints = [list(chain) for chain in chains.values()]
 
-    def angles_at(way: NDArray[np.float64], gone: Mapping[str, float]) -> NDArray[np.float64]:
-        out = np.repeat(start[None], len(way), axis=0)
-        for digit in order:
-            joints = list(chains[digit])
-            reached = np.minimum(way, gone[digit])[:, None, None]
-            out[:, joints] = start[joints] + reached * (closed[joints] - start[joints])
+    def skins(rows: NDArray[np.int64], way: NDArray[np.float64], gone: NDArray[np.float64]) -> NDArray[np.floating]:
+        return deformed(rows, angles_at(rows, np.minimum(way[:, None], gone)))
+
+    def angles_at(rows: NDArray[np.int64], gone: NDArray[np.float64]) -> NDArray[np.float64]:
+        out = start[rows]
+        for own, part in zip(joints, gone.T, strict=True):
+            out[:, own] += part[:, None, None] * (closed[rows][:, own] - start[rows][:, own])
         return out
 
-    def crossings(way: NDArray[np.float64], gone: Mapping[str, float]) -> NDArray[np.int64]:
-        """Crossing pairs of triangles between parts, shape (n, parts, parts)."""
-        out = np.zeros((len(way), len(parts.names), len(parts.names)), dtype=np.int64)
-        for n, vertices in enumerate(covering.deform(poses(angles_at(way, gone)))):
-            pairs = parts.of_face[crossing_faces(vertices, covering.surface.faces).contact(parts).pairs]
-            np.add.at(out[n], (pairs[:, 0], pairs[:, 1]), 1)
-        return out + out.transpose(0, 2, 1)
-
-    gone = dict.fromkeys(order, 1.0)
-    before = crossings(np.zeros(1), gone)
+    hands = np.arange(len(start))
+    gone = np.ones((len(hands), len(joints)))
+    if not len(order):
+        return angles_at(hands, gone), gone
+    before = skin.crossings(skins(hands, np.zeros(len(hands)), gone))
+    going = hands
     for _ in order:
-        worse = np.asarray((crossings(_WAY, gone) > before).any(axis=0))
-        crossing = [digit for digit in order if worse[label[digit]].any()]
-        if not crossing:
+        rows, way = np.repeat(going, len(_WAY)), np.tile(_WAY, len(going))
+        now = skin.crossings(skins(rows, way, gone[rows])).reshape(len(going), len(_WAY), len(names), len(names))
+        worse = np.asarray((now > before[going][:, None]).any(axis=3))[:, :, label]
+        crossing = np.asarray(worse.any(axis=1))
+        some = np.asarray(crossing.any(axis=1))
+        going, worse, crossing = going[some], worse[some], crossing[some]
+        if not len(going):
             break
-        digit = crossing[-1]
-        low, high = 0.0, gone[digit]
+        last = len(order) - 1 - crossing[:, ::-1].argmax(axis=1)
+        digit, own = order[last], label[last]
+        there = worse[np.arange(len(going)), :, last]  # at which places the digit crosses if it goes as far as wanted
+        low, high = np.zeros(len(going)), gone[going, digit]
         for _ in range(_HALVINGS):
             middle = 0.5 * (low + high)
-            now = crossings(_WAY, gone | {digit: middle})
-            if (now[:, label[digit]] > before[:, label[digit]]).any():
-                high = middle
-            else:
-                low = middle
-        gone[digit] = low
-    return angles_at(np.ones(1), gone)[0], {digit: part for digit, part in gone.items() if part < 1.0}
+            # at places that the digit still comes to nothing changes
+            passed = middle[:, None] >= _WAY
+            crosses = (there & passed).any(axis=1)
+            asked, place = np.nonzero(~passed & ~crosses[:, None])
+            if len(asked):
+                wanted = gone[going[asked]]
+                wanted[np.arange(len(asked)), digit[asked]] = middle[asked]
+                posed = skins(going[asked], _WAY[place], wanted)
+                more = (skin.crossings(posed, own[asked]) > before[going[asked], own[asked]]).any(axis=1)
+                np.logical_or.at(crosses, asked, more)
+            low, high = np.where(crosses, low, middle), np.where(crosses, middle, high)
+        gone[going, digit] = low
+    return angles_at(hands, gone), gone

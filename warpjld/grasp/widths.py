@@ -6,9 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.spatial.transform import Rotation
 
-from warpjld.grasp.distance import ObjectSet
+from warpjld.grasp.near_object import NearObject
 from warpjld.rotations import unit
 
 __all__ = ["Widths", "sample_widths"]
@@ -43,19 +42,18 @@ class Widths:
         return np.asarray(np.linalg.norm(self.second - self.first, axis=1))
 
 
-def sample_widths(objects: ObjectSet, count: int, rng: np.random.Generator, *, widest: float) -> Widths:
-    """Draw points evenly over the surface of the only object of a set and look for the point opposite to each.
+def sample_widths(near: NearObject, count: int, rng: np.random.Generator, *, widest: float) -> Widths:
+    """Draw points evenly over an object's surface and look for the point opposite to each.
 
     A line goes into the object along the normal, leaning a little at random, and is followed by steps of the distance
     itself (Hart 1996) until it leaves. Lines longer than ``widest`` [m] are dropped.
     """
-    (thing,) = objects.objects
+    thing = near.thing
     corner = thing.vertices[thing.faces]
     area = np.linalg.norm(np.cross(corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0]), axis=1)
     face = rng.choice(len(area), size=count, p=area / area.sum())
     local = np.einsum("nk,nki->ni", rng.dirichlet([1.0, 1.0, 1.0], size=count), corner[face])
-    turn = Rotation.from_quat(thing.place.rotation[0])
-    start, outward = thing.place.apply(local)[0], turn.apply(thing.normals[face])
+    outward = thing.normals[face]
     line = -outward + rng.uniform(-_LEAN, _LEAN, size=(count, 3)) * rng.uniform(size=(count, 1))
     line = unit(line)
     along = np.full(count, 20.0 * _SURFACE)
@@ -64,13 +62,14 @@ def sample_widths(objects: ObjectSet, count: int, rng: np.random.Generator, *, w
         going = np.flatnonzero(~left & (along < widest))
         if not len(going):
             break
-        found = objects.distances(start[going] + along[going, None] * line[going])
+        found = near.objects.distances(local[going] + along[going, None] * line[going], threads=1)
         depth = -found.distance[0]
         out = depth < _SURFACE
         left[going[out]] = True
-        normal[going[out]] = turn.apply(thing.normals[found.face[0][out]])
+        normal[going[out]] = thing.normals[found.face[0][out]]
         along[going] += np.where(out, 0.0, depth)
     slant = np.minimum(-(outward * line).sum(axis=1), (normal * line).sum(axis=1))
     # what leaves at once started at an edge and says nothing
     good = left & (slant > 0.0) & (along > 100.0 * _SURFACE)
-    return Widths(start[good], (start + along[:, None] * line)[good], slant[good])
+    first, second = (thing.place.apply(ends[good])[0] for ends in (local, local + along[:, None] * line))
+    return Widths(first, second, slant[good])

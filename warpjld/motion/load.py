@@ -107,8 +107,6 @@ def open_motion(
         raise InputError(f"unknown kind of motion '{path.suffix}'; known: {known}", path=path)
     if animation is not None and suffix not in _ANIMATIONS:
         raise InputError(f"no animation '{animation}': a {suffix} file holds one motion without a name", path=path)
-    if not path.exists():
-        raise InputError("no such file", path=path)
     check_input(path)
     with reading(path, f"a motion ({suffix})"):
         if suffix == ".csv":

@@ -32,6 +32,7 @@ def grasp_by_itself(
     from scipy.spatial.transform import Rotation
 
     from warpjld.grasp.auto import find_grasp
+    from warpjld.grasp.close import Closer
     from warpjld.grasp.draws import WAY
     from warpjld.grasp.intersection import intersection
     from warpjld.motion import Key
@@ -42,7 +43,7 @@ def grasp_by_itself(
     covering = cover(actor)
     thing = placed_at(scene, prop, last)
     obstacles = [placed_at(scene, other, last) for other in scene.props.values() if other is not prop]
-    found = find_grasp(covering, thing, obstacles=obstacles, side=side, count=tries, posture=posture_name)
+    found = find_grasp(Closer(covering, thing), obstacles=obstacles, side=side, count=tries, posture=posture_name)
     middle, away = (first + last) / 2.0, found.position - WAY * found.approach
     turn = Rotation.from_quat(found.rotation).as_euler("xyz")
     spline = asdict(scene.spline)

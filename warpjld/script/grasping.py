@@ -105,8 +105,8 @@ def close_digits(
     coupling: tuple[float, float] | None,
 ) -> Attempt:
     """Close digits on an object: keys of the open hand at ``first``, of the closed one at ``last``."""
-    from warpjld.grasp import ObjectSet, Status
-    from warpjld.grasp.close import close_hand
+    from warpjld.grasp import Status
+    from warpjld.grasp.close import Closer
     from warpjld.grasp.digits import digit_chains
     from warpjld.grasp.intersection import intersection
 
@@ -114,7 +114,7 @@ def close_digits(
     poses, angles = posture(scene, actor, last)
     thing = placed_at(scene, prop, last)
     wanted = list(digits) or [name for name in digit_chains(actor.skeleton) if name.startswith(f"{side}.")]
-    closed = close_hand(covering, poses, angles, ObjectSet(thing), digits=wanted, coupling=coupling)
+    closed = Closer(covering, thing).close(poses, angles, digits=wanted, coupling=coupling)
     chains = digit_chains(actor.skeleton, wanted)
     grip = {}
     for name in closed.digits:
@@ -159,10 +159,9 @@ def collisions(scene: Scene, actor: Actor, held: Prop, first: float, last: float
         both = BothWays(covering, prop.thing)
         if prop.deforms:
             shapes = [BothWays(covering, placed_at(scene, prop, frame)) for frame in frames.tolist()]
-            depths = np.stack([shape.depths(skin) for shape, skin in zip(shapes, skins, strict=True)])
+            depths = np.concatenate([shape.depths(skin[None]) for shape, skin in zip(shapes, skins, strict=True)])
         else:
-            places = scene.whereabouts(prop, frames)
-            depths = np.stack([both.depths(skin, places[k : k + 1]) for k, skin in enumerate(skins)])
+            depths = both.depths(skins, scene.whereabouts(prop, frames))
         frame, part = np.unravel_index(depths.argmax(), depths.shape)
         if depths[frame, part] > COLLIDES:
             depth = 1e3 * depths[frame, part]

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from warpjld import render
 from warpjld.covering.device import checked_device
 from warpjld.errors import InputError, WarpjldError
+from warpjld.motion.out import check_motion_out
 from warpjld.names import folded
 from warpjld.overwriting import check_outputs
 from warpjld.script.contact import check_contact, run_contact, write_contact
@@ -90,6 +91,9 @@ def run_scene(
         outputs.append(Grips("grips.csv"))
     checked_device(device)
     check_available([output.name for output in outputs])
+    for output in outputs:
+        if isinstance(output, MotionFile):
+            check_motion_out(output.name)
     read = scene.read if script is None else [*scene.read, script]
     names = _names(scene, outputs)
     if "summary.json" in map(folded, names):

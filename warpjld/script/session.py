@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import copy
 from collections.abc import Callable
+from dataclasses import dataclass
 from pathlib import Path
 
 from warpjld.errors import InputError
@@ -10,13 +12,23 @@ from warpjld.names import expanded
 from warpjld.script.interpreter import Interpreter
 from warpjld.script.parser import UnfinishedError, parse, parse_file
 from warpjld.script.scene import Scene
-from warpjld.script.statements import Node, Statement, Text
+from warpjld.script.statements import MacroDefinition, Node, Statement, Text
 from warpjld.skeleton import CHANNELS, DIGITS
 from warpjld.whole_file import whole_file
 
-__all__ = ["Session"]
+__all__ = ["AUTOSAVED", "Session"]
+
+AUTOSAVED = "autosaved.jld"
 
 _OWN = ("RUN", "SAVE", "UNDO", "QUIT", "EXIT")
+
+
+@dataclass(frozen=True, eq=False)
+class _Moment:
+    """A scene and its macros before a line was typed."""
+
+    scene: Scene
+    macros: dict[str, MacroDefinition]
 
 
 class Session:
@@ -42,6 +54,7 @@ class Session:
         self._folder, self._say = folder, say
         self._script: Path | None = None
         self._kept: list[str] = []
+        self._before: list[_Moment] = []
         self._pending: list[str] = []
         self._typed = 0
         self._start()
@@ -96,11 +109,30 @@ class Session:
         self._pending = []
         if len(nodes) == 1 and isinstance(nodes[0], Statement) and nodes[0].name.text.upper() in _OWN:
             return self._own(nodes[0])
-        if nodes:
+        if nodes and _only_looks(nodes):
             self._interpreter.execute(nodes, None)
-            if not _only_looks(nodes):
-                self._kept.append(text)
+        elif nodes:
+            moment = self._moment()
+            try:
+                self._interpreter.execute(nodes, None)
+            except BaseException:  # whatever of the line has happened is taken back
+                self._back_to(moment)
+                raise
+            self._before.append(moment)
+            self._kept.append(text)
         return True
+
+    def autosave(self) -> Path | None:
+        """Keep what was typed in the output folder; None where nothing was, or it cannot be written."""
+        path = self._folder / AUTOSAVED
+        if not self._kept:
+            return None
+        try:
+            path.parent.mkdir(parents=True, exist_ok=True)
+            self._write(path)
+        except OSError:
+            return None
+        return path
 
     def end(self) -> None:
         """The input is over.
@@ -139,29 +171,39 @@ class Session:
 
     def _save(self, name: Text) -> None:
         path = expanded(name.text)
-        lines = [] if self._script is None else [f'INCLUDE "{self._script.resolve().as_posix()}"']
         try:
-            with whole_file(path) as part:
-                part.write_text("\n".join([*lines, *self._kept]) + "\n", encoding="utf-8")
-        except OSError as error:
-            raise name.position.error(f"cannot write '{path}': {error.strerror}") from error
+            self._write(path)
+        except (OSError, ValueError) as error:  # ValueError: a zero byte in the name
+            said = error.strerror if isinstance(error, OSError) else error
+            raise name.position.error(f"cannot write '{path}': {said}") from error
         self._say(str(path))
+
+    def _write(self, path: Path) -> None:
+        lines = [] if self._script is None else [f'INCLUDE "{self._script.resolve().as_posix()}"']
+        with whole_file(path) as part:
+            part.write_text("\n".join([*lines, *self._kept]) + "\n", encoding="utf-8", errors="backslashreplace")
 
     def _undo(self, statement: Statement) -> None:
         if not self._kept:
             raise statement.name.position.error("nothing to undo")
         gone = self._kept.pop()
-        kept, self._kept = self._kept, []
-        say, self._say = self._say, lambda text: None
-        try:
-            self._start()
-            if self._script is not None:
-                self._interpreter.run_file(self._script)
-            for text in kept:
-                self.type(text)
-        finally:
-            self._say = self.scene.say = say
+        self._back_to(self._before.pop())
         self._say(f"forgotten: {gone}")
+
+    def _moment(self) -> _Moment:
+        """The scene as it is now: rigs, bound surfaces and objects, which nothing changes, are not copied."""
+        scene = self.scene
+        fixed: list[object] = [scene.say, scene.warn]
+        for actor in scene.actors.values():
+            fixed += [actor.rig, actor.skeleton, actor.parameters, actor.covering, actor.recorded]
+        for prop in scene.props.values():
+            fixed += [prop.thing, prop.shapes]
+        return _Moment(copy.deepcopy(scene, {id(one): one for one in fixed}), dict(self._interpreter.macros))
+
+    def _back_to(self, moment: _Moment) -> None:
+        self.scene = moment.scene
+        self._interpreter = Interpreter(self.scene)
+        self._interpreter.macros = dict(moment.macros)
 
 
 def _only_looks(nodes: tuple[Node, ...]) -> bool:

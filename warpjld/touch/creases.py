@@ -3,16 +3,19 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, fields
+from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.sparse import csr_array
 from scipy.spatial import cKDTree
 
 from warpjld.rotations import rotate, unit
 from warpjld.skeleton.kinematics import Poses
+from warpjld.touch.frame import FULL, NONE, SHARE
 from warpjld.touch.patches import Patches, segment_distance
-from warpjld.touch.smoothing import edge_lengths
+from warpjld.touch.smoothing import edge_lengths, skin_smoothing
 
 if TYPE_CHECKING:
     from warpjld.covering.covering import Covering
@@ -20,10 +23,14 @@ if TYPE_CHECKING:
 __all__ = ["Creases"]
 
 _KEPT = 0.25
-"""Of its rest distance from the plane that every vertex keeps. Without any, skin of both sides would lie in one plane
-and cross by rounding; at .1 more faces cross than at .25, and beyond that it moves what does not cross."""
+"""Of its rest distance from the plane that every vertex keeps at most. Without any, skin of both sides would lie in one
+plane and cross by rounding; more moves what does not cross."""
 
-_REACH = 3.0  # thicknesses from the joint, over the last of which it fades
+_LEAST_APART = 0.03  # thicknesses that a vertex keeps from the plane, where that is not more than its share
+_WIDER = 4.0  # times as far apart as both have passed through one another around
+_WIDEST = 1.0  # thicknesses that they are apart then at most
+_STEPS = 3  # of pushing and smoothing: one leaves a fifth more of what crosses, a fourth changes little
+_REACH = 6.0  # thicknesses from the joint, over the last of which it fades
 _WIDE = (0.9, 1.4)  # thicknesses along the axis between which it fades: what is beside a knuckle is another's skin
 _LEAST = 0.02  # of a vertex that both segments must hold for it to count
 
@@ -47,6 +54,7 @@ class Creases:
         opposite: Three vertices of the other side, where the plane mirrors this one to at rest, shape (entries, 3).
         share: Their shares, likewise.
         size: Thickness of the flesh at every crease [m], shape (C,).
+        smooth: Rows that smooth a field over the surface, shape (V, V).
     """
 
     joint: NDArray[np.int32]
@@ -60,6 +68,7 @@ class Creases:
     opposite: NDArray[np.int32]
     share: NDArray[np.float32]
     size: NDArray[np.float64]
+    smooth: csr_array
 
     @classmethod
     def of(cls, covering: Covering, patches: Patches) -> Creases:
@@ -92,10 +101,12 @@ class Creases:
                 if found is not None:
                     planes.append((joint, a, normal, size))
                     entries.append(found)
-        return cls._sorted(planes, entries)
+        return cls._sorted(planes, entries, skin_smoothing(vertices, patches))
 
     @classmethod
-    def _sorted(cls, planes: list[tuple[int, int, NDArray[np.float64], float]], entries: list[_Entries]) -> Creases:
+    def _sorted(
+        cls, planes: list[tuple[int, int, NDArray[np.float64], float]], entries: list[_Entries], smooth: csr_array
+    ) -> Creases:
         joined = _Entries.joined(entries)
         crease = np.repeat(np.arange(len(entries)), [len(e.rows) for e in entries])
         order = np.argsort(joined.rows, kind="stable")
@@ -112,6 +123,7 @@ class Creases:
             joined.opposite[order].astype(np.int32),
             joined.share[order].astype(np.float32),
             np.array([p[3] for p in planes]),
+            smooth,
         )
 
     def part(self, points: Any, poses: Poses) -> None:
@@ -122,7 +134,7 @@ class Creases:
             poses: Their poses.
         """
         import warp as wp
-        from warpjld_kernels.touch_crease import part_creases
+        from warpjld_kernels.touch_crease import measure_creases, move_smoothly, push_creases
 
         if not len(self.vertex):
             return
@@ -130,26 +142,42 @@ class Creases:
         same = np.where((first * second).sum(axis=-1, keepdims=True) < 0.0, -1.0, 1.0)
         normal = rotate(unit(first + same * second), self.normal)
         turned = wp.array(np.ascontiguousarray(normal, dtype=np.float32), dtype=wp.vec3, device="cpu")
-        size = wp.array(self.size.astype(np.float32), dtype=float, device="cpu")
-        entries = [
-            wp.array(a, dtype=kind, device="cpu", copy=False)
-            for a, kind in (
-                (self.vertex, wp.int32),
-                (self.first, wp.int32),
-                (self.crease, wp.int32),
-                (self.height, float),
-                (self.weight, float),
-                (self.opposite, wp.vec3i),
-                (self.share, wp.vec3),
-            )
-        ]
-        wp.launch(
-            part_creases,
-            (len(poses), len(self.vertex)),
-            inputs=[*entries, size, turned, _KEPT, wp.clone(points)],
-            outputs=[points],
-            device="cpu",
-        )
+        creases, reached, *rows = self._arrays
+        size = (len(poses), len(self.vertex))
+        near = wp.empty(size, dtype=wp.int32, device="cpu")
+        overlap = wp.zeros(points.shape, dtype=float, device="cpu")
+        deepest = wp.zeros((len(poses), len(self.joint)), dtype=float, device="cpu")
+        pushed = wp.zeros(len(poses), dtype=wp.int32, device="cpu")
+        shift = wp.zeros(points.shape, dtype=wp.vec3, device="cpu")
+        measured = [near, overlap, deepest]
+        inputs = [creases, turned, points, SHARE, _KEPT]
+        wp.launch(measure_creases, size, inputs=inputs, outputs=measured, device="cpu")
+        amounts = [_KEPT, _LEAST_APART, _WIDER, _WIDEST, FULL, NONE]
+        for _ in range(_STEPS):
+            inputs = [creases, turned, points, *measured, *rows, *amounts]
+            wp.launch(push_creases, size, inputs=inputs, outputs=[pushed, shift], device="cpu")
+            inputs = [reached, *rows, pushed, shift]
+            wp.launch(move_smoothly, (len(poses), len(reached)), inputs=inputs, outputs=[points], device="cpu")
+
+    @cached_property
+    def _arrays(self) -> list[Any]:
+        """Of the kernels: the creases, the vertices that a smoothing reaches from them, and its rows."""
+        import warp as wp
+        from warpjld_kernels.touch_crease import Creases as Arrays
+
+        def array(values: NDArray, kind: Any) -> Any:
+            flat = np.float32 if values.dtype.kind == "f" else np.int32
+            return wp.array(np.ascontiguousarray(values, dtype=flat), dtype=kind, device="cpu")
+
+        out = Arrays()
+        for name, kind in Arrays.vars.items():
+            setattr(out, name, array(getattr(self, name), kind.type.dtype))
+        pushed = np.zeros(self.smooth.shape[0])
+        pushed[self.vertex] = 1.0
+        reached = np.flatnonzero(self.smooth @ pushed)
+        kinds = (wp.int32, wp.int32, wp.int32, float)
+        some = (reached, self.smooth.indptr, self.smooth.indices, self.smooth.data)
+        return [out, *(array(values, kind) for values, kind in zip(some, kinds, strict=True))]
 
 
 @dataclass(frozen=True, eq=False)

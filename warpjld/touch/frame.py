@@ -12,16 +12,18 @@ from scipy.sparse import csr_array
 from warpjld.covering.binding import smoothstep
 from warpjld.touch.patches import Patches
 
-__all__ = ["SHARE", "Bench", "Model", "Overlaps", "fade"]
+__all__ = ["FULL", "NONE", "SHARE", "Bench", "Model", "Overlaps", "fade"]
 
 SHARE = 1.0 / 3.0
 """Of the local thickness: overlaps up to it skin can give way to, deeper ones are poses that nobody can take."""
 
 # shares: what lies that deep at most is parted in full, what lies deeper than the second is left alone: at three, the
-# middle of the flesh, the nearest way out leaps to the other side
-_FULL, _NONE = 2.0, 2.75
-_SWEEPS = 3
+# middle of the flesh, the way out is on the other side. Parted in full up to two, a closing fist gave its skin up in
+# a few frames: 3 mm in one of 240, now 1
+FULL, NONE = 1.0, 2.75
+_SWEEPS = 2  # a third parts hardly more and costs as much as the second
 _SOFT = 0.05  # shares over which an overlap comes to count
+_JUST = 0.1  # shares that two parts must lie in one another for what parting makes of it to be parted again
 _CLEARANCE = 0.05  # shares by which both sides are moved beyond their meeting
 _STIFFNESS = 0.1  # of the fit of planes: samples that weigh less than that in all move nothing in full
 _SWELLS = 1.1  # times as far from its bones as at rest flesh may come by bending
@@ -29,8 +31,8 @@ _BULGE = 0.5  # shares that a bulge is high at most
 
 
 def fade(ratio: NDArray[np.float64]) -> NDArray[np.float64]:
-    """How much of an overlap is parted whose deepest place is so many shares deep: 1 to ``_FULL``, 0 from ``_NONE``."""
-    return smoothstep((_NONE - ratio) / (_NONE - _FULL))
+    """How much of an overlap is parted whose deepest place is so many shares deep: 1 to ``FULL``, 0 from ``NONE``."""
+    return smoothstep((NONE - ratio) / (NONE - FULL))
 
 
 @dataclass(frozen=True, eq=False)
@@ -100,7 +102,7 @@ class Bench:
         self._count = self.samples.count.numpy()
         self._wanted = wp.zeros(names, dtype=wp.int32, device="cpu")
         self._active = wp.zeros(names, dtype=wp.int32, device="cpu")
-        self._before = wp.zeros((names, names), dtype=float, device="cpu")
+        self._shown = wp.zeros((names, names), dtype=float, device="cpu")
         self._deepest = wp.zeros((names, names), dtype=float, device="cpu")
         self._normals, self._moved, self._start = (wp.zeros(count, dtype=wp.vec3, device="cpu") for _ in range(3))
         self._lost, self._room = (wp.zeros(names, dtype=float, device="cpu") for _ in range(2))
@@ -151,7 +153,7 @@ class Bench:
         import warp as wp
         from warpjld_kernels import touch_bulge, touch_parting, touch_samples
 
-        def recorded(kernel: Any, dim: int, inputs: list[Any], outputs: list[Any]) -> Any:
+        def recorded(kernel: Any, dim: int | tuple[int, int], inputs: list[Any], outputs: list[Any]) -> Any:
             return wp.launch(kernel, dim, inputs=inputs, outputs=outputs, device="cpu", record_cmd=True)
 
         count, names = len(self.points), len(self._meshes)
@@ -162,14 +164,13 @@ class Bench:
         pairs, heeded = (wp.zeros(names, dtype=wp.int32, device="cpu") for _ in range(2))
         others = wp.zeros((names, names), dtype=wp.int32, device="cpu")
         heed = wp.zeros((names, count), dtype=wp.int32, device="cpu")
-        shown = wp.zeros(2 * count, dtype=float, device="cpu")
         ring = wp.zeros(count, dtype=float, device="cpu")
         self._find_pairs = [
             recorded(touch_samples.find_boxes, names, [points, parts], [low, high]),
             recorded(
                 touch_samples.find_pairs,
                 names,
-                [parts, low, high, self._before],
+                [parts, low, high, self._shown],
                 [pairs, others, self._wanted, self._active],
             ),
         ]
@@ -178,22 +179,21 @@ class Bench:
             recorded(
                 touch_samples.find_samples,
                 count,
-                [points, normals, low, high, pairs, others, self.joints, *boxes, parts, SHARE, _SOFT],
+                [points, normals, low, high, pairs, others, self.joints, *boxes, parts, SHARE, _SOFT, NONE],
                 [self._deepest, samples],
             ),
         ]
         self._heed_nothing = recorded(touch_parting.heed_nothing, names, [], [heeded, *boxes])
+        # as deep as the pose is, in every sweep: what is parted in part would be parted ever more
         self._fade = recorded(
-            touch_parting.fade_samples,
-            1,
-            [samples, parts, self._deepest, _FULL, _NONE],
-            [shown, heeded, heed, *boxes],
+            touch_parting.fade_pairs, (names, names), [parts, self._deepest, FULL, NONE, _JUST], [self._shown]
         )
+        self._heed = recorded(touch_parting.heed_samples, 1, [samples, parts], [heeded, heed, *boxes])
         self._part = [
             recorded(
                 touch_parting.part_surfaces,
                 count,
-                [points, normals, samples, shown, heeded, heed, *boxes, parts, _CLEARANCE, _SOFT, _STIFFNESS],
+                [points, normals, samples, self._shown, heeded, heed, *boxes, parts, _CLEARANCE, _SOFT, _STIFFNESS],
                 [self._moved],
             ),
             recorded(touch_parting.move, count, [self._moved], [points]),
@@ -229,13 +229,14 @@ class Bench:
         self._start.numpy()[...] = there
         for sweep in range(_SWEEPS):
             if sweep:
-                self._before.numpy()[...] = self._deepest.numpy()
                 count = self._find()
+            else:
+                self._fade.launch()
             if not count:
                 break
             self._heed_nothing.launch()
-            self._fade.set_dim(count)
-            for command in (self._fade, *self._part):
+            self._heed.set_dim(count)
+            for command in (self._heed, *self._part):
                 command.launch()
             if sweep == 0:
                 self._lost.numpy()[...] = 0.0
@@ -249,17 +250,17 @@ class Bench:
     def _first(self, points: NDArray[np.floating], joints: NDArray[np.floating] | None) -> int:
         self.points.numpy()[...] = points
         self.joints.numpy()[...] = np.nan if joints is None else joints
-        self._before.numpy()[...] = 1.0
+        self._shown.numpy()[...] = 1.0
+        self._deepest.numpy()[...] = 0.0
         for box, end in zip(self._everywhere, (-np.inf, np.inf), strict=True):
             box[...] = end
         return self._find()
 
     def _find(self) -> int:
         """Fill ``samples`` from ``points``; how many there are."""
-        wanted, active, deepest = self._wanted.numpy(), self._active.numpy(), self._deepest.numpy()
+        wanted, active = self._wanted.numpy(), self._active.numpy()
         wanted[...] = 0
         active[...] = 0
-        deepest[...] = 0.0
         self._count[...] = 0
         for command in self._find_pairs:
             command.launch()

@@ -6,10 +6,11 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse import csr_array, diags_array, eye_array
 
-from warpjld.touch.patches import neighbours
+from warpjld.touch.patches import Patches, neighbours
 
-__all__ = ["edge_lengths", "smoothing"]
+__all__ = ["edge_lengths", "skin_smoothing", "smoothing"]
 
+_REACH = 0.25  # of the thickness: how far from a displacement its volume is given back
 _MOST = 8  # Jacobi steps: beyond that a row reaches over hundreds of vertices
 _LEAST = 0.05  # of a row's largest entry: what is less is dropped
 
@@ -21,6 +22,13 @@ def edge_lengths(vertices: NDArray[np.float64], faces: NDArray[np.int32]) -> NDA
     length = np.linalg.norm(vertices[row] - vertices[column], axis=1)
     degree = np.bincount(row, minlength=len(vertices))
     return np.asarray(np.bincount(row, length, len(vertices)) / np.maximum(degree, 1))
+
+
+def skin_smoothing(vertices: NDArray[np.float64], patches: Patches) -> csr_array:
+    """Rows that smooth a field over a surface on the scale of its thickness, shape (V, V)."""
+    edge = edge_lengths(vertices, patches.faces)
+    # one ring of faces at least: what coarse faces give way by is given back on the next
+    return smoothing(vertices, patches.faces, np.maximum(_REACH * patches.thickness, edge))
 
 
 def smoothing(vertices: NDArray[np.float64], faces: NDArray[np.int32], reach: NDArray[np.float64]) -> csr_array:

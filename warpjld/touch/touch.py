@@ -25,7 +25,7 @@ from warpjld.threads import in_threads, threads_for
 from warpjld.touch.creases import Creases
 from warpjld.touch.frame import SHARE, Bench, Model, Overlaps
 from warpjld.touch.patches import Patches, patches_of, segment_distance
-from warpjld.touch.smoothing import edge_lengths, smoothing
+from warpjld.touch.smoothing import edge_lengths, skin_smoothing
 
 if TYPE_CHECKING:
     from warpjld.covering.covering import Covering
@@ -33,7 +33,6 @@ if TYPE_CHECKING:
 __all__ = ["SHARE", "Touch", "Touched"]
 
 _NOISE = 1e-6  # of the surface's size
-_REACH = 0.25  # of the thickness: how far from a displacement its volume is given back
 _SPLIT_BELOW = 8_000  # vertex-frames a thread must have before splitting pays
 
 
@@ -78,8 +77,7 @@ class Touch:
         self.creases = creases
         self._vertices = vertices
         edge = edge_lengths(vertices, patches.faces)
-        # one ring of faces at least: what coarse faces give way by is given back on the next
-        smooth = smoothing(vertices, patches.faces, np.maximum(_REACH * patches.thickness, edge))
+        smooth = creases.smooth if creases is not None else skin_smoothing(vertices, patches)
         count = len(vertices)
         self.coarse = patches.coarse(edge)
         never = self.coarse[:, None] | self.coarse

@@ -15,8 +15,8 @@ from warpjld.fem.hand import FleshHand, FleshMotion, build_flesh_hand, hand_laws
 from warpjld.fem.hand.alone import FleshAlone
 from warpjld.fem.hand.bone_loads import BoneLoads, loads_from_contact, loads_from_reactions
 from warpjld.fem.hand.muscles import Effort, effort_of
-from warpjld.grasp import ObjectSet, Places
-from warpjld.grasp.close import close_hand
+from warpjld.grasp import Places
+from warpjld.grasp.close import Closer
 from warpjld.grasp.digits import digit_chains
 from warpjld.grasp.postures import posture_angles
 from warpjld.grasp.shapes import ball
@@ -37,14 +37,9 @@ def closing() -> FleshMotion:
     hand = build_flesh_hand(rig)
     skeleton = rig.skeleton
     start = posture_angles(skeleton, "left", "sphere")[None]
-    closed = close_hand(
-        bind(skeleton, rig.surface),
-        poses_from_angles(skeleton, start),
-        start,
-        ObjectSet(ball(2.0 * RADIUS)),
-        places=Places.of(CENTRE),
-        coupling=(1.0, 0.7),
-    ).angles
+    closer = Closer(bind(skeleton, rig.surface), ball(2.0 * RADIUS))
+    open_hand = poses_from_angles(skeleton, start)
+    closed = closer.close(open_hand, start, places=Places.of(CENTRE), coupling=(1.0, 0.7)).angles
     more = closed.copy()
     more[:, np.unique(list(digit_chains(skeleton).values())), 0] += np.radians(5.0)
     shares = np.array([1.0, 2.0, 3.0])[:, None, None] / 3.0

@@ -14,7 +14,7 @@ from scipy.spatial.transform import Rotation
 
 from tests.grasp.quality.sets import four_on_box, least_on_sphere, ring_on_sphere, two_on_sphere
 from warpjld.errors import InputError
-from warpjld.grasp.quality import Contacts, contact_wrenches, wrench_space
+from warpjld.grasp.quality import Contacts, contact_wrenches, least_resistance, wrench_space
 
 _ROUNDING = 1e-9  # qhull works in float64 on numbers around 1
 _FRICTIONS = (0.2, 0.5, 0.9)
@@ -186,3 +186,26 @@ def _irregular(friction: float = 0.6) -> Contacts:
     directions /= np.linalg.norm(directions, axis=1, keepdims=True)
     axes = np.array([0.03, 0.04, 0.05])
     return Contacts(directions * axes, -directions / axes, friction)
+
+
+@pytest.mark.parametrize("count", [2, 3, 5, 9])
+@pytest.mark.parametrize("spin", [0.0, 0.002])
+def test_a_growing_hull_ends_with_the_same_epsilon(count: int, spin: float) -> None:
+    rng = np.random.default_rng(count)
+    for _ in range(8):
+        points = rng.normal(size=(count, 3))
+        points *= 0.03 / np.linalg.norm(points, axis=1, keepdims=True)
+        normals = -points / 0.03 + 0.3 * rng.normal(size=(count, 3))
+        contacts = Contacts(points, normals, np.array(0.6), np.array(spin))
+        whole = wrench_space(contacts, (0, 0, 0), torque_scale=0.03).epsilon
+        assert least_resistance(contacts, (0, 0, 0), torque_scale=0.03) == pytest.approx(whole, abs=1e-9)
+
+
+def test_a_growing_hull_of_regular_grasps() -> None:
+    """Facets of more than six wrenches, which qhull merges."""
+    for contacts in (four_on_box(0.04, 0.5), two_on_sphere(0.05, 0.5, 0.01), ring_on_sphere(0.05, 0.7)):
+        whole = wrench_space(contacts, (0, 0, 0), torque_scale=0.05).epsilon
+        assert least_resistance(contacts, (0, 0, 0), torque_scale=0.05) == pytest.approx(whole, abs=1e-9)
+    assert (
+        least_resistance(Contacts(np.zeros((0, 3)), np.zeros((0, 3)), np.zeros(0)), (0, 0, 0), torque_scale=1.0) == 0.0
+    )

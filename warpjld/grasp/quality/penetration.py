@@ -7,14 +7,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from warpjld.covering import Covering
-from warpjld.grasp.distance import ObjectSet
-from warpjld.grasp.intersection import intersection
-from warpjld.grasp.objects import GraspObject
-from warpjld.grasp.outline import outline
-from warpjld.grasp.validation import MeshReport
+from warpjld.grasp.both_ways import BothWays
+from warpjld.grasp.intersection import intersection_beside
 
-__all__ = ["Penetration", "depth_inside", "penetration"]
+__all__ = ["Penetration", "penetration"]
 
 
 @dataclass(frozen=True)
@@ -39,7 +35,7 @@ class Penetration:
         return max(self.skin, self.thing)
 
 
-def penetration(covering: Covering, vertices: NDArray[np.floating], thing: GraspObject) -> Penetration:
+def penetration(both: BothWays, vertices: NDArray[np.floating]) -> Penetration:
     """Penetration of a deformed hand and an object, looked at from both sides.
 
     With d_O the signed distance to the object, d_S that to the skin, negative inside,
@@ -51,31 +47,8 @@ def penetration(covering: Covering, vertices: NDArray[np.floating], thing: Grasp
     hide the edge of a box that cuts into it.
 
     Args:
-        covering: The hand; its skin may be open, as at the wrist.
+        both: Hand and object, which is at its own place. The hand's skin may be open, as at the wrist.
         vertices: The deformed skin [m], shape (V, 3).
-        thing: The object, at its own place.
     """
-    inside = intersection(covering, vertices, thing)
-    stage = thing.place.apply(outline(thing))[0]
-    return Penetration(
-        inside.deepest, depth_inside(stage, vertices, covering.surface.faces), inside.volume, inside.spacing
-    )
-
-
-def depth_inside(points: NDArray[np.floating], vertices: NDArray[np.floating], faces: NDArray[np.int32]) -> float:
-    """Depth of the deepest of some points inside a surface, which may be open or pass through itself [m].
-
-    Winding numbers tell inside from outside. 0 where no point is inside.
-
-    Args:
-        points: [m], shape (n, 3).
-        vertices: Of the surface [m], shape (V, 3).
-        faces: Its triangles, shape (T, 3).
-    """
-    low, high = vertices.min(axis=0), vertices.max(axis=0)
-    near = points[((points >= low) & (points <= high)).all(axis=1)]
-    if not len(near):
-        return 0.0
-    report = MeshReport(open_edges=1, solid=False)
-    skin = ObjectSet(GraspObject("skin", np.asarray(vertices, dtype=np.float64), faces, report))
-    return max(0.0, -float(skin.distances(near, threads=1).distance.min()))
+    inside = intersection_beside(both.covering, both.thing.place.to_local(vertices)[0], both.near)
+    return Penetration(inside.deepest, both.depth_of_object(vertices), inside.volume, inside.spacing)

@@ -16,13 +16,16 @@ from warpjld.grasp.quality.wrenches import contact_wrenches, has_full_rank
 if TYPE_CHECKING:
     from scipy.spatial import ConvexHull
 
-__all__ = ["WrenchSpace", "wrench_space"]
+__all__ = ["WrenchSpace", "least_resistance", "wrench_space"]
 
 Array = NDArray[np.float64]
 
 # facets of a hull in six dimensions grow with the cube of its points: beyond this it takes minutes
 _MOST_POINTS = 6_000
 _SHAKE = 1e-9
+_GROWN = 1e-12  # of the largest coordinate: what is farther beyond a facet makes the hull grow
+_TOGETHER = 24  # facets that it grows at together
+_STARTS = np.concatenate([np.eye(6), -np.eye(6)])  # directions whose farthest wrenches it begins with
 
 
 @dataclass(frozen=True, eq=False)
@@ -90,6 +93,42 @@ def wrench_space(
     if epsilon <= 10.0 * _SHAKE:  # the origin is always a point of the set; on its boundary, nothing is resisted there
         return WrenchSpace(0.0, volume, np.zeros(6), norm, torque_scale, edges)
     return WrenchSpace(epsilon, volume, hull.equations[nearest, :-1].copy(), norm, torque_scale, edges)
+
+
+def least_resistance(contacts: Contacts, center: ArrayLike, *, torque_scale: float, edges: int = 8) -> float:
+    """Epsilon of ``wrench_space`` for norm "L1" alone [N], sooner: 0 without force closure.
+
+    The hull of a few wrenches grows: where a wrench lies beyond one of its nearest facets, the farthest is added to
+    it, until the nearest facet has none beyond it and so is one of the whole hull.
+
+    Args:
+        contacts: C contacts.
+        center: Point torques are taken about [m].
+        torque_scale: Length ρ that torques are divided by [m].
+        edges: Edges of a friction cone.
+    """
+    blocks = contact_wrenches(contacts, center, torque_scale, edges)
+    if not blocks or not has_full_rank(np.concatenate(blocks, axis=1)):
+        return 0.0
+    points = _union(blocks)
+    beyond = _GROWN * float(np.abs(points).max())
+    inside = np.zeros(len(points), dtype=bool)
+    inside[0] = True
+    inside[(points @ _STARTS.T).argmax(axis=0)] = True
+    epsilon = 0.0
+    while True:
+        equations = _hull(points[inside]).equations
+        nearest = np.argsort(-equations[:, -1], kind="stable")[:_TOGETHER]
+        normals, offsets = equations[nearest, :-1], equations[nearest, -1]
+        heights = normals @ points.T
+        farthest = heights.argmax(axis=1)
+        out = heights[np.arange(len(nearest)), farthest] + offsets > beyond
+        added = farthest[out & ~inside[farthest]]
+        if not out[0] or not len(added):
+            epsilon = -float(offsets[0])
+            break
+        inside[added] = True
+    return epsilon if epsilon > 10.0 * _SHAKE else 0.0
 
 
 def _hull(points: Array) -> ConvexHull:

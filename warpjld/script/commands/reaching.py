@@ -19,10 +19,7 @@ _PARTS = ("PALM", "WRIST", *FINGERS)
 @command(
     "REACH",
     syntax="REACH <key1> <key2> [LEFT/RIGHT] <object>, or AT <x> <y> <z>, then [WITH <PALM/WRIST/THUMB/INDEX/…>]",
-    help=(
-        "The arm of a body brings the palm, the wrist or the pad of a digit to the nearest side of an object, or to a "
-        "point; feet and trunk stay."
-    ),
+    help="An arm brings palm, wrist or a digit's pad to the near side of an object or to a point; the body stays.",
     group="Grasping",
 )
 def reach(scene: Scene, arguments: Arguments) -> None:

@@ -13,6 +13,7 @@ from warpjld.covering import Covering
 from warpjld.covering.kept import bind_kept
 from warpjld.errors import InputError
 from warpjld.grasp import GraspObject, ObjectSet
+from warpjld.grasp.close import Closer
 from warpjld.grasp.finer import FinerSkin
 from warpjld.grasp.palm import Palm, palm_of
 from warpjld.grasp.postures import posture_angles
@@ -22,7 +23,7 @@ from warpjld.skeleton import CHANNELS, Skeleton, poses_from_angles
 from warpjld.study.grasping.choices import HandChoice, ObjectChoice
 from warpjld.study.grasping.plan import Posture
 
-__all__ = ["Hand", "Opened", "Thing", "hand_of", "opened_hand", "thing_of"]
+__all__ = ["Hand", "Opened", "Thing", "closer_of", "hand_of", "opened_hand", "thing_of"]
 
 _SPACING = 1.5e-3  # of the points that stand for skin [m]
 
@@ -143,3 +144,13 @@ def thing_of(choice: ObjectChoice, scale: float, density: float) -> Thing:
         raise InputError(f"object {choice.name}: encloses no volume; give it a mass")
     radius = float(np.linalg.norm(body.vertices - body.centroid, axis=1).max())
     return Thing(ObjectSet(body), mass, radius)
+
+
+@lru_cache(maxsize=32)
+def closer_of(choice: HandChoice, wanted: ObjectChoice, scale: float, density: float) -> Closer:
+    """What closes a hand on an object; kept for the process.
+
+    Raises:
+        InputError: Hand or object cannot be used.
+    """
+    return Closer(hand_of(choice).covering, thing_of(wanted, scale, density).body)

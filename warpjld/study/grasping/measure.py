@@ -7,15 +7,15 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from warpjld.grasp.both_ways import BothWays
 from warpjld.grasp.quality import (
     Patches,
-    contact_patches,
     force_closure,
     gravity_displacement,
     penetration,
     wrench_space,
 )
-from warpjld.grasp.segments import SEGMENTS
+from warpjld.grasp.touching import touching_patches
 from warpjld.skeleton import DIGITS
 from warpjld.study.grasping.load import Hand, Thing
 from warpjld.study.grasping.plan import Measuring
@@ -24,31 +24,20 @@ __all__ = ["measure_grasp"]
 
 
 def measure_grasp(
-    hand: Hand, thing: Thing, vertices: NDArray[np.float32], friction: float, how: Measuring
+    hand: Hand, thing: Thing, both: BothWays, vertices: NDArray[np.float32], friction: float, how: Measuring
 ) -> tuple[dict[str, Any], Patches]:
     """Columns of the table, and the patches of contact; definitions are in `warpjld.grasp.quality`, one a measure.
 
     Args:
         hand: Whose skin.
         thing: What is held.
+        both: The two beside one another.
         vertices: The deformed skin [m], shape (V, 3), in the object's frame.
         friction: Coulomb coefficient.
         how: Settings.
     """
     body, scale = thing.body, how.torque_scale or thing.radius
-    points = hand.finer.points(vertices)
-    found = thing.objects.distances(points, nearest=True, threads=1)
-    assert found.point is not None
-    patches = contact_patches(
-        points,
-        hand.finer.faces,
-        hand.parts,
-        SEGMENTS,
-        found.distance[0],
-        found.point[0],
-        body.normals[found.face[0]],
-        tolerance=how.contact,
-    )
+    patches, deepest = touching_patches(hand.finer, hand.parts, both.near, vertices, how.contact)
     contacts, center = patches.contacts(friction), body.centroid
     closure = force_closure(contacts, center, torque_scale=scale, edges=how.edges)
     space = wrench_space(contacts, center, torque_scale=scale, norm=how.norm, edges=how.edges)
@@ -62,8 +51,8 @@ def measure_grasp(
         tangential_stiffness=how.tangential_stiffness,
         edges=how.edges,
     )
-    inside = penetration(hand.covering, vertices, body)
-    skin_inside = max(inside.skin, -float(found.distance.min()))
+    inside = penetration(both, vertices)
+    skin_inside = max(inside.skin, deepest)
     areas = dict.fromkeys((*DIGITS, "palm"), 0.0)
     for digit, area in zip(patches.digits, patches.areas, strict=True):
         areas[digit if digit in DIGITS else "palm"] += float(area)

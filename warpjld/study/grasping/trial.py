@@ -12,8 +12,9 @@ from scipy.spatial.transform import Rotation
 
 from warpjld.errors import InputError
 from warpjld.grasp.auto import find_grasp
-from warpjld.grasp.close import close_hand
+from warpjld.grasp.close import Closer
 from warpjld.grasp.hand_scale import doubt_of_size, hand_length
+from warpjld.grasp.near_object import NearObject
 from warpjld.grasp.postures import posture_for
 from warpjld.grasp.quality import Patches
 from warpjld.grasp.segments import SEGMENTS
@@ -21,7 +22,7 @@ from warpjld.skeleton import poses_from_angles
 from warpjld.study.experiment import Outcome
 from warpjld.study.grasping.choices import HandChoice, ObjectChoice
 from warpjld.study.grasping.columns import GRASP_COLUMNS
-from warpjld.study.grasping.load import Hand, Thing, hand_of, opened_hand, thing_of
+from warpjld.study.grasping.load import Thing, closer_of, hand_of, opened_hand, thing_of
 from warpjld.study.grasping.measure import measure_grasp
 from warpjld.study.grasping.plan import GraspPlan
 from warpjld.study.grasping.wrist import Approach, draw_approach, place_palm, touch_along
@@ -119,7 +120,11 @@ class GraspExperiment:
         choice, wanted, scale, friction = self.settings.combination(trial)
         hand, thing = hand_of(choice), self._thing(wanted, scale)
         best_of = self.settings.wrist.best_of
-        tried = self._best_of(best_of, hand, thing, friction, rng) if best_of else self._one(choice, thing, rng)
+        tried = (
+            self._best_of(best_of, choice, wanted, scale, friction, rng)
+            if best_of
+            else self._one(choice, wanted, scale, rng)
+        )
         if isinstance(tried, Outcome):
             return tried
         root = {"root_position": tried.position, "root_rotation": tried.rotation}
@@ -128,14 +133,17 @@ class GraspExperiment:
         wrist = poses.positions[0, hand.rig.skeleton.index("wrist")]
         placed = dict(zip(("wrist_x", "wrist_y", "wrist_z"), wrist, strict=True))
         vertices = hand.covering.deform(poses, threads=1)[0]
-        measured, patches = measure_grasp(hand, thing, vertices, friction, self.settings.measuring)
+        both = self._closer(choice, wanted, scale).both
+        measured, patches = measure_grasp(hand, thing, both, vertices, friction, self.settings.measuring)
         kept = {"angles": tried.angles, **root, **_by_segment(patches)}
         arrays = {f"{choice.name}/{name}": array for name, array in kept.items()}
         return Outcome("closed" if tried.touches else "no contact", {**tried.values, **placed, **measured}, arrays)
 
-    def _one(self, choice: HandChoice, thing: Thing, rng: np.random.Generator) -> _Tried | Outcome:
+    def _one(
+        self, choice: HandChoice, wanted: ObjectChoice, scale: float, rng: np.random.Generator
+    ) -> _Tried | Outcome:
         """One placement drawn from the plan's ranges."""
-        hand = hand_of(choice)
+        hand, thing = hand_of(choice), self._thing(wanted, scale)
         approach = draw_approach(self.settings.wrist, rng, thing.body.size)
         values = {**_direction(approach.direction), "gap": approach.gap, "tilt": approach.tilt}
         start = approach.aim + 4.0 * thing.radius * approach.direction
@@ -145,7 +153,7 @@ class GraspExperiment:
         turn, shift = place_palm(hand.palm, approach, start + (approach.gap - way) * approach.direction)
         posture = self.settings.posture
         opened = opened_hand(choice, posture_for(thing.body.size) if posture == "auto" else posture)
-        back = _room(opened.skin, thing, turn, shift, approach)
+        back = _room(opened.skin, self._closer(choice, wanted, scale).both.near, turn, shift, approach)
         if back is None:
             return Outcome("no room", values, message="the open hand does not fit beside the object")
         values["gap"] = approach.gap + back
@@ -155,21 +163,25 @@ class GraspExperiment:
         angles = opened.angles[None]
         poses = poses_from_angles(hand.rig.skeleton, angles, root_position=position[None], root_rotation=rotation[None])
         coupling = self.settings.coupling if any(self.settings.coupling) else None
-        closed = close_hand(
-            hand.covering, poses, angles, thing.objects, digits=self.settings.digits, coupling=coupling, threads=1
-        )
+        closer = self._closer(choice, wanted, scale)
+        closed = closer.close(poses, angles, digits=self.settings.digits, coupling=coupling)
         return _Tried(closed.angles[0], position, rotation, bool(closed.touching().any()), values)
 
     def _best_of(
-        self, count: int, hand: Hand, thing: Thing, friction: float, rng: np.random.Generator
+        self,
+        count: int,
+        choice: HandChoice,
+        wanted: ObjectChoice,
+        scale: float,
+        friction: float,
+        rng: np.random.Generator,
     ) -> _Tried | Outcome:
         """The best of some placements, as the script's GRASP … AUTO takes it."""
         posture = self.settings.posture
         assert isinstance(posture, str)
         try:
             found = find_grasp(
-                hand.covering,
-                thing.body,
+                self._closer(choice, wanted, scale),
                 count=count,
                 posture=None if posture == "auto" else posture,
                 coupling=self.settings.coupling if any(self.settings.coupling) else None,
@@ -191,6 +203,9 @@ class GraspExperiment:
     def _thing(self, choice: ObjectChoice, scale: float) -> Thing:
         return thing_of(choice, scale, self.settings.measuring.density)
 
+    def _closer(self, hand: HandChoice, choice: ObjectChoice, scale: float) -> Closer:
+        return closer_of(hand, choice, scale, self.settings.measuring.density)
+
 
 def _as_in_a_plan(unit: str) -> str:
     return f'unit = "{unit.lower()}"'
@@ -200,11 +215,11 @@ def _direction(away: Array) -> dict[str, Any]:
     return dict(zip(("approach_x", "approach_y", "approach_z"), away, strict=True))
 
 
-def _room(opened: Array, thing: Thing, turn: Array, shift: Array, approach: Approach) -> float | None:
+def _room(opened: Array, near: NearObject, turn: Array, shift: Array, approach: Approach) -> float | None:
     """How far the open hand must be moved back until it is clear of the object [m]; None if too far."""
     skin, back = opened @ turn.T + shift, 0.0
     while back <= _BACKED_OFF:
-        nearest = float(thing.objects.distances(skin + back * approach.direction, threads=1).distance.min())
+        nearest = float(near.least((skin + back * approach.direction)[None])[0])
         if nearest >= _CLEAR:
             return back
         # not nearer than this can it be clear: the object is that deep in the hand

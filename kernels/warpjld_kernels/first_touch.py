@@ -1,0 +1,252 @@
+"""How far chains of joints close until the first of many vertices touches, and open until none is too deep."""
+
+import warp as wp
+
+from warpjld_kernels.closing_chain import Chain, Drives, Posture, Skin, chain_at, mapped_by
+from warpjld_kernels.flexion_search import (
+    CONVERGED,
+    INSIDE,
+    NO_CONTACT,
+    OPENING,
+    top_speed,
+)
+from warpjld_kernels.lanes import VECTORISED
+from warpjld_kernels.signed_grid import SignedGrid, distance_bounds
+from warpjld_kernels.surface_distance import Hit, Solids, nearest
+
+wp.set_module_options({**VECTORISED, "max_unroll": 1})
+
+# steps towards the object, as parts of the chain's reach
+_SHORTEST = wp.constant(64)
+_LONGEST = wp.constant(8)
+_MOST = wp.constant(160)
+_NEVER = wp.constant(1.0e30)
+
+
+@wp.struct
+class Hands:
+    """G hands on an object in its own frame: the skin, their joints, the chains that move, and where each object is
+    (relative to the point that a hand's joints are relative to)."""
+
+    solids: Solids
+    grid: SignedGrid
+    skin: Skin
+    posture: Posture
+    drives: Drives
+    position: wp.array(dtype=wp.vec3)
+    rotation: wp.array(dtype=wp.quat)
+
+
+@wp.struct
+class Touch:
+    """How a vertex came to touch, and at which closing."""
+
+    status: int
+    closing: float
+
+
+@wp.func
+def seen_from_object(hands: Hands, chain: Chain, r: int, v: int) -> wp.vec3:
+    g = hands.drives.frame[r]
+    x = mapped_by(hands.skin, hands.posture, hands.drives, chain, r, v)
+    return wp.quat_rotate_inv(hands.rotation[g], x - hands.position[g])
+
+
+@wp.func
+def march(
+    hands: Hands, r: int, v: int, target: float, tolerance: float, best: float, first: Hit, speed: float
+) -> Touch:
+    """First closing below ``best`` at which |distance − target| < tolerance, from the nearest point at the start.
+
+    Steps no longer than the distance allows bring the vertex to the first change of sign, which is then halved.
+    """
+    touch = Touch()
+    touch.status = NO_CONTACT
+    reach = hands.drives.reach[r]
+    hit = first
+    distance = hit.distance - target
+    low = float(0.0)
+    high = float(0.0)
+    s = float(0.0)
+    halving = bool(False)
+    going = bool(True)
+    count = int(0)
+    while going:
+        if halving:
+            if distance < 0.0:
+                high = s
+            else:
+                low = s
+            s = 0.5 * (low + high)
+            if count > _MOST or high - low < 1.0e-7 or s <= low or s >= high:
+                touch.status = OPENING
+                touch.closing = s
+                going = False
+        elif s >= reach or s + distance / speed > best:
+            going = False
+        else:
+            low = s
+            s = wp.min(s + wp.clamp(distance / speed, reach / float(_SHORTEST), reach / float(_LONGEST)), reach)
+        if low >= best:
+            touch.status = NO_CONTACT
+            going = False
+        if going:
+            local = seen_from_object(hands, chain_at(hands.posture, hands.drives, r, s), r, v)
+            # the last nearest point is on the surface still
+            limit = wp.float64(1.0001 * wp.length(local - hit.point) + 1.0e-6)
+            hit = nearest(hands.solids, 0, wp.vec3d(local), limit)
+            distance = hit.distance - target
+            count += 1
+            if wp.abs(distance) < tolerance:
+                touch.status = CONVERGED
+                touch.closing = s
+                going = False
+            elif distance < 0.0 and not halving:
+                high = s
+                halving = True
+                s = high  # halved above, from the side that is inside
+    return touch
+
+
+@wp.kernel
+def first_touch(
+    hands: Hands,
+    # vertices of each of D digits that may touch
+    vertex: wp.array(dtype=wp.int32),
+    first_of: wp.array(dtype=wp.int32),
+    target: float,
+    tolerance: float,
+    # scratch
+    earliest: wp.array2d(dtype=float),
+    measured: wp.array2d(dtype=wp.int32),
+    # out
+    status_out: wp.array(dtype=wp.int32),
+    closing_out: wp.array(dtype=float),
+):
+    """Least closing of a chain, row r the digit r mod D, at which one of its digit's vertices touches.
+
+    Vertices are taken by the earliest closing that their distance and speed allow; once that is later than a touch
+    already found, none of the rest can come before it.
+    """
+    r = wp.tid()
+    digit = r % (first_of.shape[0] - 1)
+    g = hands.drives.frame[r]
+    first = first_of[digit]
+    count = first_of[digit + 1] - first
+    open_hand = chain_at(hands.posture, hands.drives, r, 0.0)
+    status = int(NO_CONTACT)
+    best = hands.drives.reach[r] * 1.00001  # what comes later does not come
+    winner = int(-1)
+    n = int(0)
+    while n < count:
+        x = mapped_by(hands.skin, hands.posture, hands.drives, open_hand, r, vertex[first + n])
+        local = wp.vec3d(wp.quat_rotate_inv(hands.rotation[g], x - hands.position[g]))
+        two = distance_bounds(hands.solids, hands.grid, local)
+        distance = float(two[0]) - target
+        if distance < tolerance:
+            hit = nearest(hands.solids, 0, local, two[1])
+            distance = hit.distance - target
+            if wp.abs(distance) < tolerance:
+                status = CONVERGED
+                winner = n
+            elif distance < 0.0:
+                status = INSIDE
+                winner = n
+        if winner >= 0:
+            best = 0.0
+            n = count
+        else:
+            earliest[r, n] = distance / top_speed(hands.posture, hands.drives, r, x)
+            measured[r, n] = 0
+            n += 1
+    looking = winner < 0 and hands.drives.reach[r] >= 1.0e-6
+    while looking:
+        at = int(-1)
+        soonest = best
+        for n in range(count):
+            if earliest[r, n] < soonest:
+                soonest = earliest[r, n]
+                at = n
+        if at < 0:
+            looking = False
+        else:
+            v = vertex[first + at]
+            x = mapped_by(hands.skin, hands.posture, hands.drives, open_hand, r, v)
+            local = wp.vec3d(wp.quat_rotate_inv(hands.rotation[g], x - hands.position[g]))
+            two = distance_bounds(hands.solids, hands.grid, local)
+            hit = nearest(hands.solids, 0, local, two[1])
+            speed = top_speed(hands.posture, hands.drives, r, x)
+            if measured[r, at] == 0:  # so far only a bound: it may have to wait for others
+                measured[r, at] = 1
+                earliest[r, at] = (hit.distance - target) / speed
+            else:
+                earliest[r, at] = _NEVER
+                touch = march(hands, r, v, target, tolerance, best, hit, speed)
+                if touch.status != NO_CONTACT and (touch.closing < best or (touch.closing == best and at < winner)):
+                    best = touch.closing
+                    status = touch.status
+                    winner = at
+    status_out[r] = status
+    closing_out[r] = best
+
+
+@wp.kernel
+def distances_at(
+    hands: Hands,
+    # pairs of a chain and a vertex
+    row: wp.array(dtype=wp.int32),
+    vertex: wp.array(dtype=wp.int32),
+    closing: float,
+    # out
+    distance_out: wp.array(dtype=float),
+):
+    """Signed distances of vertices when their chain has closed by so much, or to its stop."""
+    i = wp.tid()
+    chain = chain_at(hands.posture, hands.drives, row[i], closing)
+    local = seen_from_object(hands, chain, row[i], vertex[i])
+    two = distance_bounds(hands.solids, hands.grid, wp.vec3d(local))
+    hit = nearest(hands.solids, 0, wp.vec3d(local), two[1])
+    distance_out[i] = hit.distance
+
+
+@wp.kernel
+def least_opening(
+    hands: Hands,
+    # pairs of a vertex and its least distance, those of a chain one after another
+    vertex: wp.array(dtype=wp.int32),
+    floor: wp.array(dtype=float),
+    first_of: wp.array(dtype=wp.int32),
+    widest: float,
+    cuts: int,
+    pieces: int,
+    # out
+    by_out: wp.array(dtype=float),
+):
+    """Least closing of a chain, cut into pieces over and over, that brings its vertices to their least distances.
+
+    The widest where none does.
+    """
+    r = wp.tid()
+    short = float(0.0)
+    enough = widest
+    for _ in range(cuts):
+        step = (enough - short) / float(pieces)
+        piece = int(1)
+        deep = bool(True)
+        while deep and piece <= pieces:
+            chain = chain_at(hands.posture, hands.drives, r, short + float(piece) * step)
+            deep = bool(False)
+            n = first_of[r]
+            while n < first_of[r + 1] and not deep:
+                local = seen_from_object(hands, chain, r, vertex[n])
+                two = distance_bounds(hands.solids, hands.grid, wp.vec3d(local))
+                if float(two[0]) < floor[n]:
+                    hit = nearest(hands.solids, 0, wp.vec3d(local), two[1])
+                    deep = hit.distance < floor[n]
+                n += 1
+            if deep:
+                piece += 1
+        piece = wp.min(piece, pieces)
+        enough = short + float(piece) * step
+        short = short + float(piece - 1) * step
+    by_out[r] = enough

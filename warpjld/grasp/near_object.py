@@ -1,0 +1,118 @@
+"""Points near one object: exact signed distances where they matter, bounds from a grid everywhere else."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from warpjld.grasp.distance import ObjectSet
+from warpjld.grasp.objects import GraspObject
+
+__all__ = ["NearObject", "NearPoints"]
+
+_STEP = 4e-3  # between the grid's nodes [m]
+_AROUND = 2  # steps that the grid reaches beyond the object
+_MOST = 400_000  # nodes; a larger object has a coarser grid
+
+
+@dataclass(frozen=True, eq=False)
+class NearPoints:
+    """Points within a limit of an object, or in it.
+
+    Attributes:
+        distance: Signed distance [m], +inf where it is surely beyond the limit, shape (n,).
+        face: Nearest triangle, -1 there, shape (n,).
+        point: Nearest points in the object's frame [m], shape (n, 3); only where there is a triangle.
+    """
+
+    distance: NDArray[np.float32]
+    face: NDArray[np.int32]
+    point: NDArray[np.float32]
+
+
+class NearObject:
+    """An object in its own frame, with a grid of signed distances that is filled where it is looked at.
+
+    Args:
+        thing: The object where it stands.
+
+    Attributes:
+        objects: It alone, standing at the origin.
+    """
+
+    def __init__(self, thing: GraspObject) -> None:
+        import warp as wp
+        from warpjld_kernels.signed_grid import UNKNOWN, SignedGrid
+
+        self.thing, self.objects = thing, ObjectSet(thing.placed())
+        low, high = thing.vertices.min(axis=0), thing.vertices.max(axis=0)
+        size = high - low
+        step = max(_STEP, float((np.prod(size + 4.0 * _STEP) / _MOST) ** (1.0 / 3.0)))
+        count = np.ceil(size / step).astype(int) + 2 * _AROUND + 1 if thing.report.solid else np.zeros(3, dtype=int)
+        grid = SignedGrid()
+        # float32 rounds the surface by less than this
+        slack = 1e-6 * float(np.abs(thing.vertices).max())
+        grid.object, grid.step = 0, step
+        grid.lowest, grid.highest = wp.vec3d(*(low - slack)), wp.vec3d(*(high + slack))
+        grid.low, grid.count = wp.vec3d(*(low - _AROUND * step)), wp.vec3i(*count.tolist())
+        grid.values = wp.full(int(count.prod()), float(UNKNOWN), dtype=wp.float64, device="cpu")
+        self.grid: Any = grid
+
+    def least_by_part(
+        self, points: Any, chosen: NDArray[np.int32], part_of: NDArray[np.int32], gaps: NDArray[np.float64]
+    ) -> None:
+        """Bring ``gaps`` (P, parts) down to the smallest signed distances of each part's points to the object [m].
+
+        Args:
+            points: ``wp.array`` of vec3, P or more poses in the object's frame.
+            chosen: Points that are looked at, shape (n,).
+            part_of: Part of each of them, shape (n,).
+            gaps: What is known already, contiguous.
+        """
+        import warp as wp
+        from warpjld_kernels.signed_grid import least_by_part
+
+        scratch = np.empty((len(gaps), len(chosen), 2))
+        nearest = np.full(gaps.shape, -1, dtype=np.int32)
+        arrays = (
+            (chosen, wp.int32),
+            (part_of, wp.int32),
+            (scratch, wp.vec2d),
+            (nearest, wp.int32),
+            (gaps, wp.float64),
+        )
+        inputs = [wp.array(a, dtype=kind, device="cpu", copy=False) for a, kind in arrays]
+        wp.launch(least_by_part, len(gaps), inputs=[self.objects.solids, self.grid, points, *inputs], device="cpu")
+
+    def least(self, skins: NDArray[np.floating]) -> NDArray[np.float64]:
+        """Smallest signed distance of any vertex of skins (P, V, 3) on the stage to the object at its place, (P,)."""
+        import warp as wp
+
+        count = skins.shape[1]
+        local = self.thing.place.to_local(skins.reshape(-1, 3))[0].astype(np.float32)
+        points = wp.array(local.reshape(skins.shape), dtype=wp.vec3, device="cpu", copy=False)
+        gaps = np.full((len(skins), 1), np.inf)
+        self.least_by_part(points, np.arange(count, dtype=np.int32), np.zeros(count, dtype=np.int32), gaps)
+        return gaps[:, 0]
+
+    def near(self, points: NDArray[np.floating], limit: float) -> NearPoints:
+        """Distances of points in the object's frame (n, 3) that may lie within a limit [m], or in the object."""
+        import warp as wp
+        from warpjld_kernels.signed_grid import measure_near
+
+        count = len(points)
+        distance, face = np.empty(count, dtype=np.float32), np.empty(count, dtype=np.int32)
+        point = np.zeros((count, 3), dtype=np.float32)
+        asked = wp.array(np.ascontiguousarray(points, np.float64), dtype=wp.vec3d, device="cpu", copy=False)
+        outs = [
+            wp.array(a, dtype=kind, device="cpu", copy=False)
+            for a, kind in ((distance, float), (face, wp.int32), (point, wp.vec3))
+        ]
+        wp.launch(
+            measure_near, count, inputs=[self.objects.solids, self.grid, asked, limit], outputs=outs, device="cpu"
+        )
+        distance[face < 0] = np.inf
+        return NearPoints(distance, face, point)

@@ -1,0 +1,245 @@
+"""Many poses of one skin at once: how deep points are in each, and which of its parts pass through one another."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from warpjld.covering import Covering
+from warpjld.covering.intersections import Parts, surface_parts
+from warpjld.covering.quality import closing_fans
+from warpjld.grasp.objects import Places
+from warpjld.grasp.triangle_tree import build_tree
+
+__all__ = ["PosedSkins"]
+
+_WIDTH = 8
+_MARGIN = 4e-7  # of the largest coordinate, by which boxes are wider than what they hold
+_MEMORY = 64_000_000  # bytes that the poses of a block may take
+_MOST_PARTS = 64
+
+
+class PosedSkins:
+    """The skin of a covering, ready to be posed.
+
+    Its tree is built once, at rest, and fitted to every pose: skin that is near by at rest stays so. Holes, such as a
+    hand's wrist, are closed by flat fans, and a point is inside that the skin winds round: folds, and pieces that
+    overlap, do not matter.
+
+    Args:
+        covering: The hand or body.
+
+    Attributes:
+        parts: Parts of the skin, see ``surface_parts``.
+        most: Poses that are taken together at most, which bounds memory.
+    """
+
+    def __init__(self, covering: Covering) -> None:
+        surface = covering.surface
+        self.parts: Parts = surface_parts(covering)
+        count = len(surface.vertices)
+        boundary, loop = closing_fans(surface.faces)
+        holes = int(loop.max()) + 1 if len(loop) else 0
+        centres = [surface.vertices[boundary[loop == k, 0]].mean(axis=0) for k in range(holes)]
+        rest = np.concatenate([surface.vertices, np.reshape(centres, (-1, 3))])
+        fans = np.stack([boundary[:, 1], boundary[:, 0], count + loop], axis=1)
+        self._faces = np.concatenate([surface.faces, fans]).astype(np.int32)
+        self._part = np.concatenate([self.parts.of_face, np.full(len(fans), -1)]).astype(np.int32)
+        self._points, self._skin = len(rest), count
+        self._rims = [boundary[loop == k, 0] for k in range(holes)]
+        self._tree = build_tree(rest, self._faces)
+        self._held, self._inside = _contents(self._tree, self._part)
+        self._scale = float(np.ptp(rest, axis=0).max())
+        own = np.flatnonzero(self._part >= 0)
+        order = own[np.argsort(self._part[own], kind="stable")]
+        starts = np.searchsorted(self._part[order], np.arange(len(self.parts.names) + 1))
+        self._by_part = order.astype(np.int32), starts.astype(np.int32)
+        leaves, nodes = len(self._tree.face), len(self._tree.child)
+        self.most = max(1, _MEMORY // (4 * (80 * leaves + 49 * nodes + 3 * len(rest))))
+        self._blocks: dict[int, Any] = {}
+
+    def fitted(self, vertices: NDArray[np.floating], places: Places) -> Any:
+        """``warpjld_kernels.posed_skin.PosedSkins`` of up to ``most`` deformed skins (P, V, 3) in frames (P,)."""
+        import warp as wp
+        from warpjld_kernels.posed_skin import fit_trees
+
+        skins = self._room(len(vertices))
+        stage = wp.array(np.ascontiguousarray(vertices, np.float32), dtype=wp.vec3, device="cpu", copy=False)
+        frames = [
+            wp.array(np.ascontiguousarray(a), dtype=kind, device="cpu", copy=False)
+            for a, kind in ((places.position, wp.vec3d), (places.rotation, wp.quatd))
+        ]
+        wp.launch(fit_trees, len(vertices), inputs=[stage, *frames, skins], device="cpu")
+        return skins
+
+    def least_distances(
+        self,
+        skins: Any,
+        points: Any,
+        part_of_face: NDArray[np.int32],
+        gaps: NDArray[np.float64],
+        *,
+        near: float,
+        limit: float,
+        outside: bool,
+    ) -> None:
+        """Bring ``gaps`` (P, parts) down to the smallest signed distances of points to P fitted skins [m].
+
+        Args:
+            skins: From ``fitted``.
+            points: ``wp.array`` of vec3d in the frames of the skins.
+            part_of_face: Part that each triangle of the surface counts as, shape (T,).
+            gaps: What is known already, contiguous.
+            near: Points farther from a skin's bounding box do not count [m].
+            limit: Nor do distances beyond it [m].
+            outside: Whether points outside count.
+        """
+        import warp as wp
+        from warpjld_kernels.posed_skin import points_in_skins
+
+        owner = np.full(len(self._faces), -1, dtype=np.int32)
+        owner[: len(part_of_face)] = part_of_face
+        wp.launch(
+            points_in_skins,
+            len(gaps),
+            inputs=[
+                skins,
+                points,
+                near,
+                limit,
+                outside,
+                wp.array(owner, dtype=wp.int32, device="cpu", copy=False),
+                wp.array(gaps, dtype=wp.float64, device="cpu", copy=False),
+            ],
+            device="cpu",
+        )
+
+    def distances(
+        self, skins: Any, points: NDArray[np.floating], limit: float
+    ) -> tuple[NDArray[np.float64], NDArray[np.int32]]:
+        """Signed distances of points (n, 3) to the first of fitted skins [m], infinite beyond the limit, shape (n,).
+
+        Returns:
+            Distances, and the nearest triangles: -1 beyond the limit, T and more in the fans that close holes.
+        """
+        import warp as wp
+        from warpjld_kernels.posed_skin import distances_to_skin
+
+        distance, face = np.empty(len(points)), np.empty(len(points), dtype=np.int32)
+        asked = wp.array(np.ascontiguousarray(points, np.float64), dtype=wp.vec3d, device="cpu", copy=False)
+        outs = [
+            wp.array(a, dtype=kind, device="cpu", copy=False) for a, kind in ((distance, wp.float64), (face, wp.int32))
+        ]
+        wp.launch(distances_to_skin, len(points), inputs=[skins, 0, asked, limit], outputs=outs, device="cpu")
+        return distance, face
+
+    def crossings(self, vertices: NDArray[np.floating], part: NDArray[np.int32] | None = None) -> NDArray[np.int64]:
+        """Pairs of triangles of different parts that pass through one another.
+
+        Args:
+            vertices: Deformed skins [m], shape (P, V, 3).
+            part: Part of each whose pairs are counted, shape (P,); all if left out.
+
+        Returns:
+            By both parts, shape (P, parts, parts), symmetric; or of the asked parts with the others, (P, parts).
+        """
+        found = [
+            self._crossings(vertices[k : k + self.most], None if part is None else part[k : k + self.most])
+            for k in range(0, len(vertices), self.most)
+        ]
+        return np.concatenate(found)
+
+    def _crossings(self, vertices: NDArray[np.floating], part: NDArray[np.int32] | None) -> NDArray[np.int64]:
+        import warp as wp
+        from warpjld_kernels.posed_skin import count_crossings
+
+        poses, names = len(vertices), len(self.parts.names)
+        skins = self.fitted(vertices, Places.of(vertices.mean(axis=1, dtype=np.float64)))
+        bits = np.uint64(1) << np.arange(min(names, _MOST_PARTS), dtype=np.uint64)
+        if part is None:
+            pose_of, part_of = (rows.ravel().astype(np.int32) for rows in np.indices((poses, names)))
+            later = np.array([bits[k + 1 :].sum(dtype=np.uint64) for k in range(names)], dtype=np.uint64)
+            others = later[part_of]
+        else:
+            pose_of, part_of = np.arange(poses, dtype=np.int32), np.asarray(part, dtype=np.int32)
+            others = bits.sum(dtype=np.uint64) - bits[part_of]
+        counts = np.zeros((len(pose_of), names), dtype=np.int32)
+        rows = (pose_of, part_of, others, self._by_part[1], self._by_part[0])
+        kinds = (wp.int32, wp.int32, wp.uint64, wp.int32, wp.int32)
+        inputs = [wp.array(a, dtype=k, device="cpu", copy=False) for a, k in zip(rows, kinds, strict=True)]
+        out = wp.array(counts, dtype=wp.int32, device="cpu", copy=False)
+        wp.launch(count_crossings, len(pose_of), inputs=[skins, *inputs, self._scale], outputs=[out], device="cpu")
+        found = counts.astype(np.int64)
+        if part is not None:
+            return found
+        square = found.reshape(poses, names, names)
+        return np.asarray(square + square.transpose(0, 2, 1))
+
+    def _room(self, count: int) -> Any:
+        """Arrays for so many poses; those of a smaller batch are the first of a larger one's."""
+        size = 1 << max(0, count - 1).bit_length()
+        if size not in self._blocks:
+            self._blocks = {size: self._new(size)} if size > max(self._blocks, default=0) else self._blocks
+        return self._blocks[max(self._blocks)]
+
+    def _new(self, poses: int) -> Any:
+        import warp as wp
+        from warpjld_kernels import posed_skin
+        from warpjld_kernels.triangle_tree import Tree
+
+        tree, out, own = Tree(), posed_skin.PosedSkins(), self._tree
+        nodes, leaves = len(own.child), len(own.face)
+        step = np.arange(poses, dtype=np.int64)[:, None]
+        arrays = {
+            "root": (step[:, 0] * nodes, wp.int32),
+            "child": (np.where(own.child < 0, own.child - step * leaves, own.child + step * nodes), wp.int32),
+            "boxes": (np.tile(own.boxes.ravel(), poses), float),
+            "corners": (np.tile(own.corners.ravel(), poses), float),
+            "face": (np.tile(own.face.ravel(), poses), wp.int32),
+        }
+        for name, (values, kind) in arrays.items():
+            setattr(tree, name, _on_cpu(values.ravel(), kind))
+        out.tree, out.nodes, out.leaves, out.margin = tree, nodes, leaves, _MARGIN
+        out.points = wp.zeros((poses, self._points), dtype=wp.vec3, device="cpu")
+        out.faces = _on_cpu(self._faces, wp.vec3i)
+        out.part = _on_cpu(np.where(self._part < _MOST_PARTS, self._part, -1), wp.int32)
+        rims = np.concatenate([*self._rims, np.zeros(0, dtype=np.int64)])
+        out.rim = _on_cpu(rims, wp.int32)
+        out.first_rim = _on_cpu(np.cumsum([0, *map(len, self._rims)]), wp.int32)
+        out.held = _on_cpu(self._held, wp.int32)
+        out.inside = wp.array(self._inside.ravel(), dtype=wp.uint64, device="cpu")
+        return out
+
+
+def _on_cpu(values: NDArray, kind: Any) -> Any:
+    import warp as wp
+
+    plain = np.float32 if kind is float else np.int32
+    return wp.array(np.ascontiguousarray(values, dtype=plain), dtype=kind, device="cpu")
+
+
+def _contents(tree: Any, part: NDArray[np.int32]) -> tuple[NDArray[np.int32], NDArray[np.uint64]]:
+    """Children of every node, shape (n,), and bits of the parts below each of them, shape (n, 8)."""
+    bits = np.where(part < 0, np.uint64(0), np.uint64(1) << (np.clip(part, 0, _MOST_PARTS - 1).astype(np.uint64)))
+    of_leaf = np.bitwise_or.reduce(bits[tree.face], axis=1)
+    held = np.zeros(len(tree.child), dtype=np.int32)
+    inside = np.zeros((len(tree.child), _WIDTH), dtype=np.uint64)
+    first_of_level, end = [0], 0
+    while end < len(tree.child) and tree.child[end] >= 0:  # nodes of a level lie one after another, the top one first
+        end = int(tree.child[end])
+        first_of_level.append(end)
+    ends = [*first_of_level[1:], len(tree.child)]
+    for level in range(len(ends) - 1, -1, -1):
+        for node in range(first_of_level[level], ends[level]):
+            child = int(tree.child[node])
+            if child < 0:
+                first = -1 - child
+                held[node] = min(_WIDTH, len(tree.face) - first)
+                inside[node, : held[node]] = of_leaf[first : first + held[node]]
+            else:
+                held[node] = min(_WIDTH, ends[level + 1] - child)
+                below = inside[child : child + held[node]]
+                inside[node, : held[node]] = np.bitwise_or.reduce(below, axis=1)
+    return held, inside
