@@ -16,7 +16,7 @@ from warpjld.script import Interpreter, Scene
 from warpjld.script.contact import SceneAnimation, run_contact
 from warpjld.simulation.recorded import RecordedActor, RecordedAnimation, RecordedObject
 from warpjld.simulation.simulate import Simulation, simulate
-from warpjld.simulation.specification import ContactSpecification, ObjectMaterial, SolveSpecification
+from warpjld.simulation.specification import ContactSpecification, FleshMaterial, ObjectMaterial, SolveSpecification
 from warpjld.simulation.state_variables import Points, PrescribedPoints
 from warpjld.skeleton import Poses
 
@@ -61,7 +61,15 @@ def test_what_cannot_be_is_refused_by_name(pressed: Simulation) -> None:
         pressed.force("plate")
     with pytest.raises(InputError, match="frame: want one of"):
         pressed.visible_pressure("block", 7.0)
+    with pytest.raises(InputError, match=r"last: want a frame after the first \(3\), got 3"):
+        SolveSpecification(3, 3)
+    with pytest.raises(InputError, match=r"element: want a number above 0, got -1.0"):
+        FleshMaterial(element=-1.0)
+    with pytest.raises(InputError, match=r"digits: want of .* and palm, got \['toe'\]"):
+        FleshMaterial(("toe",))
     nothing = RecordedAnimation()
+    with pytest.raises(InputError, match=r"friction: want coefficients of 0 or more, got -0.5"):
+        simulate(ContactSpecification(everywhere=-0.5, pressing=SolveSpecification(0, 1)), nothing)
     with pytest.raises(InputError, match="specification: want its pressing"):
         simulate(ContactSpecification(), nothing)
     asked = ContactSpecification(physical={"ball": ObjectMaterial()}, pressing=SolveSpecification(0, 1))

@@ -12,6 +12,7 @@ import numpy as np
 
 from warpjld.errors import InputError
 from warpjld.simulation.state_variables import Points, PrescribedPoints
+from warpjld.skeleton import DIGITS
 
 if TYPE_CHECKING:
     from warpjld.fem import Material
@@ -116,6 +117,14 @@ class FleshMaterial:
     itself: bool = True
     where: SourceLocation | None = None
 
+    def __post_init__(self) -> None:
+        for name in ("element", "flesh", "skin"):
+            _want(getattr(self, name) > 0.0, name, "a number above 0", getattr(self, name))
+        _want(0.0 <= self.poisson < 0.5, "poisson", "a ratio from 0 to below 0.5", self.poisson)
+        _want(self.stiffening >= 0.0, "stiffening", "an exponent of 0 or more", self.stiffening)
+        unknown = [digit for digit in self.digits if digit not in (*DIGITS, "palm")]
+        _want(not unknown, "digits", f"of {', '.join(DIGITS)} and palm", unknown)
+
 
 @dataclass(frozen=True)
 class BondStrength:
@@ -195,6 +204,11 @@ class SolveSpecification:
     state: str | None = None
     where: SourceLocation | None = None
 
+    def __post_init__(self) -> None:
+        _want(self.last > self.first, "last", f"a frame after the first ({self.first})", self.last)
+        _want(self.every >= 1, "every", "1 frame or more", self.every)
+        _want(self.method in ("augmented", "paper"), "method", "augmented or paper", self.method)
+
 
 @dataclass(eq=False)
 class ContactSpecification:
@@ -226,6 +240,20 @@ class ContactSpecification:
     grips: list[GripSpecification] = field(default_factory=list)
     pressing: SolveSpecification | None = None
 
+    def check(self) -> None:
+        """Refuse numbers that are none.
+
+        Raises:
+            InputError: Names the field.
+        """
+        for coefficient in (*self.friction.values(), *(() if self.everywhere is None else (self.everywhere,))):
+            _want(0.0 <= coefficient < np.inf, "friction", "coefficients of 0 or more", coefficient)
+        _want(
+            len(self.gravity) == 3 and bool(np.isfinite(self.gravity).all()), "gravity", "three numbers", self.gravity
+        )
+        for limits in self.strength.values():
+            _want(all(force > 0.0 for force in limits.values()), "strength", "forces above 0 N", limits)
+
     @property
     def pull(self) -> tuple[float, float, float]:
         """Acceleration [m/s²]: as asked, and that of the earth, downwards, where something is lifted without a word."""
@@ -248,6 +276,16 @@ class ContactSpecification:
             if name_pair(bonded.one, bonded.other) == name_pair(one, other):
                 return bonded
         return None
+
+
+def _want(holds: bool, name: str, what: str, got: object) -> None:
+    """Raise where an argument is none.
+
+    Raises:
+        InputError: Names it.
+    """
+    if not holds:
+        raise InputError(f"{name}: want {what}, got {got}")
 
 
 def name_pair(one: str, other: str) -> tuple[str, str]:

@@ -39,6 +39,7 @@ def check_specification(animation: Animation, contact: ContactSpecification, req
     Raises:
         InputError: Names the command's line.
     """
+    contact.check()
     for kind, names, known in (
         ("actor", contact.flesh, animation.actors),
         ("object", contact.physical, animation.objects),
