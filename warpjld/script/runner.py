@@ -18,6 +18,7 @@ from warpjld.errors import InputError, WarpjldError
 from warpjld.io.motion_out import check_motion_out
 from warpjld.names import folded
 from warpjld.overwriting import check_outputs
+from warpjld.press.where import placed
 from warpjld.script.crowd import Crowd, role_of
 from warpjld.script.destinations import check_destinations
 from warpjld.script.failures import Failures, Writer
@@ -136,6 +137,9 @@ def run_scene(
         for role in crowd.roles:
             scene.warned(f"{role.actor.name}: {line}" for line in (role.contact.told() if role.contact else ()))
         if failures.found and not out.made():
+            if len(failures.found) == 1:
+                (name,) = failures.found
+                raise placed(InputError(failures.lines()[0]), scene.asked.get(name))
             raise WarpjldError("; ".join(failures.lines()))
         summary.failed = failures.found
         content = summary.write(out)
@@ -265,7 +269,6 @@ def _take(studio: FilmStudio | PressureStudio, frame: int, vertices: NDArray[np.
 def _check_lengths(scene: Scene, outputs: Sequence[Output], frames: int) -> None:
     """Refuse clips and rates that a format does not take."""
     from warpjld.io.caches import open_cache
-    from warpjld.press.where import placed
 
     for output in outputs:
         try:
