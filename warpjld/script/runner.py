@@ -33,6 +33,7 @@ from warpjld.script.props import Prop, prop_places, prop_surface
 from warpjld.script.scene import Scene
 from warpjld.script.staging import frame_numbers, held, notes, stage
 from warpjld.script.summary import Summary
+from warpjld.simulation.specification import located
 
 if TYPE_CHECKING:
     from warpjld.io.caches import Cache
@@ -134,6 +135,9 @@ def run_scene(
         for role in crowd.roles:
             scene.warned(f"{role.actor.name}: {line}" for line in (role.contact.told() if role.contact else ()))
         if failures.found and not out.made():
+            if len(failures.found) == 1:
+                (name,) = failures.found
+                raise located(InputError(failures.lines()[0]), scene.asked.get(name))
             raise WarpjldError("; ".join(failures.lines()))
         summary.failed = failures.found
         content = summary.write(out)
@@ -263,7 +267,6 @@ def _take(studio: FilmStudio | PressureStudio, frame: int, vertices: NDArray[np.
 def _check_lengths(scene: Scene, outputs: Sequence[Output], frames: int) -> None:
     """Refuse clips and rates that a format does not take."""
     from warpjld.io.caches import open_cache
-    from warpjld.simulation.specification import located
 
     for output in outputs:
         try:

@@ -106,3 +106,14 @@ def test_missing_extra_is_named(surface: Surface, tmp_path: Path, monkeypatch: p
     ):
         pass
     assert list(tmp_path.iterdir()) == []
+
+
+def test_a_full_disk_ends_no_process(surface: Surface, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("shutil.disk_usage", lambda place: type("Usage", (), {"free": 1 << 20}))
+    frames = np.zeros((1, len(surface.vertices), 3), np.float32)
+    with (
+        pytest.raises(InputError, match="No space left on device"),
+        open_cache(tmp_path / "a.abc", surface, frames=1, rate=25) as cache,
+    ):
+        cache.write(frames)
+    assert not list(tmp_path.iterdir())

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import gc
+import subprocess
+import sys
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
@@ -125,3 +127,39 @@ def test_names_a_place_that_cannot_be_written(surface: Surface, tmp_path: Path) 
 def test_needs_its_with_statement(surface: Surface, clip: np.ndarray, tmp_path: Path) -> None:
     with pytest.raises(WarpjldError, match="with statement"):
         open_cache(tmp_path / "a.npz", surface, frames=7, rate=25).write(clip)
+
+
+_FULL = """
+import resource, signal, sys
+from pathlib import Path
+import numpy as np
+from tests.finger import finger
+from warpjld.errors import InputError
+from warpjld.io.caches import open_cache
+
+signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
+surface = finger().surface
+clip = np.random.default_rng(0).normal(size=(250, len(surface.vertices), 3)).astype(np.float32)
+path = Path(sys.argv[1])
+resource.setrlimit(resource.RLIMIT_FSIZE, (20_000, resource.RLIM_INFINITY))
+try:
+    with open_cache(path, surface, frames=len(clip), rate=24) as cache:
+        cache.write(clip)
+except InputError as error:
+    print(error)
+"""
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="sizes of files are limited as Linux does it")
+@pytest.mark.parametrize("suffix", ["npz", "usdc", "usda", "pc2", "mdd", "obj", "glb"])
+def test_a_full_disk_is_one_line_and_the_old_file_stays(tmp_path: Path, suffix: str) -> None:
+    if suffix.startswith("usd"):
+        pytest.importorskip("pxr")
+    path = tmp_path / f"a.{suffix}"
+    path.write_bytes(b"the old one")
+    done = subprocess.run([sys.executable, "-c", _FULL, str(path)], capture_output=True, text=True)
+    assert (done.returncode, done.stderr) == (0, "")
+    assert len(done.stdout.splitlines()) == 1
+    assert "cannot write" in done.stdout
+    assert [file.name for file in tmp_path.iterdir()] == [path.name]
+    assert path.read_bytes() == b"the old one"

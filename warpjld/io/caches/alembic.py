@@ -7,6 +7,9 @@ corners, and the texture coordinates with them, are in the reverse order. Frame 
 from __future__ import annotations
 
 import contextlib
+import errno
+import os
+import shutil
 from collections.abc import Iterator
 from typing import Any
 
@@ -17,6 +20,8 @@ from warpjld.errors import MissingExtraError
 from warpjld.io.caches.cache import Cache
 
 __all__ = ["AlembicCache"]
+
+_ROOM = 16 << 20  # bytes that stay free: others write, too, and the archive's directory comes last
 
 
 def _alembic() -> tuple[Any, Any, Any]:
@@ -60,6 +65,7 @@ class AlembicCache(Cache):
         import imath
         from alembic3d import AbcGeom
 
+        self._check_room(vertices.nbytes)
         sample = AbcGeom.OPolyMeshSchemaSample()
         kept = [_array(imath.V3fArray, vertices)]  # samples refer to arrays, they do not hold them
         sample.setPositions(kept[0])
@@ -77,7 +83,13 @@ class AlembicCache(Cache):
         with _refusals():
             self._mesh.getSchema().set(sample)
 
+    def _check_room(self, size: int) -> None:
+        """Make sure that a frame finds room: Alembic's library ends the whole process where the disk is full."""
+        if shutil.disk_usage(self.path.parent).free < _ROOM + 4 * size:
+            raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+
     def _finish(self) -> None:
+        self._check_room(0)
         self._close()
 
     def _close(self) -> None:

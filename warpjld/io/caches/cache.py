@@ -144,7 +144,8 @@ class Cache(ABC):
         return self._parts[place]
 
     def _discard(self) -> None:
-        self._close()
+        with contextlib.suppress(OSError, RuntimeError, ValueError):  # closing writes, and the disk may be full
+            self._close()
         _remove(self._parts)
         self._parts.clear()
 

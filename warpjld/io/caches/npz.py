@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import zipfile
 from typing import IO
 
@@ -59,7 +60,15 @@ class NpzCache(Cache):
 
     def _close(self) -> None:
         member, archive, self._member, self._archive = self._member, self._archive, None, None
-        if member is not None:
-            member.close()
-        if archive is not None:
-            archive.close()
+        try:
+            if member is not None:
+                member.close()
+            if archive is not None:
+                archive.close()
+        except OSError:  # the disk is full: it would be closed again, and complain again, when it is forgotten
+            if archive is not None:
+                file, archive.fp = archive.fp, None
+                if file is not None:
+                    with contextlib.suppress(OSError):
+                        file.close()
+            raise

@@ -52,7 +52,13 @@ class UsdCache(Cache):
         self._close()
 
     def _save(self) -> None:
-        if not self._stage.GetRootLayer().Save():
+        from pxr import Tf
+
+        try:
+            saved = self._stage.GetRootLayer().Save()
+        except Tf.ErrorException as error:  # a full disk, for one
+            raise OSError("USD could not save the layer: is the disk full?") from error
+        if not saved:
             raise OSError("USD could not save the layer")
         self._pending = 0
 
@@ -117,7 +123,11 @@ def _create(file: Path) -> Any:
     try:
         return Usd.Stage.CreateNew(str(file))
     except Tf.ErrorException as error:
-        raise OSError(str(error).strip().splitlines()[-1]) from error
+        raise OSError(_last_line(error)) from error
+
+
+def _last_line(error: Exception) -> str:
+    return (str(error).strip().splitlines() or ["it does not say why"])[-1].strip()
 
 
 def extent_of(vertices: NDArray[np.float32]) -> Any:
