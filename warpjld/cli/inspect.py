@@ -178,9 +178,12 @@ def _print(report: dict[str, Any], quiet: bool) -> None:
             click.echo(f"note: {note}")
     for finding in report["placing"]:
         click.echo(f"suspicious: {finding['message']}")
-    for centre in report["off centre"]:
-        click.echo(f"off centre: {centre['message']}; --centre-joints moves it there")
     if not quiet:
+        if off := report["off centre"]:
+            click.echo(
+                f"note: {len(off)} joints lie nearer to one side than the middle of their flesh, as knuckles do, "
+                f"{off[0]['joint']} among them; --centre-joints moves them there"
+            )
         if not report["placing"]:
             click.echo("placing: nothing suspicious")
         if "picture" in report:
