@@ -181,8 +181,8 @@ def _print(report: dict[str, Any], quiet: bool) -> None:
     if not quiet:
         if off := report["off centre"]:
             click.echo(
-                f"note: {len(off)} joints lie nearer to one side than the middle of their flesh, as knuckles do, "
-                f"{off[0]['joint']} among them; --centre-joints moves them there"
+                f"note: {off[0]['message']}, as knuckles may"
+                f"{f', and {len(off) - 1} more' if len(off) > 1 else ''}; --centre-joints moves them there"
             )
         if not report["placing"]:
             click.echo("placing: nothing suspicious")
