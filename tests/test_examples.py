@@ -204,3 +204,7 @@ def test_forces_depend_little_on_the_size_of_elements() -> None:
     assert (np.diff(rows[:, 1]) < 0.0).all()
     forces = rows[:, 5]
     assert np.abs(forces / forces[0] - 1.0).max() < 0.15
+
+
+def test_points_are_placed(tmp_path) -> None:
+    assert runpy.run_path(str(EXAMPLES / "place_points.py"))["main"](tmp_path) < 8.0

@@ -102,3 +102,16 @@ def test_wrong_points_are_named(files, tmp_path, change, said):
 def test_points_and_a_skeleton_are_one_too_many(files):
     with pytest.raises(InputError, match="not both"):
         load_rig(files[0], points=files[1], skeleton=files[1])
+
+
+def test_a_flexion_axis_along_its_own_segment_is_refused(files, tmp_path):
+    joints = [
+        {"name": name, "parent": ACTOR_PARENTS[name], "position": list(map(float, place))}
+        for name, place in files[2].items()
+    ]
+    knee = next(joint for joint in joints if joint["name"] == "left.knee")
+    knee["axis"] = list(map(float, files[2]["left.ankle"] - files[2]["left.knee"]))
+    path = tmp_path / "skeleton.json"
+    path.write_text(json.dumps({"joints": joints}))
+    with pytest.raises(InputError, match=r"'left.knee': its flexion axis lies along its own segment"):
+        load_rig(files[0], skeleton=path)

@@ -50,6 +50,11 @@ def test_rigs_come_from_files(data) -> None:
         ("BODY body.glb", "1:6", "expected a rig file in quotes, found body.glb"),
         ("ACTOR lft", "1:1", "there is no actor lft; did you mean LEFT?"),
         ("AXIS index.base 0 0 0", "1:21", "an axis cannot be 0 0 0"),
+        (
+            "AXIS index.knuckle2 0.08 -0.22 -0.97",
+            "1:32",
+            "left.index.knuckle2 cannot bend about its own segment",
+        ),
         ("LIMIT index.base FLEXION 50 40", "1:29", "must not be below the smallest (50)"),
         ("PARAMETER index.base PROXIMITY 0.9 0.9", "1:22", "sum to 1.2; at most 1 (C21)"),
         ("PARAMETER index.base PROXIMITY 0.9", "1:35", "expected value 2 of 2 for PROXIMITY"),

@@ -178,9 +178,12 @@ def _print(report: dict[str, Any], quiet: bool) -> None:
             click.echo(f"note: {note}")
     for finding in report["placing"]:
         click.echo(f"suspicious: {finding['message']}")
-    for centre in report["off centre"]:
-        click.echo(f"off centre: {centre['message']}; --centre-joints moves it there")
     if not quiet:
+        if off := report["off centre"]:
+            click.echo(
+                f"note: {off[0]['message']}, as knuckles may"
+                f"{f', and {len(off) - 1} more' if len(off) > 1 else ''}; --centre-joints moves them there"
+            )
         if not report["placing"]:
             click.echo("placing: nothing suspicious")
         if "picture" in report:

@@ -12,11 +12,15 @@ from warpjld.errors import InputError
 from warpjld.rotations import unit
 from warpjld.suggest import did_you_mean
 
-__all__ = ["CHANNELS", "Segment", "Skeleton"]
+__all__ = ["ALONG", "CHANNELS", "Segment", "Skeleton"]
 
 CHANNELS = ("flexion", "pivot", "twisting", "abduction")
 """Angles of a joint, in the order of their last array axis. Abduction is this project's addition: the paper's
 pivot turns the flexion axis about the segment (R27) and so moves nothing while the joint is straight."""
+
+
+ALONG = 0.1
+"""Sine of the angle to a joint's own segment below which an axis only twists it: no flexion axis (R20)."""
 
 
 @dataclass(frozen=True)

@@ -39,7 +39,7 @@ def test_a_finger_in_the_middle_passes(tube):
     ("joint", "place", "kind", "name"),
     [
         (1, [0.0, 0.02, 0.03], "outside", "left.index.knuckle2"),
-        (1, [0.0, 0.006, 0.03], "off-centre", "left.index.knuckle2"),
+        (1, [0.0, -0.006, 0.03], "off-centre", "left.index.knuckle2"),
         (2, [0.0, 0.0, 0.03], "coincident", "left.index.knuckle3"),
         (3, [0.0, 0.0, 0.0865], "extremity", "left.index.tip"),
         (3, [0.0, 0.0, 0.06], "extremity", "left.index.tip"),

@@ -14,6 +14,7 @@ from warpjld.script.keys import SIDES, read_joint
 from warpjld.script.registry import command
 from warpjld.script.scene import Scene
 from warpjld.skeleton import CHANNELS
+from warpjld.skeleton.tree import ALONG
 
 if TYPE_CHECKING:
     from warpjld.rig import Rig
@@ -147,6 +148,13 @@ def axis(scene: Scene, arguments: Arguments) -> None:
     vector = np.array(arguments.vector("the axis"))
     if np.linalg.norm(vector) < 1e-9:
         raise arguments.error("an axis cannot be 0 0 0")
+    direction = chosen.skeleton.directions[joint]
+    if np.linalg.norm(np.cross(direction, vector)) < ALONG * np.linalg.norm(vector):
+        x, y, z = direction
+        raise arguments.error(
+            f"{chosen.skeleton.names[joint]} cannot bend about its own segment, which lies along "
+            f"{x:.2f} {y:.2f} {z:.2f}: the axis wants to be across it"
+        )
     axes = chosen.skeleton.axes.copy()
     axes[joint] = vector
     chosen.skeleton = chosen.skeleton.with_axes(axes)

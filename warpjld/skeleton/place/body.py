@@ -32,6 +32,7 @@ _HIP = 0.055  # of the height: the hip joint above where the legs part
 _ANKLE = 0.043
 _KNEE = 0.5  # from ankle to hip
 _SPINE = (0.14, 0.28, 0.45, 0.72)  # vertebrae from pelvis to the lowest of the neck
+_SPINE_DEPTH, _SKULL_DEPTH = 0.42, 0.3  # of the flesh from the back; the mouth lies before the skull's base
 _NECK = (0.80, 0.92)  # where the narrowest place of the neck is looked for
 _ELBOW = 0.48  # from wrist to shoulder
 _SHOULDER = 0.1  # head of the humerus from the midline
@@ -169,7 +170,8 @@ def _trunk(solid: Solid, points: Points) -> None:
     spine |= {f"vertebra{k}": pelvis[1] + s * (lowest - pelvis[1]) for k, s in enumerate(_SPINE, start=1)}
     for name, height in spine.items():
         back, front = _depths(solid, height)
-        points[name] = np.array([0.0, height, back + 0.42 * (front - back)])
+        share = _SKULL_DEPTH if name == "skull_base" else _SPINE_DEPTH
+        points[name] = np.array([0.0, height, back + share * (front - back)])
     height = lowest - 0.035
     back, front = _depths(solid, height)
     points["sternum"] = np.array([0.0, height, back + 0.75 * (front - back)])

@@ -25,7 +25,7 @@ from warpjld.skeleton.recognise.painted import Painted, let_flesh_lead
 from warpjld.skeleton.recognise.recognise import recognise
 from warpjld.skeleton.recognise.roles import HandRoles, Roles
 from warpjld.skeleton.recognise.tree import SourceTree
-from warpjld.skeleton.tree import CHANNELS, Skeleton
+from warpjld.skeleton.tree import ALONG, CHANNELS, Skeleton
 
 __all__ = ["Canonical", "canonical_skeleton"]
 
@@ -220,6 +220,8 @@ def _skeleton(
         source = layout.sources[j]
         if source in given_axes:
             axes[j] = unit(given_axes[source])
+            if blank.children[j] and np.linalg.norm(np.cross(axes[j], blank.directions[j])) < ALONG:
+                raise InputError(f"joint '{name}': its flexion axis lies along its own segment")
         else:
             axes[j] = perpendicular(found.get(name, _bend(blank, j)), blank.directions[j])
         for channel, pair in given_limits.get(source, {}).items():

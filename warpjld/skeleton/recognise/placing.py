@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from warpjld.coincident import close_pairs, connected_parts
+from warpjld.skeleton.hand import DIGITS
+from warpjld.skeleton.recognise.complete_body import find_extremities
+from warpjld.skeleton.recognise.expected import body_expectations, finger_expectations
 from warpjld.skeleton.recognise.section import first_hits
 from warpjld.skeleton.tree import Skeleton
 from warpjld.winding import winding_numbers
@@ -19,7 +23,18 @@ _NARROW = 1.6  # a section wider than this times its depth is judged by its dept
 _PAD = (0.4, 2.5)  # flesh beyond an extremity per half thickness there: 1 in the centre of a round end
 _SAMPLES = 5
 # trunk joints follow the spine, which lies at the back: off-centre is where they belong
+_DIGIT = (0.06, 0.66)
+"""Share of the flesh, from the back, at which joints of digits lie: their bones run under the back's skin, the pad lies
+below. Toes of others lie at .08, knuckles at .2 to .5."""
+_CROWN = 0.02  # of the height: about half a head's radius
+_SPINE_AT = 0.3
+_SPINE = (0.07, 0.56)
+"""Likewise joints of the spine in the trunk: of others .15 to .46."""
+
 _WORDS = {
+    "proportion": "is misplaced along its limb",
+    "asymmetric": "is not where the other side's joint is",
+    "midline": "is off the midline",
     "outside": "lies outside the surface",
     "off-centre": "is off-centre",
     "coincident": "shares its place with another joint",
@@ -35,20 +50,28 @@ class Finding:
 
     Attributes:
         joint: The joint, or the far end of the segment.
-        kind: ``outside``, ``off-centre``, ``coincident``, ``leaves`` or ``extremity``.
+        kind: ``outside``, ``off-centre``, ``coincident``, ``leaves``, ``extremity``, ``proportion``, ``asymmetric`` or
+            ``midline``.
         amount: How far: a distance [m] for ``coincident``, else a ratio.
         detail: What was measured, for people; may be empty.
+        proposal: Displacement that puts it where it is expected [mm], or None where nothing tells.
     """
 
     joint: str
     kind: str
     amount: float
     detail: str = ""
+    proposal: tuple[float, float, float] | None = None
 
     @property
     def message(self) -> str:
         """One line for people."""
-        return f"{self.joint} {_WORDS[self.kind]}" + (f": {self.detail}" if self.detail else "")
+        said = f"{self.joint} {_WORDS[self.kind]}" + (f": {self.detail}" if self.detail else "")
+        if self.proposal is None:
+            return said
+        x, y, z = self.proposal
+        length = float(np.linalg.norm(self.proposal))
+        return f"{said}; proposed: move it {length:.1f} mm, by ({x:+.1f}, {y:+.1f}, {z:+.1f}) mm"
 
 
 def check_placing(skeleton: Skeleton, vertices: NDArray[np.float64], faces: NDArray[np.int32]) -> tuple[Finding, ...]:
@@ -62,10 +85,133 @@ def check_placing(skeleton: Skeleton, vertices: NDArray[np.float64], faces: NDAr
     findings = _coincident(skeleton, vertices)
     ends = _open_ends(vertices, faces)
     inside = _inside(vertices, faces, skeleton.rest, ends)
-    findings += [Finding(skeleton.names[j], "outside", 1.0) for j in np.flatnonzero(~inside)]
+    for j in np.flatnonzero(~inside):
+        back = _millimetres(_way_back(skeleton, vertices[np.unique(faces)], int(j)))
+        findings.append(Finding(skeleton.names[j], "outside", 1.0, "", back))
     findings += _leaving(skeleton, vertices, faces, inside, ends)
     findings += _sections(skeleton, vertices, faces, inside)
-    return tuple(findings)
+    findings += _spine(skeleton, vertices, faces, inside)
+    findings += _expected(skeleton, vertices, faces)
+    findings += _crown(skeleton, vertices, faces)
+    return tuple(_one_a_joint(findings))
+
+
+def _one_a_joint(findings: list[Finding]) -> list[Finding]:
+    """Of what is found at one joint, the first that says where it belongs, at the place of the first of all."""
+    best: dict[str, Finding] = {}
+    for one in findings:
+        had = best.get(one.joint)
+        if had is None:
+            best[one.joint] = one
+        elif had.proposal is None and one.proposal is not None and had.kind != "coincident":
+            detail = ", ".join(part for part in (had.detail, one.detail) if part)
+            best[one.joint] = replace(had, proposal=one.proposal, detail=detail)
+    return list(best.values())
+
+
+def _way_back(skeleton: Skeleton, vertices: NDArray[np.float64], joint: int) -> NDArray[np.float64]:
+    """From outside the surface back into it: in the spine between its neighbours, else past the nearest skin."""
+    place = skeleton.rest[joint]
+    above, below = int(skeleton.parents[joint]), skeleton.children[joint]
+    if skeleton.names[joint].startswith(("spine", "neck")) and above >= 0 and below:
+        low = skeleton.rest[above]
+        way = skeleton.rest[below[0]] - low
+        share = float(np.clip((place - low) @ way / max(float(way @ way), 1e-30), 0.25, 0.75))
+        return np.asarray(low + share * way - place)
+    nearest = vertices[int(((vertices - place) ** 2).sum(axis=1).argmin())]
+    inwards = nearest - place
+    length = float(np.linalg.norm(inwards))
+    return np.asarray(inwards * (1.0 + 0.01 / max(length, 0.01)))
+
+
+def _crown(skeleton: Skeleton, vertices: NDArray[np.float64], faces: NDArray[np.int32]) -> list[Finding]:
+    """The head's extremity away from the centre of the head's round top."""
+    joints = dict(zip(skeleton.names, skeleton.rest, strict=True))
+    up, _ = body_frame(joints)
+    if up is None or "head.top" not in joints:
+        return []
+    parents = {
+        name: skeleton.names[parent] if parent >= 0 else None
+        for name, parent in zip(skeleton.names, skeleton.parents, strict=True)
+        if name != "head.top"
+    }
+    kept = {"head", "neck1", "spine1", "pelvis"} & set(joints)
+    found = find_extremities({n: joints[n] for n in kept}, {n: parents[n] for n in kept}, vertices, faces)
+    if "head.top" not in found:
+        return []
+    offset = found["head.top"][1] - joints["head.top"]
+    off, height = float(np.linalg.norm(offset)), float(np.ptp(vertices[np.unique(faces)] @ up))
+    if off <= _CROWN * height:
+        return []
+    detail = f"{1e3 * off:.0f} mm from the centre of the head's round top"
+    return [Finding("head.top", "extremity", off, detail, _millimetres(offset))]
+
+
+def _millimetres(offset: NDArray[np.float64]) -> tuple[float, float, float]:
+    x, y, z = (round(1e3 * float(part), 2) for part in offset)
+    return x, y, z
+
+
+def _expected(skeleton: Skeleton, vertices: NDArray[np.float64], faces: NDArray[np.int32]) -> list[Finding]:
+    """Joints that like joints of the same body put elsewhere."""
+    joints = dict(zip(skeleton.names, skeleton.rest, strict=True))
+    found = finger_expectations(joints)
+    up, _ = body_frame(joints)
+    if up is not None:
+        high = vertices[np.unique(faces)] @ up
+
+        def uneven(place: NDArray[np.float64]) -> float:
+            rays = np.concatenate([np.eye(3), -np.eye(3)])
+            reach = first_hits(vertices, faces, np.repeat(place[None], 6, axis=0), rays)
+            a, b = reach[:3], reach[3:]
+            known = np.isfinite(a) & np.isfinite(b)
+            return float(np.mean(np.where(known, np.abs(a - b) / np.where(known, a + b, 1.0), 1.0)))
+
+        found += body_expectations(joints, up, float(np.ptp(high)), float(high.min()), uneven)
+    return [
+        Finding(one.joint, one.kind, one.amount, one.detail, _millimetres(one.place - joints[one.joint]))
+        for one in found
+    ]
+
+
+def body_frame(
+    joints: Mapping[str, NDArray[np.float64]],
+) -> tuple[NDArray[np.float64] | None, NDArray[np.float64] | None]:
+    """Up and forward of an upright body, each along the axis it is nearest to; None where its joints do not tell.
+
+    The axes, not the joints: one of these may be the misplaced one.
+    """
+    if not {"pelvis", "head", "left.hip", "right.hip"} <= set(joints):
+        return None, None
+    along = joints["head"] - joints["pelvis"]
+    k = int(np.abs(along).argmax())
+    up = np.sign(along[k]) * np.eye(3)[k]
+    across = np.cross(joints["left.hip"] - joints["right.hip"], up)
+    across[k] = 0.0
+    j = int(np.abs(across).argmax())
+    return up, np.sign(across[j]) * np.eye(3)[j]
+
+
+def _spine(
+    skeleton: Skeleton, vertices: NDArray[np.float64], faces: NDArray[np.int32], inside: NDArray[np.bool_]
+) -> list[Finding]:
+    """Joints of the spine too near to belly or back."""
+    joints = dict(zip(skeleton.names, skeleton.rest, strict=True))
+    _, forward = body_frame(joints)
+    names = [n for j, n in enumerate(skeleton.names) if n.startswith("spine") and inside[j]]
+    if forward is None or not names:
+        return []
+    origins = np.repeat([joints[n] for n in names], 2, axis=0)
+    rays = np.tile([-forward, forward], (len(names), 1))
+    reach = first_hits(vertices, faces, origins, rays).reshape(-1, 2)
+    out = []
+    for name, (back, front) in zip(names, reach, strict=True):
+        whole = back + front
+        if np.isfinite(whole) and not _SPINE[0] <= back / whole <= _SPINE[1]:
+            detail = f"{1e3 * back:.0f} mm of flesh at the back, {1e3 * front:.0f} at the front"
+            offset = (_SPINE_AT * whole - back) * forward
+            out.append(Finding(name, "off-centre", float(back / whole), detail, _millimetres(offset)))
+    return out
 
 
 def _coincident(skeleton: Skeleton, vertices: NDArray[np.float64]) -> list[Finding]:
@@ -151,23 +297,45 @@ def _sections(
     origins = np.repeat(skeleton.rest[joints], 5, axis=0)
     reach = first_hits(vertices, faces, origins, rays.reshape(-1, 3)).reshape(-1, 5)
     out = []
-    for j, (up, down, left, right, ahead) in zip(joints, reach, strict=True):
+    for k, (j, (up, down, left, right, ahead)) in enumerate(zip(joints, reach, strict=True)):
         name = skeleton.names[j]
+        digit = _in_digit(name)
+        if digit:
+            out += _digit(name, bone[k], axis[k], up, down)
         ratios = []
         for a, b, side in ((up, down, ("back", "front")), (left, right, ("one side", "other side"))):
             if np.isfinite(a) and np.isfinite(b) and a + b <= _NARROW * min(up + down, left + right):
                 ratios.append((abs(a - b) / (a + b), a, b, side))
-        if ratios and (worst := max(ratios))[0] > _OFF_CENTRE:
+        if not digit and ratios and (worst := max(ratios))[0] > _OFF_CENTRE:
             amount, a, b, (first, second) = worst
             detail = f"{1e3 * a:.1f} mm of flesh at the {first}, {1e3 * b:.1f} at the {second}"
-            out.append(Finding(name, "off-centre", float(amount), detail))
+            side = normal[k] if first == "back" else axis[k]
+            out.append(Finding(name, "off-centre", float(amount), detail, _millimetres((a - b) / 2 * side)))
         half = min(up + down, left + right) / 2
         if not skeleton.children[j] and np.isfinite([ahead, half]).all():
             pad = ahead / half
             if not _PAD[0] <= pad <= _PAD[1]:
                 detail = f"{1e3 * ahead:.1f} mm of flesh beyond, {1e3 * half:.1f} around"
-                out.append(Finding(name, "extremity", float(pad), detail))
+                offset = (ahead - half) * bone[k]
+                out.append(Finding(name, "extremity", float(pad), detail, _millimetres(offset)))
     return out
+
+
+def _in_digit(name: str) -> bool:
+    digit = name.removeprefix("left.").removeprefix("right.").partition(".")[0]
+    return digit in DIGITS or digit.startswith("toe")
+
+
+def _digit(name: str, bone: NDArray[np.float64], axis: NDArray[np.float64], back: float, front: float) -> list[Finding]:
+    """A digit's joint too near to its back or its pad; at its base, where neighbours are grown together, likewise."""
+    whole = back + front
+    if not np.isfinite(whole) or name.endswith(("carpometacarpal", "thumb.base")):
+        return []
+    if _DIGIT[0] <= back / whole <= _DIGIT[1]:
+        return []
+    detail = f"{1e3 * back:.1f} mm of flesh at the back, {1e3 * front:.1f} at the front"
+    offset = (back - 0.4 * whole) * np.cross(bone, axis)
+    return [Finding(name, "off-centre", float(back / whole), detail, _millimetres(offset))]
 
 
 def in_trunk(name: str) -> bool:

@@ -1,0 +1,35 @@
+"""The 25 points of a hand, proposed in its bare surface, and the hand animated by them (B §2.1, R12).
+
+python examples/place_points.py out
+"""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+
+import numpy as np
+import trimesh
+
+from warpjld.hand import build_hand
+from warpjld.io import load_rig
+from warpjld.io.points_file import write_points_file
+from warpjld.skeleton.place.place import propose_points
+
+
+def main(folder: Path) -> float:
+    """Mean distance [mm] of what is proposed from where the joints are."""
+    folder.mkdir(parents=True, exist_ok=True)
+    hand = build_hand("left", resolution=1500)
+    surface = folder / "hand.obj"
+    trimesh.Trimesh(hand.surface.vertices, hand.surface.faces, process=False).export(surface)
+    points = propose_points(hand.surface.vertices, hand.surface.faces)
+    write_points_file(folder / "points.json", points)
+    rig = load_rig(surface, points=folder / "points.json")
+    assert sorted(rig.skeleton.names) == sorted(points)
+    rest = dict(zip(hand.skeleton.names, hand.skeleton.rest, strict=True))
+    return 1e3 * float(np.mean([np.linalg.norm(place - rest[name]) for name, place in points.items()]))
+
+
+if __name__ == "__main__":
+    print(f"{main(Path(sys.argv[1] if len(sys.argv) > 1 else 'out')):.1f} mm from the joints on the average")

@@ -1,0 +1,82 @@
+"""Misplaced points of whole bodies and hands are named, with where they belong (R14)."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from warpjld.io import load_rig
+from warpjld.rotations import unit
+from warpjld.skeleton.recognise.placing import check_placing
+
+
+def misplaced(rig, joint, offset):
+    skeleton = rig.skeleton
+    rest = skeleton.rest.copy()
+    rest[skeleton.names.index(joint)] += offset
+    return check_placing(replace(skeleton, rest=rest), rig.surface.vertices, rig.surface.faces)
+
+
+def check_named(rig, joint, offset, within):
+    findings = misplaced(rig, joint, offset)
+    found = next((one for one in findings if one.joint == joint), None)
+    assert found is not None, [one.message for one in findings]
+    assert found.proposal is not None
+    assert "proposed: move it" in found.message
+    # moved so, it is nearer to where it was
+    assert np.linalg.norm(offset + 1e-3 * np.array(found.proposal)) < within * np.linalg.norm(offset)
+
+
+def test_the_built_in_actors_are_well_placed(figure, hands):
+    for rig in (figure, *hands.values()):
+        assert check_placing(rig.skeleton, rig.surface.vertices, rig.surface.faces) == ()
+
+
+@pytest.mark.parametrize(
+    ("joint", "offset", "within"),
+    [
+        ("left.knee", (0.0, 0.08, 0.0), 0.5),
+        ("right.knee", (0.0, 0.0, 0.04), 0.5),
+        ("left.hip", (0.05, 0.0, 0.0), 0.1),
+        ("right.hip", (-0.05, 0.0, 0.0), 0.1),
+        ("left.shoulder", (0.0, -0.05, 0.0), 0.1),
+        ("right.shoulder", (-0.05, 0.0, 0.0), 0.1),
+        ("spine2", (0.08, 0.0, 0.0), 0.1),
+        ("spine2", (0.0, 0.08, 0.0), 0.5),
+        ("head.top", (0.0, 0.05, 0.0), 0.9),
+        ("head.top", (0.0, -0.05, 0.0), 0.9),
+    ],
+)
+def test_joints_of_a_body(figure, joint, offset, within):
+    check_named(figure, joint, np.array(offset), within)
+
+
+@pytest.mark.parametrize("digit", ["index", "middle", "ring", "pinky"])
+@pytest.mark.parametrize("by", [0.008, -0.008])
+def test_a_knuckle_along_its_finger(hands, digit, by):
+    rig = hands["left"]
+    places = dict(zip(rig.skeleton.names, rig.skeleton.rest, strict=True))
+    along = unit(places[f"left.{digit}.knuckle3"] - places[f"left.{digit}.knuckle2"])
+    check_named(rig, f"left.{digit}.knuckle2", by * along, 0.6)
+
+
+@pytest.mark.parametrize(
+    "name", ["body_anny/body_lowpoly_163joints.glb", "hand_webxr_generic/left.glb", "hand_webxr_generic/right.glb"]
+)
+def test_rigs_of_others_as_shipped(data, name):
+    rig = load_rig(data / name)
+    findings = check_placing(rig.skeleton, rig.surface.vertices, rig.surface.faces)
+    assert len(findings) <= 2, [one.message for one in findings]
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("axis", range(3))
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+@pytest.mark.parametrize(
+    ("joint", "by"), [("left.shoulder", 0.05), ("spine2", 0.08), ("spine3", 0.08), ("head.top", 0.05)]
+)
+def test_any_direction_in_a_body_of_others(data, joint, by, axis, sign):
+    rig = load_rig(data / "body_anny/body_lowpoly_163joints.glb")
+    check_named(rig, joint, sign * by * np.eye(3)[axis], 1.0)

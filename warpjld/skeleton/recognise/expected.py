@@ -1,0 +1,315 @@
+"""Where joints are expected along limb, finger and spine, and beside their mirror images (R14).
+
+One criterion: a joint lies where like joints of the same body lie, so far as bodies are alike. For fingers these are
+the other fingers of the hand (bones of one hand share their style), for limbs the other side and the two halves of the
+limb, for the spine its neighbours and the midline. The deviation allowed is the larger of what rigs of others show.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+from numpy.typing import NDArray
+
+from warpjld.rotations import unit
+from warpjld.skeleton.hand import DIGITS, FINGER_JOINTS
+
+__all__ = ["Expectation", "body_expectations", "finger_expectations"]
+
+Array = NDArray[np.float64]
+Joints = Mapping[str, Array]
+
+# mean lengths of the phalanges to the tip's centre, and from the wrist to the base [mm] (Buryanov, Kotiuk 2010)
+_PHALANGES = {
+    "index": (39.8, 22.4, 15.0),
+    "middle": (44.6, 26.3, 16.5),
+    "ring": (41.4, 25.7, 16.5),
+    "pinky": (32.7, 18.1, 14.5),
+}
+_TO_BASE = {"index": 98.0, "middle": 95.0, "ring": 89.0, "pinky": 84.0}
+_ALONG = 0.045  # of the palm's length: by which joints of four fingers differ in share from one another
+_THUMB = (0.51, 0.65)  # of the way between its neighbours, second and third joint, as rigs of others have them
+_THUMB_ALONG = 0.08
+_LIMBS = (("hip", "knee", "ankle"), ("shoulder", "elbow", "wrist"))
+_HALVES = 1.32  # longer per shorter half of a limb: 1.02 to 1.13 are usual, knees a tenth of the leg off give 1.4
+_ASIDE = 0.012  # of the height: off the midline, or off where the other side's joint is
+_HAND_ASIDE = 0.0035  # likewise in hands and feet, whose joints lie closer together
+_ALIKE = 0.004  # of the height: median difference of the sides up to which a rest pose is symmetric
+_CLEARLY = 1.25  # by which one side is the odder one
+_USUAL = {"hip": (0.055, 0.53), "shoulder": (0.1, 0.8)}
+"""From the midline and from the floor, shares of the height (Drillis, Contini 1966)."""
+_BETWEEN = (0.27, 0.70)  # of the way between its neighbours: where a joint of the spine lies
+_MIDDLE = 0.48
+
+
+@dataclass(frozen=True, eq=False)
+class Expectation:
+    """A joint that is not where it is expected.
+
+    Attributes:
+        joint: Its name.
+        kind: ``proportion``, ``asymmetric`` or ``midline``.
+        place: Where it is expected [m], shape (3,).
+        amount: How far off [m].
+        detail: By what, for people.
+    """
+
+    joint: str
+    kind: str
+    place: Array
+    amount: float
+    detail: str
+
+
+def finger_expectations(joints: Joints) -> list[Expectation]:
+    """Knuckles whose share of their finger, or of the palm, differs from those of the other fingers."""
+    out = []
+    for side in ("left.", "right.", ""):
+        chains = {
+            digit: [joints[f"{side}{digit}.{joint}"] for joint in FINGER_JOINTS]
+            for digit in _PHALANGES
+            if all(f"{side}{digit}.{joint}" in joints for joint in FINGER_JOINTS)
+        }
+        wrist = joints.get(f"{side}wrist")
+        if len(chains) < 4 or wrist is None:
+            continue
+        palms = {digit: float(np.linalg.norm(chain[0] - wrist)) for digit, chain in chains.items()}
+        relative = {digit: palms[digit] / _TO_BASE[digit] for digit in chains}
+        palm = float(np.median(list(relative.values()))) * _TO_BASE["middle"]
+        wrong = set()
+        for digit, chain in chains.items():
+            others = np.median([relative[d] for d in chains if d != digit])
+            off = float((relative[digit] - others) * _TO_BASE[digit])
+            if abs(off) > _ALONG * palm:
+                finger = unit(chain[1] - chain[0])
+                wrong.add(digit)
+                out.append(
+                    Expectation(
+                        f"{side}{digit}.base",
+                        "proportion",
+                        chain[0] - off * finger,
+                        abs(off),
+                        f"{1e3 * palms[digit]:.0f} mm from the wrist, beside the other fingers "
+                        f"{1e3 * (palms[digit] - off):.0f} are expected",
+                    )
+                )
+        out += _thumb(side, joints)
+        out += _knuckles(side, {d: c for d, c in chains.items() if d not in wrong}, palm)
+    return out
+
+
+def _thumb(side: str, joints: Joints) -> list[Expectation]:
+    """A thumb has no neighbour like it: each joint between its own neighbours, the worse of two."""
+    names = [f"{side}thumb.{joint}" for joint in FINGER_JOINTS]
+    if not all(name in joints for name in names):
+        return []
+    found = []
+    for k, usual in ((1, _THUMB[0]), (2, _THUMB[1])):
+        before, at, after = (joints[name] for name in names[k - 1 : k + 2])
+        first, second = float(np.linalg.norm(at - before)), float(np.linalg.norm(after - at))
+        off = first - usual * (first + second)
+        if abs(off) > _THUMB_ALONG * (first + second):
+            way = unit(before - at) if off > 0 else unit(after - at)
+            detail = f"{1e3 * first:.1f} mm before it, {1e3 * second:.1f} behind"
+            found.append(Expectation(names[k], "proportion", at + abs(off) * way, abs(off), detail))
+    return sorted(found, key=lambda one: -one.amount)[:1]
+
+
+def _knuckles(side: str, chains: Mapping[str, list[Array]], palm: float) -> list[Expectation]:
+    if len(chains) < 3:
+        return []
+    found: list[Expectation] = []
+    shares, lengths = {}, {}
+    for digit, chain in chains.items():
+        bones = np.linalg.norm(np.diff(np.array(chain), axis=0), axis=1)
+        usual = np.cumsum(_PHALANGES[digit]) / sum(_PHALANGES[digit])
+        lengths[digit] = float(bones.sum())
+        shares[digit] = (np.cumsum(bones) / bones.sum() - usual)[:2]
+    for digit, chain in chains.items():
+        others = np.median([shares[d] for d in chains if d != digit], axis=0)
+        off = (shares[digit] - others) * lengths[digit]
+        k = int(np.abs(off).argmax())
+        if abs(off[k]) <= _ALONG * palm:
+            continue
+        before, at, after = chain[k], chain[k + 1], chain[k + 2]
+        way = unit(before - at) if off[k] > 0 else unit(after - at)
+        found.append(
+            Expectation(
+                f"{side}{digit}.{FINGER_JOINTS[k + 1]}",
+                "proportion",
+                at + abs(float(off[k])) * way,
+                abs(float(off[k])),
+                f"{abs(1e3 * float(off[k])):.1f} mm {'further out' if off[k] > 0 else 'further in'} than beside the "
+                "other fingers",
+            )
+        )
+    return found
+
+
+def body_expectations(
+    joints: Joints, up: Array, height: float, floor: float, uneven: Callable[[Array], float]
+) -> list[Expectation]:
+    """Joints of trunk and limbs that proportions, midline or the other side put elsewhere.
+
+    Args:
+        joints: Canonical joints → positions [m].
+        up: The body's up, unit vector.
+        height: Of its surface along it [m].
+        floor: Lowest place along it [m].
+        uneven: How unlike the flesh on opposite sides of a place is, from 0 to 1.
+    """
+    pairs = {name[5:]: (place, joints[f"right.{name[5:]}"]) for name, place in joints.items() if _paired(name, joints)}
+    if len(pairs) < 4:
+        return []
+    left, middle, alike = _midplane(pairs, height)
+    out = _limbs(joints)
+    out += _spine(joints, up, height, left, middle)
+    named = {one.joint for one in out}
+    if not alike:
+        return out
+    for name, (a, b) in pairs.items():
+        mirrored = b - 2.0 * float((b - middle) @ left) * left
+        off = float(np.linalg.norm(a - mirrored))
+        fine = name.partition(".")[0] in (*DIGITS, "wrist") or name.startswith(("toe", "ball", "heel"))
+        if off <= (_HAND_ASIDE if fine else _ASIDE) * height or {f"left.{name}", f"right.{name}"} & named:
+            continue
+        odd = {
+            side: uneven(place) + _oddity(name, place, joints, side, left, middle, up, height, floor)
+            for side, place in (("left", a), ("right", b))
+        }
+        ratio = odd["left"] / max(odd["right"], 1e-9)
+        # where neither is clearly the odd one, both are named
+        doubted = [side for side, r in (("left", ratio), ("right", 1.0 / max(ratio, 1e-9))) if r > 1.0 / _CLEARLY]
+        for side in doubted:
+            place = mirrored if side == "left" else a - 2.0 * float((a - middle) @ left) * left
+            beside = f"the other side's is {1e3 * off:.0f} mm elsewhere"
+            beside += "; either may be wrong" if len(doubted) > 1 else ""
+            out.append(Expectation(f"{side}.{name}", "asymmetric", place, off, beside))
+    return out
+
+
+def _paired(name: str, joints: Joints) -> bool:
+    return name.startswith("left.") and f"right.{name[5:]}" in joints
+
+
+def _midplane(pairs: Mapping[str, tuple[Array, Array]], height: float) -> tuple[Array, Array, bool]:
+    """Unit normal to the left, a point of the plane between the sides, and whether they are mirror images."""
+    a = np.array([pair[0] for pair in pairs.values()])
+    b = np.array([pair[1] for pair in pairs.values()])
+    good = np.ones(len(a), dtype=bool)
+    for _ in range(3):
+        left = unit((a - b)[good].sum(axis=0))
+        middle = np.median(((a + b) / 2)[good], axis=0)
+        mirrored = b - 2.0 * ((b - middle) @ left)[:, None] * left
+        off = np.linalg.norm(a - mirrored, axis=1)
+        good = off <= max(float(np.median(off)), _ALIKE * height)
+    return left, middle, bool(np.median(off) < _ALIKE * height)
+
+
+def _oddity(
+    name: str,
+    place: Array,
+    joints: Joints,
+    side: str,
+    left: Array,
+    middle: Array,
+    up: Array,
+    height: float,
+    floor: float,
+) -> float:
+    """How unusual one of two mirror images is: by proportions, or by how its bones differ in length from straight."""
+    if name in _USUAL:
+        aside, high = _USUAL[name]
+        return float(np.hypot(abs((place - middle) @ left) / height - aside, ((place @ up) - floor) / height - high))
+    for limb in _LIMBS:
+        if name in limb:
+            a, b, c = (joints.get(f"{side}.{joint}") for joint in limb)
+            if a is not None and b is not None and c is not None:
+                halves = np.linalg.norm(b - a), np.linalg.norm(c - b)
+                bent = 1.0 - float(unit(b - a) @ unit(c - b))
+                return float(abs(np.log(halves[0] / halves[1])) + bent)
+    chain = _chain_of(name)
+    bones = [joints[f"{side}.{joint}"] for joint in chain if f"{side}.{joint}" in joints]
+    if len(bones) > 2:
+        ways = [unit(b - a) for a, b in pairwise(bones) if np.linalg.norm(b - a) > 0]
+        lengths = [float(np.linalg.norm(b - a)) for a, b in pairwise(bones)]
+        return float(sum(1.0 - v @ w for v, w in pairwise(ways)) + np.std(np.log(np.maximum(lengths, 1e-9))))
+    return float(np.linalg.norm(place - middle) / height)
+
+
+def _chain_of(name: str) -> list[str]:
+    digit = name.partition(".")[0]
+    if digit in DIGITS:
+        return ["wrist", *(f"{digit}.{joint}" for joint in ("carpometacarpal", *FINGER_JOINTS))]
+    if digit.startswith("toe"):
+        return ["ankle", *(f"{digit}.{joint}" for joint in FINGER_JOINTS)]
+    return ["ankle", "ball", "toe.tip"] if digit in ("ball", "toe") else []
+
+
+def _limbs(joints: Joints) -> list[Expectation]:
+    out = []
+    for first, second, end in _LIMBS:
+        for side in ("left", "right"):
+            a, b, c = (joints.get(f"{side}.{name}") for name in (first, second, end))
+            if a is None or b is None or c is None:
+                continue
+            upper, lower = float(np.linalg.norm(b - a)), float(np.linalg.norm(c - b))
+            if min(upper, lower) <= 0.0 or max(upper, lower) < _HALVES * min(upper, lower):
+                continue
+            # the joint goes along the longer half until both are alike
+            off = abs(upper - lower) / 2
+            place = b + off * (unit(a - b) if upper > lower else unit(c - b))
+            parts = ("thigh", "shin") if first == "hip" else ("upper arm", "forearm")
+            out.append(
+                Expectation(
+                    f"{side}.{second}",
+                    "proportion",
+                    place,
+                    off,
+                    f"{parts[0]} {1e3 * upper:.0f} mm, {parts[1]} {1e3 * lower:.0f}",
+                )
+            )
+    return out
+
+
+def _spine(joints: Joints, up: Array, height: float, left: Array, middle: Array) -> list[Expectation]:
+    names = [n for n in ("pelvis", *sorted(n for n in joints if n.startswith("spine"))) if n in joints]
+    # a neck of several joints has its own, closer steps: the first of them ends the spine's
+    necks = sorted(n for n in joints if n.startswith("neck"))
+    names += [n for n in ((*necks, "head") if len(necks) == 1 else (*necks[:1], "head")[:1]) if n in joints]
+    places = {name: joints[name] for name in names}
+    out = []
+    for name in dict.fromkeys((*names, *necks, *(n for n in ("head", "head.top") if n in joints))):
+        aside = float((joints[name] - middle) @ left)
+        if abs(aside) > _ASIDE * height:
+            place = joints[name] - aside * left
+            places[name] = place
+            out.append(
+                Expectation(name, "midline", place, abs(aside), f"{1e3 * abs(aside):.0f} mm off the body's midline")
+            )
+    while True:
+        wrong = _out_of_row(names, places, up)
+        if not wrong:
+            return out
+        tried = {name: len(_out_of_row(names, {**places, name: place}, up)) for name, place in wrong.items()}
+        name = min(tried, key=lambda n: (tried[n], -float(np.linalg.norm(places[n] - wrong[n]))))
+        off = float(np.linalg.norm(joints[name] - wrong[name]))
+        places[name] = wrong[name]
+        out.append(Expectation(name, "proportion", wrong[name], off, "not between its neighbours along the spine"))
+        if len(out) > len(names):
+            return out
+
+
+def _out_of_row(names: list[str], places: Joints, up: Array) -> dict[str, Array]:
+    """Joints of the spine that are not about half-way between their neighbours, and where they are expected."""
+    out = {}
+    for below, name, above in zip(names, names[1:], names[2:], strict=False):
+        low, here, high = (float(places[n] @ up) for n in (below, name, above))
+        share = (here - low) / (high - low) if high > low else np.inf
+        if not _BETWEEN[0] <= share <= _BETWEEN[1]:
+            place = places[name] + (low + _MIDDLE * (high - low) - here) * up
+            out[name] = place
+    return out
