@@ -7,6 +7,7 @@ import numpy as np
 
 from warpjld.covering import bind
 from warpjld.grasp.auto import find_grasp
+from warpjld.grasp.close import Closer
 from warpjld.grasp.shapes import ball
 from warpjld.hand import build_hand
 from warpjld.simulation.recorded import RecordedActor, RecordedAnimation, RecordedObject
@@ -17,7 +18,7 @@ from warpjld.skeleton import poses_from_angles
 rig = build_hand("left")
 covering = bind(rig.skeleton, rig.surface)
 thing = ball(0.06)
-grasp = find_grasp(covering, thing, side="left")
+grasp = find_grasp(Closer(covering, thing))
 print(f"{grasp.posture}: {', '.join(grasp.touching)} touch; epsilon {grasp.verdict.epsilon:.3f}")
 
 frames = 7
@@ -38,4 +39,5 @@ contact = ContactSpecification(
 found = simulate(contact, RecordedAnimation([hand], [RecordedObject("ball", thing)]))
 print(found.verdict.text)
 for row in found.rows:
-    print(row)
+    if row.frame == found.frames[-1] and row.against:
+        print(f"{row.digit}: {row.force_n:.2f} N on {row.area_mm2:.0f} mm², peak {row.peak_kpa:.0f} kPa, {row.state}")
