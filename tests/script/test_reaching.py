@@ -9,7 +9,9 @@ import numpy as np
 import pytest
 
 from warpjld.errors import InputError
+from warpjld.grasp.palm import palm_of
 from warpjld.io import load_rig
+from warpjld.rig import Rig
 from warpjld.script import Interpreter, Scene
 from warpjld.script.binding import cover
 from warpjld.script.staging import stage
@@ -95,3 +97,10 @@ def test_wrong_lines(anny: Scene, line: str, says: str) -> None:
 def test_a_hand_alone_has_no_arm(run: Callable[[str], Scene]) -> None:
     with pytest.raises(InputError, match="a hand without an arm"):
         run("REACH 0 20 LEFT AT 0 0 0")
+
+
+def test_a_thigh_behind_the_palm_is_no_palm(figure: Rig) -> None:
+    """The built-in body: its palms look at its thighs."""
+    palm = palm_of(figure.skeleton, "left")
+    middle = palm.on_skin(figure.surface.vertices).middle
+    assert np.linalg.norm(middle - palm.middle) < 0.03

@@ -42,7 +42,8 @@ class Palm:
         away = vertices - self.middle
         height = away @ self.normal
         beside = np.linalg.norm(away - height[:, None] * self.normal, axis=1)
-        near = (beside < _BESIDE * self.length) & (height > 0.0)
+        # no farther than the hand is thick: beyond a body's palm lies its thigh
+        near = (beside < _BESIDE * self.length) & (height > 0.0) & (height < self.length)
         if not near.any():
             raise InputError("hand: found no skin on the palm's side of the middle metacarpal")
         return replace(self, middle=self.middle + float(height[near].mean()) * self.normal)
