@@ -38,10 +38,10 @@ from warpjld.simulation.report.verdict import ContactVerdict, verdict_of
 from warpjld.simulation.report.visible_overlap import remaining_overlaps, visible_overlap_notes
 from warpjld.simulation.solve.checkpoint import CheckpointFile
 from warpjld.simulation.solve.checks import check_model, check_specification
-from warpjld.simulation.solve.frames import Progress, SolveResult, solve_frames
 from warpjld.simulation.solve.identity import identity_of
 from warpjld.simulation.solve.solved_frame import SolvedFrame
 from warpjld.simulation.solve.start_frame import StartFrame, find_start
+from warpjld.simulation.solve_frames import Progress, SolveResult, solve_frames
 from warpjld.simulation.specification import ContactSpecification, SolveSpecification
 
 __all__ = ["Simulation", "VisiblePressure", "simulate"]

@@ -10,7 +10,8 @@ from numpy.typing import NDArray
 
 from warpjld.fem import HexMesh, box_hexes, merge
 from warpjld.fem.contact import Exclusion, Pair
-from warpjld.fem.contact.interface.contact_points import ContactPoints, Interface
+from warpjld.fem.contact.interface.contact_interface import Interface
+from warpjld.fem.contact.interface.contact_points import ContactPoints
 
 SIDE, THICK = 0.02, 0.006
 

@@ -11,7 +11,8 @@ from numpy.typing import NDArray
 from tests.fem.contact.bodies import named
 from warpjld.fem import box_hexes, merge
 from warpjld.fem.contact import Pair
-from warpjld.fem.contact.interface.contact_points import ContactPoints, Interface
+from warpjld.fem.contact.interface.contact_interface import Interface
+from warpjld.fem.contact.interface.contact_points import ContactPoints
 from warpjld.fem.contact.law.contact_state import ActiveSet, ContactState, initial_state
 from warpjld.fem.contact.law.return_mapping import ContactTractions, return_mapping
 from warpjld.fem.contact.solver.tangent import MortarTangent, linearise_mortar

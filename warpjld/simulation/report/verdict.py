@@ -4,14 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from warpjld.fem import Status
 from warpjld.simulation.report.table import ContactRow
 from warpjld.simulation.report.visible_overlap import RemainingOverlap
-from warpjld.simulation.solve.frames import SolveResult
+
+if TYPE_CHECKING:
+    from warpjld.simulation.solve_frames import SolveResult
 
 __all__ = ["ContactVerdict", "verdict_of"]
 

@@ -19,7 +19,7 @@ import numpy as np
 
 from warpjld.fem.arrays import Array, Ints, Ints32, Mask
 from warpjld.fem.body import Body
-from warpjld.fem.contact.interface.contact_points import Interface
+from warpjld.fem.contact.interface.contact_interface import Interface
 
 __all__ = ["ContactArea", "beyond", "contact_modulus", "held_beyond"]
 

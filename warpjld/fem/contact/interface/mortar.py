@@ -2,20 +2,18 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from scipy.sparse import coo_array, csr_array
 
 from warpjld.errors import InputError
 from warpjld.fem.arrays import Array, Ints, Ints32
+from warpjld.fem.contact.interface.contact_points import ContactPoints
 from warpjld.fem.contact.interface.pair_filter import counted_share
 from warpjld.fem.contact.interface.pairs import Pair
 from warpjld.fem.contact.interface.surface import ContactSurface
 from warpjld.fem.launch import on_rows, shared
-
-if TYPE_CHECKING:
-    from warpjld.fem.contact.interface.contact_points import ContactPoints
 
 __all__ = ["Mortar"]
 
@@ -83,8 +81,6 @@ class Mortar:
 
         Of facets face to face, no farther apart than ``reach``, nor deeper.
         """
-        from warpjld.fem.contact.interface.contact_points import ContactPoints
-
         slave, master = self.slave, self.master
         pairs = self._neighbours(x, reach)
         found = self.integrals(pairs, slave.quads, master.quads, x, reach)

@@ -8,7 +8,8 @@ import numpy as np
 
 from warpjld.fem.arrays import Array, Ints, Mask
 from warpjld.fem.contact.interface.contact_area import ContactArea
-from warpjld.fem.contact.interface.contact_points import ContactPoints, Interface, tangential
+from warpjld.fem.contact.interface.contact_interface import Interface
+from warpjld.fem.contact.interface.contact_points import ContactPoints, tangential
 from warpjld.fem.contact.law.return_mapping import ContactTractions
 from warpjld.fem.contact.results.contact_solution import Touch
 from warpjld.fem.contact.results.nodal_contact import to_nodes

@@ -7,7 +7,7 @@ import numpy as np
 from warpjld.fem.arrays import Array
 from warpjld.fem.assembly.block_matrix import IndefiniteError
 from warpjld.fem.body import Body
-from warpjld.fem.contact.interface.contact_points import Interface
+from warpjld.fem.contact.interface.contact_interface import Interface
 from warpjld.fem.contact.law.contact_state import ContactState
 from warpjld.fem.contact.solver.contact_system import ContactSystem, LoadStep
 from warpjld.fem.contact.solver.damping import Damping

@@ -8,7 +8,8 @@ from typing import Any
 import numpy as np
 
 from warpjld.fem.arrays import Array
-from warpjld.fem.contact.interface.contact_points import ContactPoints, Interface
+from warpjld.fem.contact.interface.contact_interface import Interface
+from warpjld.fem.contact.interface.contact_points import ContactPoints
 from warpjld.fem.contact.law.contact_state import ActiveSet, ContactState
 from warpjld.fem.contact.law.multipliers import update_multipliers
 from warpjld.fem.contact.law.return_mapping import ContactTractions, return_mapping

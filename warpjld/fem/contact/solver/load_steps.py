@@ -10,7 +10,7 @@ from warpjld.errors import InputError
 from warpjld.fem.arrays import Array
 from warpjld.fem.body import Body
 from warpjld.fem.contact.interface.contact_area import contact_modulus
-from warpjld.fem.contact.interface.contact_points import Interface, interfaces_of
+from warpjld.fem.contact.interface.contact_interface import Interface, interfaces_of
 from warpjld.fem.contact.interface.pairs import Pair
 from warpjld.fem.contact.law.contact_state import ContactState, initial_state, without_bonds
 from warpjld.fem.contact.law.return_mapping import overstrained

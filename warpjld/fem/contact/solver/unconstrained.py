@@ -7,7 +7,8 @@ import numpy as np
 from warpjld.fem.arrays import Array, Mask
 from warpjld.fem.assembly.block_matrix import BlockMatrix
 from warpjld.fem.body import Body
-from warpjld.fem.contact.interface.contact_points import ContactPoints, Interface
+from warpjld.fem.contact.interface.contact_interface import Interface
+from warpjld.fem.contact.interface.contact_points import ContactPoints
 from warpjld.fem.contact.law.contact_state import ContactState
 from warpjld.fem.contact.solver.contact_system import ContactForces
 from warpjld.fem.load.prescribed import Prescribed, free_motions
