@@ -149,6 +149,21 @@ def test_python_api(tmp_path, capsys) -> None:
     assert "31 frames" in capsys.readouterr().out
 
 
+def test_python_contact(capsys) -> None:
+    names = runpy.run_path(str(EXAMPLES / "python_contact.py"))
+    found = names["found"]
+    assert found.solved.status.name == "CONVERGED"
+    assert found.force("hand")[-1, 1] > 0.1, "the plate pushes the finger up"
+    assert "upwards on the finger" in capsys.readouterr().out
+
+
+@pytest.mark.slow
+def test_python_grasp(capsys) -> None:
+    names = runpy.run_path(str(EXAMPLES / "python_grasp.py"))
+    assert names["found"].solved.status.name == "CONVERGED"
+    assert " N on " in capsys.readouterr().out
+
+
 def test_grasp_objects(tmp_path, capsys) -> None:
     """One ball; the example's other objects and the real ones take the same way."""
     study = tmp_path / "one.toml"

@@ -98,7 +98,7 @@ def test_targets_for_people(hand: Path, shapes: Path, tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
-        (["builtin:middle"], "want builtin:left or builtin:right"),
+        (["builtin:middle"], "want builtin:left, builtin:right or builtin:body"),
         (["missing.glb"], "no such file"),
         (["builtin:left", "-o", "nowhere/at/all.json"], "no such folder"),
         (["builtin:left", "--motion", "a.csv"], "which are not given"),

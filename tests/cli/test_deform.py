@@ -117,7 +117,7 @@ def test_rig_argument_names_files_and_built_in_hands(monkeypatch: pytest.MonkeyP
         "rig of a/b.glb",
         "rig of C:/b.glb",
     ]
-    with pytest.raises(InputError, match="builtin:left or builtin:right"):
+    with pytest.raises(InputError, match="builtin:left, builtin:right or builtin:body"):
         open_rig("builtin:foot")
     with pytest.raises(InputError, match="--unit only work for files"):
         open_rig("builtin:left", unit="cm")
