@@ -94,11 +94,7 @@ def build_fingertip(
     height = float(np.ptp((at_cut - joint) @ back))
     middle = mesh.nodes[mesh.elements].mean(axis=1)
     share, side, up = ((middle - joint) @ v for v in (along / length, across / height, back / height))
-    # towards its end the bone tapers a little, then closes in a half ellipse
-    end = np.clip((share - reach) / 0.12 + 1.0, 0.0, 1.0)
-    size = np.sqrt(np.maximum(1.0 - end**2, 0.0)) * (1.0 - 0.15 * np.clip(share / reach, 0.0, 1.0))
-    top = raised * (1.0 - 0.25 * np.clip(share / reach, 0.0, 1.0))
-    bony = (side / bone[0]) ** 2 + ((up - top) / bone[1]) ** 2 < size**2
+    bony = _in_bone(share, side, up, bone, raised, reach)
     if not bony.any():
         raise InputError(f"spacing: at {spacing:g} m no element fits inside the bone")
     depth = -envelope.ask(middle).distance
@@ -125,6 +121,26 @@ def build_fingertip(
     ray = under - np.linspace(0.0, height, 400)[:, None] * back
     palm = ray[int(np.argmax(envelope.ask(ray).distance > 0.0))] @ back
     return Fingertip(mesh, fit, along, back, joint, length, float(lowest - palm))
+
+
+def _in_bone(
+    share: NDArray[np.float64],
+    side: NDArray[np.float64],
+    up: NDArray[np.float64],
+    bone: tuple[float, float],
+    raised: float,
+    reach: float,
+) -> NDArray[np.bool_]:
+    """Which points lie in the bone, shape (n,): it tapers a little towards its end, then closes in a half ellipse.
+
+    Args:
+        share: Place along the phalanx over its length; ``side`` and ``up``: across it, over its height.
+        bone, raised, reach: As of ``build_fingertip``.
+    """
+    end = np.clip((share - reach) / 0.12 + 1.0, 0.0, 1.0)
+    size = np.sqrt(np.maximum(1.0 - end**2, 0.0)) * (1.0 - 0.15 * np.clip(share / reach, 0.0, 1.0))
+    top = raised * (1.0 - 0.25 * np.clip(share / reach, 0.0, 1.0))
+    return np.asarray((side / bone[0]) ** 2 + ((up - top) / bone[1]) ** 2 < size**2)
 
 
 def _cut(
