@@ -30,6 +30,7 @@ _MODULES = (
     "lazily.py",
     "limits.py",
     "listed.py",
+    "nesting.py",
     "normals.py",
     "reading.py",
     "rig/*.py",
