@@ -57,8 +57,9 @@ def test_it_is_not_bound_again(hand: Rig, folder: Path, monkeypatch: pytest.Monk
     def refuse(*_: object, **__: object) -> None:
         raise AssertionError("bound again")
 
-    for work in ("domains_from_geometry", "anchor", "operator_fields", "Diffusion", "pack_runs"):
-        monkeypatch.setattr(f"warpjld.covering.covering.{work}", refuse)
+    works = ("bind.domains_from_geometry", "bind.anchor", "covering.operator_fields")
+    for work in (*works, "covering.Diffusion", "covering.pack_runs"):
+        monkeypatch.setattr(f"warpjld.covering.{work}", refuse)
     kept = bind_kept(hand)[0]
     kept.deform(_poses(hand))
     kept.points(_poses(hand), [0, 7])
