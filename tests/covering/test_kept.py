@@ -57,7 +57,11 @@ def test_it_is_not_bound_again(hand: Rig, folder: Path, monkeypatch: pytest.Monk
     def refuse(*_: object, **__: object) -> None:
         raise AssertionError("bound again")
 
-    works = ("bind.domains_from_geometry", "bind.anchor", "covering.operator_fields")
+    works = (
+        "surface_binding.domains_from_geometry",
+        "surface_binding.anchor",
+        "covering.operator_fields",
+    )
     for work in (*works, "covering.Diffusion", "covering.pack_runs"):
         monkeypatch.setattr(f"warpjld.covering.{work}", refuse)
     kept = bind_kept(hand)[0]

@@ -10,7 +10,7 @@ from warpjld.covering.kept_key import binding_key, binding_sources
 from warpjld.hand import build_hand
 
 _PACKAGES = ("warpjld", "warpjld_kernels")
-_ROOTS = ("warpjld.covering.bind", "warpjld.covering.kept")
+_ROOTS = ("warpjld.covering.surface_binding", "warpjld.covering.kept")
 
 
 def _imported(module: str, file: Path) -> set[str]:

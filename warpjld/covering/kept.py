@@ -14,7 +14,6 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from warpjld.covering.bind import bind_rig
 from warpjld.covering.binding import Anchors
 from warpjld.covering.covering import Covering
 from warpjld.covering.fields import Fields
@@ -22,6 +21,7 @@ from warpjld.covering.kept_key import binding_key
 from warpjld.covering.operators import fans
 from warpjld.covering.parameters import Parameters
 from warpjld.covering.runs import Columns, Runs
+from warpjld.covering.surface_binding import bind_rig
 from warpjld.errors import InputError
 from warpjld.kept_files import keep, kept_folder, used
 from warpjld.rig import Rig
