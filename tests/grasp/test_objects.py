@@ -155,7 +155,7 @@ def test_wrong_sizes_are_refused(call) -> None:
 def test_wrong_files(tmp_path: Path) -> None:
     (tmp_path / "a.obj").write_text("v 0 0 0\n")
     for path, options, says in (
-        ("b.obj", {}, "no such file"),
+        ("b.obj", {}, "No such file"),
         ("a.obj", {}, "no triangles"),
         ("a.obj", {"unit": "feet"}, "want one of"),
         ("a.obj", {"up": "w"}, "want x, y or z"),
