@@ -20,7 +20,11 @@ from warpjld.skeleton import DIGITS
 pytestmark = pytest.mark.usefixtures("quick_hands")
 
 EXAMPLES = Path(__file__).resolve().parents[1] / "examples"
-SCRIPTS = sorted(path.name for path in EXAMPLES.glob("*.jld") if not path.name.startswith(("press_", "hold_")))
+SCRIPTS = [
+    pytest.param(path.name, marks=pytest.mark.slow if path.name == "reach.jld" else ())
+    for path in sorted(EXAMPLES.glob("*.jld"))
+    if not path.name.startswith(("press_", "hold_"))
+]
 PRESSED = sorted(path.name for path in EXAMPLES.glob("press_*.jld"))
 
 

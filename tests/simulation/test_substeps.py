@@ -67,7 +67,7 @@ def test_a_tap_between_two_frames_is_said(run: Callable[[str], Scene], tmp_path:
     report = run_contact(scene, tmp_path)
     assert report.verdict.status == "CONVERGED"
     assert all(row.force_n < 1e-6 for row in report.rows)
-    (brush,) = report.solved.brushes
+    (brush,) = report.solved.missed
     assert (brush.actor, brush.digit, brush.against, brush.before, brush.after) == ("LEFT", "index", "PLATE", 0.0, 2.0)
     assert brush.force > 0.01
     assert report.verdict.text.startswith("nothing touches at any frame, but between them: LEFT index touches PLATE")
