@@ -104,3 +104,26 @@ def test_a_thigh_behind_the_palm_is_no_palm(figure: Rig) -> None:
     palm = palm_of(figure.skeleton, "left")
     middle = palm.on_skin(figure.surface.vertices).middle
     assert np.linalg.norm(middle - palm.middle) < 0.03
+
+
+def test_a_body_takes_an_object_with_its_arm(anny: Scene) -> None:
+    scene = _fresh(anny)
+    Interpreter(scene).run_text("OBJECT APPLE BALL 0.07 AT 0.25 0.3 0.4\nGRASP 0 40 LEFT APPLE AUTO")
+    (attempt,) = scene.attempts
+    assert attempt.status == "CONVERGED"
+    assert len(attempt.values["digits"]) >= 3
+    actor = scene.actor()
+    assert not actor.placement.tracks, "the body stays where it is"
+    rest, taken = (stage(actor, np.array([frame]), scene.rate) for frame in (0.0, 40.0))
+    for joint in ("pelvis", "head", "left.ankle", "right.ankle", "right.wrist"):
+        k = actor.skeleton.index(joint)
+        np.testing.assert_allclose(taken.positions[0, k], rest.positions[0, k], atol=1e-12)
+    skin = cover(actor).deform(taken)[0]
+    distance = np.linalg.norm(skin - np.array([0.25, 0.3, 0.4]), axis=1) - 0.035
+    assert -2e-3 < distance.min() < 1e-3
+
+
+def test_an_object_out_of_the_arms_reach_is_refused(anny: Scene) -> None:
+    scene = _fresh(anny)
+    with pytest.raises(InputError, match=r"cannot take APPLE where it stands: its arm is \d+ mm short"):
+        Interpreter(scene).run_text("OBJECT APPLE BALL 0.07 AT 0.3 0.3 2.0\nGRASP 0 40 LEFT APPLE AUTO TRIES 32")

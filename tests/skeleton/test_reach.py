@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 
 from tests.motion.skeletons import body, hand
 from warpjld.errors import InputError
@@ -21,7 +22,7 @@ def _reach(skeleton: Skeleton, side: str, place: np.ndarray, **more: object) -> 
     arm = arm_of(skeleton, side)
     angles = np.zeros((len(skeleton), 4))
     body_pose = rest_poses(skeleton)
-    target = Target(place, np.zeros(3), _PALM, **more)  # type: ignore[arg-type]
+    target = Target(place, np.zeros(3), **more)  # type: ignore[arg-type]
     found = reach(arm, angles, body_pose, target)
     return arm, found, poses_from_angles(skeleton, found.angles[None])
 
@@ -97,21 +98,35 @@ def test_of_what_is_out_of_reach_the_distance_is_told() -> None:
 def test_the_palm_looks_where_it_is_to_look() -> None:
     skeleton = body()
     look = np.array([0.0, -1.0, 0.0])
-    _, found, _ = _reach(skeleton, "left", np.array([0.35, 1.1, 0.25]), look=look)
+    _, found, _ = _reach(skeleton, "left", np.array([0.35, 1.1, 0.25]), aims=((_PALM, look),))
     assert found.short < 1e-4
     assert np.degrees(found.off) < 25.0
     _, free, _ = _reach(skeleton, "left", np.array([0.35, 1.1, 0.25]))
     assert free.off == 0.0
 
 
+def test_a_hand_comes_to_a_place_with_its_rotation() -> None:
+    """That of a posture inside the limits."""
+    skeleton = body()
+    arm, angles = arm_of(skeleton, "left"), np.zeros((len(skeleton), 4))
+    low, high = arm.limits.T
+    values = low + np.random.default_rng(2).uniform(0.3, 0.7, len(low)) * (high - low)
+    positions, rotations = arm.chains(angles, values[None], rest_poses(skeleton))
+    turn = Rotation.from_quat(rotations[0, -1])
+    aims = tuple((axis, turn.apply(axis)) for axis in np.eye(3)[:2])
+    found = reach(arm, angles, rest_poses(skeleton), Target(positions[0, -1], np.zeros(3), aims, exact=True))
+    assert found.short < 1e-4
+    assert np.degrees(found.off) < 0.1
+
+
 def test_a_body_that_stands_elsewhere_reaches_the_same_place_beside_it() -> None:
     skeleton = body()
     arm, angles = arm_of(skeleton, "left"), np.zeros((len(skeleton), 4))
     place = np.array([0.2, 1.2, 0.3])
-    here = reach(arm, angles, rest_poses(skeleton), Target(place, np.zeros(3), _PALM))
+    here = reach(arm, angles, rest_poses(skeleton), Target(place, np.zeros(3)))
     shift = np.array([[3.0, -1.0, 2.0]])
     away = poses_from_angles(skeleton, angles[None], root_position=shift)
-    there = reach(arm, angles, away, Target(place + shift[0], np.zeros(3), _PALM))
+    there = reach(arm, angles, away, Target(place + shift[0], np.zeros(3)))
     np.testing.assert_allclose(there.angles, here.angles, atol=1e-5)
 
 

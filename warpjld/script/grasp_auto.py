@@ -13,10 +13,19 @@ from warpjld.script.grasping import Attempt, collisions, placed_at
 from warpjld.script.staging import stage
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from warpjld.covering import Covering
+    from warpjld.grasp import GraspObject
+    from warpjld.grasp.auto import AutoGrasp
+    from warpjld.grasp.close import Closer
     from warpjld.script.props import Prop
     from warpjld.script.scene import Actor, Scene
 
 __all__ = ["grasp_by_itself"]
+
+_BEFORE = 0.6
+"""Part of the arm's way after which the open hand is before the object; then it comes straight."""
 
 
 def grasp_by_itself(
@@ -24,18 +33,15 @@ def grasp_by_itself(
 ) -> Attempt:
     """Find a grasp, and set keys: the open hand away from the object at ``first``, on it half-way, closed at ``last``.
 
+    A hand alone is moved as a whole; of a body the arm guides it, from where it is at ``first``, and the body stays.
     The other objects are obstacles where they are at ``last``.
 
     Raises:
         InputError: Nothing was found.
     """
-    from scipy.spatial.transform import Rotation
-
     from warpjld.grasp.auto import find_grasp
     from warpjld.grasp.close import Closer
-    from warpjld.grasp.draws import WAY
     from warpjld.grasp.intersection import intersection
-    from warpjld.motion import Key
     from warpjld.skeleton import CHANNELS
 
     if actor.recorded is not None:
@@ -43,15 +49,12 @@ def grasp_by_itself(
     covering = cover(actor)
     thing = placed_at(scene, prop, last)
     obstacles = [placed_at(scene, other, last) for other in scene.props.values() if other is not prop]
-    found = find_grasp(Closer(covering, thing), obstacles=obstacles, side=side, count=tries, posture=posture_name)
-    middle, away = (first + last) / 2.0, found.position - WAY * found.approach
-    turn = Rotation.from_quat(found.rotation).as_euler("xyz")
-    spline = asdict(scene.spline)
-    for k, axis in enumerate("xyz"):
-        for key, value in ((first, away[k]), (middle, found.position[k]), (last, found.position[k])):
-            actor.placement.set_key(f"move.{axis}", Key(key, float(value), **spline))
-        for key in (first, middle, last):
-            actor.placement.set_key(f"turn.{axis}", Key(key, float(turn[k]), **spline))
+    closer, middle = Closer(covering, thing), (first + last) / 2.0
+    if f"{side}.shoulder" in actor.skeleton.names:
+        found = _by_arm(scene, actor, closer, side, (first, middle, last), obstacles, tries, posture_name)
+    else:
+        found = find_grasp(closer, obstacles=obstacles, side=side, count=tries, posture=posture_name)
+        _carry(scene, actor, found, (first, middle, last))
     grip = {}
     changed = np.argwhere((found.start != 0.0) | (found.angles != 0.0))
     for joint, column in changed.tolist():
@@ -65,7 +68,7 @@ def grasp_by_itself(
     message = (
         f"the best of {found.tried} placements, posture {found.posture}: {len(found.touching)} digits touch; {inside}"
     )
-    others = collisions(scene, actor, prop, first, last)
+    others = [*collisions(scene, actor, prop, first, last), *_through_body(scene, actor, covering, side, first, last)]
     message += "".join(f"; {told}" for told in others)
     values = {
         "posture": found.posture,
@@ -76,3 +79,57 @@ def grasp_by_itself(
         "collisions": others,
     }
     return Attempt(f"GRASP {prop.name} AUTO", last, actor.name, prop.name, "CONVERGED", message, values)
+
+
+def _carry(scene: Scene, actor: Actor, found: AutoGrasp, frames: tuple[float, float, float]) -> None:
+    """Move a hand as a whole: away from the object, to it, and stay."""
+    from scipy.spatial.transform import Rotation
+
+    from warpjld.grasp.draws import WAY
+    from warpjld.motion import Key
+
+    away = found.position - WAY * found.approach
+    turn = Rotation.from_quat(found.rotation).as_euler("xyz")
+    spline = asdict(scene.spline)
+    for k, axis in enumerate("xyz"):
+        for key, value in zip(frames, (away[k], found.position[k], found.position[k]), strict=True):
+            actor.placement.set_key(f"move.{axis}", Key(key, float(value), **spline))
+            actor.placement.set_key(f"turn.{axis}", Key(key, float(turn[k]), **spline))
+
+
+def _through_body(scene: Scene, actor: Actor, covering: Covering, side: str, first: float, last: float) -> list[str]:
+    """Frames at which the arm of a body passes through the rest of it, in words."""
+    from warpjld.script.reaching import pierced_frames
+    from warpjld.skeleton.arm import arm_of
+
+    if f"{side}.shoulder" not in actor.skeleton.names:
+        return []
+    pierced = pierced_frames(scene, actor, covering, arm_of(actor.skeleton, side), first, last)
+    through = [f"{frame:.4g}" for frame, count in pierced.items() if count]
+    return [f"the arm passes through the body at frame {', '.join(through)}"] if through else []
+
+
+def _by_arm(
+    scene: Scene,
+    actor: Actor,
+    closer: Closer,
+    side: str,
+    frames: tuple[float, float, float],
+    obstacles: Sequence[GraspObject],
+    tries: int,
+    posture_name: str | None,
+) -> AutoGrasp:
+    """Let the arm bring the hand: before the object first, then to it."""
+    from warpjld.script.grasp_by_arm import grasp_in_reach
+    from warpjld.script.grasping import posture
+    from warpjld.script.reaching import key_arm
+
+    first, middle, last = frames
+    found = grasp_in_reach(
+        scene, actor, closer, side, (middle, last), obstacles=obstacles, count=tries, posture_name=posture_name
+    )
+    _, angles = posture(scene, actor, first)
+    moments = ((first, found.arm.values(angles[0])), (first + _BEFORE * (middle - first), found.before))
+    for frame, values in (*moments, (middle, found.there), (last, found.there)):
+        key_arm(scene, actor, found.arm, frame, values)
+    return found.grasp

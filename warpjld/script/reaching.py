@@ -17,12 +17,13 @@ from warpjld.skeleton import CHANNELS, Poses, poses_from_angles
 
 if TYPE_CHECKING:
     from warpjld.covering import Covering
+    from warpjld.grasp.arm_clearance import ArmClearance
     from warpjld.script.props import Prop
     from warpjld.script.scene import Actor, Scene
     from warpjld.skeleton.arm import Arm
     from warpjld.skeleton.reach import Reached
 
-__all__ = ["REACHED", "Goal", "nearest_side", "reach_for"]
+__all__ = ["REACHED", "Goal", "arm_to_hand", "key_arm", "nearest_side", "pierced_frames", "reach_for"]
 
 REACHED = 0.002
 """Distance up to which a place is reached [m]."""
@@ -66,16 +67,16 @@ def reach_for(scene: Scene, actor: Actor, side: str, first: float, last: float, 
     clearance = ArmClearance(covering, arm, poses)
     found, at = _solved(scene, actor, covering, arm, poses, angles[0], last, goal, clearance)
     _, before = posture(scene, actor, first)
-    _key(scene, actor, arm, first, arm.values(before[0]))
-    _key(scene, actor, arm, last, arm.values(found.angles))
+    key_arm(scene, actor, arm, first, arm.values(before[0]))
+    key_arm(scene, actor, arm, last, arm.values(found.angles))
     short = float(np.linalg.norm(at - goal.place))
-    pierced = _pierced(scene, actor, covering, arm, first, last)
+    pierced = pierced_frames(scene, actor, covering, arm, first, last)
     if _on_the_way(pierced, last):
         # round the body: half-way the arm goes where it would be, but clear of it
         middle = 0.5 * (first + last)
         poses, angles = posture(scene, actor, middle)
-        _key(scene, actor, arm, middle, clear(arm, angles[0], poses, arm.values(angles[0]), clearance))
-        pierced = _pierced(scene, actor, covering, arm, first, last)
+        key_arm(scene, actor, arm, middle, clear(arm, angles[0], poses, arm.values(angles[0]), clearance))
+        pierced = pierced_frames(scene, actor, covering, arm, first, last)
     status = "CONVERGED" if short <= REACHED else "SHORT"
     if pierced[last]:
         status = "PIERCES"
@@ -90,13 +91,15 @@ def reach_for(scene: Scene, actor: Actor, side: str, first: float, last: float, 
     return Attempt(f"REACH {goal.name}", last, actor.name, goal.object, status, message, values)
 
 
-def _key(scene: Scene, actor: Actor, arm: Arm, frame: float, values: NDArray[np.float64]) -> None:
+def key_arm(scene: Scene, actor: Actor, arm: Arm, frame: float, values: NDArray[np.float64]) -> None:
     """Set keys of all the angles that move an arm."""
     for (k, column), value in zip(arm.free.tolist(), values.tolist(), strict=True):
         actor.set_keys(f"{actor.skeleton.names[arm.joints[k]]}.{CHANNELS[column]}", [frame], value, scene.spline)
 
 
-def _pierced(scene: Scene, actor: Actor, covering: Covering, arm: Arm, first: float, last: float) -> dict[float, int]:
+def pierced_frames(
+    scene: Scene, actor: Actor, covering: Covering, arm: Arm, first: float, last: float
+) -> dict[float, int]:
     """How many faces of the body an arm passes through, by frame."""
     from warpjld.grasp.arm_clearance import pierced_faces
 
@@ -107,6 +110,28 @@ def _pierced(scene: Scene, actor: Actor, covering: Covering, arm: Arm, first: fl
 
 def _on_the_way(pierced: dict[float, int], last: float) -> list[float]:
     return [frame for frame, count in pierced.items() if count and frame != last]
+
+
+def arm_to_hand(
+    scene: Scene, actor: Actor, arm: Arm, clearance: ArmClearance, frame: float, hand: Poses
+) -> tuple[Reached, int]:
+    """The arm's posture at a frame that brings the hand where another pose of the same skeleton has it (one frame), and
+    how many faces of the body it passes through."""
+    from warpjld.grasp.arm_clearance import pierced_faces
+    from warpjld.rotations import matrices
+    from warpjld.skeleton.reach import Target, reach
+
+    wrist = arm.joints[-1]
+    poses, angles = posture(scene, actor, frame)
+    turn = matrices(hand.rotations[0, wrist])
+    aims = tuple((axis, turn @ axis) for axis in np.eye(3)[:2])
+    target = Target(hand.positions[0, wrist], np.zeros(3), aims, exact=True)
+    found = reach(arm, angles[0], poses, target, depths=clearance)
+    _, root = actor.motion.sample(np.array([frame]), actor.skeleton)
+    body = poses_from_angles(arm.skeleton, found.angles[None], root_position=root)
+    covering = cover(actor)
+    skin = covering.deform(actor.placement.apply(body, np.array([frame])))[0]
+    return found, len(pierced_faces(covering, arm, skin))
 
 
 def nearest_side(
@@ -133,7 +158,7 @@ def _solved(
     angles: NDArray[np.float64],
     key: float,
     goal: Goal,
-    clearance: object,
+    clearance: ArmClearance,
 ) -> tuple[Reached, NDArray[np.float64]]:
     """The arm's posture and where it brings the part of the hand [m]: skin slides a little on bones, so the offset of
     the skin from the wrist is taken anew from the posture found."""
@@ -158,8 +183,8 @@ def _solved(
     _, root = actor.motion.sample(np.array([key]), actor.skeleton)
     body, offset = poses, arm.carried(part_of(poses), poses)
     for _ in range(_ROUNDS):
-        target = Target(goal.place, offset, palm.normal, goal.look)
-        found = reach(arm, angles, poses, target, depths=clearance)  # type: ignore[arg-type]
+        target = Target(goal.place, offset, () if goal.look is None else ((palm.normal, goal.look),))
+        found = reach(arm, angles, poses, target, depths=clearance)
         body = actor.placement.apply(
             poses_from_angles(arm.skeleton, found.angles[None], root_position=root), np.array([key])
         )

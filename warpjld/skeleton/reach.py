@@ -35,7 +35,10 @@ _STEP = 1e-6  # of differences [rad]
 _NEAR = (20.0, 1000.0)
 """Weight of the distance over the arm's length, first and at last: what is comfortable is settled, then the target is
 met: comfort moves it by less than 1e-5 of the arm's length."""
-_LOOK = 2.0  # weight of where the palm looks, over the sine of the angle that it is off
+_LOOK = 2.0
+"""Weight of directions that are wished for, such as where the palm looks, over the sine of the angle that they are off;
+those that a grasp prescribes weigh as places do."""
+_EXACT = 5.0  # of directions that are prescribed, at first; at last as much more as of places
 _DEEP = 50.0  # weight of depths in the body, over the arm's length
 # weights of discomfort, over half of the range that clinical tables give
 _DISCOMFORT = {
@@ -61,14 +64,15 @@ class Target:
     Attributes:
         place: Where the point is to be [m], shape (3,).
         point: The point, as an offset from the wrist in the wrist's rest axes [m], shape (3,).
-        normal: Direction out of the palm at rest, shape (3,).
-        look: Where the palm is to look, a unit direction, shape (3,); None: anywhere.
+        aims: Pairs of a unit direction of the hand at rest and of what it is to be turned to, shapes (3,): none, one
+            (the palm looks somewhere), or two (the hand's whole rotation).
+        exact: Whether aims are as binding as the place, or give way to what is comfortable.
     """
 
     place: NDArray[np.float64]
     point: NDArray[np.float64]
-    normal: NDArray[np.float64]
-    look: NDArray[np.float64] | None = None
+    aims: tuple[tuple[NDArray[np.float64], NDArray[np.float64]], ...] = ()
+    exact: bool = False
 
 
 @dataclass(frozen=True, eq=False)
@@ -78,7 +82,7 @@ class Reached:
     Attributes:
         angles: Of the skeleton [rad], shape (J, 4): of the arm those that were found, of all others those given.
         short: Distance that is left [m].
-        off: Angle between where the palm looks and where it was to look [rad], 0 where that was left open.
+        off: Largest angle between an aim and where it was to be turned [rad], 0 where there is none.
         depth: How deep the deepest sample of the arm lies in the body [m].
     """
 
@@ -179,8 +183,8 @@ class _Costs:
         upper = unit(positions[:, arm.elbow] - positions[:, arm.shoulder])
         out = [near * away / arm.length, _HANG * (upper - self._hang), self._weights * values]
         out.append(self._swing * (values - self._now))
-        if target.look is not None:
-            out.append(_LOOK * (rotate(rotations[:, -1], target.normal) - target.look))
+        weight = near / _NEAR[0] * _EXACT if target.exact else _LOOK
+        out += [weight * (rotate(rotations[:, -1], own) - wanted) for own, wanted in target.aims]
         if self._depths is not None:
             out.append(_DEEP * self._depths(positions, rotations) / arm.length)
         return np.concatenate(out, axis=1)
@@ -205,10 +209,8 @@ class _Costs:
         target = self._target
         positions, rotations = self._arm.chains(self._angles, x[None], self._body)
         away = positions[0, -1] + rotate(rotations[0, -1], target.point) - target.place
-        off = 0.0
-        if target.look is not None:
-            looks = rotate(rotations[0, -1], target.normal)
-            off = float(np.arccos(np.clip(looks @ target.look, -1.0, 1.0)))
+        cosines = [float(rotate(rotations[0, -1], own) @ wanted) for own, wanted in target.aims]
+        off = float(np.arccos(np.clip(min(cosines, default=1.0), -1.0, 1.0)))
         depth = 0.0 if self._depths is None else float(self._depths(positions, rotations).max(initial=0.0))
         return Reached(self._arm.posed(self._angles, x), float(np.linalg.norm(away)), off, depth)
 
