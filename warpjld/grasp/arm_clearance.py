@@ -52,7 +52,7 @@ class ArmClearance:
         normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
         size = np.linalg.norm(normals, axis=1)
         middles = corners.mean(axis=1)
-        shoulder = arm.chains(np.zeros((len(arm.skeleton), 4)), arm.limits[None, :, 0] * 0.0, body)[0][0, arm.shoulder]
+        shoulder = arm.chains(np.zeros((len(arm.skeleton), 4)), np.zeros((1, len(arm.free))), body)[0][0, arm.shoulder]
         near = np.linalg.norm(middles - shoulder, axis=1) < _SHOULDER * self._radii[0]
         kept = np.asarray((size > 0.0) & ~near)
         self._middles, self._normals = middles[kept], normals[kept] / size[kept, None]

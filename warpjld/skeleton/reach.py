@@ -83,13 +83,11 @@ class Reached:
         angles: Of the skeleton [rad], shape (J, 4): of the arm those that were found, of all others those given.
         short: Distance that is left [m].
         off: Largest angle between an aim and where it was to be turned [rad], 0 where there is none.
-        depth: How deep the deepest sample of the arm lies in the body [m].
     """
 
     angles: NDArray[np.float64]
     short: float
     off: float
-    depth: float
 
 
 def reach(
@@ -117,7 +115,7 @@ def reach(
             solved = least_squares(
                 lambda x, near=near: costs(x[None], near)[0],
                 found,
-                jac=lambda x, near=near: costs.slopes(x, near),
+                jac=lambda x, near=near: _slopes(lambda some: costs(some, near), x),
                 bounds=(low, high),
                 xtol=1e-10,
                 ftol=1e-10,
@@ -151,13 +149,10 @@ def clear(
         positions, rotations = arm.chains(angles, some, body)
         return np.concatenate([some - values, _DEEP * depths(positions, rotations) / arm.length], axis=1)
 
-    def slopes(x: NDArray[np.float64]) -> NDArray[np.float64]:
-        shifts = _STEP * np.eye(len(x))
-        both = costs(np.concatenate([x + shifts, x - shifts]))
-        return np.asarray((both[: len(x)] - both[len(x) :]).T / (2.0 * _STEP))
-
     start = np.clip(values, low + 1e-9, high - 1e-9)
-    solved = least_squares(lambda x: costs(x[None])[0], start, jac=slopes, bounds=(low, high), max_nfev=100)
+    solved = least_squares(
+        lambda x: costs(x[None])[0], start, jac=lambda x: _slopes(costs, x), bounds=(low, high), max_nfev=100
+    )
     return np.asarray(solved.x)
 
 
@@ -189,12 +184,6 @@ class _Costs:
             out.append(_DEEP * self._depths(positions, rotations) / arm.length)
         return np.concatenate(out, axis=1)
 
-    def slopes(self, x: NDArray[np.float64], near: float) -> NDArray[np.float64]:
-        """Derivatives of the residuals (R, n) by central differences, all in one batch."""
-        shifts = _STEP * np.eye(len(x))
-        both = self(np.concatenate([x + shifts, x - shifts]), near)
-        return np.asarray((both[: len(x)] - both[len(x) :]).T / (2.0 * _STEP))
-
     def starts(self) -> NDArray[np.float64]:
         """The best of postures spread evenly over the arm's range, shape (S, n)."""
         from scipy.stats import qmc
@@ -211,8 +200,16 @@ class _Costs:
         away = positions[0, -1] + rotate(rotations[0, -1], target.point) - target.place
         cosines = [float(rotate(rotations[0, -1], own) @ wanted) for own, wanted in target.aims]
         off = float(np.arccos(np.clip(min(cosines, default=1.0), -1.0, 1.0)))
-        depth = 0.0 if self._depths is None else float(self._depths(positions, rotations).max(initial=0.0))
-        return Reached(self._arm.posed(self._angles, x), float(np.linalg.norm(away)), off, depth)
+        return Reached(self._arm.posed(self._angles, x), float(np.linalg.norm(away)), off)
+
+
+def _slopes(
+    residuals: Callable[[NDArray[np.float64]], NDArray[np.float64]], x: NDArray[np.float64]
+) -> NDArray[np.float64]:
+    """Derivatives (R, n) of residuals, of B postures (B, n) → (B, R), by central differences, all in one batch."""
+    shifts = _STEP * np.eye(len(x))
+    both = residuals(np.concatenate([x + shifts, x - shifts]))
+    return np.asarray((both[: len(x)] - both[len(x) :]).T / (2.0 * _STEP))
 
 
 def _hanging(arm: Arm, body: Poses) -> NDArray[np.float64]:
