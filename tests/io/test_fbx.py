@@ -24,8 +24,6 @@ from warpjld.motion.load import open_motion
 pytest.importorskip("ufbx")
 
 PLACE, TURN = 1e-6, 1e-5  # what the reading is held to: metres, and entries of rotation matrices
-SINGLE = 3e-6
-"""Keys are single floats: angles of up to 180° in degrees, down a chain of joints."""
 
 
 @pytest.fixture(scope="module")
@@ -124,7 +122,7 @@ def test_the_same_rig_and_animation_as_glb(
     np.testing.assert_allclose(animation.tree.frames, read.tree.frames, atol=1e-12)
     flesh = animation.worlds @ np.linalg.inv(animation.tree.frames)
     wanted = worlds @ np.linalg.inv(hand.frames)
-    np.testing.assert_allclose(animation.worlds[..., :3, 3], worlds[..., :3, 3], atol=SINGLE)
+    np.testing.assert_allclose(animation.worlds[..., :3, 3], worlds[..., :3, 3], atol=PLACE)
     np.testing.assert_allclose(flesh[..., :3, :3], wanted[..., :3, :3], atol=TURN)
     if not mirrored:
         np.testing.assert_allclose(animation.worlds[..., :3, :3], worlds[..., :3, :3], atol=TURN)
@@ -290,7 +288,7 @@ def test_animations_are_chosen_by_name_and_empty_ones_passed_over(tmp_path: Path
     assert second.title == "far"
     for animation, worlds in ((first, near), (second, far)):
         assert animation.rate == 24.0
-        np.testing.assert_allclose(animation.worlds[..., :3, 3], worlds[..., :3, 3], atol=SINGLE)
+        np.testing.assert_allclose(animation.worlds[..., :3, 3], worlds[..., :3, 3], atol=PLACE)
     assert len(read_fbx_animation(path, name="far", rate=48.0)) == 17
     with pytest.raises(InputError, match=r"no animation 'nearly'; it has 'Take 001', 'pose', 'near', 'far'"):
         read_fbx_animation(path, name="nearly")
@@ -339,7 +337,7 @@ def test_plain_nodes_are_joints_where_there_are_no_bones(tmp_path: Path) -> None
     worlds = np.stack([fbx.frames, turned(fbx.frames)])
     animation = read_fbx_animation(replace(fbx, stacks={"x": worlds}).write(tmp_path / "nulls.fbx"))
     assert animation.tree.names == ("a", "b", "c")
-    np.testing.assert_allclose(animation.worlds[1], worlds[1], atol=SINGLE)
+    np.testing.assert_allclose(animation.worlds[1], worlds[1], atol=PLACE)
 
 
 @pytest.mark.parametrize("inherit", [0, 2])
@@ -350,7 +348,7 @@ def test_joints_that_do_not_inherit_scale_keep_their_names(tmp_path: Path, inher
     rig, animation = read_fbx_rig(path), read_fbx_animation(path)
     assert rig.tree.names == animation.tree.names == ("a", "b", "c")
     np.testing.assert_allclose(rig.vertices, fbx.meshes[0].vertices, atol=PLACE)
-    np.testing.assert_allclose(animation.worlds, worlds, atol=SINGLE)
+    np.testing.assert_allclose(animation.worlds, worlds, atol=PLACE)
 
 
 def test_a_joint_scaled_to_nothing_keeps_its_rotation(tmp_path: Path) -> None:
