@@ -164,7 +164,8 @@ class Bench:
         pairs, heeded = (wp.zeros(names, dtype=wp.int32, device="cpu") for _ in range(2))
         others = wp.zeros((names, names), dtype=wp.int32, device="cpu")
         heed = wp.zeros((names, count), dtype=wp.int32, device="cpu")
-        ring = wp.zeros(count, dtype=float, device="cpu")
+        ring, plains = (wp.zeros(count, dtype=float, device="cpu") for _ in range(2))
+        units = wp.zeros(count, dtype=wp.vec3, device="cpu")
         self._find_pairs = [
             recorded(touch_samples.find_boxes, names, [points, parts], [low, high]),
             recorded(
@@ -175,11 +176,16 @@ class Bench:
             ),
         ]
         self._find_samples = [
-            recorded(touch_samples.find_normals, count, [points, parts.part, self._active, *star], [normals]),
+            recorded(
+                touch_samples.find_normals,
+                count,
+                [points, parts.part, self._active, *star, parts.area],
+                [normals, units, plains],
+            ),
             recorded(
                 touch_samples.find_samples,
                 count,
-                [points, normals, low, high, pairs, others, self.joints, *boxes, parts, SHARE, _SOFT, NONE],
+                [points, units, plains, low, high, pairs, others, self.joints, *boxes, parts, SHARE, _SOFT, NONE],
                 [self._deepest, samples],
             ),
         ]
