@@ -9,6 +9,7 @@ wp.set_module_options({"enable_backward": False})
 FAR = wp.constant(1.0e30)
 NEARLY = wp.constant(0.5)  # of the nearest distance beyond it: faces that near have a say in where out is
 BESIDE = wp.constant(0.03)  # of a mesh's reach from its bones: outside its box by that nothing is inside it
+DEEPEST = wp.constant(0.8)  # of the deepest: what is that deep has it near
 UNSURE = wp.constant(0.0)  # length of the mean of the ways out that is none
 SURE = wp.constant(0.9)  # and that is one
 
@@ -276,6 +277,11 @@ def beneath(
 
 @wp.kernel
 def find_samples(
+    # vertices that are asked, and by pairs of parts how much what they say counts; at nought they are not asked
+    some: wp.array(dtype=wp.int32),
+    heard: wp.array2d(dtype=float),
+    # of every vertex one that was asked before; next to the deepest of those all are asked, so that it is the deepest
+    beside: wp.array(dtype=wp.int32),
     # frame
     points: wp.array(dtype=wp.vec3),
     units: wp.array(dtype=wp.vec3),
@@ -294,6 +300,7 @@ def find_samples(
     soft: float,
     none: float,
     # out
+    ratio_out: wp.array(dtype=float),
     deepest_out: wp.array2d(dtype=float),
     samples: Samples,
 ):
@@ -302,10 +309,12 @@ def find_samples(
     Surfaces that face the same way do not press on one another, nor does what is nearest to the border of a mesh,
     where it is open.
     """
-    v = wp.tid()
+    v = some[wp.tid()]
     p = points[v]
     own = parts.part[v]
     asked = count[own]
+    around = ratio_out[beside[v]]
+    deep = float(0.0)
     if asked > 0:
         low = within_lower[own]
         high = within_upper[own]
@@ -319,9 +328,9 @@ def find_samples(
         # what is under the open end of a mesh may be outside its box: that fades out, lest it leap
         beyond = wp.length(wp.max(wp.max(low - p, p - high), wp.vec3(0.0, 0.0, 0.0)))
         near = 1.0 - beyond / wp.max(BESIDE * parts.around[k], 1.0e-30)
-        if near > 0.0:
+        if near > 0.0 and (heard[own, k] > 0.0 or around > DEEPEST * deepest_out[own, k]):
             near *= beside_bones(joints, parts, k, p)
-        if near > 0.0:
+        if near > 0.0 and (heard[own, k] > 0.0 or around > DEEPEST * deepest_out[own, k]):
             reach = wp.max(2.0 * parts.thickness[v], parts.around[k])
             found = wp.mesh_query_point_no_sign(parts.mesh[k], p, reach)
             if found.result and may_be_behind(points, units, parts, k, p, found.face, found.u, found.v):
@@ -341,7 +350,9 @@ def find_samples(
                     # whichever way the surfaces face, and sooner where the way out is not sure
                     if inside > parts.at_rest[v]:
                         ratio = (inside - parts.at_rest[v]) / limit
-                        wp.atomic_max(deepest_out, own, k, ratio + (1.0 - sure) * none * wp.min(ratio, 1.0))
+                        ratio += (1.0 - sure) * none * wp.min(ratio, 1.0)
+                        deep = wp.max(deep, ratio)
+                        wp.atomic_max(deepest_out, own, k, ratio)
                     if depth > 0.0:
                         yields = parts.give[v] / wp.max(parts.give[v] + parts.give_of[k], 1.0e-12)
                         at = wp.atomic_add(samples.count, 0, 1)
@@ -353,6 +364,7 @@ def find_samples(
                             samples.normal[at] = n
                             samples.depth[at] = depth
                             samples.parted[at] = parted
-                            samples.counts[at] = wp.min(parted / (soft * limit), 1.0)
+                            samples.counts[at] = heard[own, k] * wp.min(parted / (soft * limit), 1.0)
                             samples.radius[at] = wp.max(wp.min(over.thick, parts.thickness[v]), 1.2 * parts.edge[v])
                             samples.ratio[at] = depth / limit
+    ratio_out[v] = deep
