@@ -45,8 +45,9 @@ def counts(creases: Creases, entry: int, r: wp.vec3, n: wp.vec3) -> float:
 @wp.kernel
 def measure_creases(
     creases: Creases,
-    # normals of the planes in every frame
+    # normals of the planes in every frame, and how much they count: a joint that is hardly bent presses nothing
     normal: wp.array2d(dtype=wp.vec3),
+    bent: wp.array2d(dtype=float),
     points: wp.array2d(dtype=wp.vec3),
     share: float,
     kept: float,
@@ -62,13 +63,15 @@ def measure_creases(
     near = int(0)
     for entry in range(creases.first[row], creases.first[row + 1]):
         j = creases.crease[entry]
+        if bent[frame, j] == 0.0:
+            continue
         n = normal[frame, j]
         r = points[frame, v] - across(creases, entry, frame, points)
         overlap = -wp.sign(creases.height[entry]) * wp.dot(r, n)
         if -overlap < 2.0 * kept * wp.abs(creases.height[entry]) + ROOM * creases.size[j]:
             near = 1
         if overlap > 0.0:
-            overlap *= counts(creases, entry, r, n)
+            overlap *= bent[frame, j] * counts(creases, entry, r, n)
             most = wp.max(most, overlap)
             wp.atomic_max(deepest_out, frame, j, overlap / (2.0 * share * creases.size[j]))
     near_out[frame, row] = near
@@ -79,6 +82,7 @@ def measure_creases(
 def push_creases(
     creases: Creases,
     normal: wp.array2d(dtype=wp.vec3),
+    bent: wp.array2d(dtype=float),
     points: wp.array2d(dtype=wp.vec3),
     near: wp.array2d(dtype=wp.int32),
     overlap: wp.array2d(dtype=float),
@@ -114,6 +118,8 @@ def push_creases(
     shift = wp.vec3(0.0, 0.0, 0.0)
     for entry in range(creases.first[row], last):
         j = creases.crease[entry]
+        if bent[frame, j] == 0.0:
+            continue
         n = normal[frame, j]
         r = p - across(creases, entry, frame, points)
         side = wp.sign(creases.height[entry])
@@ -121,7 +127,7 @@ def push_creases(
         apart = wp.min(apart, 2.0 * kept * wp.abs(creases.height[entry]))
         missing = apart - side * wp.dot(r + shift, n)
         if missing > 0.0:
-            shown = wp.clamp((none - deepest[frame, j]) / (none - full), 0.0, 1.0)
+            shown = bent[frame, j] * wp.clamp((none - deepest[frame, j]) / (none - full), 0.0, 1.0)
             shift += 0.5 * shown * counts(creases, entry, r, n) * missing * side * n
     shift_out[frame, v] = shift
     if wp.length_sq(shift) > 0.0:

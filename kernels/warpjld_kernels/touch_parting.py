@@ -6,6 +6,8 @@ from warpjld_kernels.touch_samples import FAR, Parts, Samples
 
 wp.set_module_options({"enable_backward": False})
 
+HOLDS = wp.constant(4.0)  # how soon what is parted in part holds as what is parted in full does
+
 
 @wp.kernel
 def fade_pairs(
@@ -36,8 +38,31 @@ def fade_pairs(
 
 
 @wp.kernel
+def choose_heard(
+    # by pairs of parts, as far as a few vertices have told
+    deepest: wp.array2d(dtype=float),
+    few: float,
+    none: float,
+    # out
+    some_out: wp.array2d(dtype=float),
+    all_out: wp.array2d(dtype=float),
+):
+    """How much vertices count that are some way apart, and all the others.
+
+    What lies too deep in one another for anything to be parted need not be asked further; where much lies inside, what
+    is some way apart says enough.
+    """
+    own, other = wp.tid()
+    depth = wp.max(deepest[own, other], deepest[other, own])
+    some_out[own, other] = wp.where(depth < none, 1.0, 0.0)
+    all_out[own, other] = wp.clamp(2.0 - depth / few, 0.0, 1.0)
+
+
+@wp.kernel
 def heed_samples(
     samples: Samples,
+    # by pairs of parts: how much of their overlaps is parted
+    shown: wp.array2d(dtype=float),
     parts: Parts,
     # out
     count_out: wp.array(dtype=wp.int32),
@@ -49,6 +74,8 @@ def heed_samples(
     i = wp.tid()
     own = samples.own[i]
     other = samples.other[i]
+    if shown[own, other] == 0.0:
+        return
     reach = wp.vec3(samples.radius[i], samples.radius[i], samples.radius[i])
     for side in range(2):
         for k in range(parts.beside.shape[1]):
@@ -126,9 +153,11 @@ def part_surfaces(
                 if side != 0.0 and missing > 0.0 and looks > 0.0:
                     # a plane that is just being passed counts for nothing yet: else all would jump
                     passing = wp.min(missing / (soft * limit), 1.0)
-                    weight = near * near * sure * looks * passing * samples.counts[i]
+                    # what is not parted at all holds nothing back either
+                    share = shown[samples.own[i], samples.other[i]]
+                    weight = near * near * sure * looks * passing * samples.counts[i] * wp.min(HOLDS * share, 1.0)
                     matrix += weight * wp.outer(n, n)
-                    right += weight * shown[samples.own[i], samples.other[i]] * missing * n
+                    right += weight * share * missing * n
         matrix += stiffness * wp.identity(n=3, dtype=float)
         d = wp.inverse(matrix) * right
     moved_out[v] = d

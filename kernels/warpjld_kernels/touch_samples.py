@@ -9,6 +9,7 @@ wp.set_module_options({"enable_backward": False})
 FAR = wp.constant(1.0e30)
 NEARLY = wp.constant(0.5)  # of the nearest distance beyond it: faces that near have a say in where out is
 BESIDE = wp.constant(0.03)  # of a mesh's reach from its bones: outside its box by that nothing is inside it
+DEEPEST = wp.constant(0.8)  # of the deepest: what is that deep has it near
 UNSURE = wp.constant(0.0)  # length of the mean of the ways out that is none
 SURE = wp.constant(0.9)  # and that is one
 
@@ -118,6 +119,12 @@ def find_pairs(
             active_out[parts.beside[k, i]] = 1
 
 
+@wp.func
+def smooth_skin(normal: wp.vec3, area: float) -> float:
+    """1 where a vertex has its faces side by side, 0 where they are folded: there is no inside and no outside."""
+    return wp.clamp(4.0 * wp.length(normal) / wp.max(area, 1.0e-30) - 0.6, 0.0, 1.0)
+
+
 @wp.kernel
 def find_normals(
     points: wp.array(dtype=wp.vec3),
@@ -126,10 +133,14 @@ def find_normals(
     # faces of every vertex
     first: wp.array(dtype=wp.int32),
     around: wp.array(dtype=wp.vec2i),
+    area: wp.array(dtype=float),
     # out
     normal_out: wp.array(dtype=wp.vec3),
+    unit_out: wp.array(dtype=wp.vec3),
+    plain_out: wp.array(dtype=float),
 ):
-    """Vertex normals, as long as a third of the area of the faces around; of active parts only.
+    """Vertex normals, as long as a third of the area of the faces around, and of length 1, and how plain the skin is;
+    of active parts only.
 
     ``around`` holds a face's two other corners, so that none is read twice.
     """
@@ -139,7 +150,10 @@ def find_normals(
         total = wp.vec3(0.0, 0.0, 0.0)
         for i in range(first[v], first[v + 1]):
             total += wp.cross(points[around[i][0]] - p, points[around[i][1]] - p)
-        normal_out[v] = total / 6.0
+        normal = total / 6.0
+        normal_out[v] = normal
+        unit_out[v] = wp.normalize(normal)
+        plain_out[v] = smooth_skin(normal, area[v])
 
 
 @wp.func
@@ -160,15 +174,9 @@ def beside_bones(joints: wp.array(dtype=wp.vec3), parts: Parts, k: int, p: wp.ve
 
 
 @wp.func
-def smooth_skin(normal: wp.vec3, area: float) -> float:
-    """1 where a vertex has its faces side by side, 0 where they are folded: there is no inside and no outside."""
-    return wp.clamp(4.0 * wp.length(normal) / wp.max(area, 1.0e-30) - 0.6, 0.0, 1.0)
-
-
-@wp.func
 def may_be_behind(
     points: wp.array(dtype=wp.vec3),
-    normals: wp.array(dtype=wp.vec3),
+    units: wp.array(dtype=wp.vec3),
     parts: Parts,
     k: int,
     p: wp.vec3,
@@ -182,7 +190,7 @@ def may_be_behind(
     b = mesh.indices[3 * face + 1]
     c = mesh.indices[3 * face + 2]
     w = 1.0 - u - v
-    n = u * wp.normalize(normals[a]) + v * wp.normalize(normals[b]) + w * wp.normalize(normals[c])
+    n = u * units[a] + v * units[b] + w * units[c]
     at = 3 * (parts.first_face[k] + face)
     border = u * parts.border[at] + v * parts.border[at + 1] + w * parts.border[at + 2]
     foot = u * points[a] + v * points[b] + w * points[c]
@@ -204,7 +212,13 @@ class Beneath:
 
 @wp.func
 def beneath(
-    points: wp.array(dtype=wp.vec3), normals: wp.array(dtype=wp.vec3), parts: Parts, k: int, p: wp.vec3, least: float
+    points: wp.array(dtype=wp.vec3),
+    units: wp.array(dtype=wp.vec3),
+    plains: wp.array(dtype=float),
+    parts: Parts,
+    k: int,
+    p: wp.vec3,
+    least: float,
 ) -> Beneath:
     """Means over the faces that are nearly as near as the nearest, at a distance of ``least``.
 
@@ -223,23 +237,30 @@ def beneath(
         a = mesh.indices[3 * face]
         b = mesh.indices[3 * face + 1]
         c = mesh.indices[3 * face + 2]
-        bary = nearest_weights(p, points[a], points[b], points[c])
+        pa = points[a]
+        pb = points[b]
+        pc = points[c]
+        # most faces whose box reaches into the cube around are beyond the ball in it
+        low = wp.min(wp.min(pa, pb), pc)
+        high = wp.max(wp.max(pa, pb), pc)
+        beyond = wp.max(wp.max(low - p, p - high), wp.vec3(0.0, 0.0, 0.0))
+        if wp.length_sq(beyond) >= reach * reach:
+            continue
+        bary = nearest_weights(p, pa, pb, pc)
         u = bary[0]
         v = bary[1]
         w = bary[2]
-        r = p - (u * points[a] + v * points[b] + w * points[c])
+        r = p - (u * pa + v * pb + w * pc)
         near = 1.0 - (wp.length(r) - least) / width
         if near > 0.0:
-            area = wp.length(wp.cross(points[b] - points[a], points[c] - points[a]))
+            area = wp.length(wp.cross(pb - pa, pc - pa))
             weight = area * near * near
-            n = wp.normalize(u * wp.normalize(normals[a]) + v * wp.normalize(normals[b]) + w * wp.normalize(normals[c]))
+            n = wp.normalize(u * units[a] + v * units[b] + w * units[c])
             total += weight
             out.normal += weight * n
             out.depth -= weight * wp.dot(r, n)
             out.thick += weight * (u * parts.thickness[a] + v * parts.thickness[b] + w * parts.thickness[c])
-            plain = smooth_skin(normals[a], parts.area[a])
-            plain = wp.min(plain, smooth_skin(normals[b], parts.area[b]))
-            out.plain += weight * wp.min(plain, smooth_skin(normals[c], parts.area[c]))
+            out.plain += weight * wp.min(wp.min(plains[a], plains[b]), plains[c])
             at = 3 * (parts.first_face[k] + face)
             border = u * parts.border[at] + v * parts.border[at + 1] + w * parts.border[at + 2]
             out.border += weight * wp.min(2.0 * border, 1.0)
@@ -256,9 +277,15 @@ def beneath(
 
 @wp.kernel
 def find_samples(
+    # vertices that are asked, and by pairs of parts how much what they say counts; at nought they are not asked
+    some: wp.array(dtype=wp.int32),
+    heard: wp.array2d(dtype=float),
+    # of every vertex one that was asked before; next to the deepest of those all are asked, so that it is the deepest
+    beside: wp.array(dtype=wp.int32),
     # frame
     points: wp.array(dtype=wp.vec3),
-    normals: wp.array(dtype=wp.vec3),
+    units: wp.array(dtype=wp.vec3),
+    plains: wp.array(dtype=float),
     lower: wp.array(dtype=wp.vec3),
     upper: wp.array(dtype=wp.vec3),
     count: wp.array(dtype=wp.int32),
@@ -273,6 +300,7 @@ def find_samples(
     soft: float,
     none: float,
     # out
+    ratio_out: wp.array(dtype=float),
     deepest_out: wp.array2d(dtype=float),
     samples: Samples,
 ):
@@ -281,16 +309,18 @@ def find_samples(
     Surfaces that face the same way do not press on one another, nor does what is nearest to the border of a mesh,
     where it is open.
     """
-    v = wp.tid()
+    v = some[wp.tid()]
     p = points[v]
     own = parts.part[v]
     asked = count[own]
+    around = ratio_out[beside[v]]
+    deep = float(0.0)
     if asked > 0:
         low = within_lower[own]
         high = within_upper[own]
         if p[0] < low[0] or p[1] < low[1] or p[2] < low[2] or p[0] > high[0] or p[1] > high[1] or p[2] > high[2]:
             asked = 0
-    looks = wp.normalize(normals[v])
+    looks = units[v]
     for i in range(asked):
         k = others[own, i]
         low = lower[k]
@@ -298,21 +328,21 @@ def find_samples(
         # what is under the open end of a mesh may be outside its box: that fades out, lest it leap
         beyond = wp.length(wp.max(wp.max(low - p, p - high), wp.vec3(0.0, 0.0, 0.0)))
         near = 1.0 - beyond / wp.max(BESIDE * parts.around[k], 1.0e-30)
-        if near > 0.0:
+        if near > 0.0 and (heard[own, k] > 0.0 or around > DEEPEST * deepest_out[own, k]):
             near *= beside_bones(joints, parts, k, p)
-        if near > 0.0:
+        if near > 0.0 and (heard[own, k] > 0.0 or around > DEEPEST * deepest_out[own, k]):
             reach = wp.max(2.0 * parts.thickness[v], parts.around[k])
             found = wp.mesh_query_point_no_sign(parts.mesh[k], p, reach)
-            if found.result and may_be_behind(points, normals, parts, k, p, found.face, found.u, found.v):
+            if found.result and may_be_behind(points, units, parts, k, p, found.face, found.u, found.v):
                 foot = wp.mesh_eval_position(parts.mesh[k], found.face, found.u, found.v)
                 least = wp.length(p - foot)
                 near *= wp.min(5.0 - 5.0 * least / reach, 1.0)
-                over = beneath(points, normals, parts, k, p, least)
+                over = beneath(points, units, plains, parts, k, p, least)
                 if over.depth > 0.0:
                     n = over.normal
                     sure = wp.clamp((over.sure - UNSURE) / (SURE - UNSURE), 0.0, 1.0)
                     facing = wp.clamp(-2.0 * wp.dot(n, looks), parts.facing, 1.0)
-                    plain = wp.min(smooth_skin(normals[v], parts.area[v]), over.plain)
+                    plain = wp.min(plains[v], over.plain)
                     inside = near * wp.min(over.depth, least) * plain * over.border
                     depth = inside * facing - parts.at_rest[v]
                     parted = wp.max(inside * facing * sure - parts.at_rest[v], 0.0)
@@ -320,7 +350,9 @@ def find_samples(
                     # whichever way the surfaces face, and sooner where the way out is not sure
                     if inside > parts.at_rest[v]:
                         ratio = (inside - parts.at_rest[v]) / limit
-                        wp.atomic_max(deepest_out, own, k, ratio + (1.0 - sure) * none * wp.min(ratio, 1.0))
+                        ratio += (1.0 - sure) * none * wp.min(ratio, 1.0)
+                        deep = wp.max(deep, ratio)
+                        wp.atomic_max(deepest_out, own, k, ratio)
                     if depth > 0.0:
                         yields = parts.give[v] / wp.max(parts.give[v] + parts.give_of[k], 1.0e-12)
                         at = wp.atomic_add(samples.count, 0, 1)
@@ -332,6 +364,7 @@ def find_samples(
                             samples.normal[at] = n
                             samples.depth[at] = depth
                             samples.parted[at] = parted
-                            samples.counts[at] = wp.min(parted / (soft * limit), 1.0)
+                            samples.counts[at] = heard[own, k] * wp.min(parted / (soft * limit), 1.0)
                             samples.radius[at] = wp.max(wp.min(over.thick, parts.thickness[v]), 1.2 * parts.edge[v])
                             samples.ratio[at] = depth / limit
+    ratio_out[v] = deep

@@ -120,6 +120,24 @@ def test_what_is_too_deep_is_told() -> None:
     assert not TOUCH.apply(pair(0.2 * RADIUS)[None])[1]
 
 
+def test_what_is_told_of_a_pose_that_nobody_can_take_is_nearly_its_deepest() -> None:
+    """Parting asks only some vertices there, measuring all of them."""
+    for overlap in (0.95, 1.1, 1.3):
+        points = pair(overlap * RADIUS)[None]
+        some, every = TOUCH.parted(points)[1][0], TOUCH.measured(points)[0]
+        assert len(some.vertex) < 0.5 * len(every.vertex)
+        assert 0.9 * every.depth.max() < some.depth.max() <= every.depth.max()
+
+
+def test_a_frame_does_not_follow_from_those_before() -> None:
+    frames = np.stack([pair(d * RADIUS) for d in (0.9, 0.2, 1.2, 0.3)])
+    together, told = TOUCH.apply(frames)
+    for k, frame in enumerate(frames):
+        alone, of_it = TOUCH.apply(frame[None], first=k)
+        np.testing.assert_array_equal(alone[0], together[k])
+        assert of_it == [one for one in told if one.frame == k]
+
+
 def test_refuses_points_of_another_surface_and_negative_compliances() -> None:
     with pytest.raises(InputError, match="want points of shape"):
         TOUCH.apply(np.zeros((1, 5, 3)))

@@ -31,6 +31,7 @@ _WIDER = 4.0  # times as far apart as both have passed through one another aroun
 _WIDEST = 1.0  # thicknesses that they are apart then at most
 _STEPS = 3  # of pushing and smoothing: one leaves a fifth more of what crosses, a fourth changes little
 _REACH = 6.0  # thicknesses from the joint, over the last of which it fades
+_BENT = (np.radians(5.0), np.radians(20.0))  # from rest, between which a joint comes to press its sides
 _WIDE = (0.9, 1.4)  # thicknesses along the axis between which it fades: what is beside a knuckle is another's skin
 _LEAST = 0.02  # of a vertex that both segments must hold for it to count
 
@@ -142,6 +143,10 @@ class Creases:
         same = np.where((first * second).sum(axis=-1, keepdims=True) < 0.0, -1.0, 1.0)
         normal = rotate(unit(first + same * second), self.normal)
         turned = wp.array(np.ascontiguousarray(normal, dtype=np.float32), dtype=wp.vec3, device="cpu")
+        angle = 2.0 * np.arccos(np.clip(np.abs((first * second).sum(axis=-1)), 0.0, 1.0))
+        bent = wp.array(
+            np.clip((angle - _BENT[0]) / (_BENT[1] - _BENT[0]), 0.0, 1.0).astype(np.float32), dtype=float, device="cpu"
+        )
         creases, reached, *rows = self._arrays
         size = (len(poses), len(self.vertex))
         near = wp.empty(size, dtype=wp.int32, device="cpu")
@@ -150,12 +155,14 @@ class Creases:
         pushed = wp.zeros(len(poses), dtype=wp.int32, device="cpu")
         shift = wp.zeros(points.shape, dtype=wp.vec3, device="cpu")
         measured = [near, overlap, deepest]
-        inputs = [creases, turned, points, SHARE, _KEPT]
+        inputs = [creases, turned, bent, points, SHARE, _KEPT]
         wp.launch(measure_creases, size, inputs=inputs, outputs=measured, device="cpu")
         amounts = [_KEPT, _LEAST_APART, _WIDER, _WIDEST, FULL, NONE]
         for _ in range(_STEPS):
-            inputs = [creases, turned, points, *measured, *rows, *amounts]
+            inputs = [creases, turned, bent, points, *measured, *rows, *amounts]
             wp.launch(push_creases, size, inputs=inputs, outputs=[pushed, shift], device="cpu")
+            if not pushed.numpy().any():
+                break
             inputs = [reached, *rows, pushed, shift]
             wp.launch(move_smoothly, (len(poses), len(reached)), inputs=inputs, outputs=[points], device="cpu")
 

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.sparse import csr_array
+from scipy.spatial import cKDTree
 
 from warpjld.covering.binding import smoothstep
 from warpjld.touch.patches import Patches
@@ -27,6 +28,9 @@ _JUST = 0.1  # shares that two parts must lie in one another for what parting ma
 _CLEARANCE = 0.05  # shares by which both sides are moved beyond their meeting
 _STIFFNESS = 0.1  # of the fit of planes: samples that weigh less than that in all move nothing in full
 _SWELLS = 1.1  # times as far from its bones as at rest flesh may come by bending
+# of a part's median thickness: how far apart vertices are that are asked first how deep they lie, and those that are
+# asked where that is farther than so many shares, over as many again
+_PROBES, _APART, _FEW = 1.0, 0.3, 0.35
 _BULGE = 0.5  # shares that a bulge is high at most
 
 
@@ -106,7 +110,10 @@ class Bench:
         self._deepest = wp.zeros((names, names), dtype=float, device="cpu")
         self._normals, self._moved, self._start = (wp.zeros(count, dtype=wp.vec3, device="cpu") for _ in range(3))
         self._lost, self._room = (wp.zeros(names, dtype=float, device="cpu") for _ in range(2))
-        self._record(star, smooth)
+        first, beside = _apart(model.patches, vertices, _PROBES)
+        apart, _ = _apart(model.patches, vertices, _APART)
+        asked = [np.flatnonzero(some) for some in (first, apart & ~first, ~apart & ~first)]
+        self._record(star, smooth, asked, beside)
 
     def _parts(self, model: Model, vertices: NDArray[np.floating]) -> Any:
         import warp as wp
@@ -149,7 +156,9 @@ class Bench:
         parts.around = _floats(_SWELLS * model.around)
         return parts
 
-    def _record(self, star: list[Any], smooth: list[Any]) -> None:
+    def _record(
+        self, star: list[Any], smooth: list[Any], asked: list[NDArray[np.int64]], beside: NDArray[np.int64]
+    ) -> None:
         import warp as wp
         from warpjld_kernels import touch_bulge, touch_parting, touch_samples
 
@@ -164,7 +173,8 @@ class Bench:
         pairs, heeded = (wp.zeros(names, dtype=wp.int32, device="cpu") for _ in range(2))
         others = wp.zeros((names, names), dtype=wp.int32, device="cpu")
         heed = wp.zeros((names, count), dtype=wp.int32, device="cpu")
-        ring = wp.zeros(count, dtype=float, device="cpu")
+        ring, plains = (wp.zeros(count, dtype=float, device="cpu") for _ in range(2))
+        units = wp.zeros(count, dtype=wp.vec3, device="cpu")
         self._find_pairs = [
             recorded(touch_samples.find_boxes, names, [points, parts], [low, high]),
             recorded(
@@ -174,21 +184,33 @@ class Bench:
                 [pairs, others, self._wanted, self._active],
             ),
         ]
-        self._find_samples = [
-            recorded(touch_samples.find_normals, count, [points, parts.part, self._active, *star], [normals]),
+        self._find_normals = recorded(
+            touch_samples.find_normals,
+            count,
+            [points, parts.part, self._active, *star, parts.area],
+            [normals, units, plains],
+        )
+        probed, apart, every = (wp.ones((names, names), dtype=float, device="cpu") for _ in range(3))
+        self._heard = apart.numpy(), every.numpy()
+        ratio = wp.zeros(count + 1, dtype=float, device="cpu")
+        none, probe = _numbers(np.full(count, count)), _numbers(beside)
+        frame = [points, units, plains, low, high, pairs, others, self.joints, *boxes]
+        self._probe, *self._find_samples = (
             recorded(
                 touch_samples.find_samples,
-                count,
-                [points, normals, low, high, pairs, others, self.joints, *boxes, parts, SHARE, _SOFT, NONE],
-                [self._deepest, samples],
-            ),
-        ]
+                len(some),
+                [_numbers(some), heard, beside, *frame, parts, SHARE, _SOFT, NONE],
+                [ratio, self._deepest, samples],
+            )
+            for some, heard, beside in zip(asked, (probed, apart, every), (none, probe, none), strict=True)
+        )
+        self._choose = recorded(touch_parting.choose_heard, (names, names), [self._deepest, _FEW, NONE], [apart, every])
         self._heed_nothing = recorded(touch_parting.heed_nothing, names, [], [heeded, *boxes])
         # as deep as the pose is, in every sweep: what is parted in part would be parted ever more
         self._fade = recorded(
             touch_parting.fade_pairs, (names, names), [parts, self._deepest, FULL, NONE, _JUST], [self._shown]
         )
-        self._heed = recorded(touch_parting.heed_samples, 1, [samples, parts], [heeded, heed, *boxes])
+        self._heed = recorded(touch_parting.heed_samples, 1, [samples, self._shown, parts], [heeded, heed, *boxes])
         self._part = [
             recorded(
                 touch_parting.part_surfaces,
@@ -216,11 +238,12 @@ class Bench:
 
     def measure(self, points: NDArray[np.floating], joints: NDArray[np.floating] | None) -> Overlaps:
         """What overlaps in one frame (V, 3), whose joints are there (J, 3) where that is known."""
-        return self._overlaps(self._first(points, joints))
+        return self._overlaps(self._first(points, joints, everywhere=True))
 
     def part(self, points: NDArray[np.floating], joints: NDArray[np.floating] | None) -> Overlaps:
-        """Part one frame (V, 3) in place; what overlapped before."""
-        count = self._first(points, joints)
+        """Part one frame (V, 3) in place; what overlapped before, of pairs of parts that lie too deep in one another
+        only at some vertices."""
+        count = self._first(points, joints, everywhere=False)
         found = self._overlaps(count)
         if not count:
             return found
@@ -247,17 +270,23 @@ class Bench:
         points[at] = there[at]
         return found
 
-    def _first(self, points: NDArray[np.floating], joints: NDArray[np.floating] | None) -> int:
+    def _first(self, points: NDArray[np.floating], joints: NDArray[np.floating] | None, *, everywhere: bool) -> int:
         self.points.numpy()[...] = points
         self.joints.numpy()[...] = np.nan if joints is None else joints
         self._shown.numpy()[...] = 1.0
         self._deepest.numpy()[...] = 0.0
         for box, end in zip(self._everywhere, (-np.inf, np.inf), strict=True):
             box[...] = end
-        return self._find()
+        for heard in self._heard:
+            heard[...] = 1.0
+        return self._find(choose=not everywhere)
 
-    def _find(self) -> int:
-        """Fill ``samples`` from ``points``; how many there are."""
+    def _find(self, *, choose: bool = False) -> int:
+        """Fill ``samples`` from ``points``; how many there are.
+
+        Most of what lies in one another in a pose that nobody can take is too deep to be parted, and a few vertices
+        say so: with ``choose`` the others are not asked about it.
+        """
         wanted, active = self._wanted.numpy(), self._active.numpy()
         wanted[...] = 0
         active[...] = 0
@@ -270,6 +299,10 @@ class Bench:
         for k in asked:
             if (mesh := self._meshes[k]) is not None:
                 mesh.refit()
+        self._find_normals.launch()
+        self._probe.launch()
+        if choose:
+            self._choose.launch()
         for command in self._find_samples:
             command.launch()
         return min(int(self._count[0]), len(self.samples.vertex))
@@ -290,6 +323,31 @@ def _no_samples(room: int) -> Any:
     for name, kind in Samples.vars.items():
         setattr(samples, name, wp.zeros(1 if name == "count" else room, dtype=kind.type.dtype, device="cpu"))
     return samples
+
+
+def _apart(
+    patches: Patches, vertices: NDArray[np.floating], distance: float
+) -> tuple[NDArray[np.bool_], NDArray[np.int64]]:
+    """Vertices that are apart from one another in their part, in parts of its median thickness, and of every vertex the
+    one of them that it is nearer to than that; both of shape (V,)."""
+    chosen, beside = np.zeros(len(vertices), dtype=bool), np.arange(len(vertices))
+    for k in range(len(patches.names)):
+        rows = np.flatnonzero(patches.part == k)
+        if not len(rows):
+            continue
+        points = np.asarray(vertices, dtype=np.float64)[rows]
+        reach, tree, free = (
+            distance * float(np.median(patches.thickness[rows])),
+            cKDTree(points),
+            np.ones(len(rows), bool),
+        )
+        for i, point in enumerate(points):
+            if free[i]:
+                near = np.array(tree.query_ball_point(point, reach))
+                beside[rows[near[free[near]]]] = rows[i]
+                free[near] = False
+                chosen[rows[i]] = True
+    return chosen, beside
 
 
 def _vectors(values: NDArray[np.floating]) -> Any:
