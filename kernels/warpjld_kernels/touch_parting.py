@@ -6,6 +6,7 @@ from warpjld_kernels.touch_samples import FAR, Parts, Samples
 
 wp.set_module_options({"enable_backward": False})
 
+NEARLY = wp.constant(0.6)  # of the deepest: what is that deep may have it near
 HOLDS = wp.constant(4.0)  # how soon what is parted in part holds as what is parted in full does
 
 
@@ -46,8 +47,9 @@ def choose_heard(
     # out
     some_out: wp.array2d(dtype=float),
     all_out: wp.array2d(dtype=float),
+    deep_out: wp.array2d(dtype=float),
 ):
-    """How much vertices count that are some way apart, and all the others.
+    """How much vertices count that are some way apart, and all the others; and what is nearly as deep as the deepest.
 
     What lies too deep in one another for anything to be parted need not be asked further; where much lies inside, what
     is some way apart says enough.
@@ -56,6 +58,7 @@ def choose_heard(
     depth = wp.max(deepest[own, other], deepest[other, own])
     some_out[own, other] = wp.where(depth < none, 1.0, 0.0)
     all_out[own, other] = wp.clamp(2.0 - depth / few, 0.0, 1.0)
+    deep_out[own, other] = NEARLY * deepest[own, other]
 
 
 @wp.kernel

@@ -9,7 +9,6 @@ wp.set_module_options({"enable_backward": False})
 FAR = wp.constant(1.0e30)
 NEARLY = wp.constant(0.5)  # of the nearest distance beyond it: faces that near have a say in where out is
 BESIDE = wp.constant(0.03)  # of a mesh's reach from its bones: outside its box by that nothing is inside it
-DEEPEST = wp.constant(0.8)  # of the deepest: what is that deep has it near
 UNSURE = wp.constant(0.0)  # length of the mean of the ways out that is none
 SURE = wp.constant(0.9)  # and that is one
 
@@ -280,8 +279,10 @@ def find_samples(
     # vertices that are asked, and by pairs of parts how much what they say counts; at nought they are not asked
     some: wp.array(dtype=wp.int32),
     heard: wp.array2d(dtype=float),
-    # of every vertex one that was asked before; next to the deepest of those all are asked, so that it is the deepest
+    # of every vertex one that was asked before, and by pairs of parts how deep that must lie for the vertex to be asked
+    # all the same, lest something else be taken for the deepest
     beside: wp.array(dtype=wp.int32),
+    deep_enough: wp.array2d(dtype=float),
     # frame
     points: wp.array(dtype=wp.vec3),
     units: wp.array(dtype=wp.vec3),
@@ -328,9 +329,9 @@ def find_samples(
         # what is under the open end of a mesh may be outside its box: that fades out, lest it leap
         beyond = wp.length(wp.max(wp.max(low - p, p - high), wp.vec3(0.0, 0.0, 0.0)))
         near = 1.0 - beyond / wp.max(BESIDE * parts.around[k], 1.0e-30)
-        if near > 0.0 and (heard[own, k] > 0.0 or around > DEEPEST * deepest_out[own, k]):
+        if near > 0.0 and (heard[own, k] > 0.0 or around > deep_enough[own, k]):
             near *= beside_bones(joints, parts, k, p)
-        if near > 0.0 and (heard[own, k] > 0.0 or around > DEEPEST * deepest_out[own, k]):
+        if near > 0.0 and (heard[own, k] > 0.0 or around > deep_enough[own, k]):
             reach = wp.max(2.0 * parts.thickness[v], parts.around[k])
             found = wp.mesh_query_point_no_sign(parts.mesh[k], p, reach)
             if found.result and may_be_behind(points, units, parts, k, p, found.face, found.u, found.v):

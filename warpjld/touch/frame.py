@@ -192,6 +192,7 @@ class Bench:
         )
         probed, apart, every = (wp.ones((names, names), dtype=float, device="cpu") for _ in range(3))
         self._heard = apart.numpy(), every.numpy()
+        deep = wp.zeros((names, names), dtype=float, device="cpu")
         ratio = wp.zeros(count + 1, dtype=float, device="cpu")
         none, probe = _numbers(np.full(count, count)), _numbers(beside)
         frame = [points, units, plains, low, high, pairs, others, self.joints, *boxes]
@@ -199,12 +200,14 @@ class Bench:
             recorded(
                 touch_samples.find_samples,
                 len(some),
-                [_numbers(some), heard, beside, *frame, parts, SHARE, _SOFT, NONE],
+                [_numbers(some), heard, beside, deep, *frame, parts, SHARE, _SOFT, NONE],
                 [ratio, self._deepest, samples],
             )
             for some, heard, beside in zip(asked, (probed, apart, every), (none, probe, none), strict=True)
         )
-        self._choose = recorded(touch_parting.choose_heard, (names, names), [self._deepest, _FEW, NONE], [apart, every])
+        self._choose = recorded(
+            touch_parting.choose_heard, (names, names), [self._deepest, _FEW, NONE], [apart, every, deep]
+        )
         self._heed_nothing = recorded(touch_parting.heed_nothing, names, [], [heeded, *boxes])
         # as deep as the pose is, in every sweep: what is parted in part would be parted ever more
         self._fade = recorded(
@@ -329,8 +332,8 @@ def _apart(
     patches: Patches, vertices: NDArray[np.floating], distance: float
 ) -> tuple[NDArray[np.bool_], NDArray[np.int64]]:
     """Vertices that are apart from one another in their part, in parts of its median thickness, and of every vertex the
-    one of them that it is nearer to than that; both of shape (V,)."""
-    chosen, beside = np.zeros(len(vertices), dtype=bool), np.arange(len(vertices))
+    nearest of them; both of shape (V,)."""
+    chosen, nearest = np.zeros(len(vertices), dtype=bool), np.arange(len(vertices))
     for k in range(len(patches.names)):
         rows = np.flatnonzero(patches.part == k)
         if not len(rows):
@@ -343,11 +346,11 @@ def _apart(
         )
         for i, point in enumerate(points):
             if free[i]:
-                near = np.array(tree.query_ball_point(point, reach))
-                beside[rows[near[free[near]]]] = rows[i]
-                free[near] = False
+                free[tree.query_ball_point(point, reach)] = False
                 chosen[rows[i]] = True
-    return chosen, beside
+        some = rows[chosen[rows]]
+        nearest[rows] = some[cKDTree(vertices[some]).query(points)[1]]
+    return chosen, nearest
 
 
 def _vectors(values: NDArray[np.floating]) -> Any:
