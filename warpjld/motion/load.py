@@ -19,7 +19,7 @@ from warpjld.reading import reading
 from warpjld.rig import Rig
 from warpjld.skeleton import Poses
 
-__all__ = ["MOTION_FORMATS", "LoadedMotion", "load_motion", "open_motion"]
+__all__ = ["MOTION_FORMATS", "LoadedMotion", "load_motion"]
 
 MOTION_FORMATS = {
     ".csv": "key angles of joints by frame, degrees",
@@ -57,14 +57,6 @@ class LoadedMotion:
 
 
 def load_motion(
-    path: str | Path, rig: Rig, *, rate: float | None = None, limits: Limits = "error"
-) -> tuple[Poses, float]:
-    """Poses of a rig from a motion file, and their frames a second; see ``open_motion``, which also gives notes."""
-    loaded = open_motion(path, rig, rate=rate, limits=limits)
-    return loaded.poses, loaded.rate
-
-
-def open_motion(
     path: str | Path,
     rig: Rig,
     *,

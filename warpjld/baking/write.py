@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from warpjld.bake.baked import Baked
+from warpjld.baking.baked import Baked
 from warpjld.errors import InputError
 from warpjld.folders import make_folder
 from warpjld.motion.out.baked_skin import BakedSkin

@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from warpjld.bake import bake, training_poses, unseen_poses, write_baked
+from warpjld.baking import bake, training_poses, unseen_poses, write_baked
 from warpjld.covering import bind_rig
 from warpjld.io import load_rig
 

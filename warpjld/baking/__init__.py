@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from warpjld.bake.baked import Baked, bake
-from warpjld.bake.poses import NamedPoses, training_poses, unseen_poses
-from warpjld.bake.report import Accuracy, accuracy, write_report
-from warpjld.bake.write import write_baked
+from warpjld.baking.baked import Baked, bake
+from warpjld.baking.poses import NamedPoses, training_poses, unseen_poses
+from warpjld.baking.report import Accuracy, accuracy, write_report
+from warpjld.baking.write import write_baked
 
 __all__ = [
     "Accuracy",

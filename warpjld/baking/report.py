@@ -10,8 +10,8 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from warpjld.bake.baked import Baked
-from warpjld.bake.poses import NamedPoses
+from warpjld.baking.baked import Baked
+from warpjld.baking.poses import NamedPoses
 from warpjld.covering.baselines import linear_blend_skinning
 from warpjld.covering.covering import Covering
 from warpjld.errors import InputError

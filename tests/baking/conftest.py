@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from warpjld.bake import Baked, bake, training_poses
+from warpjld.baking import Baked, bake, training_poses
 from warpjld.covering import Covering, bind_rig
 from warpjld.hand import build_hand
 

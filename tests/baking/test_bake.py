@@ -13,8 +13,8 @@ from numpy.typing import NDArray
 from scipy.optimize import minimize
 from scipy.spatial.transform import Rotation
 
-from warpjld.bake import Baked, accuracy, bake, training_poses, unseen_poses, write_baked
-from warpjld.bake.weights import fit_weights
+from warpjld.baking import Baked, accuracy, bake, training_poses, unseen_poses, write_baked
+from warpjld.baking.weights import fit_weights
 from warpjld.cli.bake import command
 from warpjld.covering import Covering
 from warpjld.errors import InputError

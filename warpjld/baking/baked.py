@@ -8,9 +8,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from warpjld.bake.bones import Bones, bones_of
-from warpjld.bake.correctives import Correctives, fit_correctives, no_correctives
-from warpjld.bake.weights import fit_weights
+from warpjld.baking.bones import Bones, bones_of
+from warpjld.baking.correctives import Correctives, fit_correctives, no_correctives
+from warpjld.baking.weights import fit_weights
 from warpjld.covering.covering import Covering
 from warpjld.errors import InputError
 from warpjld.rig import Rig

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from warpjld.bake.poses import NamedPoses, joined, training_poses, unseen_poses
+from warpjld.baking.poses import NamedPoses, joined, training_poses, unseen_poses
 from warpjld.skeleton.kinematics import Poses
 from warpjld.skeleton.tree import Skeleton
 
