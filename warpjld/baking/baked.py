@@ -40,6 +40,10 @@ class Baked:
     weights: NDArray[np.float64]
     correctives: Correctives
 
+    def __repr__(self) -> str:
+        shapes = len(self.correctives)
+        return f"Baked('{self.rig.name}': {self.joints.shape[1]} joints a vertex, {shapes} corrective shapes)"
+
     def blended(self, poses: Poses) -> NDArray[np.float64]:
         """Every vertex's blended motion, shape (F, V, 3, 4)."""
         moves = self.bones.moves(poses)
@@ -89,6 +93,15 @@ def bake(
 
     Raises:
         InputError: Influences or correctives out of range, fewer poses than shapes, or poses of another rig.
+
+    Examples:
+        >>> hand = wj.build_hand("left", resolution=1500)
+        >>> motion = wj.Motion()
+        >>> motion.set_key("index.base.flexion", 0, 0.0)
+        >>> motion.set_key("index.base.flexion", 10, 1.2)  # rad
+        >>> baked = wj.bake(hand, wj.bind(hand), motion.poses(hand.skeleton))
+        >>> baked
+        Baked('left hand': 4 joints a vertex, 0 corrective shapes)
     """
     if influences not in (4, 8):
         raise InputError(f"influences: want 4 or 8, got {influences}")

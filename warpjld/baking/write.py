@@ -58,6 +58,15 @@ def write_baked(path: Path, baked: Baked, clip: Poses | None = None, *, rate: fl
     Raises:
         InputError: Unknown suffix, poses of another rig, or a place that cannot be written.
         MissingExtraError: The format needs an optional dependency.
+
+    Examples:
+        >>> from tempfile import mkdtemp
+        >>> hand = wj.build_hand("left", resolution=1500)
+        >>> motion = wj.Motion()
+        >>> motion.set_key("index.base.flexion", 0, 0.0)
+        >>> motion.set_key("index.base.flexion", 10, 1.2)  # rad
+        >>> baked = wj.bake(hand, wj.bind(hand), motion.poses(hand.skeleton))
+        >>> _ = wj.write_baked(Path(mkdtemp()) / "hand.glb", baked)
     """
     check_baked(path)
     make_folder(path.parent)

@@ -80,6 +80,11 @@ class ClipFiles:
     notes: tuple[str, ...]
     warnings: tuple[str, ...]
 
+    def __repr__(self) -> str:
+        names = ", ".join(file.name for file in self.files[:3]) + (", …" if len(self.files) > 3 else "")
+        doubts = f", {len(self.warnings)} warnings" if self.warnings else ""
+        return f"ClipFiles({names}: {self.frames} frames at {self.moved.rate:g} a second{doubts})"
+
 
 def deform_clip(
     how: Deforming,

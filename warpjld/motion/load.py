@@ -55,6 +55,10 @@ class LoadedMotion:
     notes: tuple[str, ...] = ()
     warnings: tuple[str, ...] = ()
 
+    def __repr__(self) -> str:
+        doubts = f", {len(self.warnings)} warnings" if self.warnings else ""
+        return f"LoadedMotion({len(self.poses)} frames at {self.rate:g} a second{doubts})"
+
 
 def load_motion(
     path: str | Path,
@@ -85,6 +89,14 @@ def load_motion(
 
     Raises:
         InputError: An unknown suffix, a file that cannot be read or understood, or that does not fit the rig.
+
+    Examples:
+        >>> from tempfile import mkdtemp
+        >>> file = Path(mkdtemp()) / "bend.csv"
+        >>> _ = file.write_text("frame,index.base.flexion\\n0,0\\n10,60\\n")  # degrees
+        >>> moved = wj.load_motion(file, wj.build_hand("left", resolution=1500), rate=25)
+        >>> moved
+        LoadedMotion(11 frames at 25 a second)
     """
     path = Path(path)
     if rate is not None and not (np.isfinite(rate) and rate > 0.0):
