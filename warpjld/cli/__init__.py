@@ -23,6 +23,7 @@ _FAULT = 70  # EX_SOFTWARE of sysexits.h
 _TRACEBACK = "WARPJLD_TRACEBACK"
 
 _COMMANDS = {
+    "example": "List, run or copy the examples that come with the package.",
     "run": "Run a script: animation, grasping, contact; pictures, films, exports.",
     "shell": "Type a script's commands one by one and look at the result.",
     "inspect": "Report what was recognised in a rig.",
@@ -33,6 +34,7 @@ _COMMANDS = {
     "bake": "Write a rig for engines: fitted skin weights and corrective shapes.",
     "study": "Run many grasps and bring them into one table.",
     "fem": "Load a deformable body and solve for its shape, stresses and reactions.",
+    "doctor": "Say what is installed, what works here, and what is missing.",
 }
 _HELP = """Metres, degrees, newtons and pascals everywhere. HELP in the shell, or `echo HELP | warpjld shell`, lists
 what scripts understand."""
