@@ -17,7 +17,7 @@ from warpjld.errors import WarpjldError
 from warpjld.limits import LIMITS, set_limit
 from warpjld.suggest import one_of
 
-__all__ = ["main"]
+__all__ = ["group", "main"]
 
 _FAULT = 70  # EX_SOFTWARE of sysexits.h
 _TRACEBACK = "WARPJLD_TRACEBACK"
@@ -77,7 +77,7 @@ def _limits() -> str:
     metavar="NAME=NUMBER",
     help=f"Raise or lower a limit on what is read or computed, before the command; repeatable. {_limits()}.",
 )
-def _group(limits: tuple[str, ...]) -> None:
+def group(limits: tuple[str, ...]) -> None:
     """Hands and bodies deformed by Joint-dependent Local Deformations, without painted weights."""
     for one in limits:
         name, _, value = one.partition("=")
@@ -94,7 +94,7 @@ def main(arguments: list[str] | None = None) -> None:
     if isinstance(sys.stdout, io.TextIOWrapper):
         sys.stdout.reconfigure(errors="backslashreplace")  # names of files may be no text
     try:
-        code = _group.main(arguments, prog_name="warpjld", standalone_mode=False)
+        code = group.main(arguments, prog_name="warpjld", standalone_mode=False)
     except click.exceptions.Abort:
         click.echo("interrupted", err=True)
         sys.exit(130)
