@@ -23,9 +23,9 @@ _FAULT = 70  # EX_SOFTWARE of sysexits.h
 _TRACEBACK = "WARPJLD_TRACEBACK"
 
 _COMMANDS = {
-    "example": "List, run or copy the examples that come with the package.",
     "run": "Run a script: animation, grasping, contact; pictures, films, exports.",
     "shell": "Type a script's commands one by one and look at the result.",
+    "example": "List, run or copy the examples that come with the package.",
     "inspect": "Report what was recognised in a rig.",
     "place": "Propose the named points of a body or hand in a bare surface.",
     "calibrate": "Fit the covering's parameters to a rig.",
