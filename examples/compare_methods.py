@@ -10,32 +10,29 @@ from pathlib import Path
 
 import numpy as np
 
-from warpjld.covering import Covering, bind, load_parameters
+import warpjld as wj
 from warpjld.covering.baselines import dual_quaternion_skinning, linear_blend_skinning
-from warpjld.covering.calibrate import calibrate
 from warpjld.covering.intersections import crossing_faces, surface_parts
 from warpjld.covering.pose_sets import curled
 from warpjld.covering.quality import Stretch, edge_stretch, enclosed_volume, unique_edges
-from warpjld.io import load_rig
 from warpjld.render import Camera, ColorScale, Quality, grid, save_picture, shaded
-from warpjld.rig import Rig
-from warpjld.skeleton import CHANNELS, Poses, Skeleton, poses_from_angles
+from warpjld.skeleton import CHANNELS
 
-Method = Callable[[Poses], np.ndarray]
+Method = Callable[[wj.Poses], np.ndarray]
 
 CELL = (420, 420)
 STRETCH = ColorScale(np.log2(0.5), np.log2(2.0), title="log2 of edge stretch", colormap="coolwarm")
 
 
-def shots(skeleton: Skeleton) -> dict[str, tuple[Poses, tuple[str, ...]]]:
+def shots(skeleton: wj.Skeleton) -> dict[str, tuple[wj.Poses, tuple[str, ...]]]:
     """Poses worth looking at, and where to look from."""
 
-    def posed(**degrees: float) -> Poses:
+    def posed(**degrees: float) -> wj.Poses:
         angles = np.zeros((1, len(skeleton), len(CHANNELS)))
         for place, value in degrees.items():
             *joint, channel = place.split("_")
             angles[0, skeleton.index(".".join(joint)), CHANNELS.index(channel)] = np.radians(value)
-        return poses_from_angles(skeleton, angles)
+        return wj.poses_from_angles(skeleton, angles)
 
     turned = ("radial", "palmar", "three-quarter-back")
     return {
@@ -49,10 +46,10 @@ def shots(skeleton: Skeleton) -> dict[str, tuple[Poses, tuple[str, ...]]]:
     }
 
 
-def methods(rig: Rig, parameters: Path | None) -> tuple[Covering, dict[str, Method]]:
+def methods(rig: wj.Rig, parameters: Path | None) -> tuple[wj.Covering, dict[str, Method]]:
     """The covering, and every method as a function from poses to positions (F, V, 3)."""
-    covering = bind(rig.skeleton, rig.surface)
-    fitted = calibrate(covering).parameters if parameters is None else load_parameters(parameters, rig.skeleton)
+    covering = wj.bind(rig)
+    fitted = wj.calibrate(covering).parameters if parameters is None else wj.load_parameters(parameters, rig.skeleton)
     calibrated = covering.with_parameters(fitted)
     out: dict[str, Method] = {}
     if rig.skin is not None:
@@ -62,7 +59,7 @@ def methods(rig: Rig, parameters: Path | None) -> tuple[Covering, dict[str, Meth
     return covering, out | {"JLD default": covering.deform, "JLD calibrated": calibrated.deform}
 
 
-def table(rig: Rig, covering: Covering, ways: dict[str, Method]) -> str:
+def table(rig: wj.Rig, covering: wj.Covering, ways: dict[str, Method]) -> str:
     """Volume, stretch and crossing faces of every shot and method, as Markdown."""
     surface, parts = rig.surface, surface_parts(covering)
     edges, rest = unique_edges(surface.faces), enclosed_volume(surface.vertices, surface.faces)
@@ -83,7 +80,7 @@ def table(rig: Rig, covering: Covering, ways: dict[str, Method]) -> str:
     return "\n".join(lines)
 
 
-def worst_stretch(rig: Rig, points: np.ndarray) -> np.ndarray:
+def worst_stretch(rig: wj.Rig, points: np.ndarray) -> np.ndarray:
     """log2 of the stretch of each vertex's most stretched or squeezed edge, shape (V,)."""
     edges = unique_edges(rig.surface.faces)
     log = np.log2(edge_stretch(rig.surface.vertices, points, edges))
@@ -94,7 +91,7 @@ def worst_stretch(rig: Rig, points: np.ndarray) -> np.ndarray:
     return np.where(high > -low, high, low)
 
 
-def draw(rig: Rig, ways: dict[str, Method], folder: Path, quality: Quality | None) -> list[Path]:
+def draw(rig: wj.Rig, ways: dict[str, Method], folder: Path, quality: Quality | None) -> list[Path]:
     """A sheet per shot: methods side by side; views one above the other, the first also coloured by stretch."""
     wrist = rig.skeleton.index("wrist")
     base = rig.skeleton.index("middle.base")
@@ -132,7 +129,7 @@ def main(arguments: list[str] | None = None) -> str:
     parser.add_argument("--tables-only", action="store_true", help="draw nothing")
     parser.add_argument("--draft", action="store_true", help="draw quickly")
     given = parser.parse_args(arguments)
-    rig = load_rig(given.rig)
+    rig = wj.load_rig(given.rig)
     covering, ways = methods(rig, given.parameters)
     text = table(rig, covering, ways)
     print(text)

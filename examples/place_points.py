@@ -11,21 +11,19 @@ from pathlib import Path
 import numpy as np
 import trimesh
 
-from warpjld.hand import build_hand
-from warpjld.io import load_rig
+import warpjld as wj
 from warpjld.io.points_file import write_points_file
-from warpjld.skeleton.place.place import propose_points
 
 
 def main(folder: Path) -> float:
     """Mean distance [mm] of what is proposed from where the joints are."""
     folder.mkdir(parents=True, exist_ok=True)
-    hand = build_hand("left", resolution=1500)
+    hand = wj.build_hand("left", resolution=1500)
     surface = folder / "hand.obj"
     trimesh.Trimesh(hand.surface.vertices, hand.surface.faces, process=False).export(surface)
-    points = propose_points(hand.surface.vertices, hand.surface.faces)
+    points = wj.propose_points(hand.surface.vertices, hand.surface.faces)
     write_points_file(folder / "points.json", points)
-    rig = load_rig(surface, points=folder / "points.json")
+    rig = wj.load_rig(surface, points=folder / "points.json")
     assert sorted(rig.skeleton.names) == sorted(points)
     rest = dict(zip(hand.skeleton.names, hand.skeleton.rest, strict=True))
     return 1e3 * float(np.mean([np.linalg.norm(place - rest[name]) for name, place in points.items()]))

@@ -8,26 +8,23 @@ from pathlib import Path
 
 import numpy as np
 
-from warpjld.covering import bind
-from warpjld.hand import build_hand
-from warpjld.io.caches import open_cache
-from warpjld.motion import Motion
+import warpjld as wj
 
 
 def main(folder: Path) -> Path:
     """Write ``bend.npz`` into a folder and return its path."""
-    hand = build_hand("left")
+    hand = wj.build_hand("left")
 
-    motion = Motion(rate=30)
+    motion = wj.Motion(rate=30)
     for frame, degrees in ((0, 0), (15, 70), (30, 0)):
         for joint in ("index.base", "index.knuckle2", "index.knuckle3"):
             motion.set_key(f"{joint}.flexion", frame, np.radians(degrees))
 
     poses = motion.poses(hand.skeleton)
-    covering = bind(hand.skeleton, hand.surface)
+    covering = wj.bind(hand)
 
     path = folder / "bend.npz"
-    with open_cache(path, hand.surface, frames=len(poses), rate=motion.rate) as cache:
+    with wj.open_cache(path, hand.surface, frames=len(poses), rate=motion.rate) as cache:
         for _, vertices in covering.blocks(poses):
             cache.write(vertices)
 

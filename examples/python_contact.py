@@ -6,22 +6,19 @@ python examples/python_contact.py
 import numpy as np
 import trimesh
 
-from warpjld.hand import build_hand
-from warpjld.simulation.recorded import RecordedActor, RecordedAnimation, RecordedObject
-from warpjld.simulation.simulate import simulate
-from warpjld.simulation.specification import ContactSpecification, FleshMaterial, SolveSpecification
+import warpjld as wj
 
-rig = build_hand("left")
+rig = wj.build_hand("left")
 frames = 9
 down = np.zeros((frames, 3))
 down[:, 1] = np.linspace(0.0, -0.0063, frames)  # the hand goes down by 6.3 mm [m]
-hand = RecordedActor("hand", rig, angles=np.zeros((frames, len(rig.skeleton), 4)), root=down)
-plate = RecordedObject("plate", trimesh.creation.box((0.036, 0.006, 0.036)), positions=(0.034, -0.0275, -0.165))
+hand = wj.RecordedActor("hand", rig, angles=np.zeros((frames, len(rig.skeleton), 4)), root=down)
+plate = wj.RecordedObject("plate", trimesh.creation.box((0.036, 0.006, 0.036)), positions=(0.034, -0.0275, -0.165))
 
-contact = ContactSpecification(
-    flesh={"hand": FleshMaterial(digits=("index",))}, pressing=SolveSpecification(0, 8, every=2)
+contact = wj.ContactSpecification(
+    flesh={"hand": wj.FleshMaterial(digits=("index",))}, pressing=wj.SolveSpecification(0, 8, every=2)
 )
-found = simulate(contact, RecordedAnimation([hand], [plate]))
+found = wj.simulate(contact, wj.RecordedAnimation([hand], [plate]))
 
 print(found.verdict.text)
 for frame, force, pressure in zip(found.frames, found.force("hand"), found.pressure, strict=True):

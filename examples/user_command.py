@@ -5,19 +5,19 @@
 An installed package adds its commands without ``--commands`` by an entry point in the group ``warpjld.commands``.
 """
 
-from warpjld.script import Arguments, Scene, command
+import warpjld as wj
 
 FIST = {"base": 84, "knuckle2": 98, "knuckle3": 70}
 """Flexion of a finger's joints in a closed fist [degrees]."""
 
 
-@command(
+@wj.command(
     "GRIP",
     syntax="GRIP <LEFT/RIGHT> <key> <percent>",
     help="Bend all fingers by a share of a fist, the pinky most.",
     group="Examples",
 )
-def grip(scene: Scene, arguments: Arguments) -> None:
+def grip(scene: wj.Scene, arguments: wj.Arguments) -> None:
     """Sets one key on twelve joints."""
     side = arguments.choice("the side", ("LEFT", "RIGHT")).lower()
     key = arguments.number("the key")

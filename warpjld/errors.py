@@ -12,7 +12,15 @@ _LONGEST = 1000
 
 
 class WarpjldError(Exception):
-    """Base of all errors raised on purpose."""
+    """Base of all errors raised on purpose.
+
+    Examples:
+        >>> try:
+        ...     wj.load_rig("missing.glb")
+        ... except wj.WarpjldError as error:
+        ...     print(error)
+        missing.glb: no such file
+    """
 
 
 class InputError(WarpjldError):
@@ -23,6 +31,13 @@ class InputError(WarpjldError):
         path: The file concerned, if any.
         line: 1-based line in that file.
         column: 1-based column in that line.
+
+    Examples:
+        >>> try:
+        ...     wj.build_hand("left", length=19.0)
+        ... except wj.InputError as error:
+        ...     print(error.message)
+        length: want metres...
     """
 
     def __init__(
@@ -44,7 +59,12 @@ class InputError(WarpjldError):
 
 
 class MissingExtraError(WarpjldError):
-    """An optional dependency is not installed: names the extra that brings it."""
+    """An optional dependency is not installed: names the extra that brings it.
+
+    Examples:
+        >>> print(wj.MissingExtraError("reading FBX files", "fbx"))
+        reading FBX files needs an optional dependency: pip install 'warpjld[fbx]'
+    """
 
     def __init__(self, purpose: str, extra: str) -> None:
         super().__init__(f"{purpose} needs an optional dependency: pip install 'warpjld[{extra}]'")

@@ -47,6 +47,9 @@ class Surface:
     corner_uv: NDArray[np.float32] | None = None
     parts: tuple[Part, ...] = ()
 
+    def __repr__(self) -> str:
+        return f"Surface({len(self.vertices)} vertices, {len(self.faces)} triangles, {self.size:.3g} m across)"
+
     @property
     def size(self) -> float:
         """Diagonal of the bounding box [m]: what tolerances are relative to."""

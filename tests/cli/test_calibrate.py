@@ -15,7 +15,7 @@ from warpjld.covering import bind_rig
 from warpjld.covering.parameters import load_parameters, save_parameters
 from warpjld.errors import InputError
 from warpjld.io import load_rig
-from warpjld.motion import open_motion
+from warpjld.motion import load_motion
 
 
 @pytest.fixture(scope="module")
@@ -62,7 +62,7 @@ def shapes(hand: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
     motion.write_text("\n".join(rows) + "\n", encoding="utf-8")
     covering = bind_rig(rig)
     wanted = replace(covering.parameters, inflation=covering.parameters.inflation + 0.4)
-    poses = open_motion(motion, rig).poses
+    poses = load_motion(motion, rig).poses
     vertices = rig.surface.to_source(covering.with_parameters(wanted).deform(poses))
     np.savez(folder / "shapes.npz", vertices=vertices, channels=np.array(channels), angles=angles)
     np.savez(folder / "bare.npz", vertices=vertices)

@@ -19,7 +19,7 @@ from warpjld.grasp.keyframes import load_keyframes
 from warpjld.grasp.object_file import load_object
 from warpjld.io import load_rig
 from warpjld.motion.hand_file import read_hands
-from warpjld.motion.load import open_motion
+from warpjld.motion.load import load_motion
 from warpjld.motion.target_file import read_targets
 from warpjld.script import Interpreter, Scene
 from warpjld.script.runner import run_scene
@@ -152,11 +152,11 @@ def _rig(path: Path) -> object:
 
 def _both(path: Path) -> object:
     rig = load_rig(path)
-    return open_motion(path, rig)
+    return load_motion(path, rig)
 
 
 def _moved(path: Path) -> object:
-    return open_motion(path, RIG)
+    return load_motion(path, RIG)
 
 
 def _object(path: Path) -> object:
@@ -206,7 +206,7 @@ def _recording(kind: str) -> Callable[[Path], None]:
 def _held_hand(path: Path) -> object:
     from tests.motion.skeletons import hand, rig
 
-    return open_motion(path, rig(hand("left")))
+    return load_motion(path, rig(hand("left")))
 
 
 def _parameters(path: Path) -> None:

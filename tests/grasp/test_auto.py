@@ -7,7 +7,6 @@ from warpjld.errors import InputError
 from warpjld.grasp import ObjectSet
 from warpjld.grasp.auto import find_grasp
 from warpjld.grasp.both_ways import BothWays
-from warpjld.grasp.close import Closer
 from warpjld.grasp.draws import WAY
 from warpjld.grasp.judge import Judge
 from warpjld.grasp.near_object import NearObject
@@ -54,7 +53,7 @@ def test_sampled_hands_are_next_to_the_object_and_not_in_it(covering) -> None:
 
 def test_finding_a_grasp(covering) -> None:
     thing = ball(0.06, subdivisions=3).placed((1.0, 0.5, 0.0))
-    found = find_grasp(Closer(covering, thing), count=8, seed=1)
+    found = find_grasp(covering, thing, count=8, seed=1)
     assert found.posture == "sphere"
     assert found.verdict.closed
     assert found.verdict.epsilon > 0.05
@@ -62,7 +61,7 @@ def test_finding_a_grasp(covering) -> None:
     skin = covering.deform(found.poses(covering.skeleton))[0]
     seen = penetration(BothWays(covering, thing), skin)
     assert seen.depth <= 6e-4
-    again = find_grasp(Closer(covering, thing), count=8, seed=1)
+    again = find_grasp(covering, thing, count=8, seed=1)
     np.testing.assert_array_equal(found.angles, again.angles)
     np.testing.assert_array_equal(found.position, again.position)
 
@@ -86,7 +85,7 @@ def test_a_hand_does_not_reach_through_the_table(covering) -> None:
     obstacle = Obstacles(covering, [table])
     depths = []
     for obstacles in ([], [table]):
-        found = find_grasp(Closer(covering, thing), obstacles=obstacles, count=16, seed=1)
+        found = find_grasp(covering, thing, obstacles=obstacles, count=16, seed=1)
         assert found.verdict.closed
         poses = found.poses(covering.skeleton)
         depths.append(obstacle.depth(covering.deform(poses)))
@@ -103,7 +102,7 @@ def test_a_hand_does_not_reach_through_the_table(covering) -> None:
 def test_what_is_walled_in_is_told(covering) -> None:
     walls = box(0.2, 0.2, 0.2, name="crate")
     with pytest.raises(InputError, match="or out of reach: crate blocked 64 more"):
-        find_grasp(Closer(covering, ball(0.06, subdivisions=2)), obstacles=[walls], count=8)
+        find_grasp(covering, ball(0.06, subdivisions=2), obstacles=[walls], count=8)
 
 
 @pytest.mark.parametrize(
@@ -117,19 +116,19 @@ def test_what_is_walled_in_is_told(covering) -> None:
 )
 def test_wrong_wishes(covering, options: dict, says: str) -> None:
     with pytest.raises(InputError, match=says):
-        find_grasp(Closer(covering, ball()), **options)
+        find_grasp(covering, ball(), **options)
 
 
 def test_what_no_hand_can_span_is_told_with_both_widths(covering) -> None:
     with pytest.raises(InputError, match=r"narrower than 1\d{3} mm, and thumb and fingers open to 1?\d{2} mm"):
-        find_grasp(Closer(covering, ball(1.5, subdivisions=3)))
+        find_grasp(covering, ball(1.5, subdivisions=3))
     with pytest.raises(InputError, match="nowhere narrower than 250 mm"):
-        find_grasp(Closer(covering, box(0.25, 0.25, 0.25)))
+        find_grasp(covering, box(0.25, 0.25, 0.25))
 
 
 def test_what_does_not_hold_is_told(covering) -> None:
     with pytest.raises(InputError, match="none of 6 placements ends in a grasp that holds at friction"):
-        find_grasp(Closer(covering, ball(0.06, subdivisions=2)), count=6, friction=0.01)
+        find_grasp(covering, ball(0.06, subdivisions=2), count=6, friction=0.01)
 
 
 def bowl(radius: float, wall: float):
@@ -162,7 +161,7 @@ def test_a_bowl_is_taken_by_its_rim(covering) -> None:
     """Wider than the hand opens: thumb on one side of the wall, fingers on the other."""
     thing = bowl(0.08, 0.004)
     assert not thing.report.notes()
-    found = find_grasp(Closer(covering, thing), seed=1)
+    found = find_grasp(covering, thing, seed=1)
     assert found.verdict.closed
     assert found.penetration <= 6e-4
     skin = covering.deform(found.poses(covering.skeleton))[0]

@@ -19,7 +19,7 @@ from scipy.spatial.transform import Rotation
 
 from warpjld.errors import InputError
 from warpjld.io import load_rig
-from warpjld.motion import open_motion
+from warpjld.motion import load_motion
 from warpjld.motion.load import LoadedMotion
 from warpjld.rig import Rig
 
@@ -124,7 +124,7 @@ def compare(path: Path, rig: Rig, plain: Rig, wanted: LoadedMotion, animation: s
     apart, near = cKDTree(vertices).query(plain.surface.vertices)
     assert len(vertices) == len(plain.surface.vertices)
     assert apart.max() < PLACE
-    read = open_motion(path, rig, animation=animation)
+    read = load_motion(path, rig, animation=animation)
     assert len(read.poses) == FRAMES
     places = scale * turn.apply(read.poses.positions[:, order].reshape(-1, 3)) + move
     np.testing.assert_allclose(places.reshape(FRAMES, -1, 3)[:, own], wanted.poses.positions[:, own], atol=MOVED)
@@ -151,7 +151,7 @@ def test_whatever_blender_exports_is_the_same_rig(tmp_path: Path, file: str) -> 
     assert done.returncode == 0, done.stdout + done.stderr
     assert "FAILED" not in done.stdout, done.stdout
     plain = load_rig(tmp_path / "plain.glb")
-    wanted = {name: open_motion(tmp_path / "plain.glb", plain, animation=name) for name in ("First", "Second")}
+    wanted = {name: load_motion(tmp_path / "plain.glb", plain, animation=name) for name in ("First", "Second")}
     with pytest.raises(InputError, match="draco"):
         load_rig(tmp_path / "draco.glb")
     wrong = []

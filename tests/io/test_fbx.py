@@ -19,7 +19,7 @@ from warpjld.io.fbx.rig import read_fbx_rig
 from warpjld.io.gltf.skin import read_gltf_rig
 from warpjld.io.source import SourceRig
 from warpjld.motion.fbx_animation import fbx_animation_names, read_fbx_animation
-from warpjld.motion.load import open_motion
+from warpjld.motion.load import load_motion
 
 pytest.importorskip("ufbx")
 
@@ -322,7 +322,7 @@ def test_an_animation_without_skin_moves_the_rig_of_another_file(hand: Glb, tmp_
     worlds = moved(hand)
     rig = load_rig(as_fbx(hand, shown=worlds[3]).write(tmp_path / "rig.fbx"))
     bare = as_fbx(hand, stacks={"wave": worlds}, meshes=[], unit=100.0, up="z")
-    motion = open_motion(bare.write(tmp_path / "wave.fbx"), rig)
+    motion = load_motion(bare.write(tmp_path / "wave.fbx"), rig)
     assert motion.rate == 30.0
     at = [rig.skeleton.names.index(name) for name in hand.names]
     kept = [k for k, j in enumerate(at) if rig.sources[j] >= 0]

@@ -53,7 +53,8 @@ def exported(data: Path, tmp_path_factory: pytest.TempPathFactory) -> dict[str, 
     source = data / "hand_webxr_generic" / "left.glb"
     rig = load_rig(source)
     (folder / "one.csv").write_text("frame,index.base.flexion\n0,45\n")
-    poses, rate = load_motion(folder / "one.csv", rig)
+    moved = load_motion(folder / "one.csv", rig)
+    poses, rate = moved.poses, moved.rate
     moved = bind(rig.skeleton, rig.surface).deform(poses)
     for suffix in ("usda", "usdc", "obj", "glb", "abc", "npz"):
         with open_cache(folder / f"hand.{suffix}", rig.surface, frames=len(moved), rate=rate) as cache:

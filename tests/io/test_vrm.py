@@ -14,7 +14,7 @@ from tests.io.vrm_files import BONES, CANONICAL, HAIR, animation, avatar, with_h
 from warpjld.errors import InputError
 from warpjld.io import load_rig
 from warpjld.io.vrm import read_vrm_rig
-from warpjld.motion.load import open_motion
+from warpjld.motion.load import load_motion
 from warpjld.motion.vrma import read_vrma
 
 TURNS = {"0": Rotation.from_euler("y", 180.0, degrees=True).as_matrix(), "1": np.eye(3)}
@@ -101,7 +101,7 @@ def test_an_animation_points_limbs_where_it_says(vrm: tuple[str, Path], tmp_path
     }
     travel = steps * [0.0, 0.0, 0.55]
     rig = load_rig(path)
-    motion = open_motion(animation(tmp_path / "dance.vrma", turns, travel), rig)
+    motion = load_motion(animation(tmp_path / "dance.vrma", turns, travel), rig)
     assert motion.rate == 30.0
     names = rig.skeleton.names
     for bone, end in (

@@ -11,7 +11,7 @@ from tests.motion.hand_files import camera_landmarks, postures, save, webxr_pose
 from tests.motion.skeletons import hand, rig
 from tests.motion.test_hand_sides import leap_frames
 from warpjld.errors import InputError
-from warpjld.motion import open_motion
+from warpjld.motion import load_motion
 
 JUNK: tuple[Any, ...] = (None, 5, -1.5, 1e300, "x", "", True, [], {}, [1, 2, 3], [[]], {"a": 1}, float("nan"), [None])
 
@@ -69,7 +69,7 @@ def test_junk_anywhere_is_refused_or_read_without_nan(tmp_path: Path, kind: str)
             container[key] = JUNK[rng.integers(len(JUNK))]
         path = save(tmp_path, content)
         try:
-            poses = open_motion(path, driven).poses.positions
+            poses = load_motion(path, driven).poses.positions
         except InputError as error:
             message = str(error)
         else:

@@ -9,7 +9,7 @@ from scipy.spatial.transform import Rotation
 
 from tests.motion.conventions import FRAMES, Convention, Recording, record
 from tests.motion.skeletons import body, rig
-from warpjld.motion import open_motion
+from warpjld.motion import load_motion
 from warpjld.motion.bvh import read_bvh
 from warpjld.motion.landmarks import landmarks_of_clip
 from warpjld.motion.load import LoadedMotion
@@ -348,7 +348,7 @@ BONES = [
 def play(folder: Path, recording: Recording) -> LoadedMotion:
     path = folder / "motion.bvh"
     path.write_text(recording.text)
-    return open_motion(path, rig(body()))
+    return load_motion(path, rig(body()))
 
 
 def degrees(a: np.ndarray, b: np.ndarray) -> np.ndarray:

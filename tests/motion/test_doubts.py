@@ -11,7 +11,7 @@ from tests.motion.conventions import FRAMES, record
 from tests.motion.skeletons import body, rig
 from tests.motion.test_conventions import CONVENTIONS, play
 from warpjld.io import load_rig
-from warpjld.motion import open_motion
+from warpjld.motion import load_motion
 from warpjld.motion.doubts import doubts_of_own_joints, jumps
 from warpjld.motion.joint_animation import JointAnimation
 from warpjld.skeleton.recognise.tree import SourceTree
@@ -49,7 +49,7 @@ def test_flips_are_named_with_joint_and_frames_before_resampling(tmp_path: Path)
     path = tmp_path / "m.bvh"
     path.write_text(record(MIXAMO, frames=frames).text)
     for rate in (None, 120.0):
-        warnings = open_motion(path, rig(body()), rate=rate).warnings
+        warnings = load_motion(path, rig(body()), rate=rate).warnings
         assert warnings == ("mixamorig:Head turns by 100° from frame 1 to 2 of the recording: a flip?",)
 
 
@@ -77,10 +77,10 @@ def test_joints_merged_into_others_are_named_where_their_own_animation_moves_the
 @pytest.mark.parametrize("name", ["body_anny/body_104joints.glb", "body_mesh2motion_mannequin/human-male.glb"])
 def test_real_recordings_are_not_suspected_of_flips(data: Path, name: str) -> None:
     driven = load_rig(data / name)
-    walk = open_motion(data / "motion_cmu_walk_bvh" / "cmu_12_01_walk.bvh", driven)
+    walk = load_motion(data / "motion_cmu_walk_bvh" / "cmu_12_01_walk.bvh", driven)
     assert len(walk.warnings) == 1
     assert "the motion moves LeftFingerBase, LeftHandIndex1, LThumb" in walk.warnings[0]
-    pose = open_motion(data / "motion_makehuman_benchmark_pose_bvh" / "tpose.bvh", driven)
+    pose = load_motion(data / "motion_makehuman_benchmark_pose_bvh" / "tpose.bvh", driven)
     assert pose.warnings == ()
 
 

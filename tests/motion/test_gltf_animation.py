@@ -95,7 +95,8 @@ def turn(axis: str, degrees: float) -> np.ndarray:
 def test_linear_rotations_are_slerped_and_added_joints_follow(tmp_path: Path) -> None:
     file, driven = chain()
     file.animate(2, "rotation", [0, 1], np.array([turn("z", 0), turn("z", -90)]))
-    poses, rate = load_motion(file.save(tmp_path / "a.glb"), driven, rate=10)
+    moved = load_motion(file.save(tmp_path / "a.glb"), driven, rate=10)
+    poses, rate = moved.poses, moved.rate
     assert (len(poses), rate) == (11, 10)
     degrees = Rotation.from_quat(poses.rotations[:, 1]).as_rotvec(degrees=True)
     np.testing.assert_allclose(degrees, np.linspace(0, -90, 11)[:, None] * [0, 0, 1], atol=1e-4)
@@ -110,7 +111,7 @@ def test_steps_and_cubics_of_translations(tmp_path: Path) -> None:
     cubic = np.zeros((6, 3))
     cubic[[1, 4]] = [[0, 0.5, 0], [0, 1.5, 0]]  # values; tangents zero: 3u² - 2u³
     file.animate(2, "translation", [0, 2], cubic, "CUBICSPLINE")
-    poses, _ = load_motion(file.save(tmp_path / "a.glb"), driven, rate=2)
+    poses = load_motion(file.save(tmp_path / "a.glb"), driven, rate=2).poses
     np.testing.assert_allclose(poses.positions[:, 0, 0], [0, 0, 2, 2, 6], atol=FLOAT32)
     u = np.linspace(0, 1, 5)
     stretched = np.linalg.norm(poses.positions[:, 1] - poses.positions[:, 0], axis=1)
@@ -122,7 +123,7 @@ def test_cubic_rotations_are_unit_and_hit_their_keys(tmp_path: Path) -> None:
     keys = np.zeros((6, 4))
     keys[[1, 4]] = [turn("x", 0), turn("x", 80)]
     file.animate(3, "rotation", [0, 1], keys, "CUBICSPLINE")
-    poses, _ = load_motion(file.save(tmp_path / "a.glb"), driven, rate=4)
+    poses = load_motion(file.save(tmp_path / "a.glb"), driven, rate=4).poses
     np.testing.assert_allclose(np.linalg.norm(poses.rotations, axis=-1), 1, atol=1e-12)
     angles = Rotation.from_quat(poses.rotations[:, 2]).magnitude()
     np.testing.assert_allclose(np.degrees(angles[[0, 2, 4]]), [0, 40, 80], atol=1e-4)
@@ -131,7 +132,7 @@ def test_cubic_rotations_are_unit_and_hit_their_keys(tmp_path: Path) -> None:
 def test_scale_moves_joints_and_leaves_rotations(tmp_path: Path) -> None:
     file, driven = chain()
     file.animate(1, "scale", [0, 1], np.array([[1, 1, 1], [1, 3, 1]]))
-    poses, _ = load_motion(file.save(tmp_path / "a.glb"), driven, rate=1)
+    poses = load_motion(file.save(tmp_path / "a.glb"), driven, rate=1).poses
     np.testing.assert_allclose(poses.positions[1, 1], [-3, 1, 0], atol=FLOAT32)
     np.testing.assert_allclose(poses.rotations[1], np.tile([0, 0, 0, 1], (4, 1)), atol=1e-6)
 
@@ -139,7 +140,7 @@ def test_scale_moves_joints_and_leaves_rotations(tmp_path: Path) -> None:
 def test_of_keys_at_one_time_the_last_counts(tmp_path: Path) -> None:
     file, driven = chain()
     file.animate(2, "rotation", [0, 1, 1, 2], np.array([turn("z", d) for d in (0, 40, 10, 10)]))
-    poses, _ = load_motion(file.save(tmp_path / "a.glb"), driven, rate=2)
+    poses = load_motion(file.save(tmp_path / "a.glb"), driven, rate=2).poses
     degrees = Rotation.from_quat(poses.rotations[:, 1]).as_rotvec(degrees=True)[:, 2]
     np.testing.assert_allclose(degrees, [0, 5, 10, 10, 10], atol=1e-4)
 
@@ -147,7 +148,8 @@ def test_of_keys_at_one_time_the_last_counts(tmp_path: Path) -> None:
 def test_rate_is_that_of_the_keys(tmp_path: Path) -> None:
     file, driven = chain()
     file.animate(2, "rotation", np.arange(5) / 24, np.array([turn("z", d) for d in range(0, 50, 10)]))
-    poses, rate = load_motion(file.save(tmp_path / "a.glb"), driven)
+    moved = load_motion(file.save(tmp_path / "a.glb"), driven)
+    poses, rate = moved.poses, moved.rate
     assert (len(poses), rate) == (5, 24)
 
 
@@ -189,7 +191,8 @@ def test_real_rigs_play_animations_of_their_own(data: Path, tmp_path: Path, name
     driven = load_rig(data / name)
     wanted = bent(driven.skeleton)
     copy = animated_copy(data / name, driven, wanted, tmp_path / "copy.glb")
-    got, rate = load_motion(copy, driven)
+    moved = load_motion(copy, driven)
+    got, rate = moved.poses, moved.rate
     assert rate == 25
     np.testing.assert_allclose(got.positions, wanted.positions, atol=FLOAT32)
     np.testing.assert_allclose(got.rotations, wanted.rotations, atol=5e-6)
@@ -200,7 +203,8 @@ def test_another_skeleton_is_retargeted(data: Path, tmp_path: Path) -> None:
     source = load_rig(data / "hand_webxr_generic" / "left.glb")
     copy = animated_copy(data / "hand_webxr_generic" / "left.glb", source, bent(source.skeleton), tmp_path / "copy.glb")
     driven = rig(hand("left"))
-    poses, rate = load_motion(copy, driven)
+    moved = load_motion(copy, driven)
+    poses, rate = moved.poses, moved.rate
     assert (len(poses), rate) == (5, 25)
     knuckle = driven.skeleton.index("index.knuckle3")
     assert np.degrees(poses.flexion[-1, knuckle] - poses.flexion[0, knuckle]) == pytest.approx(

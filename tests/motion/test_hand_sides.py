@@ -10,7 +10,7 @@ from tests.motion.hand_files import POSTURES, postures, save, webxr_poses
 from tests.motion.skeletons import body, hand, rig, with_forearm
 from warpjld.errors import InputError
 from warpjld.io import load_rig
-from warpjld.motion import open_motion
+from warpjld.motion import load_motion
 from warpjld.motion.finger_bends import FINGERS, bending_side, finger_bends, leaning
 from warpjld.motion.hand_file import read_hands
 from warpjld.rig import Rig
@@ -50,12 +50,12 @@ def test_side_and_flexions_are_as_written(tmp_path: Path, side: str, names: tupl
     skeleton = hand(side)
     wanted = postures(skeleton, side, names)
     path = written(tmp_path, skeleton, side, names)
-    own = open_motion(path, rig(skeleton))
+    own = load_motion(path, rig(skeleton))
     same(own.poses, wanted, skeleton)
     assert (len(own.notes), own.warnings) == (1, ())
     assert f" {side} " in own.notes[0]
     assert "--side" in own.notes[0]
-    other = open_motion(path, rig(hand(OTHER[side])))
+    other = load_motion(path, rig(hand(OTHER[side])))
     same(other.poses, wanted, skeleton, mirror=-1.0)
     assert other.notes[1] == f"a recorded {side} hand drives the other one, mirrored"
 
@@ -67,7 +67,7 @@ def test_hands_of_others_are_told_apart_in_every_posture(data: Path, tmp_path: P
     driven = load_rig(data / file)
     side = driven.skeleton.names[0].partition(".")[0]
     for names in SETS:
-        loaded = open_motion(written(tmp_path, driven.skeleton, side, names), driven)
+        loaded = load_motion(written(tmp_path, driven.skeleton, side, names), driven)
         assert f" {side} " in loaded.notes[0], names
         wanted = postures(driven.skeleton, side, names)
         np.testing.assert_allclose(loaded.poses.flexion, wanted.flexion, atol=1e-6)
@@ -76,7 +76,7 @@ def test_hands_of_others_are_told_apart_in_every_posture(data: Path, tmp_path: P
 def test_built_in_hands_keep_side_and_flexions(tmp_path: Path) -> None:
     skeleton = with_forearm(hand("right"))
     names = ("fist", "point", "flat", "spread")
-    loaded = open_motion(written(tmp_path, skeleton, "right", names), rig(skeleton))
+    loaded = load_motion(written(tmp_path, skeleton, "right", names), rig(skeleton))
     same(loaded.poses, postures(skeleton, "right", names), skeleton)
 
 
@@ -101,13 +101,13 @@ def test_what_a_file_states_wins(tmp_path: Path, how: int) -> None:
     (one,) = read_hands(path).hands
     assert one.side == "left"
     assert len(one.times) == 2
-    assert open_motion(path, rig(skeleton)).notes == ()
+    assert load_motion(path, rig(skeleton)).notes == ()
     with pytest.raises(
         InputError, match=r"hand.json: as a right hand its fingers bend backwards, worst right.*pose '.*fist"
     ):
-        open_motion(save(tmp_path, statements(poses, "right")[how]), rig(skeleton))
+        load_motion(save(tmp_path, statements(poses, "right")[how]), rig(skeleton))
     flat = {"flat": poses["flat"]}
-    warned = open_motion(save(tmp_path, statements(flat, "right")[how]), rig(hand("right")))
+    warned = load_motion(save(tmp_path, statements(flat, "right")[how]), rig(hand("right")))
     assert "look like a left one's" in warned.warnings[0]
 
 
@@ -115,11 +115,11 @@ def test_side_overrides_what_a_file_states_and_bends(tmp_path: Path) -> None:
     skeleton = hand("left")
     poses = webxr_poses(skeleton, "left", postures(skeleton, "left", ("fist",)), ("fist",))
     path = save(tmp_path, {"right": poses})
-    loaded = open_motion(path, rig(skeleton), side="left")
+    loaded = load_motion(path, rig(skeleton), side="left")
     assert "taken for a left one, as asked for" in loaded.warnings[0]
     same(loaded.poses, postures(skeleton, "left", ("fist",)), skeleton)
     with pytest.raises(InputError, match=r"as a right hand its fingers bend backwards.*leave --side out"):
-        open_motion(save(tmp_path, poses), rig(skeleton), side="right")
+        load_motion(save(tmp_path, poses), rig(skeleton), side="right")
 
 
 def test_sides_that_make_no_sense_are_refused(tmp_path: Path) -> None:
@@ -147,11 +147,11 @@ def flatter(skeleton: Skeleton) -> dict:
 def test_a_hand_that_is_its_own_mirror_image_is_the_rigs_or_nobodys(tmp_path: Path) -> None:
     path = save(tmp_path, flatter(hand("left")))
     for side in ("left", "right"):
-        loaded = open_motion(path, rig(hand(side)))
+        loaded = load_motion(path, rig(hand(side)))
         assert f"taken for a {side} one, as the rig's" in loaded.notes[0]
     with pytest.raises(InputError, match=r"hand.json: the file does not say which hand this is.*--side"):
-        open_motion(path, rig(two_hands()))
-    assert open_motion(path, rig(two_hands()), side="left").notes == ("the recorded left hand drives the left one",)
+        load_motion(path, rig(two_hands()))
+    assert load_motion(path, rig(two_hands()), side="left").notes == ("the recorded left hand drives the left one",)
 
 
 def test_single_joints_that_err_are_warned_of_and_hands_bent_back_refused(tmp_path: Path) -> None:
@@ -162,7 +162,7 @@ def test_single_joints_that_err_are_warned_of_and_hands_bent_back_refused(tmp_pa
     angles[0, skeleton.index("index.knuckle3"), 0] = np.radians(-40)
     bent = webxr_poses(skeleton, "left", poses, names)
     bent[names[7]] = webxr_poses(skeleton, "left", poses_from_angles(skeleton, angles), ("one",))["one"]
-    loaded = open_motion(save(tmp_path, bent), rig(skeleton))
+    loaded = load_motion(save(tmp_path, bent), rig(skeleton))
     (warning,) = loaded.warnings
     assert "in 1 of 20 frames, worst left.index.knuckle3 by 40° at pose 'point 7'" in warning
     angles[0, skeleton.index("index.knuckle3"), 0] = 0.0
@@ -172,7 +172,7 @@ def test_single_joints_that_err_are_warned_of_and_hands_bent_back_refused(tmp_pa
     with pytest.raises(
         InputError, match=r"bend backwards on either hand, worst left.index.knuckle2 by 60° at pose 'torn'"
     ):
-        open_motion(save(tmp_path, torn | {"handedness": "left"}), rig(skeleton))
+        load_motion(save(tmp_path, torn | {"handedness": "left"}), rig(skeleton))
 
 
 def joined(skeleton: Skeleton, left: Poses, right: Poses) -> Poses:
@@ -195,16 +195,16 @@ def both(folder: Path, skeleton: Skeleton) -> Path:
 def test_a_recording_of_two_hands_drives_both_by_side(tmp_path: Path) -> None:
     skeleton = two_hands()
     path = both(tmp_path, skeleton)
-    loaded = open_motion(path, rig(skeleton))
+    loaded = load_motion(path, rig(skeleton))
     fist, point = postures(skeleton, "left", ("flat", "fist")), postures(skeleton, "right", ("flat", "point"))
     same(loaded.poses, joined(skeleton, fist, point), skeleton)
     assert loaded.notes == (
         "the recorded left hand drives the left one",
         "the recorded right hand drives the right one",
     )
-    one = open_motion(path, rig(skeleton), side="right")
+    one = load_motion(path, rig(skeleton), side="right")
     same(one.poses, point, skeleton)
-    single = open_motion(path, rig(hand("right")))
+    single = load_motion(path, rig(hand("right")))
     same(single.poses, postures(hand("right"), "right", ("flat", "point")), hand("right"))
     assert single.notes == ("the recorded left hand drives nothing: the rig has none",)
 
@@ -212,7 +212,7 @@ def test_a_recording_of_two_hands_drives_both_by_side(tmp_path: Path) -> None:
 def test_a_lone_hand_takes_its_own_side(tmp_path: Path) -> None:
     skeleton = body()
     for side in ("left", "right"):
-        loaded = open_motion(written(tmp_path, hand(side), side, ("flat", "fist")), rig(skeleton))
+        loaded = load_motion(written(tmp_path, hand(side), side, ("flat", "fist")), rig(skeleton))
         moved = np.linalg.norm(loaded.poses.positions[1] - skeleton.rest, axis=-1)
         assert moved[skeleton.index(f"{side}.index.tip")] > 0.03
         assert moved[skeleton.index(f"{OTHER[side]}.index.tip")] < 1e-9
@@ -245,7 +245,7 @@ def test_leap_hands_are_followed_by_side_though_lost_and_numbered_anew(tmp_path:
     names = ("flat",) * 3 + ("fist",) * 3
     left, right = postures(skeleton, "left", names), postures(skeleton, "right", names[::-1])
     path = save(tmp_path, leap_frames(skeleton, {"left": left.positions, "right": right.positions}, lost=(1,)))
-    loaded = open_motion(path, rig(skeleton))
+    loaded = load_motion(path, rig(skeleton))
     assert (len(loaded.poses), loaded.rate) == (6, 100.0)
     same(loaded.poses, joined(skeleton, left, right), skeleton)
     assert loaded.notes[0] == "left hand was lost in 1 frames, at most 1 in a row after frame 0: interpolated"
@@ -278,7 +278,7 @@ def test_two_recordings_of_the_data_folder_in_one_drive_both_hands_of_a_body(dat
     content["frames"] = [fields, *frames]
     driven: Rig = load_rig(data / "body_mesh2motion_mannequin" / "human-male.glb")
     skeleton = driven.skeleton
-    loaded = open_motion(save(tmp_path, content), driven)
+    loaded = load_motion(save(tmp_path, content), driven)
     for finger in FINGERS:
         flexions = [loaded.poses.flexion[:, skeleton.index(f"{side}.{finger}.knuckle2")] for side in ("left", "right")]
         assert np.ptp(flexions[0]) > np.radians(1)

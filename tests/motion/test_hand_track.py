@@ -12,7 +12,7 @@ from scipy.spatial.transform import Rotation
 from tests.motion.skeletons import body, hand, rig, with_forearm
 from warpjld.errors import InputError
 from warpjld.io import load_rig
-from warpjld.motion import load_motion, open_motion
+from warpjld.motion import load_motion
 from warpjld.motion.hand_file import read_hands
 from warpjld.motion.hand_track import HandTrack
 from warpjld.motion.hands_drive import poses_of_hands
@@ -205,7 +205,7 @@ def test_webxr_poses_tell_their_side_and_are_a_second_apart(tmp_path: Path, side
     wanted = gesture(skeleton, travel=0.0)
     track, rate = only_hand(path := save(tmp_path, webxr(skeleton, wanted)))
     assert (track.side, rate, track.moves) == (None, 1.0, False)
-    moved = open_motion(path, rig(skeleton), rate=4)
+    moved = load_motion(path, rig(skeleton), rate=4)
     assert f"fingers bend as a {side} hand's" in moved.notes[0]
     poses, rate = moved.poses, moved.rate
     assert (len(poses), rate) == (13, 4)
@@ -216,7 +216,8 @@ def test_webxr_poses_tell_their_side_and_are_a_second_apart(tmp_path: Path, side
 def test_leap_recordings_of_both_formats(tmp_path: Path, packed: bool) -> None:
     skeleton = hand("right")
     wanted = gesture(skeleton)
-    poses, rate = load_motion(save(tmp_path, leap(skeleton, wanted, packed=packed)), rig(skeleton))
+    moved = load_motion(save(tmp_path, leap(skeleton, wanted, packed=packed)), rig(skeleton))
+    poses, rate = moved.poses, moved.rate
     assert rate == 100.0
     np.testing.assert_allclose(poses.positions, wanted.positions, atol=1e-9)
 
@@ -294,11 +295,11 @@ def test_real_recordings_are_followed_phalanx_by_phalanx(data: Path, name: str) 
 def test_grabbing_curls_and_pinching_brings_thumb_and_index_together(data: Path) -> None:
     driven = real_rig(data)
     skeleton = driven.skeleton
-    grab, _ = load_motion(data / LEAP / "grab.json", driven)
+    grab = load_motion(data / LEAP / "grab.json", driven).poses
     curl = np.degrees(grab.flexion[:, [skeleton.index(f"{d}.knuckle2") for d in DIGITS[:4]]]).mean(axis=1)
     assert curl.min() < 25
     assert curl.max() > 60
-    pinch, _ = load_motion(data / LEAP / "pinch-57fps.json", driven)
+    pinch = load_motion(data / LEAP / "pinch-57fps.json", driven).poses
     gap = np.linalg.norm(
         pinch.positions[:, skeleton.index("thumb.tip")] - pinch.positions[:, skeleton.index("index.tip")], axis=-1
     )
@@ -308,8 +309,9 @@ def test_grabbing_curls_and_pinching_brings_thumb_and_index_together(data: Path)
 def test_webxr_poses_of_another_hand_are_left_and_point(data: Path) -> None:
     driven = real_rig(data)
     path = data / "motion_iwer_webxr_poses" / "poses.json"
-    assert "fingers bend as a left hand's" in open_motion(path, driven).notes[0]
-    poses, rate = load_motion(path, driven)
+    assert "fingers bend as a left hand's" in load_motion(path, driven).notes[0]
+    moved = load_motion(path, driven)
+    poses, rate = moved.poses, moved.rate
     assert (len(poses), rate) == (3, 1.0)
     bends = np.degrees(poses.flexion[2])
     assert bends[driven.skeleton.index("index.knuckle2")] < 15

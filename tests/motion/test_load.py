@@ -10,14 +10,14 @@ from tests.motion.skeletons import body, hand, rig
 from warpjld.errors import InputError
 from warpjld.io import load_rig
 from warpjld.motion import load_motion
-from warpjld.motion.load import open_motion
 
 
 def test_tables_play_at_the_given_rate(tmp_path: Path) -> None:
     path = tmp_path / "curl.CSV"
     path.write_text("frame,index.base.flexion\n0,0\n10,60\n")
     for rate, expected in ((None, 30.0), (50.0, 50.0)):
-        poses, got = load_motion(path, rig(hand()), rate=rate)
+        moved = load_motion(path, rig(hand()), rate=rate)
+        poses, got = moved.poses, moved.rate
         assert (len(poses), got) == (11, expected)
     assert np.degrees(poses.flexion[-1, hand().index("index.base")]) == pytest.approx(60)
 
@@ -27,7 +27,7 @@ def test_limits_are_checked_or_not(tmp_path: Path) -> None:
     path.write_text("frame,index.base.flexion\n0,0\n10,160\n")
     with pytest.raises(InputError, match=r"curl.csv: left.index.base: flexion 160° at frame 10"):
         load_motion(path, rig(hand()))
-    poses, _ = load_motion(path, rig(hand()), limits="clamp")
+    poses = load_motion(path, rig(hand()), limits="clamp").poses
     assert np.degrees(poses.flexion[-1, hand().index("index.base")]) == pytest.approx(90)
 
 
@@ -47,7 +47,8 @@ def test_unknown_suffixes_list_the_known_ones(tmp_path: Path) -> None:
 
 def test_a_real_walk_by_its_suffix(data: Path) -> None:
     path = data / "motion_cmu_walk_bvh" / "cmu_12_01_walk.bvh"
-    poses, rate = load_motion(path, load_rig(data / "body_anny" / "body_104joints.glb"), rate=30)
+    moved = load_motion(path, load_rig(data / "body_anny" / "body_104joints.glb"), rate=30)
+    poses, rate = moved.poses, moved.rate
     assert (len(poses), rate) == (131, 30)
     strange = replace(body(), names=tuple(f"part {j}" for j in range(len(body()))))
     with pytest.raises(InputError, match=r"walk.bvh: no joint of the motion"):
@@ -58,4 +59,4 @@ def test_a_name_is_refused_where_a_file_holds_one_motion(tmp_path: Path) -> None
     path = tmp_path / "curl.csv"
     path.write_text("frame,index.base.flexion\n0,0\n10,60\n")
     with pytest.raises(InputError, match=r"curl.csv: no animation 'walk': a .csv file holds one motion without a name"):
-        open_motion(path, rig(hand()), animation="walk")
+        load_motion(path, rig(hand()), animation="walk")

@@ -14,7 +14,7 @@ from tests.motion.hand_files import POSTURES, postures, save
 from tests.motion.skeletons import hand, rig, with_forearm
 from warpjld.errors import InputError
 from warpjld.io import load_rig
-from warpjld.motion import open_motion
+from warpjld.motion import load_motion
 from warpjld.motion.hand_file import read_hands
 from warpjld.motion.out import write_motion
 from warpjld.skeleton import Poses, Skeleton, default_limits, hand_joint_names, rest_poses
@@ -108,7 +108,7 @@ def test_phalanges_point_where_forward_kinematics_say(tmp_path: Path, side: str,
     numbers = np.concatenate([orient, pose.reshape(frames, 45), place], axis=1)
     numbers = {45: numbers[:, 3:48], 48: numbers[:, :48], 51: numbers}[width]
     path = save(tmp_path, {"pose": numbers.tolist(), "flat_hand_mean": True, "fps": 24})
-    loaded = open_motion(path, rig(skeleton))
+    loaded = load_motion(path, rig(skeleton))
     assert loaded.rate == 24
     assert any(f"fingers bend as a {side} hand's" in note for note in loaded.notes)
     assert any("MANO's own order" in note for note in loaded.notes)
@@ -130,18 +130,18 @@ def test_hands_that_rest_bent_or_askew_become_flat(data: Path, tmp_path: Path) -
     skeleton = mano_rig("right", askew)
     pose = random_pose("right", 4)
     fields = {"hand_pose": pose.reshape(4, 45).tolist(), "flat_hand_mean": True, "is_rhand": True}
-    loaded = open_motion(save(tmp_path, fields), rig(skeleton))
+    loaded = load_motion(save(tmp_path, fields), rig(skeleton))
     wanted = np.array([directions("right", p, np.zeros(3)) @ askew.T for p in pose])
     # axes that are read off the knuckles, not off the model: the palm's tilt against its axes remains
     assert angles(phalanges(skeleton, loaded.poses.positions), wanted).max() < 8.0
     for file in ("hand_anny/right.glb", "hand_godot_low/Hand_low_R.gltf", "hand_webxr_generic/right.glb"):
         driven = load_rig(data / file)
-        flat = open_motion(save(tmp_path, fields | {"hand_pose": np.zeros((1, 45)).tolist()}), driven)
+        flat = load_motion(save(tmp_path, fields | {"hand_pose": np.zeros((1, 45)).tolist()}), driven)
         bones = phalanges(driven.skeleton, flat.poses.positions)[0].reshape(5, 3, 3)
         assert angles(bones[:4, :-1], bones[:4, 1:]).max() < 20.0
         fist = np.zeros((1, 15, 3))
         fist[:, :12, 2] = np.radians(70.0)
-        curled = open_motion(save(tmp_path, fields | {"hand_pose": fist.reshape(1, 45).tolist()}), driven)
+        curled = load_motion(save(tmp_path, fields | {"hand_pose": fist.reshape(1, 45).tolist()}), driven)
         bones = phalanges(driven.skeleton, curled.poses.positions)[0].reshape(5, 3, 3)
         np.testing.assert_allclose(angles(bones[:4, :-1], bones[:4, 1:]), 70.0, atol=15.0)
         tips = [driven.skeleton.index(f"{finger}.tip") for finger in ORDER[:4]]
@@ -157,7 +157,7 @@ def test_writing_and_reading_give_the_same_rotations(tmp_path: Path, side: str) 
         wanted = postures(skeleton, side, POSTURES)
         write_motion(tmp_path / "out.npz", rig(skeleton), wanted, rate=25.0)
         assert list(tmp_path.iterdir()) == [tmp_path / "out.npz"]
-        loaded = open_motion(tmp_path / "out.npz", rig(skeleton))
+        loaded = load_motion(tmp_path / "out.npz", rig(skeleton))
         assert (loaded.rate, loaded.warnings, loaded.notes) == (25.0, (), ())
         np.testing.assert_allclose(loaded.poses.positions, wanted.positions, atol=1e-9)
         same = np.abs((loaded.poses.rotations * wanted.rotations).sum(axis=-1))
@@ -172,7 +172,7 @@ def test_real_hands_come_back(data: Path, tmp_path: Path) -> None:
         side = driven.skeleton.names[0].partition(".")[0]
         wanted = postures(driven.skeleton, side, POSTURES)
         write_motion(tmp_path / "out.npz", driven, wanted, rate=30.0)
-        got = open_motion(tmp_path / "out.npz", driven).poses
+        got = load_motion(tmp_path / "out.npz", driven).poses
         np.testing.assert_allclose(got.positions, wanted.positions, atol=1e-8)
 
 
@@ -212,7 +212,7 @@ def test_a_rig_with_two_hands_is_written_with_both(tmp_path: Path) -> None:
         np.concatenate([half.flexion for half in halves], axis=1),
     )
     write_motion(tmp_path / "out.npz", rig(both), wanted, rate=30.0)
-    got = open_motion(tmp_path / "out.npz", rig(both)).poses
+    got = load_motion(tmp_path / "out.npz", rig(both)).poses
     fingers = [j for j, name in enumerate(both.names) if not name.endswith(".wrist")]
     same = np.abs((got.rotations * wanted.rotations).sum(axis=-1))[:, fingers]
     assert np.degrees(2 * np.arccos(np.clip(same, 0, 1))).max() < 1e-4
@@ -246,7 +246,7 @@ def test_ways_of_writing_the_same(tmp_path: Path) -> None:
         {"flat_hand_mean": True, "frames": [{"hand_pose": row.tolist(), "handedness": "Right"} for row in flat]},
     ]
     for content in contents:
-        loaded = open_motion(save(tmp_path, content), rig(skeleton), rate=30)
+        loaded = load_motion(save(tmp_path, content), rig(skeleton), rate=30)
         wanted = np.array([directions("right", p, np.zeros(3)) for p in pose])
         np.testing.assert_allclose(phalanges(skeleton, loaded.poses.positions), wanted, atol=1e-9)
     save(tmp_path, flat.tolist(), "bare.json")
@@ -256,8 +256,8 @@ def test_ways_of_writing_the_same(tmp_path: Path) -> None:
         with pytest.raises(
             InputError, match=rf"{name}: does not say whether no rotation means the flat hand.*flat_hand_mean"
         ):
-            open_motion(tmp_path / name, rig(skeleton))
-        loaded = open_motion(tmp_path / name, rig(skeleton), rate=30, flat_hand_mean=True)
+            load_motion(tmp_path / name, rig(skeleton))
+        loaded = load_motion(tmp_path / name, rig(skeleton), rate=30, flat_hand_mean=True)
         np.testing.assert_allclose(phalanges(skeleton, loaded.poses.positions), wanted, atol=1e-9)
 
 
@@ -268,11 +268,11 @@ def test_hands_of_whole_bodies_drive_both(data: Path, tmp_path: Path, width: int
     poses = np.full((4, width), 0.3)
     poses[:, start : start + 45], poses[:, start + 45 : start + 90] = left, right
     np.savez(tmp_path / "body.npz", poses=poses, trans=np.zeros((4, 3)), mocap_framerate=60.0)
-    loaded = open_motion(tmp_path / "body.npz", driven, flat_hand_mean=True)
+    loaded = load_motion(tmp_path / "body.npz", driven, flat_hand_mean=True)
     assert loaded.rate == 60.0
     assert "only its hands are followed" in loaded.warnings[0]
     for side, pose in (("left", left), ("right", right)):
-        one = open_motion(
+        one = load_motion(
             save(tmp_path, {"side": side, "hand_pose": pose.tolist(), "flat_hand_mean": True, "fps": 60}), driven
         )
         own = [j for j, name in enumerate(driven.skeleton.names) if name.startswith(f"{side}.")]
@@ -287,7 +287,7 @@ def test_pickles_are_refused_by_name(tmp_path: Path) -> None:
     np.save(tmp_path / "object.npy", np.array([{"a": 1}], dtype=object), allow_pickle=True)
     for name in ("mano.pkl", "mano.npy", "mano.npz", "object.npy"):
         with pytest.raises(InputError, match=rf"{name}: .*pickled Python objects"):
-            open_motion(tmp_path / name, rig(hand("left")))
+            load_motion(tmp_path / name, rig(hand("left")))
 
 
 @pytest.mark.parametrize(
@@ -323,7 +323,7 @@ def test_mistakes_are_named(tmp_path: Path, content: object, message: str) -> No
 def test_rotations_of_the_other_hand_are_refused(tmp_path: Path) -> None:
     fields = {"hand_pose": random_pose("left", 3).reshape(3, 45).tolist(), "flat_hand_mean": True, "side": "right"}
     with pytest.raises(InputError, match="as a right hand its fingers bend backwards"):
-        open_motion(save(tmp_path, fields), rig(hand("right")))
+        load_motion(save(tmp_path, fields), rig(hand("right")))
 
 
 def test_files_that_announce_more_than_they_hold_are_refused(tmp_path: Path) -> None:

@@ -9,7 +9,7 @@ from tests.motion.hand_files import camera_landmarks, postures, save
 from tests.motion.skeletons import hand, rig
 from warpjld.errors import InputError
 from warpjld.io import load_rig
-from warpjld.motion import open_motion
+from warpjld.motion import load_motion
 from warpjld.motion.hand_file import read_hands
 from warpjld.skeleton import Poses
 
@@ -99,7 +99,7 @@ def written(points: np.ndarray) -> dict[str, object]:
 
 @pytest.mark.parametrize("how", list(written(landmarks())))
 def test_every_way_of_writing_gives_the_same_hand(tmp_path: Path, how: str) -> None:
-    loaded = open_motion(save(tmp_path, written(landmarks())[how]), rig(hand("right")))
+    loaded = load_motion(save(tmp_path, written(landmarks())[how]), rig(hand("right")))
     wanted = postures(hand("right"), "right", NAMES)
     np.testing.assert_allclose(bends(loaded.poses), bends(wanted), atol=1e-6)
     assert (len(loaded.poses), loaded.rate) == (len(NAMES), 25.0)
@@ -109,15 +109,15 @@ def test_every_way_of_writing_gives_the_same_hand(tmp_path: Path, how: str) -> N
 def test_bare_lists_are_told_apart_by_their_bends_and_play_at_the_rate_asked_for(tmp_path: Path) -> None:
     for side in ("left", "right"):
         path = save(tmp_path, landmarks(side).tolist())
-        loaded = open_motion(path, rig(hand(side)))
+        loaded = load_motion(path, rig(hand(side)))
         np.testing.assert_allclose(bends(loaded.poses), bends(postures(hand("right"), "right", NAMES)), atol=1e-6)
         assert "taken as 30 frames a second" in loaded.notes[0]
         assert f"fingers bend as a {side} hand's" in loaded.notes[-1]
-        assert (len(open_motion(path, rig(hand(side)), rate=12).poses), loaded.rate) == (len(NAMES), 30.0)
+        assert (len(load_motion(path, rig(hand(side)), rate=12).poses), loaded.rate) == (len(NAMES), 30.0)
         np.savez(tmp_path / "a.npz", landmarks=landmarks(side))
         np.save(tmp_path / "a.npy", landmarks(side))
         for name in ("a.npz", "a.npy"):
-            same = open_motion(tmp_path / name, rig(hand(side)))
+            same = load_motion(tmp_path / name, rig(hand(side)))
             np.testing.assert_allclose(same.poses.positions, loaded.poses.positions, atol=1e-9)
 
 
@@ -129,7 +129,7 @@ def test_arrays_of_two_hands_drive_a_body(data: Path, tmp_path: Path) -> None:
     for sides in (np.array(["Left", "Right"]), np.array([["Left", "Right"]] * len(NAMES)), None):
         arrays = {"landmarks": both, "timestamps": times} | ({} if sides is None else {"handedness": sides})
         np.savez(tmp_path / "two.npz", **arrays)
-        results.append(open_motion(tmp_path / "two.npz", driven))
+        results.append(load_motion(tmp_path / "two.npz", driven))
         assert results[-1].rate == 50.0
     joints = [driven.skeleton.index(f"{s}.middle.knuckle2") for s in ("left", "right")]
     curl = np.degrees(results[0].poses.flexion[:, joints])
@@ -143,7 +143,7 @@ def test_lost_and_unsure_frames_are_bridged_and_said(tmp_path: Path) -> None:
     poses = postures(hand("right"), "right", ("flat", "flat", "fist", "fist", "fist", "flat", "flat"))
     points = camera_landmarks(hand("right"), "right", poses)
     wanted = bends(
-        open_motion(
+        load_motion(
             save(tmp_path, {"landmarks": points[1:-1].tolist(), "fps": 10, "side": "right"}), rig(hand("right"))
         ).poses
     )
@@ -152,7 +152,7 @@ def test_lost_and_unsure_frames_are_bridged_and_said(tmp_path: Path) -> None:
     frames[3] = {"landmarks": [], "handedness": []}
     frames[2]["score"], frames[2]["landmarks"] = 0.3, xyz(points[0])
     frames[6] = {}
-    loaded = open_motion(save(tmp_path, {"fps": 10, "frames": frames}), rig(hand("right")))
+    loaded = load_motion(save(tmp_path, {"fps": 10, "frames": frames}), rig(hand("right")))
     notes = " | ".join(loaded.notes)
     assert "the right hand was lost in 2 frames, at most 2 in a row after frame 1: interpolated" in notes
     assert "seen from frame 1 to 5 of 7: held before and after" in notes
@@ -164,7 +164,7 @@ def test_lost_and_unsure_frames_are_bridged_and_said(tmp_path: Path) -> None:
     assert (got[3] < got[4]).all()
     arrays = np.where(np.isin(np.arange(7), (0, 2, 3, 6))[:, None, None], np.nan, points)
     np.savez(tmp_path / "nan.npz", landmarks=arrays, fps=10, handedness="Right")
-    again = open_motion(tmp_path / "nan.npz", rig(hand("right")))
+    again = load_motion(tmp_path / "nan.npz", rig(hand("right")))
     np.testing.assert_allclose(again.poses.positions, loaded.poses.positions, atol=1e-9)
     sure = np.ones((7, 21))
     sure[[0, 2, 3, 6]] = 0.1
@@ -172,7 +172,7 @@ def test_lost_and_unsure_frames_are_bridged_and_said(tmp_path: Path) -> None:
     shifted = points.copy()
     shifted[4, 8] += 9.0
     np.savez(tmp_path / "sure.npz", world_landmarks=shifted, confidence=sure, fps=10, handedness="Right")
-    third = open_motion(tmp_path / "sure.npz", rig(hand("right")))
+    third = load_motion(tmp_path / "sure.npz", rig(hand("right")))
     assert any("1 unsure landmarks were interpolated" in note for note in third.notes)
     assert np.abs(third.poses.positions).max() < 1.0
 
@@ -180,10 +180,10 @@ def test_lost_and_unsure_frames_are_bridged_and_said(tmp_path: Path) -> None:
 def test_selfies_keep_their_label_and_bend_forward(tmp_path: Path) -> None:
     """The older API labels hands as though its image were mirrored: label and shape then contradict each other."""
     content = {"fps": 10, "handedness": "Left", "landmarks": landmarks("right").tolist()}
-    loaded = open_motion(save(tmp_path, content), rig(hand("left")))
+    loaded = load_motion(save(tmp_path, content), rig(hand("left")))
     np.testing.assert_allclose(bends(loaded.poses), bends(postures(hand("right"), "right", NAMES)), atol=1e-6)
     assert "labelled a left hand, but shaped like a right one" in loaded.warnings[0]
-    right = open_motion(save(tmp_path, content), rig(hand("right")), side="right")
+    right = load_motion(save(tmp_path, content), rig(hand("right")), side="right")
     np.testing.assert_allclose(bends(right.poses), bends(postures(hand("right"), "right", NAMES)), atol=1e-6)
 
 
@@ -225,7 +225,7 @@ def test_mistakes_are_named(tmp_path: Path, content: object, message: str) -> No
 def test_hands_of_one_point_are_refused(tmp_path: Path) -> None:
     path = save(tmp_path, {"landmarks": [[[0.5, 0.5, 0.0]] * 21], "handedness": "left"})
     with pytest.raises(InputError, match="palm lie in a line or a point at frame 0"):
-        open_motion(path, rig(hand("left")))
+        load_motion(path, rig(hand("left")))
 
 
 def test_arrays_that_are_no_landmarks_are_refused(tmp_path: Path) -> None:

@@ -18,7 +18,7 @@ from tests.motion.skinned_files import Skinned, Track, animal, write
 from tests.motion.skinning_oracle import Skinning
 from warpjld.errors import InputError
 from warpjld.io import load_rig
-from warpjld.motion import open_motion
+from warpjld.motion import load_motion
 from warpjld.motion.animations import animation_names
 from warpjld.motion.load import LoadedMotion
 from warpjld.rig import Rig
@@ -103,7 +103,7 @@ def test_files_of_every_make(tmp_path: Path, case: str) -> None:
     tracks = gait(animal(), moving=how.pop("moving", ()))
     path = write(tmp_path / "a.glb", animal(), {"walk": tracks}, **how)
     rig = load_rig(path)
-    loaded = open_motion(path, rig)
+    loaded = load_motion(path, rig)
     oracle = Skinning(path)
     assert (len(loaded.poses), loaded.rate) == (13, 30)
     shape = oracle.vertices(None) @ rig.placing[:3, :3].T + rig.placing[:3, 3]
@@ -119,7 +119,7 @@ def test_files_of_every_make(tmp_path: Path, case: str) -> None:
 def test_interpolations(tmp_path: Path, mode: str) -> None:
     path = write(tmp_path / "a.glb", animal(), {"walk": gait(animal(), mode)})
     rig = load_rig(path)
-    loaded = open_motion(path, rig)
+    loaded = load_motion(path, rig)
     assert worst(rig, loaded, Skinning(path), list(range(13))) < CLOSE
 
 
@@ -127,7 +127,7 @@ def test_interpolations(tmp_path: Path, mode: str) -> None:
 def test_what_was_guessed_on_loading_does_not_matter(tmp_path: Path, how: dict) -> None:
     path = write(tmp_path / "a.glb", animal(), {"walk": gait(animal())}, unit=100.0, armature=TURNED)
     rig = load_rig(path, **how)
-    assert worst(rig, open_motion(path, rig), Skinning(path), [5, 12]) < CLOSE
+    assert worst(rig, load_motion(path, rig), Skinning(path), [5, 12]) < CLOSE
 
 
 def test_flat_hierarchies(tmp_path: Path) -> None:
@@ -141,7 +141,7 @@ def test_flat_hierarchies(tmp_path: Path) -> None:
     )
     path = write(tmp_path / "a.glb", flat, {"walk": gait(flat)})
     rig = load_rig(path)
-    assert worst(rig, open_motion(path, rig), Skinning(path), [5, 12]) < CLOSE
+    assert worst(rig, load_motion(path, rig), Skinning(path), [5, 12]) < CLOSE
 
 
 @pytest.mark.parametrize(
@@ -158,13 +158,13 @@ def test_doubled_names_are_told_apart_by_their_place(tmp_path: Path, names: list
     called = replace(animal(), names=names)
     path = write(tmp_path / "a.glb", called, {"walk": gait(called)})
     rig = load_rig(path)
-    loaded = open_motion(path, rig)
+    loaded = load_motion(path, rig)
     assert worst(rig, loaded, Skinning(path), [5, 12]) < CLOSE
     if what == "none named":
         return
     # the same from a file of nodes only, in which other nodes come first and the joints hang elsewhere
     bare = write(tmp_path / "nodes.glb", called, {"walk": gait(called)}, skinned=False, above=above)
-    apart = open_motion(bare, rig)
+    apart = load_motion(bare, rig)
     np.testing.assert_allclose(apart.poses.positions, loaded.poses.positions, atol=1e-6)
     np.testing.assert_allclose(np.abs((apart.poses.rotations * loaded.poses.rotations).sum(-1)), 1, atol=1e-9)
 
@@ -177,7 +177,7 @@ def test_an_animation_without_skin_of_the_same_skeleton(tmp_path: Path, unit: fl
     moves = write(
         tmp_path / "moves.glb", animal(), {"walk": gait(animal())}, unit=unit, armature=armature, skinned=False, above=2
     )
-    loaded = open_motion(moves, rig)
+    loaded = load_motion(moves, rig)
     assert worst(rig, loaded, Skinning(rigged), [5, 12]) < CLOSE
 
 
@@ -188,7 +188,7 @@ def test_an_animation_whose_file_shows_another_pose_plays_on_the_same_bones(tmp_
     rig = load_rig(rigged)
     first = {j: values[0] for (j, path), (_, values, _) in tracks.items() if path == "rotation"}
     moves = write(tmp_path / "m.glb", animal(), {"walk": tracks}, unit=100.0, skinned=False, shown=first)
-    loaded = open_motion(moves, rig)
+    loaded = load_motion(moves, rig)
     assert any("another rest pose" in note for note in loaded.notes)
     assert worst(rig, loaded, Skinning(rigged), [0, 5, 12]) < CLOSE
 
@@ -203,7 +203,7 @@ def test_joints_that_the_animations_file_lacks_follow_and_are_told(tmp_path: Pat
         offsets=animal().offsets[kept],
         turns=animal().turns[kept],
     )
-    loaded = open_motion(write(tmp_path / "m.glb", fewer, {"walk": gait(fewer)}, skinned=False), rig)
+    loaded = load_motion(write(tmp_path / "m.glb", fewer, {"walk": gait(fewer)}, skinned=False), rig)
     assert any("flap.a, flap.b" in note for note in loaded.notes)
     skull, flap = (rig.skeleton.index(name) for name in ("skull", "flap.a"))
     alike = (loaded.poses.rotations[:, skull] * loaded.poses.rotations[:, flap]).sum(-1)
@@ -232,7 +232,7 @@ def test_a_leaf_turns_whole(tmp_path: Path, leaf: str) -> None:
     path = write(tmp_path / "a.glb", what, {"nod": {(j, "rotation"): track}})
     rig = load_rig(path)
     assert f"{leaf}.end" in rig.skeleton.names
-    loaded = open_motion(path, rig)
+    loaded = load_motion(path, rig)
     oracle = Skinning(path)
     want, rest = oracle.vertices(1.0), oracle.vertices(None)
     moved = np.linalg.norm(want - rest, axis=1)
@@ -272,7 +272,7 @@ def test_a_joint_gets_an_end_for_flesh_that_none_of_its_bones_reaches(tmp_path: 
     oracle = Skinning(path)
     want, rest = oracle.vertices(1.0), oracle.vertices(None)
     snout = one_bone(oracle) & (rest[:, 2] > 0.8)
-    got = covered(rig, open_motion(path, rig), 30, muscles=False)
+    got = covered(rig, load_motion(path, rig), 30, muscles=False)
     off, moved = (np.linalg.norm(got - x, axis=1) / rig.surface.size for x in (want, rest))
     # the rounding of the neck fades out along the snout; its front is rigid
     assert snout.sum() > 20
@@ -288,17 +288,17 @@ def test_scale_zero_and_negative_are_told_with_node_and_frame(tmp_path: Path) ->
     zero: Track = (times, np.array([[1, 1, 1], [0, 0, 0], [1, 1, 1]]), "STEP")
     path = write(tmp_path / "a.glb", what, {"wink": gait(what) | {(ear, "scale"): zero}})
     rig = load_rig(path)
-    loaded = open_motion(path, rig)
+    loaded = load_motion(path, rig)
     assert len(loaded.warnings) == 1
     assert "'flap.a' to 0 at frame 15" in loaded.warnings[0]
     others = [k for k, name in enumerate(rig.skeleton.names) if not name.startswith("flap")]
-    plain = open_motion(write(tmp_path / "b.glb", what, {"wink": gait(what)}), rig)
+    plain = load_motion(write(tmp_path / "b.glb", what, {"wink": gait(what)}), rig)
     for field in ("positions", "rotations"):
         same = getattr(plain.poses, field)[:12, others]
         np.testing.assert_allclose(getattr(loaded.poses, field)[:12, others], same, atol=1e-6)
     negative: Track = (times[:2], np.array([[1, 1, 1], [-1, 1, 1]]), "LINEAR")
     path = write(tmp_path / "c.glb", what, {"flip": {(tail, "scale"): negative}})
-    loaded = open_motion(path, rig)
+    loaded = load_motion(path, rig)
     assert any("'brush1': its scale turns negative at frame 8" in warning for warning in loaded.warnings)
     assert np.isfinite(loaded.poses.rotations).all()
     # the joint below lies where the file says, mirrored
@@ -312,7 +312,7 @@ def test_scale_zero_at_rest(tmp_path: Path) -> None:
     path = write(tmp_path / "a.glb", what, {"walk": gait(what)})
     rig = load_rig(path)
     assert any("'brush2': scale 0 at rest" in doubt for doubt in rig.suspicious)
-    loaded = open_motion(path, rig)
+    loaded = load_motion(path, rig)
     assert worst(rig, loaded, Skinning(path), [5, 12]) < CLOSE
     nothing = write(tmp_path / "b.glb", animal(), {}, armature={"scale": [0.0, 0.0, 0.0]})
     with pytest.raises(InputError, match="node 'Armature': scale 0 at rest collapses all joints"):
@@ -324,7 +324,7 @@ def test_scales_that_are_one_or_stay_are_no_news(tmp_path: Path) -> None:
     kept: Track = (np.array([0.0, 1.0]), np.tile([1.2, 1.2, 1.2], (2, 1)), "LINEAR")
     path = write(tmp_path / "a.glb", what, {"walk": gait(what) | {(2, "scale"): kept}})
     rig = load_rig(path)
-    loaded = open_motion(path, rig)
+    loaded = load_motion(path, rig)
     assert loaded.warnings == ()
     assert worst(rig, loaded, Skinning(path), [5, 12]) < CLOSE
 
@@ -336,7 +336,7 @@ def test_a_mirrored_file_moves_as_the_mirror_image(tmp_path: Path) -> None:
     mirror = np.array([-1.0, 1.0, 1.0])
     np.testing.assert_allclose(mirrored.surface.vertices * mirror, plain.surface.vertices, atol=1e-6)
     np.testing.assert_array_equal(mirrored.surface.faces[:, ::-1], plain.surface.faces)
-    first, second = (open_motion(rig.path, rig).poses for rig in (plain, mirrored))
+    first, second = (load_motion(rig.path, rig).poses for rig in (plain, mirrored))
     np.testing.assert_allclose(second.positions * mirror, first.positions, atol=1e-6)
     pseudo = np.array([1.0, -1.0, -1.0, 1.0])  # a reflection keeps turns about x
     np.testing.assert_allclose(np.abs((second.rotations * pseudo * first.rotations).sum(-1)), 1, atol=1e-9)
@@ -354,14 +354,14 @@ def test_animations_are_listed_and_chosen_by_name(tmp_path: Path) -> None:
     path = write(tmp_path / "a.glb", animal(), {"Nod": nod, "Wag": wag})
     rig = load_rig(path)
     assert animation_names(path) == ("Nod", "Wag")
-    unsaid = open_motion(path, rig)
+    unsaid = load_motion(path, rig)
     assert any("'Nod', the first of 2: Nod, Wag" in note for note in unsaid.notes)
-    chosen = {name: open_motion(path, rig, animation=name).poses for name in ("nod", "WAG")}
+    chosen = {name: load_motion(path, rig, animation=name).poses for name in ("nod", "WAG")}
     girth = rig.skeleton.index("girth")
     angles = [Rotation.from_quat(p.rotations[-1, girth]).magnitude() for p in (unsaid.poses, *chosen.values())]
     np.testing.assert_allclose(angles, [0.2, 0.2, 0.9], atol=1e-6)
     with pytest.raises(InputError, match="no animation 'wig' in this file; did you mean Wag"):
-        open_motion(path, rig, animation="wig")
+        load_motion(path, rig, animation="wig")
     assert animation_names(tmp_path / "a.csv") == ()
 
 
@@ -382,9 +382,9 @@ def test_one_animation_a_node_is_one_animation(tmp_path: Path, names: list) -> N
     gltf.save_binary(str(split))
     assert len(animation_names(split)) == 1
     rig = load_rig(whole)
-    loaded = open_motion(split, rig)
+    loaded = load_motion(split, rig)
     assert any("3 animations, each of one node" in note for note in loaded.notes)
-    np.testing.assert_allclose(loaded.poses.positions, open_motion(whole, rig).poses.positions, atol=1e-9)
+    np.testing.assert_allclose(loaded.poses.positions, load_motion(whole, rig).poses.positions, atol=1e-9)
 
 
 def test_animated_morph_targets_are_told(tmp_path: Path) -> None:
@@ -395,7 +395,7 @@ def test_animated_morph_targets_are_told(tmp_path: Path) -> None:
     target = pygltflib.AnimationChannelTarget(node=0, path="weights")
     channels.append(pygltflib.AnimationChannel(sampler=0, target=target))
     gltf.save_binary(str(path))
-    assert any("morph targets" in warning for warning in open_motion(path, load_rig(path)).warnings)
+    assert any("morph targets" in warning for warning in load_motion(path, load_rig(path)).warnings)
 
 
 QUADRUPED = ["_rootJoint", "b_Root_00", "b_Hip_01", "b_Spine01_02", "b_Neck_04", "b_Head_05", "b_Ear_a", "b_Ear_b"] + [
@@ -420,7 +420,7 @@ def test_the_joint_with_the_flesh_stands_for_roots_above_it(tmp_path: Path) -> N
     rig = load_rig(path)
     pelvis = rig.source_joints.index("b_Hip_01")
     np.testing.assert_allclose(rig.skeleton.rest[pelvis], what.offsets[0], atol=1e-6)
-    loaded, oracle = open_motion(path, rig), Skinning(path)
+    loaded, oracle = load_motion(path, rig), Skinning(path)
     assert worst(rig, loaded, oracle, [5, 12]) < CLOSE
     hips = one_bone(oracle) & (oracle.joints[:, 0] == 2)
     assert np.isfinite(follow(rig, loaded, oracle, 5)[hips]).all()
@@ -431,7 +431,7 @@ def test_flesh_of_joints_that_are_part_of_another_is_told(tmp_path: Path) -> Non
     what = replace(animal(), names=names)
     path = write(tmp_path / "a.glb", what, {"walk": gait(what, moving=("Spine", "Jaw"))})
     rig = load_rig(path)
-    told = any("Jaw (" in warning and "part of head" in warning for warning in open_motion(path, rig).warnings)
+    told = any("Jaw (" in warning and "part of head" in warning for warning in load_motion(path, rig).warnings)
     assert told == ("jaw" not in rig.skeleton.names)
 
 
@@ -459,7 +459,7 @@ def test_real_rigs_with_every_joint_turning(data: Path, tmp_path: Path, name: st
         file.animate(n, "rotation", np.array([0.0, 0.5]), np.array([rest.as_quat(), turned.as_quat()]))
     path = file.save(tmp_path / "a.glb")
     rig = load_rig(path)
-    loaded, oracle = open_motion(path, rig), Skinning(path)
+    loaded, oracle = load_motion(path, rig), Skinning(path)
     assert len(loaded.poses) == 16
     assert worst(rig, loaded, oracle, [7, 15]) < CLOSE
     followed = np.isfinite(follow(rig, loaded, oracle, 15)).all(axis=1)
@@ -490,7 +490,7 @@ def faults() -> Path:
 )
 def test_faults_move_as_plain_skinning_says(faults: Path, name: str, frames: int) -> None:
     rig = load_rig(faults / name)
-    loaded = open_motion(faults / name, rig)
+    loaded = load_motion(faults / name, rig)
     assert len(loaded.poses) == frames
     assert worst(rig, loaded, Skinning(faults / name), [frames // 2, frames - 1]) < CLOSE
     assert loaded.warnings == ()
@@ -502,7 +502,7 @@ def test_faults_of_scale_are_told_in_one_line_each(faults: Path) -> None:
         ("scaleneg_anim.glb", "node 'J1': its scale turns negative at frame 16"),
     ):
         rig = load_rig(faults / "scale_zero" / name)
-        loaded = open_motion(faults / "scale_zero" / name, rig)
+        loaded = load_motion(faults / "scale_zero" / name, rig)
         assert message in "\n".join(loaded.warnings)
         assert np.isfinite(loaded.poses.positions).all()
         assert np.isfinite(loaded.poses.rotations).all()
@@ -511,7 +511,7 @@ def test_faults_of_scale_are_told_in_one_line_each(faults: Path) -> None:
 def test_the_fault_of_the_leaf_moves_as_far_as_the_file_says(faults: Path) -> None:
     path = faults / "leaf_joint" / "leaf.glb"
     rig = load_rig(path)
-    loaded = open_motion(path, rig)
+    loaded = load_motion(path, rig)
     got, oracle = covered(rig, loaded, 30), Skinning(path)
     want, rest = oracle.vertices(1.0), oracle.vertices(None)
     tip = int(np.argmax(np.linalg.norm(want - rest, axis=1)))
@@ -526,7 +526,7 @@ def test_the_covered_hand_moves_alike_in_metres_and_centimetres(faults: Path) ->
         rig = load_rig(path)
         oracle = Skinning(path)
         want = oracle.vertices(1.0) @ rig.placing[:3, :3].T + rig.placing[:3, 3]
-        off = np.linalg.norm(covered(rig, open_motion(path, rig), 30) - want, axis=1)[one_bone(oracle)]
+        off = np.linalg.norm(covered(rig, load_motion(path, rig), 30) - want, axis=1)[one_bone(oracle)]
         assert off.max() < CLOSE * rig.surface.size
 
 
@@ -538,5 +538,5 @@ def test_flips_are_looked_for_at_the_files_own_rate(tmp_path: Path) -> None:
     path = write(tmp_path / "a.glb", animal(), {"walk": {(3, "rotation"): track}})
     rig = load_rig(path)
     for rate in (None, 30.0, 120.0, 10.0):
-        (line,) = open_motion(path, rig, rate=rate).warnings
+        (line,) = load_motion(path, rig, rate=rate).warnings
         assert line == "skull turns by 120° from frame 1 to 2 of the recording: a flip?"

@@ -14,7 +14,7 @@ from tests.motion.skeletons import rig as rigged
 from tests.motion.skinned_files import animal, write
 from tests.motion.test_own_animation import FBX, TURNED, gait
 from warpjld.io import load_rig
-from warpjld.motion import open_motion
+from warpjld.motion import load_motion
 from warpjld.motion.bvh import read_bvh
 from warpjld.motion.clip import Clip
 from warpjld.motion.out import write_motion
@@ -42,7 +42,7 @@ def moved(rig: Rig, frames: int = 5) -> Poses:
 def test_the_built_in_hand(tmp_path: Path, hands: dict[str, Rig], side: str) -> None:
     poses = moved(hands[side])
     write_motion(tmp_path / "m.bvh", hands[side], poses, rate=24.0)
-    loaded = open_motion(tmp_path / "m.bvh", hands[side])
+    loaded = load_motion(tmp_path / "m.bvh", hands[side])
     assert_same(loaded.poses, poses)
     assert (loaded.rate, loaded.warnings) == (24.0, ())
     assert any("rig's own joints" in note for note in loaded.notes)
@@ -56,7 +56,7 @@ def test_rigs_of_files(tmp_path: Path, how: dict, names: list[str] | None) -> No
     rig = load_rig(path)
     poses = moved(rig)
     write_motion(tmp_path / "m.bvh", rig, poses, rate=30.0)
-    loaded = open_motion(tmp_path / "m.bvh", rig)
+    loaded = load_motion(tmp_path / "m.bvh", rig)
     assert_same(loaded.poses, poses)
     assert loaded.warnings == ()
 
@@ -70,9 +70,9 @@ def test_rigs_of_files(tmp_path: Path, how: dict, names: list[str] | None) -> No
 )
 def test_real_rigs(tmp_path: Path, data: Path, name: str, motion: str) -> None:
     rig = load_rig(data / name)
-    poses = open_motion(data / motion, rig).poses
+    poses = load_motion(data / motion, rig).poses
     write_motion(tmp_path / "m.bvh", rig, poses, rate=120.0)
-    assert_same(open_motion(tmp_path / "m.bvh", rig).poses, poses)
+    assert_same(load_motion(tmp_path / "m.bvh", rig).poses, poses)
 
 
 def clip_of(rig: Rig, tmp_path: Path) -> Clip:

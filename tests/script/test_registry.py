@@ -10,7 +10,7 @@ import pytest
 from warpjld.errors import InputError
 from warpjld.script import all_commands, command, commands_table, registry
 
-README = Path(__file__).resolve().parents[2] / "README.md"
+PAGE = Path(__file__).resolve().parents[2] / "docs" / "reference" / "commands.md"
 
 
 @pytest.fixture
@@ -99,8 +99,8 @@ def test_every_command_is_documented() -> None:
         assert len(c.help) < 130, c.name
 
 
-def test_the_readme_lists_the_commands_as_they_are() -> None:
-    text = README.read_text(encoding="utf-8")
+def test_the_page_lists_the_commands_as_they_are() -> None:
+    text = PAGE.read_text(encoding="utf-8")
     found = re.search(r"<!-- commands -->\n(.*?)<!-- /commands -->", text, re.DOTALL)
-    assert found is not None, "README.md has no table of commands between <!-- commands --> and <!-- /commands -->"
+    assert found is not None, "commands.md has no table of commands between <!-- commands --> and <!-- /commands -->"
     assert found[1].strip() == commands_table().strip()

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
 from warpjld.errors import InputError
-from warpjld.motion.load import LoadedMotion, open_motion
+from warpjld.motion.load import LoadedMotion, load_motion
 from warpjld.rig import Rig
 
 if TYPE_CHECKING:
@@ -28,7 +28,7 @@ class Deforming:
         rig: The rig.
         parameters: The covering's; None for the defaults.
         domains: The covering's; likewise ``method``.
-        reading: Keyword arguments of ``open_motion``: rate, limits, side.
+        reading: Keyword arguments of ``load_motion``: rate, limits, side.
         span: ``A:B``, the frames to make, the motion's first being 0; None for all.
         device: Warp device.
         threads: CPU threads; None for as many as pay.
@@ -80,6 +80,11 @@ class ClipFiles:
     notes: tuple[str, ...]
     warnings: tuple[str, ...]
 
+    def __repr__(self) -> str:
+        names = ", ".join(file.name for file in self.files[:3]) + (", …" if len(self.files) > 3 else "")
+        doubts = f", {len(self.warnings)} warnings" if self.warnings else ""
+        return f"ClipFiles({names}: {self.frames} frames at {self.moved.rate:g} a second{doubts})"
+
 
 def deform_clip(
     how: Deforming,
@@ -113,7 +118,7 @@ def deform_clip(
     if surfaces:
         checked_device(how.device)
     rig = how.rig
-    moved = open_motion(motion, rig, animation=animation, **how.reading)
+    moved = load_motion(motion, rig, animation=animation, **how.reading)
     first, last = frame_span(how.span, len(moved.poses))
     poses = moved.poses[slice(first, last + 1)]
     contact = None

@@ -17,7 +17,7 @@ from warpjld.errors import WarpjldError
 from warpjld.limits import LIMITS, set_limit
 from warpjld.suggest import one_of
 
-__all__ = ["main"]
+__all__ = ["group", "main"]
 
 _FAULT = 70  # EX_SOFTWARE of sysexits.h
 _TRACEBACK = "WARPJLD_TRACEBACK"
@@ -25,6 +25,7 @@ _TRACEBACK = "WARPJLD_TRACEBACK"
 _COMMANDS = {
     "run": "Run a script: animation, grasping, contact; pictures, films, exports.",
     "shell": "Type a script's commands one by one and look at the result.",
+    "example": "List, run or copy the examples that come with the package.",
     "inspect": "Report what was recognised in a rig.",
     "place": "Propose the named points of a body or hand in a bare surface.",
     "calibrate": "Fit the covering's parameters to a rig.",
@@ -33,6 +34,7 @@ _COMMANDS = {
     "bake": "Write a rig for engines: fitted skin weights and corrective shapes.",
     "study": "Run many grasps and bring them into one table.",
     "fem": "Load a deformable body and solve for its shape, stresses and reactions.",
+    "doctor": "Say what is installed, what works here, and what is missing.",
 }
 _HELP = """Metres, degrees, newtons and pascals everywhere. HELP in the shell, or `echo HELP | warpjld shell`, lists
 what scripts understand."""
@@ -75,7 +77,7 @@ def _limits() -> str:
     metavar="NAME=NUMBER",
     help=f"Raise or lower a limit on what is read or computed, before the command; repeatable. {_limits()}.",
 )
-def _group(limits: tuple[str, ...]) -> None:
+def group(limits: tuple[str, ...]) -> None:
     """Hands and bodies deformed by Joint-dependent Local Deformations, without painted weights."""
     for one in limits:
         name, _, value = one.partition("=")
@@ -92,7 +94,7 @@ def main(arguments: list[str] | None = None) -> None:
     if isinstance(sys.stdout, io.TextIOWrapper):
         sys.stdout.reconfigure(errors="backslashreplace")  # names of files may be no text
     try:
-        code = _group.main(arguments, prog_name="warpjld", standalone_mode=False)
+        code = group.main(arguments, prog_name="warpjld", standalone_mode=False)
     except click.exceptions.Abort:
         click.echo("interrupted", err=True)
         sys.exit(130)

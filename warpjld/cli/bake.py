@@ -12,7 +12,7 @@ from warpjld.cli import options
 from warpjld.cli.answer import answer
 
 if TYPE_CHECKING:
-    from warpjld.bake import Accuracy
+    from warpjld.baking import Accuracy
 
 __all__ = ["command"]
 
@@ -72,10 +72,10 @@ def command(
 
     RIG is a rig file (.glb, .gltf, .vrm, .fbx, .usd, .usda, .usdc, .usdz), a surface with --skeleton, or builtin:left,
     builtin:right."""
-    from warpjld.bake import accuracy, bake, write_baked, write_report
-    from warpjld.bake.motions import with_motions
-    from warpjld.bake.report import check_report
-    from warpjld.bake.write import check_baked, drivers_file
+    from warpjld.baking import accuracy, bake, write_baked, write_report
+    from warpjld.baking.motions import with_motions
+    from warpjld.baking.report import check_report
+    from warpjld.baking.write import check_baked, drivers_file
     from warpjld.cli.progress import progress
     from warpjld.cli.rig_argument import open_rig, rig_files
     from warpjld.cli.warn import warn
@@ -83,7 +83,7 @@ def command(
     from warpjld.covering.kept import bind_kept
     from warpjld.folders import make_folder
     from warpjld.io.identity import files_of
-    from warpjld.motion import open_motion
+    from warpjld.motion import load_motion
     from warpjld.overwriting import check_outputs
     from warpjld.quiet import silence_warp
 
@@ -99,8 +99,8 @@ def command(
     opened = open_rig(rig, **how)
     chosen = None if parameters is None else load_parameters(parameters, opened.skeleton)
     warnings: list[str] = []
-    loaded = [open_motion(path, opened) for path in motions]
-    shown = None if clip is None else open_motion(clip, opened)
+    loaded = [load_motion(path, opened) for path in motions]
+    shown = None if clip is None else load_motion(clip, opened)
     for motion in (*loaded, *([shown] if shown else [])):
         warnings.extend(motion.warnings)
     if opened.skin is None:

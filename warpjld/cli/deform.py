@@ -10,7 +10,7 @@ import click
 
 from warpjld.cli import options
 from warpjld.cli.answer import answer
-from warpjld.cli.deform_wanted import Wanted, count, deforming, tell_rig
+from warpjld.cli.deform_wanted import Wanted, count, tell_rig
 from warpjld.cli.warn import warn
 from warpjld.errors import InputError
 from warpjld.io.caches import FORMATS
@@ -131,26 +131,35 @@ def command(rig: str, clips: tuple[Path, ...], motions: tuple[Path, ...], **give
 
 
 def _single(wanted: Wanted, job: ClipJob) -> None:
-    from warpjld.batch import deform_clip
+    from warpjld.batch.deform_file import deform_file
+    from warpjld.cli.deform_wanted import checked_parameters, opened
     from warpjld.cli.progress import progress
     from warpjld.io.caches import check_cache
     from warpjld.motion.out import check_motion_out
 
     began = time.perf_counter()
-    surfaces = () if wanted.out is None else (wanted.out,)
-    for path in surfaces:  # an unknown suffix or a missing library must not cost the work of binding
-        check_cache(path)
+    if wanted.out is not None:  # an unknown suffix or a missing library must not cost the work of reading the rig
+        check_cache(wanted.out)
     for path in wanted.motions_out:
         check_motion_out(path)
-    how = deforming(wanted)
+    rig = opened(wanted)
     with progress(wanted.quiet) as report:
-        made = deform_clip(
-            how,
+        made = deform_file(
+            rig,
             job.motion,
+            wanted.out,
+            motion_out=wanted.motions_out,
+            parameters=checked_parameters(wanted, rig),
+            binding=wanted.binding,
+            domains=wanted.domains,
+            method=wanted.method,
+            touch=wanted.touch,
             animation=job.animation,
-            surfaces=surfaces,
-            motions=wanted.motions_out,
+            frames=wanted.span,
+            device=wanted.device,
+            threads=wanted.threads,
             report=report,
+            **wanted.reading,
         )
     warn(made.warnings)
     summary = {
@@ -160,19 +169,19 @@ def _single(wanted: Wanted, job: ClipJob) -> None:
         "frames": made.frames,
         "first_frame": made.first,
         "rate": made.moved.rate,
-        "joints": len(how.rig.skeleton),
-        "vertices": len(how.rig.surface.weld),
-        "triangles": len(how.rig.surface.source_faces),
+        "joints": len(rig.skeleton),
+        "vertices": len(rig.surface.weld),
+        "triangles": len(rig.surface.source_faces),
         "seconds": round(time.perf_counter() - began, 3),
-        "warnings": [*how.rig.suspicious, *made.warnings],
-        "rig_notes": list(how.rig.notes),
+        "warnings": [*rig.suspicious, *made.warnings],
+        "rig_notes": list(rig.notes),
         "notes": [*made.moved.notes, *made.notes],
     }
     if wanted.as_json:
         answer(summary)
     elif not wanted.quiet:
         _tell(summary)
-        tell_rig(wanted, how)
+        tell_rig(wanted, rig)
 
 
 def _tell(summary: dict[str, Any]) -> None:

@@ -63,7 +63,7 @@ def make_batch(wanted: Wanted, jobs: list[ClipJob]) -> None:
             }
         )
     elif not wanted.quiet:
-        tell_rig(wanted, how)
+        tell_rig(wanted, how.rig)
         there = len(result.clips) - result.made
         click.echo(
             f"{count(len(result.clips), 'clip')}, {count(frames, 'frame')}: "

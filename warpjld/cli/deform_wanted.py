@@ -10,8 +10,10 @@ import click
 
 if TYPE_CHECKING:
     from warpjld.batch import ClipJob, Deforming
+    from warpjld.covering import Parameters
+    from warpjld.rig import Rig
 
-__all__ = ["Wanted", "count", "deforming", "tell_rig"]
+__all__ = ["Wanted", "checked_parameters", "count", "deforming", "opened", "tell_rig"]
 
 
 @dataclass(frozen=True)
@@ -97,17 +99,30 @@ class Wanted:
         }
 
 
-def deforming(wanted: Wanted) -> Deforming:
-    from warpjld.batch import Deforming
+def opened(wanted: Wanted) -> Rig:
+    """The rig; what looks suspicious in it goes to stderr."""
     from warpjld.cli.rig_argument import open_rig
-    from warpjld.covering import load_parameters
     from warpjld.quiet import silence_warp
 
     silence_warp()
-    rig = open_rig(wanted.rig, **wanted.how)
+    return open_rig(wanted.rig, **wanted.how)
+
+
+def checked_parameters(wanted: Wanted, rig: Rig) -> Parameters | None:
+    """The covering's parameters; None for the defaults."""
+    from warpjld.covering import load_parameters
+
+    return None if wanted.parameters is None else load_parameters(wanted.parameters, rig.skeleton)
+
+
+def deforming(wanted: Wanted) -> Deforming:
+    """The rig and the settings that all clips of a batch share."""
+    from warpjld.batch import Deforming
+
+    rig = opened(wanted)
     return Deforming(
         rig,
-        None if wanted.parameters is None else load_parameters(wanted.parameters, rig.skeleton),
+        checked_parameters(wanted, rig),
         wanted.domains,
         wanted.method,
         wanted.reading,
@@ -119,11 +134,13 @@ def deforming(wanted: Wanted) -> Deforming:
     )
 
 
-def tell_rig(wanted: Wanted, how: Deforming) -> None:
-    count = len(how.rig.notes)
+def tell_rig(wanted: Wanted, rig: Rig) -> None:
+    """Say where to read what was mended."""
+    count = len(rig.notes)
     if count:
         click.echo(f"note: {count} on what was recognised and mended in the rig: warpjld inspect {wanted.rig}")
 
 
 def count(number: int, what: str) -> str:
+    """``3 frames``, ``1 frame``."""
     return f"{number} {what}{'s' * (number != 1)}"

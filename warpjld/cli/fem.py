@@ -30,7 +30,7 @@ _ROUNDING = 1e-9  # of the largest reaction: smaller ones are shown as none
 @options.json
 @options.quiet
 def command(study: Path, out: Path | None, no_pictures: bool, as_json: bool, quiet: bool) -> None:
-    """Solve the load steps of STUDY (a .toml file, see examples/fem.md and examples/inflate_ball.toml).
+    """Solve the load steps of STUDY (a .toml file, see docs/reference/fem-study.md and examples/inflate_ball.toml).
 
     Written: NAME.pvd with one .vtu an instant (for ParaView), reactions.csv, and pictures of displacement and stress
     after each step; they take the place of former ones when all are made. When a step finds no equilibrium, or at

@@ -35,9 +35,7 @@ def command(
     a film and a contact sheet. A summary goes to summary.json in the output folder."""
     from warpjld.cli.progress import progress
     from warpjld.quiet import silence_warp
-    from warpjld.script import Interpreter, Scene
-    from warpjld.script.plugin import load_commands
-    from warpjld.script.runner import run_scene
+    from warpjld.script.run_script import run_script
     from warpjld.script.summary import table
 
     silence_warp()
@@ -46,12 +44,10 @@ def command(
         if not quiet:
             click.echo(text, err=as_json)
 
-    for path in commands:
-        load_commands(path)
-    scene = Scene(folder=out, say=say, dry=check)
-    Interpreter(scene).run_file(script)
     with progress(quiet) as report:
-        summary = run_scene(scene, out, script=script, device=device, threads=threads, dry=check, progress=report)
+        summary = run_script(
+            script, out, commands=commands, check=check, device=device, threads=threads, say=say, progress=report
+        )
     if as_json:
         answer(summary)
     elif not quiet:

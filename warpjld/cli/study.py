@@ -52,33 +52,29 @@ def command(
     from warpjld.cli.progress import progress
     from warpjld.errors import InputError
     from warpjld.quiet import silence_warp
-    from warpjld.study import rerun_trial, run_study
-    from warpjld.study.grasping import GraspExperiment, load_plan
+    from warpjld.study.grasping import Study
 
     silence_warp()
-    settings = load_plan(plan)
-    experiment = GraspExperiment(settings)
+    study = Study.load(plan)
     if row is not None:
         if fresh or check:
             raise InputError("--rerun repeats a trial that is there: --fresh and --check do not go with it")
         with progress(quiet) as report:
-            again = rerun_trial(experiment, out, row, report=report)
+            again = study.rerun(out, row, report=report)
         _tell_rerun(again, as_json, quiet)
         return
     with progress(quiet) as report:
         report("loading hands and objects", 0, 1)
-        notes = experiment.check()
-        warn(experiment.doubts(), "suspicious")
+        notes, doubts = study.check()
+        warn(doubts, "suspicious")
         if not check:
             try:
-                result = run_study(
-                    experiment, out, processes=processes, table=table, fresh=fresh, title=settings.title, report=report
-                )
+                result = study.run(out, processes=processes, table=table, fresh=fresh, report=report)
             except KeyboardInterrupt:
                 click.echo(f"stopped; the same command goes on from what is in {out}", err=True)
                 raise
     if check:
-        _tell_checked(plan, settings, notes, as_json, quiet)
+        _tell_checked(plan, study.plan, notes, as_json, quiet)
         return
     warn(result.notes)
     _tell(result, notes, as_json, quiet)

@@ -72,6 +72,10 @@ class Calibration:
     before: PoseMeasures
     after: PoseMeasures
 
+    def __repr__(self) -> str:
+        before, after = self.loss
+        return f"Calibration({self.status.value}, loss {before:.3g} to {after:.3g} over {self.poses} poses)"
+
 
 def calibrate(
     covering: Covering,
@@ -97,6 +101,17 @@ def calibrate(
 
     Raises:
         InputError: Fewer than one iteration, no poses, or poses of another skeleton.
+
+    Examples:
+        >>> hand = wj.build_hand("left", resolution=1500)
+        >>> covering = wj.bind(hand)
+        >>> motion = wj.Motion()
+        >>> motion.set_key("index.base.flexion", 0, 0.6)  # rad
+        >>> poses = motion.poses(hand.skeleton)
+        >>> found = wj.calibrate(covering, poses, guards=poses, iterations=1)
+        >>> found.loss[1] <= found.loss[0]
+        True
+        >>> calibrated = covering.with_parameters(found.parameters)
     """
     if iterations < 1:
         raise InputError(f"iterations: want at least 1, got {iterations}")

@@ -46,6 +46,15 @@ class Covering:
         fans: The operators.
         domains: Weight of every operator at every vertex, shape (V, fans); of what is rigid, which it is counted with.
         anchors: Places of the vertices on their segments.
+
+    Examples:
+        >>> hand = wj.build_hand("left", resolution=1500)
+        >>> covering = wj.bind(hand)
+        >>> motion = wj.Motion()
+        >>> motion.set_key("index.base.flexion", 0, 0.0)
+        >>> motion.set_key("index.base.flexion", 10, 1.2)  # rad
+        >>> covering.deform(motion.poses(hand.skeleton)).shape
+        (11, ..., 3)
     """
 
     def __init__(
@@ -65,6 +74,9 @@ class Covering:
         self.anchors = anchors
         self._resident: dict[str, list[Any]] = {}
         self._kept: Callable[[], Fields] | None = None
+
+    def __repr__(self) -> str:
+        return f"{type(self).__name__}({len(self.surface.vertices)} vertices on {len(self.skeleton)} joints)"
 
     def keeping(self, runs: Runs, fields: Callable[[], Fields], swelling: NDArray[np.float64]) -> Covering:
         """This covering, with what was computed of it before: its runs, its swelling, and its fields when wanted."""

@@ -40,11 +40,6 @@ class Gradients:
 class Differentiable:
     """The covering formula over fixed poses, with its vector-Jacobian product.
 
-    >>> deformation = Differentiable(covering, poses)
-    >>> moved = deformation.forward(parameters)               # (F, n, 3)
-    >>> gradients = deformation.backward(2.0 * (moved - goal))  # of Σ |moved − goal|²
-    >>> gradients.parameters.muscle                            # (J,)
-
     The places of the vertices and the swelling are those of ``covering``: where parameters move places between palm
     segments (proximities, A Fig. 7), or change what swells, that is neither followed nor differentiated. Take
     ``covering.with_parameters`` for it.
@@ -57,6 +52,17 @@ class Differentiable:
 
     Raises:
         InputError: Poses that do not fit or are not finite, a vertex that does not exist, an unknown device.
+
+    Examples:
+        >>> hand = wj.build_hand("left", resolution=1500)
+        >>> covering, motion = wj.bind(hand), wj.Motion()
+        >>> motion.set_key("index.base.flexion", 0, 1.0)  # rad
+        >>> deformation = wj.Differentiable(covering, motion.poses(hand.skeleton))
+        >>> moved = deformation.forward()  # (F, V, 3)
+        >>> goal = moved + 0.001
+        >>> gradients = deformation.backward(2.0 * (moved - goal))  # of Σ |moved − goal|²
+        >>> gradients.parameters.muscle.shape
+        (26,)
     """
 
     def __init__(

@@ -41,6 +41,14 @@ class Parameters:
         peak: Ratio along that segment where the muscle is fullest, in (0, 1), shape (J,) (R22d, R64).
         exponents: Exponent b of the two functions a^b, before and beyond the peak, shape (J, 2) (R65).
         palm: Exponent k of the palm's scale factor where neighbouring segments approach, shape (J,) (R44, C3).
+
+    Examples:
+        >>> from dataclasses import replace
+        >>> covering = wj.bind(wj.build_hand("left", resolution=1500))
+        >>> mine = replace(covering.parameters, inflation=2.0 * covering.parameters.inflation)
+        >>> mine
+        Parameters(of 26 joints)
+        >>> rounder = covering.with_parameters(mine)
     """
 
     inflation: NDArray[np.float64]
@@ -49,6 +57,9 @@ class Parameters:
     peak: NDArray[np.float64]
     exponents: NDArray[np.float64]
     palm: NDArray[np.float64]
+
+    def __repr__(self) -> str:
+        return f"Parameters(of {len(self.inflation)} joints)"
 
     def shapes_like(self, other: Parameters) -> bool:
         """Whether fields are shaped alike: only amplitudes differ, if anything does."""
@@ -116,6 +127,11 @@ def save_parameters(path: str | Path, skeleton: Skeleton, parameters: Parameters
 
     Raises:
         InputError: It cannot be written.
+
+    Examples:
+        >>> from tempfile import mkdtemp
+        >>> covering = wj.bind(wj.build_hand("left", resolution=1500))
+        >>> wj.save_parameters(Path(mkdtemp()) / "hand.json", covering.skeleton, covering.parameters)
     """
     joints = {
         name: {f.name: np.round(getattr(parameters, f.name)[j], 6).tolist() for f in fields(parameters)}
@@ -134,6 +150,17 @@ def load_parameters(path: str | Path, skeleton: Skeleton) -> Parameters:
 
     Raises:
         InputError: Unreadable file, unknown joint or field, or a value of the wrong shape or range.
+
+    Examples:
+        >>> from tempfile import mkdtemp
+        >>> file = Path(mkdtemp()) / "rounder.json"
+        >>> _ = file.write_text(
+        ...     '{"warpjld": "parameters", "version": 1, "joints": {"left.index.base": {"inflation": 0.2}}}'
+        ... )
+        >>> skeleton = wj.build_hand("left", resolution=1500).skeleton
+        >>> parameters = wj.load_parameters(file, skeleton)
+        >>> float(parameters.inflation[skeleton.index("index.base")])
+        0.2
     """
     content = read_json(path)
     with reading(path, "a parameter file"):

@@ -90,6 +90,11 @@ def bind_rig(
     Args:
         rig: The rig.
         skeleton: In place of the rig's own, where limits were changed.
+
+    Examples:
+        >>> covering = wj.bind(wj.build_hand("left", resolution=1500))
+        >>> covering
+        Covering(... vertices on 26 joints)
     """
     return bind(
         rig.skeleton if skeleton is None else skeleton,

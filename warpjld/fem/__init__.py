@@ -1,4 +1,13 @@
-"""Finite elements: hexahedral meshes, materials, loads, and solvers that say how they ended (B §3, R91–R107)."""
+"""Finite elements: hexahedral meshes, materials, loads, and solvers that say how they ended (B §3, R91–R107).
+
+Examples:
+    >>> mesh = wj.fem.box_hexes((0.1, 0.02, 0.02), (10, 2, 2))  # m, elements
+    >>> body = wj.fem.Body(mesh, wj.fem.LinearElastic(young=1e6, poisson=0.3, density=1000.0))
+    >>> held = wj.fem.prescribe(mesh, "x-", x=0.0, y=0.0, z=0.0)
+    >>> found = wj.fem.solve(body, held, wj.fem.Loads(gravity=(0.0, -9.81, 0.0)))
+    >>> found.converged, bool(found.displacement[:, 1].min() < -1e-3)  # m
+    (True, True)
+"""
 
 from warpjld.fem.body import Body
 from warpjld.fem.load.loads import Centrifugal, Loads

@@ -15,7 +15,7 @@ from warpjld.errors import InputError
 from warpjld.grasp.close import Closed, Closer
 from warpjld.grasp.draws import Draws
 from warpjld.grasp.hand_scale import doubt_of_size, hand_length
-from warpjld.grasp.judge import Judge, Verdict
+from warpjld.grasp.judge import Judge, Verdict, check_friction, hand_side
 from warpjld.grasp.objects import GraspObject
 from warpjld.grasp.obstacles import COLLIDES, Obstacles
 from warpjld.grasp.placements import Candidates
@@ -60,6 +60,12 @@ class AutoGrasp:
     touching: tuple[str, ...]
     tried: int
 
+    def __repr__(self) -> str:
+        return (
+            f"AutoGrasp({self.posture}, {', '.join(self.touching)} touch, epsilon {self.verdict.epsilon:.3f} N, "
+            f"penetration {1e3 * self.penetration:.2f} mm, best of {self.tried})"
+        )
+
     @property
     def score(self) -> float:
         """That of the verdict."""
@@ -78,8 +84,10 @@ class AutoGrasp:
 
 
 def find_grasp(
-    closer: Closer,
+    covering: Covering,
+    thing: GraspObject,
     *,
+    closer: Closer | None = None,
     obstacles: Sequence[GraspObject] = (),
     side: str | None = None,
     count: int = 192,
@@ -105,7 +113,9 @@ def find_grasp(
     while they close. Placements that they are in the way of are drawn again.
 
     Args:
-        closer: Of the hand on the object where it stands.
+        covering: The hand, smooth method.
+        thing: The object, where it stands.
+        closer: Of the hand on the object, where there is one already.
         obstacles: Other objects where they stand.
         side: ``left`` or ``right``; may be left out for a single hand.
         count: Placements at most.
@@ -116,19 +126,21 @@ def find_grasp(
 
     Raises:
         InputError: No hand, no such posture, an object nowhere narrow enough, or no placement ends in a grasp.
+
+    Examples:
+        >>> hand = wj.build_hand("left", resolution=1500)
+        >>> grasp = wj.find_grasp(wj.bind(hand), wj.shapes.ball(0.06), count=32)
+        >>> "left.thumb" in grasp.touching, grasp.penetration < 6e-4  # m
+        (True, True)
     """
-    covering, thing = closer.covering, closer.thing
     if count < 1:
         raise InputError(f"count: want 1 or more, got {count}")
-    if not (np.isfinite(friction) and friction > 0.0):
-        raise InputError(f"friction: want a number above 0, got {friction:g}")
-    sides = [s for s in ("left", "right") if f"{s}.middle.base" in covering.skeleton.names]
-    side = side or (sides[0] if len(sides) == 1 else "")
-    if side not in sides:
-        raise InputError(f"side: want one of {', '.join(sides) or 'a hand'}, got '{side}'")
+    check_friction(friction)
+    side = hand_side(covering, side)
     first = posture or posture_for(thing.size)
     others = [kind for kind in _OTHERS if kind != first]
     kinds = [first] if posture else [kind for other in others for kind in (first, other)]
+    closer = closer or Closer(covering, thing)
     around, rng = Obstacles(covering, obstacles), np.random.default_rng(seed)
     judge = Judge(closer.both, side, friction)
     draws = {kind: Draws(covering, closer.both.near, around, side, kind, rng) for kind in dict.fromkeys(kinds)}

@@ -10,9 +10,11 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from warpjld.covering import Covering
+from warpjld.errors import InputError
 from warpjld.grasp.both_ways import BothWays
 from warpjld.grasp.finer import FinerSkin
 from warpjld.grasp.kept import kept_with
+from warpjld.grasp.objects import GraspObject
 from warpjld.grasp.quality.closure import force_closure
 from warpjld.grasp.quality.contacts import Contacts
 from warpjld.grasp.quality.touch import Patches
@@ -21,7 +23,7 @@ from warpjld.grasp.segments import SEGMENTS, vertex_segments
 from warpjld.grasp.touching import touching_patches
 from warpjld.skeleton import Poses
 
-__all__ = ["Judge", "Verdict"]
+__all__ = ["Judge", "Verdict", "check_friction", "hand_side", "judge"]
 
 _TOUCH = 5e-4  # skin this near touches [m]
 _NEARLY = 2.5e-3  # the same at a first look [m]
@@ -47,6 +49,11 @@ class Verdict:
     digits: tuple[str, ...]
     palm: bool
     depth: float
+
+    def __repr__(self) -> str:
+        held = "force closed" if self.closed else "not force closed"
+        by = ", ".join([*self.digits, *(["palm"] if self.palm else [])]) or "nothing"
+        return f"Verdict({held}, epsilon {self.epsilon:.3f} N, {by} presses, depth {1e3 * self.depth:.2f} mm)"
 
     @property
     def score(self) -> float:
@@ -129,6 +136,63 @@ class Judge:
         contacts = Contacts(patches.points[kept], patches.normals[kept], np.array(self.friction), spin[kept])
         names = [patches.digits[k] for k in kept]
         return contacts, tuple(dict.fromkeys(n for n in names if n != "palm")), "palm" in names
+
+
+def judge(
+    covering: Covering, thing: GraspObject, poses: Poses, *, side: str | None = None, friction: float = 0.6
+) -> list[Verdict]:
+    """How well closed hands hold an object: contacts that can press, force closure, depth.
+
+    Args:
+        covering: The hand, smooth method.
+        thing: The object, where it stands.
+        poses: Closed hands, one a frame.
+        side: ``left`` or ``right``; may be left out for a single hand.
+        friction: Coulomb coefficient.
+
+    Returns:
+        One verdict a frame.
+
+    Raises:
+        InputError: No such hand, or no such coefficient.
+
+    Examples:
+        >>> hand = wj.build_hand("left", resolution=1500)
+        >>> covering, ball = wj.bind(hand), wj.shapes.ball(0.06)
+        >>> grasp = wj.find_grasp(covering, ball, count=32)
+        >>> (verdict,) = wj.judge(covering, ball, grasp.poses(hand.skeleton))
+        >>> verdict.closed, verdict.depth < 1e-3  # m
+        (True, True)
+    """
+    side = hand_side(covering, side)
+    check_friction(friction)
+    both = BothWays(covering, thing)
+    skins = covering.deform(poses)
+    depths = both.depths(skins).max(axis=1)
+    return Judge(both, side, friction).judge(poses, skins, depths)
+
+
+def hand_side(covering: Covering, side: str | None) -> str:
+    """Which hand of a covering is meant; the only one where none is named.
+
+    Raises:
+        InputError: No such hand, or two of them.
+    """
+    sides = [s for s in ("left", "right") if f"{s}.middle.base" in covering.skeleton.names]
+    wanted = side or (sides[0] if len(sides) == 1 else "")
+    if wanted not in sides:
+        raise InputError(f"side: want one of {', '.join(sides) or 'a hand'}, got '{wanted}'")
+    return wanted
+
+
+def check_friction(friction: float) -> None:
+    """Refuse what is no coefficient of friction.
+
+    Raises:
+        InputError: It is not.
+    """
+    if not (np.isfinite(friction) and friction > 0.0):
+        raise InputError(f"friction: want a number above 0, got {friction:g}")
 
 
 def _skin(covering: Covering) -> FinerSkin:

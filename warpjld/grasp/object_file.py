@@ -42,6 +42,14 @@ def load_object(
 
     Raises:
         InputError: Unreadable, empty, not finite, not manifold, an unknown unit or axis.
+
+    Examples:
+        >>> from tempfile import mkdtemp
+        >>> file = Path(mkdtemp()) / "wedge.off"
+        >>> surface = "OFF;4 4 0;0 0 0;5 0 0;0 5 0;0 0 5;3 0 2 1;3 0 1 3;3 1 2 3;3 0 3 2"
+        >>> _ = file.write_text(surface.replace(";", "\\n"))
+        >>> wj.load_object(file, unit="cm")
+        GraspObject('wedge': 4 facets, 0.05 × 0.05 × 0.05 m)
     """
     if unit not in UNITS:
         raise InputError(f"unit: want one of {', '.join(UNITS)}, got '{unit}'")

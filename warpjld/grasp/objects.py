@@ -79,6 +79,13 @@ class GraspObject:
         report: What was found on the surface when it came in.
         place: Where it stands at first.
         origin: File it comes from, or the built-in shape.
+
+    Examples:
+        >>> ball = wj.shapes.ball(0.065).placed((0.0, -0.05, -0.06))
+        >>> ball
+        GraspObject('ball': 5120 facets, 0.065 × 0.065 × 0.065 m)
+        >>> round(1e6 * ball.volume)  # cm³
+        143
     """
 
     name: str
@@ -87,6 +94,10 @@ class GraspObject:
     report: MeshReport = field(default_factory=MeshReport)
     place: Places = field(default_factory=Places.of)
     origin: str = ""
+
+    def __repr__(self) -> str:
+        x, y, z = self.size
+        return f"GraspObject('{self.name}': {len(self.faces)} facets, {x:.3g} × {y:.3g} × {z:.3g} m)"
 
     def placed(self, position: ArrayLike = (0.0, 0.0, 0.0), rotation: ArrayLike = (0.0, 0.0, 0.0, 1.0)) -> GraspObject:
         """The same object standing elsewhere."""
@@ -158,6 +169,11 @@ def make_object(
 
     Raises:
         InputError: Empty, not finite, wrong shapes, not manifold, or one-sided.
+
+    Examples:
+        >>> wj.make_object("wedge", [[0, 0, 0], [0.05, 0, 0], [0, 0.05, 0], [0, 0, 0.05]],
+        ...                [[0, 2, 1], [0, 1, 3], [1, 2, 3], [0, 3, 2]])
+        GraspObject('wedge': 4 facets, 0.05 × 0.05 × 0.05 m)
     """
     try:
         surface = weld_surface(vertices, faces, parts=parts)

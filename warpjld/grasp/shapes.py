@@ -1,4 +1,9 @@
-"""Built-in objects [m], Y up, their origin at the centre of the bounding box."""
+"""Built-in objects [m], Y up, their origin at the centre of the bounding box.
+
+Examples:
+    >>> wj.shapes.glass(0.07, 0.12)  # diameter and height, m
+    GraspObject('glass': ... facets, 0.07 × 0.12 × 0.07 m)
+"""
 
 from __future__ import annotations
 

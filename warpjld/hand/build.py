@@ -53,6 +53,10 @@ def build_hand(
 
     Raises:
         InputError: An unknown side or digit, or a measure out of range.
+
+    Examples:
+        >>> wj.build_hand("left", resolution=1500)
+        Rig('left hand': 26 joints, ... vertices, ... triangles)
     """
     # SciPy's splines, which shape it, take as long to import as a whole hand takes to be read
     from warpjld.hand.fit import fit_plan

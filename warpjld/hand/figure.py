@@ -192,6 +192,10 @@ def build_body(*, height: float = 1.75, resolution: int = 300) -> Rig:
 
     Raises:
         InputError: A height or resolution out of range.
+
+    Examples:
+        >>> wj.build_body()
+        Rig('body': 87 joints, ... vertices, ... triangles)
     """
     if not 0.5 <= height <= 2.6:
         raise InputError(f"height: want metres, between 0.5 and 2.6, got {height!r}")

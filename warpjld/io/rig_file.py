@@ -52,6 +52,18 @@ def load_rig(
 
     Raises:
         InputError: Unreadable, no joints, broken data, or a bad argument.
+
+    Examples:
+        >>> import json
+        >>> from tempfile import mkdtemp
+        >>> folder = Path(mkdtemp())
+        >>> surface = "OFF;4 4 0;0 0 -1;0 0 6;1 0 2;0 1 2;3 0 2 1;3 0 1 3;3 1 2 3;3 0 3 2"
+        >>> _ = (folder / "arm.off").write_text(surface.replace(";", "\\n"))
+        >>> joints = [{"name": "low", "parent": None, "position": [0.2, 0.2, 0]}]
+        >>> joints += [{"name": "high", "parent": "low", "position": [0.2, 0.2, 3]}]
+        >>> _ = (folder / "arm.json").write_text(json.dumps({"joints": joints}))
+        >>> wj.load_rig(folder / "arm.off", skeleton=folder / "arm.json", unit="m", up="y")
+        Rig('arm': 2 joints, 4 vertices, 4 triangles)
     """
     from warpjld.io.assemble import assemble_rig
 

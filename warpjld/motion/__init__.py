@@ -1,7 +1,7 @@
 """Keys and Kochanek–Bartels in-betweens of joint angles (R2–R5), and motions of other programs."""
 
 from warpjld.motion.csv_file import read_csv, write_csv
-from warpjld.motion.load import MOTION_FORMATS, LoadedMotion, load_motion, open_motion
+from warpjld.motion.load import MOTION_FORMATS, LoadedMotion, load_motion
 from warpjld.motion.spline import Spline
 from warpjld.motion.tracks import Clamped, Key, Limits, Motion, Track
 
@@ -15,7 +15,6 @@ __all__ = [
     "Spline",
     "Track",
     "load_motion",
-    "open_motion",
     "read_csv",
     "write_csv",
 ]

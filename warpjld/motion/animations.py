@@ -15,7 +15,7 @@ __all__ = ["animation_names", "choose_animation"]
 
 
 def animation_names(path: str | Path) -> tuple[str, ...]:
-    """Names of the animations of a file, as ``open_motion`` takes them; none of a kind that holds a single motion.
+    """Names of the animations of a file, as ``load_motion`` takes them; none of a kind that holds a single motion.
 
     Raises:
         InputError: It cannot be read.

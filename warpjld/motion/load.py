@@ -19,7 +19,7 @@ from warpjld.reading import reading
 from warpjld.rig import Rig
 from warpjld.skeleton import Poses
 
-__all__ = ["MOTION_FORMATS", "LoadedMotion", "load_motion", "open_motion"]
+__all__ = ["MOTION_FORMATS", "LoadedMotion", "load_motion"]
 
 MOTION_FORMATS = {
     ".csv": "key angles of joints by frame, degrees",
@@ -55,16 +55,12 @@ class LoadedMotion:
     notes: tuple[str, ...] = ()
     warnings: tuple[str, ...] = ()
 
+    def __repr__(self) -> str:
+        doubts = f", {len(self.warnings)} warnings" if self.warnings else ""
+        return f"LoadedMotion({len(self.poses)} frames at {self.rate:g} a second{doubts})"
+
 
 def load_motion(
-    path: str | Path, rig: Rig, *, rate: float | None = None, limits: Limits = "error"
-) -> tuple[Poses, float]:
-    """Poses of a rig from a motion file, and their frames a second; see ``open_motion``, which also gives notes."""
-    loaded = open_motion(path, rig, rate=rate, limits=limits)
-    return loaded.poses, loaded.rate
-
-
-def open_motion(
     path: str | Path,
     rig: Rig,
     *,
@@ -93,6 +89,14 @@ def open_motion(
 
     Raises:
         InputError: An unknown suffix, a file that cannot be read or understood, or that does not fit the rig.
+
+    Examples:
+        >>> from tempfile import mkdtemp
+        >>> file = Path(mkdtemp()) / "bend.csv"
+        >>> _ = file.write_text("frame,index.base.flexion\\n0,0\\n10,60\\n")  # degrees
+        >>> moved = wj.load_motion(file, wj.build_hand("left", resolution=1500), rate=25)
+        >>> moved
+        LoadedMotion(11 frames at 25 a second)
     """
     path = Path(path)
     if rate is not None and not (np.isfinite(rate) and rate > 0.0):

@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 from warpjld.errors import InputError
 from warpjld.motion.array_file import read_arrays
 from warpjld.motion.channels import ROOT_CHANNELS
-from warpjld.motion.load import open_motion
+from warpjld.motion.load import load_motion
 from warpjld.motion.tracks import Motion
 from warpjld.reading import reading
 from warpjld.rig import Rig
@@ -67,7 +67,7 @@ def read_targets(path: str | Path, rig: Rig, *, motion: str | Path | None = None
             return Targets(_poses(arrays, len(vertices), rig), vertices)
     if "channels" in arrays or "angles" in arrays:
         raise InputError(f"has poses of its own: no motion file is wanted beside them, got {motion}", path=path)
-    loaded = open_motion(motion, rig)
+    loaded = load_motion(motion, rig)
     if len(loaded.poses) != len(vertices):
         raise InputError(f"has {len(loaded.poses)} frames for {len(vertices)} target shapes", path=motion)
     return Targets(loaded.poses, vertices, loaded.warnings)

@@ -95,6 +95,15 @@ class Motion:
         tension: Default tension; likewise ``continuity`` and ``bias``.
         span: First and last frame; None for those of the keys.
         tracks: Tracks by channel.
+
+    Examples:
+        >>> motion = wj.Motion(rate=30)
+        >>> motion.set_key("index.base.flexion", 0, 0.0)
+        >>> motion.set_key("index.base.flexion", 20, 1.2)  # rad
+        >>> motion
+        Motion(1 track, frames 0 to 20 at 30 a second)
+        >>> float(motion.value("index.base.flexion", 10))
+        0.6
     """
 
     rate: float = 30.0
@@ -107,6 +116,11 @@ class Motion:
     def __post_init__(self) -> None:
         if not (np.isfinite(self.rate) and self.rate > 0.0):
             raise InputError(f"rate: want frames a second, above 0, got {self.rate:g}")
+
+    def __repr__(self) -> str:
+        first, last = self.frame_range
+        count = len(self.tracks)
+        return f"Motion({count} track{'s' * (count != 1)}, frames {first:g} to {last:g} at {self.rate:g} a second)"
 
     def set_key(
         self,

@@ -1,6 +1,14 @@
 """Pictures and films of a moving surface and its skeleton, off screen, from plain arrays.
 
 Importing this starts nothing: pyvista is loaded when the first picture is drawn.
+
+Examples:
+    >>> from tempfile import mkdtemp
+    >>> hand = wj.build_hand("left", resolution=1500)
+    >>> camera = wj.render.Camera.view("palmar", hand.surface.vertices)
+    >>> picture = wj.render.wireframe(hand.surface.vertices, hand.surface.faces, camera, size=(80, 60))
+    >>> wj.render.save_picture(Path(mkdtemp()) / "hand.png", picture).name
+    'hand.png'
 """
 
 from warpjld.render.camera import VIEWS, Camera

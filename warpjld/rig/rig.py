@@ -48,6 +48,11 @@ class Rig:
             is flesh.
         notes: What was recognised, guessed or mended, for people to read.
         suspicious: What is probably wrong, and what to do about it: told on stderr by every command.
+
+    Examples:
+        >>> hand = wj.build_hand("left", resolution=1500)
+        >>> hand.skeleton.names[:3], hand.surface.vertices.shape
+        (('left.forearm', 'left.wrist', ...), (..., 3))
     """
 
     name: str
@@ -62,6 +67,13 @@ class Rig:
     rigid: NDArray[np.int32] | None = None
     notes: tuple[str, ...] = ()
     suspicious: tuple[str, ...] = ()
+
+    def __repr__(self) -> str:
+        told = (
+            f"{len(self.skeleton)} joints, {len(self.surface.vertices)} vertices, {len(self.surface.faces)} triangles"
+        )
+        doubts = f", {len(self.suspicious)} suspicious" if self.suspicious else ""
+        return f"Rig('{self.name}': {told}{doubts})"
 
     @property
     def source_joints(self) -> tuple[str, ...]:

@@ -30,6 +30,16 @@ class Arguments:
         command: The command called.
         position: Where the call stands.
         interpreter: Who runs it, for commands that run other commands.
+
+    Examples:
+        >>> @wj.command("NUDGE", syntax="NUDGE <LEFT/RIGHT> <metres>", help="Say how far.")
+        ... def nudge(scene: wj.Scene, arguments: wj.Arguments) -> None:
+        ...     side = arguments.choice("the side", ("LEFT", "RIGHT"))
+        ...     scene.say(f"{side} by {arguments.number('the way', minimum=0):g} m")
+        >>> from warpjld.script import Interpreter, all_commands
+        >>> Interpreter(wj.Scene()).run_text("NUDGE LEFT 0.02")
+        LEFT by 0.02 m
+        >>> all_commands().remove("NUDGE")
     """
 
     def __init__(

@@ -82,7 +82,16 @@ def grasp_in_reach(
     nearest, why = math.inf, ""
     for seed in range(_SEARCHES):
         try:
-            grasp = find_grasp(closer, obstacles=obstacles, side=side, count=count, posture=posture_name, seed=seed)
+            grasp = find_grasp(
+                closer.covering,
+                closer.thing,
+                closer=closer,
+                obstacles=obstacles,
+                side=side,
+                count=count,
+                posture=posture_name,
+                seed=seed,
+            )
         except InputError as error:
             why = why or error.message
             continue

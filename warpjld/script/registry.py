@@ -153,6 +153,16 @@ def command(name: str, *, syntax: str, help: str, group: str = "User") -> Callab
 
     Raises:
         InputError: There is a command of that name already.
+
+    Examples:
+        >>> @wj.command("SPREAD", syntax="SPREAD <key> <degrees>", help="Spread index and ring finger.")
+        ... def spread(scene: wj.Scene, arguments: wj.Arguments) -> None:
+        ...     key, degrees = arguments.number("the key"), arguments.number("the angle")
+        ...     for finger, way in (("INDEX", 1), ("RING", -1)):
+        ...         line = f"FINGER1 LEFT {finger} ABDUCTION AT {key} {way * degrees}"
+        ...         arguments.interpreter.run_text(line, "<SPREAD>")
+        >>> from warpjld.script import all_commands
+        >>> all_commands().remove("SPREAD")
     """
 
     def register(function: _F) -> _F:

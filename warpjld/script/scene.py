@@ -120,6 +120,15 @@ class Scene:
         read: Files that were read, which no output may take the place of.
         say: Where PRINT and SHOW write.
         warn: Told what is probably wrong with a rig or a motion, as it is met; ``warnings`` keeps it for the summary.
+
+    Examples:
+        >>> from warpjld.script import Interpreter
+        >>> scene = wj.Scene()
+        >>> Interpreter(scene).run_text("FRAMES 0 24")
+        >>> scene.add("left", wj.build_hand("left", resolution=1500)).name
+        'LEFT'
+        >>> scene
+        Scene(1 actor, 0 objects, frames 0 to 24 at 30 a second, 0 outputs)
     """
 
     actors: dict[str, Actor] = field(default_factory=dict)
@@ -142,6 +151,12 @@ class Scene:
     say: Callable[[str], None] = print
     warn: Callable[[str], None] = _to_stderr
     warnings: list[str] = field(default_factory=list)
+
+    def __repr__(self) -> str:
+        counts = ((len(self.actors), "actor"), (len(self.props), "object"))
+        told = ", ".join(f"{n} {what}{'s' * (n != 1)}" for n, what in counts)
+        clock = f"frames {self.first} to {self.last} at {self.rate:g} a second"
+        return f"Scene({told}, {clock}, {len(self.outputs)} outputs)"
 
     def warned(self, lines: Iterable[str]) -> None:
         """Tell warnings, and keep them."""

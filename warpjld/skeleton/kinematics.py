@@ -31,11 +31,26 @@ class Poses:
         rotations: Rotation of each joint's bone from the rest pose, unit quaternions x, y, z, w, shape (F, J, 4).
             Signs are aligned along the tree, so that any two neighbours blend the short way.
         flexion: Vertical component of each joint's flexion [rad], shape (F, J) (R28, R29).
+
+    Examples:
+        >>> hand = wj.build_hand("left", resolution=1500)
+        >>> motion = wj.Motion()
+        >>> motion.set_key("index.base.flexion", 0, 0.0)
+        >>> motion.set_key("index.base.flexion", 10, 1.2)  # rad
+        >>> poses = motion.poses(hand.skeleton)
+        >>> poses
+        Poses(11 frames of 26 joints)
+        >>> poses[5:].positions.shape
+        (6, 26, 3)
     """
 
     positions: NDArray[np.float64]
     rotations: NDArray[np.float64]
     flexion: NDArray[np.float64]
+
+    def __repr__(self) -> str:
+        frames = len(self)
+        return f"Poses({frames} frame{'s' * (frames != 1)} of {self.positions.shape[1]} joints)"
 
     def __len__(self) -> int:
         return len(self.positions)
@@ -65,6 +80,14 @@ def poses_from_angles(
 
     Raises:
         InputError: Wrong shapes, or angles that are not finite.
+
+    Examples:
+        >>> import numpy as np
+        >>> skeleton = wj.build_hand("left", resolution=1500).skeleton
+        >>> angles = np.zeros((2, len(skeleton), 4))
+        >>> angles[1, skeleton.index("index.base"), 0] = np.radians(70)  # flexion
+        >>> wj.poses_from_angles(skeleton, angles)
+        Poses(2 frames of 26 joints)
     """
     count = len(skeleton)
     if angles.ndim != 3 or angles.shape[1:] != (count, len(CHANNELS)):

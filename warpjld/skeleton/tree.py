@@ -53,6 +53,13 @@ class Skeleton:
             segment × axis points to the external side (R20).
         limits: Smallest and largest angle [rad] of each channel, shape (J, 4, 2), channels as in ``CHANNELS``.
         palms: Per hand its palm segments as (proximal, distal) pairs, ulnar to radial; neighbours are adjacent.
+
+    Examples:
+        >>> skeleton = wj.build_hand("left", resolution=1500).skeleton
+        >>> skeleton
+        Skeleton(26 joints, root 'left.forearm')
+        >>> skeleton.index("index.base") == skeleton.names.index("left.index.base")
+        True
     """
 
     names: tuple[str, ...]
@@ -83,6 +90,9 @@ class Skeleton:
         late = np.flatnonzero(self.parents >= np.arange(count))
         if late.size:
             raise InputError(f"skeleton: parent of '{self.names[late[0]]}' does not come before it")
+
+    def __repr__(self) -> str:
+        return f"Skeleton({len(self)} joints, root '{self.names[0]}')"
 
     def __len__(self) -> int:
         return len(self.names)

@@ -52,6 +52,10 @@ class StudyResult:
     seconds: float
     notes: tuple[str, ...] = ()
 
+    def __repr__(self) -> str:
+        rates = f"{self.rates[0].successes} of {self.rates[0].trials} succeed" if self.rates else "no trials"
+        return f"StudyResult({rates}, {self.ran} run now in {self.seconds:.1f} s)"
+
 
 def table_columns(experiment: Experiment) -> tuple[Column, ...]:
     """Columns of the study's table, in order."""

@@ -20,7 +20,6 @@ from warpjld.io.usd.skin import read_usd_rig
 from warpjld.motion import load_motion
 from warpjld.motion.animations import animation_names
 from warpjld.motion.joint_animation import JointAnimation
-from warpjld.motion.load import open_motion
 from warpjld.motion.usd_animation import read_usd_animation
 
 pytest.importorskip("pxr")
@@ -89,8 +88,9 @@ def test_the_same_motion_as_gltf(
     glb = with_animation(
         write_glb(hand_glb(names=plain_name), tmp_path / "a.glb"), keys, (np.array(times) - start) / rate
     )
-    theirs, _ = load_motion(glb, load_rig(glb), rate=rate)
-    ours, own_rate = load_motion(usd, load_rig(usd))
+    theirs = load_motion(glb, load_rig(glb), rate=rate).poses
+    moved = load_motion(usd, load_rig(usd))
+    ours, own_rate = moved.poses, moved.rate
     assert own_rate == rate
     assert len(ours) == 4 * apart + 1 == len(theirs)
     np.testing.assert_allclose(ours.positions, theirs.positions, atol=POSITION)
@@ -177,7 +177,7 @@ def test_units_and_axes(hand: Stage, tmp_path: Path) -> None:
     a = replace(hand, keys=keys[:1]).write(tmp_path / "a.usda")
     b = replace(other, keys=keys[1:]).write(tmp_path / "b.usda")
     rigs = load_rig(a), load_rig(b)
-    poses = [load_motion(path, rig)[0] for path, rig in zip((a, b), rigs, strict=True)]
+    poses = [load_motion(path, rig).poses for path, rig in zip((a, b), rigs, strict=True)]
     np.testing.assert_allclose(poses[1].positions, poses[0].positions, atol=POSITION)
     clips = [read_usd_animation(path).clip() for path in (a, b)]
     np.testing.assert_allclose(clips[1].positions, 100 * clips[0].positions, atol=1e-3)
@@ -189,7 +189,7 @@ def test_stages_with_an_animation_only(hand: Stage, tmp_path: Path) -> None:
     whole = replace(hand, keys=keys).write(tmp_path / "a.usda")
     bare = replace(hand, keys=keys, with_mesh=False).write(tmp_path / "b.usda")
     rig = load_rig(whole)
-    np.testing.assert_array_equal(load_motion(bare, rig)[0].rotations, load_motion(whole, rig)[0].rotations)
+    np.testing.assert_array_equal(load_motion(bare, rig).poses.rotations, load_motion(whole, rig).poses.rotations)
 
 
 def test_animations_are_chosen_by_name(tmp_path: Path) -> None:
@@ -268,7 +268,7 @@ def test_no_animation_is_told_why(hand: Stage, tmp_path: Path) -> None:
         (bar(joints=None, keys=[]).write(tmp_path / "c.usda"), "no animation in this file"),
     ):
         with pytest.raises(InputError, match=message) as caught:
-            open_motion(path, rig)
+            load_motion(path, rig)
         assert caught.value.path == path
 
 
@@ -286,4 +286,4 @@ def test_broken_samples_are_named(tmp_path: Path, broken: Callable, message: str
     broken(keys)
     path = bar(keys=[keys]).write(tmp_path / "a.usda")
     with pytest.raises(InputError, match=message):
-        open_motion(path, load_rig(path))
+        load_motion(path, load_rig(path))

@@ -13,7 +13,7 @@ from scipy.spatial import cKDTree
 from scipy.spatial.transform import Rotation
 
 from warpjld.io import load_rig
-from warpjld.motion import load_motion, open_motion
+from warpjld.motion import load_motion
 from warpjld.motion.out import source_motion, write_motion
 
 pytest.importorskip("pxr")
@@ -47,7 +47,7 @@ def test_blender_exports_one_rig_twice(data: Path, tmp_path: Path, name: str) ->
     np.testing.assert_allclose(ours.skeleton.rest[order], theirs.skeleton.rest, atol=1e-6)
     for a, b in ((ours, theirs), (theirs, ours)):
         assert cKDTree(a.surface.vertices).query(b.surface.vertices)[0].max() < 1e-6
-    moved, same = load_motion(usd, ours)[0], load_motion(glb, theirs)[0]
+    moved, same = load_motion(usd, ours).poses, load_motion(glb, theirs).poses
     assert len(moved) == len(same) == 5
     np.testing.assert_allclose(moved.positions[:, order], same.positions, atol=2e-6)
     turned = Rotation.from_quat(moved.rotations[:, order].reshape(-1, 4)).inv() * Rotation.from_quat(
@@ -66,7 +66,7 @@ def test_blender_exports_one_rig_twice(data: Path, tmp_path: Path, name: str) ->
 )
 def test_bones_stand_in_blender_where_ours_do(data: Path, tmp_path: Path, name: str, motion: str) -> None:
     rig = load_rig(data / name)
-    loaded = open_motion(data / motion, rig, rate=30)
+    loaded = load_motion(data / motion, rig, rate=30)
     path = tmp_path / "motion.usdc"
     write_motion(path, rig, loaded.poses, rate=30, start_frame=1)
     frames = [0, len(loaded.poses) // 2, len(loaded.poses) - 1]

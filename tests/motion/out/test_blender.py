@@ -12,7 +12,7 @@ import pytest
 
 from warpjld.hand import build_hand
 from warpjld.io import load_rig
-from warpjld.motion import open_motion
+from warpjld.motion import load_motion
 from warpjld.motion.out import source_motion, write_motion
 
 SHARED = Path(__file__).resolve().parents[4] / "shared" / "data"
@@ -40,7 +40,7 @@ def test_bones_stand_where_ours_do(rig_file: str, motion_file: str, tmp_path: Pa
     if not SHARED.is_dir():
         pytest.skip("no shared data beside the repository")
     rig = build_hand("left", resolution=3000) if rig_file == "builtin" else load_rig(SHARED / rig_file)
-    moved = open_motion(SHARED / motion_file, rig)
+    moved = load_motion(SHARED / motion_file, rig)
     count = len(moved.poses)
     frames = [0, count // 2, count - 1]
     files = [tmp_path / f"motion{suffix}" for suffix in (".glb", ".bvh")]

@@ -17,7 +17,7 @@ from tests.motion.out.gltf_reader import chunks, evaluate, skinned
 from warpjld.errors import InputError
 from warpjld.io import load_rig
 from warpjld.io.skeleton_file import write_skeleton_file
-from warpjld.motion import open_motion
+from warpjld.motion import load_motion
 from warpjld.motion.out import source_motion, write_motion
 from warpjld.rig import Rig, Skin
 from warpjld.skeleton import Poses, poses_from_rotations, poses_from_world
@@ -84,7 +84,7 @@ def test_joints_stand_where_they_should(
         expected = turns.apply(at - rig.skeleton.rest[own]) + poses.positions[f, own]
         np.testing.assert_allclose(placed[f], expected, atol=CLOSE)
     again = load_rig(tmp_path / "out.glb")
-    back = open_motion(tmp_path / "out.glb", again)
+    back = load_motion(tmp_path / "out.glb", again)
     assert len(back.poses) == 5
     np.testing.assert_allclose(back.poses.positions, poses.positions, atol=CLOSE)
     same = np.abs((back.poses.rotations * poses.rotations).sum(-1))
@@ -168,7 +168,7 @@ def test_files_beside_a_gltf_are_taken_in(
     assert picture["mimeType"] == "image/png"
     view = after["bufferViews"][picture["bufferView"]]
     assert stored[view["byteOffset"] :][: view["byteLength"]] == b"\x89PNG picture"
-    back = open_motion(tmp_path / "else" / "where.glb", load_rig(tmp_path / "else" / "where.glb"))
+    back = load_motion(tmp_path / "else" / "where.glb", load_rig(tmp_path / "else" / "where.glb"))
     np.testing.assert_allclose(back.poses.positions, poses.positions, atol=CLOSE)
 
 
@@ -220,7 +220,7 @@ def test_a_rig_from_elsewhere_becomes_a_file_of_its_own(hands: dict[str, Rig], t
         assert np.median(off) < CLOSE
         assert off.max() < 5e-3  # where a weight near the smallest was left out
     again = load_rig(tmp_path / "out.glb", side="left")
-    back = open_motion(tmp_path / "out.glb", again)
+    back = load_motion(tmp_path / "out.glb", again)
     own = [rig.skeleton.names.index(name) for name in again.skeleton.names]
     np.testing.assert_allclose(back.poses.positions, poses.positions[:, own], atol=CLOSE)
 

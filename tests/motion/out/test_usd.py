@@ -99,7 +99,8 @@ def check(path: Path, rig: Rig, poses: Poses) -> None:
     np.testing.assert_allclose(
         again.surface.to_source(again.surface.vertices), rig.surface.to_source(rig.surface.vertices), atol=POSITION
     )
-    back, rate = load_motion(path, again)
+    moved = load_motion(path, again)
+    back, rate = moved.poses, moved.rate
     assert rate == RATE
     where = [again.skeleton.index(name) for name in rig.skeleton.names]
     same_poses(Poses(back.positions[:, where], back.rotations[:, where], back.flexion[:, where]), poses)
@@ -136,7 +137,7 @@ def test_a_rig_from_a_file(
     assert UsdGeom.GetStageUpAxis(stage) == up.upper()
     assert UsdGeom.GetStageMetersPerUnit(stage) == pytest.approx(0.01 if unit == "cm" else 1.0)
     np.testing.assert_allclose(load_rig(path).source.frames, rig.source.frames, atol=1e-6 * max(scale, 1.0))
-    same_poses(load_motion(path, rig)[0], poses)
+    same_poses(load_motion(path, rig).poses, poses)
 
 
 def test_scales_that_usd_rounds(write_glb: Callable, hand_glb: Callable, tmp_path: Path) -> None:

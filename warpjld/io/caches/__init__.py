@@ -56,12 +56,6 @@ def open_cache(
     another number of frames was written than announced. Memory does not grow with the number of frames, except
     for ``.glb``, which is limited to short clips.
 
-    >>> with open_cache("hand.usdc", surface, frames=len(poses), rate=25) as cache:   # doctest: +SKIP
-    ...     for _, block in covering.blocks(poses):
-    ...         cache.write(block)
-    >>> cache.files                                                                     # doctest: +SKIP
-    (PosixPath('hand.usdc'),)
-
     Args:
         path: File to write; its folder is made if missing. For ``.obj`` the name of the sequence: ``hand.obj``
             becomes ``hand.0000.obj``, ``hand.0001.obj``, … Beside ``hand.pc2`` and ``hand.mdd``, which hold
@@ -75,6 +69,19 @@ def open_cache(
     Raises:
         InputError: Unknown suffix, no frames, a clip too long for the format, or a place that cannot be written.
         MissingExtraError: USD without the extra ``usd``, Alembic without ``abc``.
+
+    Examples:
+        >>> from tempfile import mkdtemp
+        >>> hand = wj.build_hand("left", resolution=1500)
+        >>> covering, motion = wj.bind(hand), wj.Motion(rate=25)
+        >>> motion.set_key("index.base.flexion", 0, 0.0)
+        >>> motion.set_key("index.base.flexion", 10, 1.2)  # rad
+        >>> poses = motion.poses(hand.skeleton)
+        >>> with wj.open_cache(Path(mkdtemp()) / "hand.npz", hand.surface, frames=len(poses), rate=25) as cache:
+        ...     for _, block in covering.blocks(poses):
+        ...         cache.write(block)
+        >>> cache.files[0].name
+        'hand.npz'
     """
     path = Path(path)
     cache: Cache = _kind(path)(path, surface, Clip(frames=frames, rate=rate, start=start_frame, name=name))

@@ -119,7 +119,7 @@ def actor(scene: Scene, arguments: Arguments) -> None:
 )
 def motion(scene: Scene, arguments: Arguments) -> None:
     """R110 and any recorded motion."""
-    from warpjld.motion import open_motion
+    from warpjld.motion import load_motion
 
     chosen = scene.actor()
     path = arguments.input_file("a motion file")
@@ -131,7 +131,7 @@ def motion(scene: Scene, arguments: Arguments) -> None:
         flat_hand_mean=lambda: arguments.choice("whether no rotation is the flat hand", ("ON", "OFF")) == "ON",
     )
     rig = replace(chosen.rig, skeleton=chosen.skeleton)  # with the script's axes and limits
-    moved = open_motion(path, rig, rate=scene.rate, **options)  # type: ignore[arg-type]
+    moved = load_motion(path, rig, rate=scene.rate, **options)  # type: ignore[arg-type]
     chosen.recorded, chosen.motion_notes = (moved.poses, moved.rate), moved.notes
     scene.warned(f"{chosen.name}: {warning}" for warning in moved.warnings)
 

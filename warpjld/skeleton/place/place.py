@@ -37,6 +37,12 @@ def propose_points(
 
     Raises:
         InputError: It is neither, or does not show what it takes: legs, arms and fingers apart from one another.
+
+    Examples:
+        >>> hand = wj.build_hand("left", resolution=1500)
+        >>> points = wj.propose_points(hand.surface.vertices, hand.surface.faces)
+        >>> len(points), points["left.index.tip"].shape
+        (25, (3,))
     """
     used = np.unique(faces)
     number = np.full(len(vertices), -1)

@@ -111,7 +111,7 @@ class GraspPlan:
 
 
 def load_plan(path: str | Path) -> GraspPlan:
-    """Read a study file; see ``examples/study.md`` for its keys.
+    """Read a study file; see ``docs/reference/grasp-study.md`` for its keys.
 
     Raises:
         InputError: Unreadable, an unknown key (with a suggestion), or a value out of range: file, line and key named.

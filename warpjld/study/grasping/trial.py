@@ -180,8 +180,11 @@ class GraspExperiment:
         posture = self.settings.posture
         assert isinstance(posture, str)
         try:
+            closer = self._closer(choice, wanted, scale)
             found = find_grasp(
-                self._closer(choice, wanted, scale),
+                closer.covering,
+                closer.thing,
+                closer=closer,
                 count=count,
                 posture=None if posture == "auto" else posture,
                 coupling=self.settings.coupling if any(self.settings.coupling) else None,

@@ -1,0 +1,96 @@
+"""A grasp study: a plan from a file, run, resumed, and single trials of it run again."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+
+from warpjld.study.grasping.plan import GraspPlan, load_plan
+from warpjld.study.grasping.trial import GraspExperiment
+from warpjld.study.rerun import Rerun, rerun_trial
+from warpjld.study.run import StudyResult, TableFormat, run_study
+
+__all__ = ["Study"]
+
+
+@dataclass(frozen=True)
+class Study:
+    """A study that closes hands on objects many times, and brings the grasps into one table.
+
+    Attributes:
+        plan: What is tried.
+
+    Examples:
+        >>> from tempfile import mkdtemp
+        >>> folder = Path(mkdtemp())
+        >>> _ = (folder / "plan.toml").write_text('''
+        ... title = "One grasp"
+        ... trials = 1
+        ... seed = 1
+        ... [[hands]]
+        ... builtin = "left"
+        ... resolution = 1500
+        ... [[objects]]
+        ... builtin = "ball"
+        ... diameter = 0.065
+        ... ''')
+        >>> study = wj.Study.load(folder / "plan.toml")
+        >>> study
+        Study(One grasp: 1 trial, 1 hand, 1 object)
+        >>> notes, doubts = study.check()  # then study.run(folder / "out")
+        >>> doubts
+        []
+    """
+
+    plan: GraspPlan
+
+    def __repr__(self) -> str:
+        counts = ((self.plan.trials, "trial"), (len(self.plan.hands), "hand"), (len(self.plan.objects), "object"))
+        return f"Study({self.plan.title}: " + ", ".join(f"{n} {what}{'s' * (n != 1)}" for n, what in counts) + ")"
+
+    @classmethod
+    def load(cls, path: str | Path) -> Study:
+        """Read a plan (TOML).
+
+        Raises:
+            InputError: It cannot be read, or asks for what cannot be; names the line or key.
+        """
+        return cls(load_plan(Path(path)))
+
+    @property
+    def experiment(self) -> GraspExperiment:
+        """What is repeated."""
+        return GraspExperiment(self.plan)
+
+    def check(self) -> tuple[list[str], list[str]]:
+        """Load every hand and object once: notes on them, and what looks suspicious.
+
+        Raises:
+            InputError: One of them cannot be used.
+        """
+        return self.experiment.check(), self.experiment.doubts()
+
+    def run(
+        self,
+        out: str | Path,
+        *,
+        processes: int | None = None,
+        table: TableFormat = "parquet",
+        fresh: bool = False,
+        report: Callable[[str, int, int], None] = lambda what, done, total: None,
+    ) -> StudyResult:
+        """Run what is missing of the study in a folder; arguments and errors as of ``run_study``."""
+        return run_study(
+            self.experiment, out, processes=processes, table=table, fresh=fresh, title=self.plan.title, report=report
+        )
+
+    def rerun(
+        self,
+        out: str | Path,
+        trial: int,
+        *,
+        report: Callable[[str, int, int], None] = lambda what, done, total: None,
+    ) -> Rerun:
+        """Run one trial again, compare it with what is there, and draw it; errors as of ``rerun_trial``."""
+        return rerun_trial(self.experiment, out, trial, report=report)
