@@ -302,3 +302,21 @@ def test_facets_of_an_open_surface_are_met_like_those_of_a_closed_one(stiff) -> 
     assert not sheet.report.solid
     assert (opened.status == Status.CONVERGED).all()
     np.testing.assert_allclose(opened.angles, closed.angles, atol=1e-7)
+
+
+def test_a_joint_bent_at_rest_is_searched_from_straight(stiff) -> None:
+    """The angle counts from the straight joint, and the skin is there where the search says it is (R25)."""
+    initial = np.zeros_like(stiff.skeleton.initial)
+    initial[1] = np.radians([25.0, 0.0, 0.0, 0.0])
+    skeleton = replace(stiff.skeleton, initial=initial)
+    bent = bind(skeleton, stiff.surface, parameters=default_parameters(skeleton), domains=stiff.domains)
+    vertex = top(bent, 0.5)
+    floor = PLANE.placed((0, -0.02, 0))
+    poses = poses_from_angles(skeleton, initial[None])
+    found = FlexionSearch(bent, ObjectSet(floor)).run(poses, initial[None], Searches(vertex=vertex, joint=1))
+    assert found.status[0] == Status.CONVERGED
+    assert found.angles[0, 0] > initial[1, 0]
+    touching = initial[None].copy()
+    touching[0, 1, 0] = found.angles[0, 0]
+    skin = bent.deform(poses_from_angles(skeleton, touching))[0]
+    assert skin[vertex, 1] == pytest.approx(-0.01, abs=2e-6)

@@ -121,7 +121,7 @@ def close_digits(
     for name in closed.digits:
         for joint in chains[name]:
             channel = f"{actor.skeleton.names[joint]}.flexion"
-            before = float(actor.motion.value(channel, first))
+            before = actor.value(channel, first)
             grip[channel] = before
             actor.set_keys(channel, [first], before, scene.spline)
             actor.set_keys(channel, [last], float(closed.angles[0, joint, 0]), scene.spline)

@@ -133,7 +133,7 @@ def _grasp_auto(  # type: ignore[no-untyped-def]
 def _leave_keys(
     scene: Scene, actor: Actor, prop: Prop, side: str, first: float, last: float, digits: Sequence[str]
 ) -> None:
-    """Keys where a grasp would have them, all of no flexion: what follows it in the script can be checked."""
+    """Keys where a grasp would have them, all as the joints are: what follows it in the script can be checked."""
     from warpjld.grasp.digits import digit_chains
     from warpjld.script.grasping import Attempt
 
@@ -141,8 +141,9 @@ def _leave_keys(
     grip = {}
     for joint in (joint for chain in digit_chains(actor.skeleton, wanted).values() for joint in chain):
         channel = f"{actor.skeleton.names[joint]}.flexion"
-        actor.set_keys(channel, [first, last], 0.0, scene.spline)
-        grip[channel] = 0.0
+        rest = actor.value(channel, first)
+        actor.set_keys(channel, [first, last], rest, scene.spline)
+        grip[channel] = rest
     scene.grips[actor.name] = scene.grips.get(actor.name, {}) | grip
     message = "not searched: nothing is computed by --check"
     scene.attempts.append(Attempt(f"GRASP {prop.name}", last, actor.name, prop.name, "NOT_SEARCHED", message, {}))
@@ -163,7 +164,7 @@ def release(scene: Scene, arguments: Arguments) -> None:
     for channel, value in scene.grips.pop(actor.name).items():
         keys = actor.motion.tracks[channel].keys
         # the last key's own value, to the bit: only then do splines hold it
-        held = keys[-1].value if keys[-1].frame <= first else float(actor.motion.value(channel, first))
+        held = keys[-1].value if keys[-1].frame <= first else actor.value(channel, first)
         actor.set_keys(channel, [first], held, scene.spline)
         actor.set_keys(channel, [last], value, scene.spline)
 
