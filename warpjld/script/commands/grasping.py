@@ -18,13 +18,13 @@ if TYPE_CHECKING:
     from warpjld.script.props import Prop
     from warpjld.script.scene import Actor
 
-_AUTO = "<key> [LEFT/RIGHT] {}<hand vertex or PAD> <object> <facet or NEAREST> [DISTANCE <metres>]"
+_AUTO = "<key> [LEFT/RIGHT] {}<hand vertex or PAD> <object> <facet or NEAREST> [DISTANCE <metres>] [WITHIN <metres>]"
 
 
 @command(
     "AUTO_WRIST",
     syntax=f"AUTO_WRIST {_AUTO.format('')}",
-    help="Flexion of the wrist at a key with which a vertex of the hand touches an object.",
+    help="Wrist flexion that brings a vertex to an object: the nearest, either way, or out of it; WITHIN: how exactly.",
     group="Grasping",
 )
 def auto_wrist(scene: Scene, arguments: Arguments) -> None:
@@ -172,6 +172,7 @@ def release(scene: Scene, arguments: Arguments) -> None:
 def _search(scene: Scene, arguments: Arguments, name: str, key: float, side: str, joint_name: str, finger: str) -> None:
     from warpjld.grasp import NEAREST, Status
     from warpjld.grasp.digits import pad_vertex
+    from warpjld.grasp.search import FINEST
     from warpjld.script.binding import cover
     from warpjld.script.grasping import Attempt, search_flexion
 
@@ -188,12 +189,15 @@ def _search(scene: Scene, arguments: Arguments, name: str, key: float, side: str
         facet = NEAREST
     else:
         facet = arguments.integer("the facet (its number, or NEAREST)", minimum=0, maximum=len(prop.thing.faces) - 1)
-    options = arguments.options(distance=lambda: arguments.number("the distance in metres"))
-    distance = float(cast(float, options.get("distance", 0.0)))
+    options = arguments.options(
+        distance=lambda: arguments.number("the distance in metres"),
+        within=lambda: arguments.number("how exactly, in metres", minimum=FINEST, maximum=0.1),
+    )
+    distance, within = (float(cast(float, options.get(k, v))) for k, v in (("distance", 0.0), ("within", 1e-6)))
     if scene.dry:
         actor.set_keys(f"{actor.skeleton.names[joint]}.{CHANNELS[0]}", [key], 0.0, scene.spline)
         return
-    found, inside = search_flexion(scene, actor, prop, key, joint, vertex, facet, distance)
+    found, inside = search_flexion(scene, actor, prop, key, joint, vertex, facet, distance, within)
     status = Status(int(found.status[0]))
     message = found.message()
     if status is Status.CONVERGED:
