@@ -53,6 +53,12 @@ def test_scripts(name: str, tmp_path, grip) -> None:
     assert {Path(file["name"]).suffix for file in summary["files"]} >= {".mp4", ".png"}
 
 
+def test_a_hand_digitised_half_closed(tmp_path) -> None:
+    away = runpy.run_path(str(EXAMPLES / "half_closed.py"))["main"](tmp_path, (120, 90))
+    assert away < 0.4
+    assert (tmp_path / "flat.png").stat().st_size > 1000
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("name", PRESSED)
 def test_pressing(name: str, tmp_path) -> None:

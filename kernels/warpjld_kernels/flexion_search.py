@@ -99,10 +99,11 @@ def search(
     point_out: wp.array(dtype=wp.vec3),
     evaluations_out: wp.array(dtype=wp.int32),
 ):
-    """First closing s of a chain at which |distance − target| < tolerance.
+    """First closing s of a chain at which |distance − target| < tolerance, from outside or from inside.
 
     Steps no longer than the distance allows bring the vertex to the first change of sign, which is then halved. Where
-    there is none, the closest approach is refined, lest a short contact be stepped over.
+    there is none, the closest approach is refined, lest a short contact be stepped over. From inside, distances count
+    with the other sign, so that it is the way out that is looked for.
     """
     i = first + wp.tid()
     task = Task()
@@ -118,6 +119,7 @@ def search(
     phase = int(_FIRST)
     s = float(0.0)
     count = int(0)
+    side = float(1.0)
     speed = float(0.0)
     # bracket of the change of sign; the step before the present one
     low = float(0.0)
@@ -147,7 +149,10 @@ def search(
             if count > 0:  # the last nearest point is on the surface still
                 limit = wp.float64(1.0001 * wp.length(local - hit.point) + 1.0e-6)
             hit = nearest(solids, task.thing, wp.vec3d(local), limit)
-        hit.distance = hit.distance - task.target
+        hit.distance = side * (hit.distance - task.target)
+        if phase == _FIRST and hit.distance < 0.0:
+            side = -1.0
+            hit.distance = -hit.distance
         count += 1
         if hit.distance < closest.distance or count == 1:
             closest = hit
@@ -172,16 +177,12 @@ def search(
             else:
                 s = s_next
         elif hit.distance < 0.0:
-            if phase == _FIRST:
-                status = INSIDE
-                phase = _DONE
-            else:
-                low = previous
-                if phase == _REFINE:
-                    low = x0
-                high = s
-                s = 0.5 * (low + high)
-                phase = _HALVE
+            low = previous
+            if phase == _REFINE:
+                low = x0
+            high = s
+            s = 0.5 * (low + high)
+            phase = _HALVE
         elif phase == _REFINE:
             if slot == 1:
                 d1 = hit.distance
@@ -228,9 +229,14 @@ def search(
     if status == NO_CONTACT:
         s = at
         hit = closest
+    if side < 0.0:
+        if status == NO_CONTACT:
+            status = INSIDE
+        if status == AT_LIMIT:
+            status = INSIDE
     status_out[i] = status
     closing_out[i] = s
-    distance_out[i] = hit.distance + task.target
+    distance_out[i] = side * hit.distance + task.target
     face_out[i] = hit.face
     point_out[i] = hit.point
     evaluations_out[i] = count

@@ -115,31 +115,6 @@ def origin(v: int, places: Places, positions: wp.array2d(dtype=wp.vec3), f: int)
     return here
 
 
-@wp.kernel
-def express(
-    # model
-    places: Places,
-    parameters: Parameters,
-    rest: wp.array(dtype=wp.vec3),
-    # rest pose, one frame
-    positions: wp.array2d(dtype=wp.vec3),
-    original: wp.array3d(dtype=wp.vec3),
-    modified: wp.array2d(dtype=wp.vec3),
-    # out
-    coordinates_out: wp.array(dtype=wp.vec3),
-    virtual_out: wp.array(dtype=float),
-):
-    """Coordinates of vertices in their initial bases (§5.5, R57), and initial lengths of their virtual segments."""
-    v = wp.tid()
-    if places.rigid[v] >= 0:
-        coordinates_out[v] = rest[v] - positions[0, places.rigid[v]]
-        virtual_out[v] = 1.0
-        return
-    axes = basis(v, places, parameters, positions, original, modified, 0)
-    coordinates_out[v] = wp.inverse(axes) * (rest[v] - origin(v, places, positions, 0))
-    virtual_out[v] = wp.length(foot(v, 1, places, positions, 0) - foot(v, 0, places, positions, 0))
-
-
 @wp.func
 def rounded(
     v: int,
@@ -187,6 +162,40 @@ def swollen(
     driven = 0.5 * (flexion_ratio[f, p] + flexion_ratio[f, places.ends[s, 1]])
     grown = 1.0 + places.muscle[s] * parameters.muscle[p] * driven * profile
     return wp.vec3(local[0], grown * local[1], local[2])
+
+
+@wp.kernel
+def express(
+    # model
+    places: Places,
+    parameters: Parameters,
+    rest: wp.array(dtype=wp.vec3),
+    # rest pose, one frame
+    positions: wp.array2d(dtype=wp.vec3),
+    original: wp.array3d(dtype=wp.vec3),
+    modified: wp.array2d(dtype=wp.vec3),
+    flexion_ratio: wp.array2d(dtype=float),
+    # out
+    coordinates_out: wp.array(dtype=wp.vec3),
+    virtual_out: wp.array(dtype=float),
+):
+    """Coordinates of vertices in their initial bases (§5.5, R57), as they are where joints are straight (R25), and
+    initial lengths of their virtual segments."""
+    v = wp.tid()
+    if places.rigid[v] >= 0:
+        coordinates_out[v] = rest[v] - positions[0, places.rigid[v]]
+        virtual_out[v] = 1.0
+        return
+    axes = basis(v, places, parameters, positions, original, modified, 0)
+    local = wp.inverse(axes) * (rest[v] - origin(v, places, positions, 0))
+    grown = wp.vec3(1.0)
+    if places.between[v] == 0:
+        if places.external[v] != 0:
+            grown = rounded(v, grown, places, parameters, flexion_ratio, 0)
+        else:
+            grown = swollen(v, grown, places, parameters, flexion_ratio, 0)
+    coordinates_out[v] = wp.cw_div(local, grown)
+    virtual_out[v] = wp.length(foot(v, 1, places, positions, 0) - foot(v, 0, places, positions, 0))
 
 
 @wp.kernel

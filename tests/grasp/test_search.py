@@ -100,9 +100,15 @@ def test_every_status_with_its_message(stiff) -> None:
     places = Places.of([start, (0, 0.5, 0), start + np.array([0, 0.025, 0]), (0, -0.2, -0.03)])
     poses, angles = straight(stiff)
     search = FlexionSearch(stiff, ObjectSet(BALL))
-    found = search.run(poses, angles, Searches(vertex=vertex, joint=1, place=[0, 1, 2, 3]), places=places)
+    stop = [0.5, np.nan, np.nan, np.nan]
+    found = search.run(poses, angles, Searches(vertex=vertex, joint=1, place=[0, 1, 2, 3], stop=stop), places=places)
     assert found.status.tolist() == [Status.INSIDE, *[Status.NO_CONTACT] * 3]
-    assert found.message(0).startswith("already inside the object by 20.00 mm at 0.00°")
+    assert "not out of it within the joint's limits; least deep" in found.message(0)
+    assert found.angles[0, 0] == pytest.approx(0.5)
+    assert (
+        search.run(poses, angles, Searches(vertex=vertex, joint=1, stop=0.0), places=places[0]).status[0]
+        == Status.INSIDE
+    )
     assert "closest approach 5.00 mm at 0.00°" in found.message(2)  # it only moves away
     assert 0 < found.angles[3, 0] < np.radians(120)  # somewhere on the way down
     closest = min(
@@ -285,8 +291,10 @@ def test_other_wrong_input(stiff) -> None:
     with pytest.raises(InputError, match="tolerance"):
         search.run(poses, angles, Searches(vertex=1, joint=1), tolerance=1e-12)
     paper = bind(stiff.skeleton, stiff.surface, method="paper")
-    with pytest.raises(InputError, match="smooth method only"):
-        FlexionSearch(paper, ObjectSet(ball()))
+    with pytest.raises(InputError, match="one method, smooth or paper, for all"):
+        FlexionSearch([stiff, paper], ObjectSet(ball()))
+    with pytest.raises(InputError, match="a stop belongs to one direction"):
+        search.nearest(poses, angles, Searches(vertex=1, joint=1, stop=0.5))
 
 
 def test_facets_of_an_open_surface_are_met_like_those_of_a_closed_one(stiff) -> None:
@@ -302,3 +310,89 @@ def test_facets_of_an_open_surface_are_met_like_those_of_a_closed_one(stiff) -> 
     assert not sheet.report.solid
     assert (opened.status == Status.CONVERGED).all()
     np.testing.assert_allclose(opened.angles, closed.angles, atol=1e-7)
+
+
+def test_a_joint_bent_at_rest_is_searched_from_straight(stiff) -> None:
+    """The angle counts from the straight joint, and the skin is there where the search says it is (R25)."""
+    initial = np.zeros_like(stiff.skeleton.initial)
+    initial[1] = np.radians([25.0, 0.0, 0.0, 0.0])
+    skeleton = replace(stiff.skeleton, initial=initial)
+    bent = bind(skeleton, stiff.surface, parameters=default_parameters(skeleton), domains=stiff.domains)
+    vertex = top(bent, 0.5)
+    floor = PLANE.placed((0, -0.02, 0))
+    poses = poses_from_angles(skeleton, initial[None])
+    found = FlexionSearch(bent, ObjectSet(floor)).run(poses, initial[None], Searches(vertex=vertex, joint=1))
+    assert found.status[0] == Status.CONVERGED
+    assert found.angles[0, 0] > initial[1, 0]
+    touching = initial[None].copy()
+    touching[0, 1, 0] = found.angles[0, 0]
+    skin = bent.deform(poses_from_angles(skeleton, touching))[0]
+    assert skin[vertex, 1] == pytest.approx(-0.01, abs=2e-6)
+
+
+@pytest.fixture(scope="module", params=["smooth", "paper"])
+def either(request, stiff) -> Covering:
+    """The stiff tube by both methods: without inflation the paper's is rigid beyond the joint's area."""
+    if request.param == "smooth":
+        return stiff
+    plain = replace(stiff.parameters, proximity=np.full((3, 2), 0.2))
+    return bind(stiff.skeleton, stiff.surface, method="paper", parameters=plain, domains=stiff.domains)
+
+
+@pytest.mark.parametrize("degrees", [-40.0, -21.0, 21.0, 70.0])
+def test_contact_is_found_on_either_side(either, degrees: float) -> None:
+    """A ball whose surface the vertex meets at that angle, by moving away from the palm or towards it."""
+    vertex = top(either, 0.75)
+    joint = either.skeleton.rest[1]
+    before = turned(either, vertex, np.radians(degrees))
+    ahead = np.cross([-1.0, 0.0, 0.0], before - joint) * np.sign(degrees)
+    centre = before + 0.02 * ahead / np.linalg.norm(ahead)
+    found = FlexionSearch(either, ObjectSet(BALL.placed(centre))).nearest(
+        *straight(either), Searches(vertex=vertex, joint=1)
+    )
+    assert found.status[0] == Status.CONVERGED
+    # BALL's facets lie up to 10 micrometres inside the sphere
+    assert np.degrees(found.angles[0, 0]) == pytest.approx(degrees, abs=0.05)
+    assert np.sign(found.closing[0]) == np.sign(degrees)
+    assert abs(found.distance[0]) < 1e-6
+
+
+@pytest.mark.parametrize("out", [-0.3, 0.3])
+def test_from_inside_the_shorter_way_out(either, out: float) -> None:
+    """Vertex 5 mm inside: it turns to where the surface is nearest."""
+    vertex = top(either, 0.75)
+    start = either.surface.vertices[vertex]
+    across = np.cross([-1.0, 0.0, 0.0], start - either.skeleton.rest[1])
+    across /= np.linalg.norm(across)
+    centre = start - np.sign(out) * 0.015 * across  # surface 5 mm ahead on this side, 35 mm on the other
+    ball_ = ObjectSet(BALL.placed(centre))
+    assert ball_.distances(start[None]).distance[0, 0] == pytest.approx(-0.005, abs=2e-5)
+    gap = lambda a: np.linalg.norm(turned(either, vertex, a) - centre) - 0.02  # noqa: E731
+    exact = brentq(gap, 0.0, out, xtol=1e-12)
+    found = FlexionSearch(either, ball_).nearest(*straight(either), Searches(vertex=vertex, joint=1))
+    assert found.status[0] == Status.CONVERGED
+    np.testing.assert_allclose(found.angles[0, 0], exact, atol=1e-3)
+    assert abs(found.distance[0]) < 1e-6
+
+
+def test_within_is_how_exactly(either) -> None:
+    vertex, floor = top(either, 0.75), PLANE.placed((0, -0.02, 0))
+    search = FlexionSearch(either, ObjectSet(floor))
+    wanted = Searches(vertex=vertex, joint=1)
+    found = [search.nearest(*straight(either), wanted, tolerance=within) for within in (1e-3, 1e-6)]
+    assert all(f.status[0] == Status.CONVERGED for f in found)
+    assert 1e-6 < abs(found[0].distance[0]) < 1e-3
+    assert abs(found[1].distance[0]) < 1e-6
+    assert found[0].evaluations[0] < found[1].evaluations[0]
+
+
+def test_of_two_ways_without_contact_the_closer_approach(either) -> None:
+    vertex = top(either, 0.75)
+    away = turned(either, vertex, np.radians(-44.0))
+    up = np.array([0.0, 1.0, 0.0])
+    found = FlexionSearch(either, ObjectSet(BALL.placed(away + 0.025 * up))).nearest(
+        *straight(either), Searches(vertex=vertex, joint=1)
+    )
+    assert found.status[0] == Status.NO_CONTACT
+    assert found.angles[0, 0] < 0.0
+    assert 0.0 < found.distance[0] < 0.006

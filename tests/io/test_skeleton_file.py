@@ -49,6 +49,39 @@ def test_an_arm_from_an_stl(tmp_path, tube):
     assert s.names[3] == "left.hand.tip"
 
 
+def test_initial_angles(tmp_path, tube):
+    """Stated ones, and those of an elbow that is bent where none is stated (R25)."""
+    shoulder, elbow, wrist = ARM["joints"]
+    bent = {"joints": [shoulder, elbow | {"axis": [-1, 0, 0]}, wrist | {"position": [0, 0.15, 0.5]}]}
+    rig = load_rig(tube, skeleton=write(tmp_path, bent), unit="m")
+    assert np.degrees(rig.skeleton.initial[1, 0]) == pytest.approx(np.degrees(np.arctan2(0.15, 0.2)), abs=1e-6)
+    assert any(note.startswith("bent at rest: left.elbow by 36.9°") for note in rig.notes)
+    bent["joints"][1] = bent["joints"][1] | {"initial": {"flexion": 30, "twisting": -5}}
+    rig = load_rig(tube, skeleton=write(tmp_path, bent), unit="m")
+    np.testing.assert_allclose(np.degrees(rig.skeleton.initial[1]), [30, 0, -5, 0])
+    write_skeleton_file(tmp_path / "again.json", rig.skeleton)
+    again = load_rig(tube, skeleton=tmp_path / "again.json", unit="m")
+    np.testing.assert_allclose(again.skeleton.initial, rig.skeleton.initial, atol=1e-7)
+
+
+@pytest.mark.parametrize(
+    ("initial", "says"),
+    [
+        (30, "joint 'left.elbow': initial wants"),
+        ({"flexon": 30}, "did you mean flexion"),
+        ({"flexion": "30"}, "joint 'left.elbow': initial flexion wants degrees"),
+        ({"flexion": 150}, "initial flexion 150° is beyond its limits, 0° to 140°"),
+    ],
+)
+def test_initial_angles_that_are_none(tmp_path, tube, initial, says):
+    content = {
+        "joints": [joint | ({"initial": initial} if "elbow" in joint["name"] else {}) for joint in ARM["joints"]]
+    }
+    with pytest.raises(InputError, match=says) as caught:
+        load_rig(tube, skeleton=write(tmp_path, content), unit="m")
+    assert caught.value.path is not None
+
+
 @pytest.mark.parametrize("suffix", ["obj", "ply", "stl", "off", "glb"])
 def test_the_built_in_hand_survives_every_surface_format(tmp_path, hands, suffix):
     rig = hands["right"]

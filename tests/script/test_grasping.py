@@ -173,6 +173,8 @@ def test_the_summary_tells_objects_searches_and_contacts(run, tmp_path: Path) ->
         ("OBJECT a BALL\nOBJECTS a JOINT wrist 1 5\nOBJECTS a JOINT index.base 4 6", "follows another joint"),
         ("OBJECT a BALL\nAUTO_F_1 1 LEFT INDEX 99999999 a NEAREST", "or less"),
         ("OBJECT a BALL\nAUTO_F_1 1 LEFT INDEX PAD a 5120", "5119 or less"),
+        ("OBJECT a BALL\nAUTO_F_1 1 LEFT INDEX PAD a NEAREST WITHIN 0", "how exactly, in metres must be 1e-07 or more"),
+        ("OBJECT a BALL\nAUTO_WRIST 1 LEFT PAD a NEAREST WITHIN", "expected how exactly, in metres"),
         ("OBJECT a BALL\nAUTO_F_1 1 LEFT INDEX PAD b NEAREST", "there is no object b"),
         ("OBJECT a BALL\nAUTO_F_2_3 1 LEFT INDEX PAD a NEAREST", "expected KNUCKLES2/KNUCKLES3"),
         ("OBJECT a BALL\nGRASP 5 5 LEFT a", "key2 must come after key1"),
@@ -216,3 +218,42 @@ def test_what_else_a_closing_hand_runs_into_is_told(run) -> None:
     (told,) = scene.attempts[0].values["collisions"]
     assert told.startswith("collides with TABLE: left.")
     assert told in scene.attempts[0].message
+
+
+@pytest.mark.parametrize("method", ["SMOOTH", "PAPER"])
+def test_a_wrist_that_extends_to_touch(run, method: str) -> None:
+    """The contact lies behind the back of the hand, at −21° (R76, R142)."""
+    scene = run(f"METHOD {method}\nWRIST LEFT FLEXION AT 7 -21")
+    actor = scene.actor()
+    vertex = pad_vertex(cover(actor), "left.middle")
+    extended = cover(actor).deform(stage(actor, np.array([7.0]), scene.rate))[0]
+    normal = vertex_normals(extended.astype(float), actor.rig.surface.faces)[vertex]
+    # the pad comes to the ball from below: its surface is on the pad's back
+    flat = cover(actor).deform(poses_from_angles(actor.skeleton, np.zeros((1, len(actor.skeleton), 4))))[0]
+    ahead = (extended[vertex] - flat[vertex]) / np.linalg.norm(extended[vertex] - flat[vertex])
+    assert ahead @ normal < 0.5
+    x, y, z = extended[vertex] + 0.0200 * ahead
+    run(f"WRIST LEFT FLEXION AT 0 0\nWRIST LEFT FLEXION AT 7 0\nOBJECT a BALL 0.04 AT {x} {y} {z}")
+    run("AUTO_WRIST 7 LEFT PAD a NEAREST WITHIN 1e-5")
+    (attempt,) = scene.attempts
+    assert attempt.status == "CONVERGED"
+    assert flexion(scene, "wrist", 7) == pytest.approx(-21.0, abs=0.15)
+    assert abs(attempt.values["distance_mm"]) < 0.01
+
+
+@pytest.mark.parametrize("method", ["SMOOTH", "PAPER"])
+def test_a_finger_that_begins_inside_comes_out(run, method: str) -> None:
+    """5 mm deep at first: it is turned out of the ball, the shorter way (R142)."""
+    scene = run(f"METHOD {method}\nFINGER1 LEFT INDEX FLEXION AT 3 20")
+    actor = scene.actor()
+    vertex = pad_vertex(cover(actor), "left.index")
+    skin = cover(actor).deform(stage(actor, np.array([3.0]), scene.rate))[0]
+    normal = vertex_normals(skin.astype(float), actor.rig.surface.faces)[vertex]
+    x, y, z = skin[vertex] + 0.025 * normal
+    run(f"OBJECT a BALL 0.06 AT {x} {y} {z}\nAUTO_F_1 3 LEFT INDEX PAD a NEAREST")
+    (attempt,) = scene.attempts
+    assert attempt.status == "CONVERGED"
+    assert 0 < 20 - flexion(scene, "index.base", 3) < 15
+    skin = cover(actor).deform(stage(actor, np.array([3.0]), scene.rate))[0]
+    there = ObjectSet(placed_at(scene, scene.prop("a"), 3.0)).distances(skin[vertex][None]).distance[0, 0]
+    assert abs(there) < 2e-6

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from warpjld.covering.pose_sets import curled
 from warpjld.rotations import about
 from warpjld.skeleton.hand import DIGITS
-from warpjld.skeleton.kinematics import Poses, poses_from_angles, poses_from_rotations
+from warpjld.skeleton.kinematics import Poses, poses_beside_rest, poses_from_rotations
 from warpjld.skeleton.tree import CHANNELS, Skeleton
 
 __all__ = ["NamedPoses", "joined", "training_poses", "unseen_poses"]
@@ -79,9 +79,9 @@ def training_poses(skeleton: Skeleton, *, seed: int = 0, random: int = _RANDOM) 
     )
     many[..., 1:] = (np.where(side > 0.0, side * high, -side * low) * _ASIDE)[..., 1:]
     many *= moves
-    parts = [poses_from_angles(skeleton, many), _turned(skeleton, inner)]
+    parts = [poses_beside_rest(skeleton, many), _turned(skeleton, inner)]
     if alone:
-        parts.append(poses_from_angles(skeleton, np.array(alone)))
+        parts.append(poses_beside_rest(skeleton, np.array(alone)))
     return joined(parts)
 
 
@@ -104,7 +104,7 @@ def unseen_poses(skeleton: Skeleton) -> NamedPoses:
             digit = skeleton.names[j].split(".")[-2]
             lean = {"index": 1.0, "middle": 0.3, "ring": -0.5, "pinky": -1.0}.get(digit, 0.0)
             spread[:, j, _ABDUCTION] = np.radians([9.0, 17.0]) * lean
-        add("spread", poses_from_angles(skeleton, spread))
+        add("spread", poses_beside_rest(skeleton, spread))
     single: tuple[tuple[str, str, tuple[tuple[int, float], ...]], ...] = (
         ("thumb", "thumb.base", ((_FLEXION, 12.0), (_ABDUCTION, -25.0))),
         ("thumb", "thumb.base", ((_ABDUCTION, 25.0),)),
@@ -128,12 +128,12 @@ def unseen_poses(skeleton: Skeleton) -> NamedPoses:
             angles = np.zeros((1, len(skeleton), len(CHANNELS)))
             for channel, degrees in channels:
                 angles[0, joints, channel] = np.radians(degrees)
-            add(name, poses_from_angles(skeleton, angles))
+            add(name, poses_beside_rest(skeleton, angles))
     low, high = ranges(skeleton)
     generator = np.random.default_rng(20_000)
     share = generator.uniform(0.0, 0.8, (8, *low.shape)) * (generator.uniform(size=(8, *low.shape)) < 0.5)
     share[..., 1:] *= 0.5
-    add("random", poses_from_angles(skeleton, share * np.where(generator.uniform(size=share.shape) < 0.7, high, low)))
+    add("random", poses_beside_rest(skeleton, share * np.where(generator.uniform(size=share.shape) < 0.7, high, low)))
     return NamedPoses(tuple(names), joined(parts))
 
 

@@ -97,6 +97,11 @@ def _report(rig: Rig) -> dict[str, Any]:
                     for channel, pair in zip(CHANNELS, skeleton.limits[j], strict=True)
                     if np.ptp(pair) > 0 and skeleton.children[j]
                 },
+                "initial": {
+                    channel: round(float(np.degrees(angle)), 1)
+                    for channel, angle in zip(CHANNELS, skeleton.initial[j], strict=True)
+                    if angle
+                },
                 "domain": int(domains[j]),
             }
         )

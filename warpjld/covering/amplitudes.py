@@ -17,7 +17,7 @@ import scipy.sparse as sp
 from numpy.typing import NDArray
 
 from warpjld.covering.covering import Covering
-from warpjld.covering.drivers import drive
+from warpjld.covering.drivers import drive, initial_ratio
 from warpjld.covering.parameters import Parameters
 from warpjld.covering.rows import scalar_inputs
 from warpjld.covering.segment_table import SegmentTable
@@ -49,7 +49,7 @@ class Frame:
         points: S'(a₀) [m], shape (V, 3).
         moved: Vertices that amplitudes move in it, shape (n,).
         directions: D of those [m], shape (3 n, 2 J); rows are x, y, z of a vertex.
-        ratio: Flexion ratios of the joints, shape (J,).
+        ratio: How far the flexion ratios of the joints are from those at rest, shape (J,).
     """
 
     number: int
@@ -76,11 +76,14 @@ class LinearDeformation:
         anchors, fields, skeleton = covering.anchors, covering.fields, covering.skeleton
         self.amplitudes = amplitudes_of(covering.parameters)
         self._drivers = drive(skeleton, anchors, poses)
+        joints, initial = len(skeleton), initial_ratio(skeleton)
         scalars = scalar_inputs(anchors, covering.parameters, self._drivers)
-        joints = len(skeleton)
+        # offsets are those of straight joints: to first order, the rest pose's inflation is taken off every pose's
+        scalars[:, :joints] -= initial
+        scalars[:, joints + fields.palm.shape[1] :] -= 0.5 * initial[anchors.ends].sum(axis=1)
         self._ratio, self._driven = scalars[:, :joints].copy(), scalars[:, joints + fields.palm.shape[1] :].copy()
         for driven in (self._ratio, self._driven):
-            driven[driven < _STILL] = 0.0
+            driven[np.abs(driven) < _STILL] = 0.0
         self._offset = fields.offsets(anchors.rest, skeleton.rest)
         self._roundings, self._muscles = fields.roundings.tocsc(), fields.muscles.tocsc()
         table = SegmentTable.build(skeleton, anchors.ends)
@@ -114,7 +117,7 @@ class LinearDeformation:
         rows = 3 * place[:, None] + np.arange(3)
         shape = (3 * len(moved), 2 * joints)
         directions = sp.coo_array((value.ravel(), (rows.ravel(), np.repeat(column, 3))), shape=shape).tocsr()
-        return Frame(number, points, moved, directions, self._ratio[number])
+        return Frame(number, points, moved, directions, np.abs(self._ratio[number]))
 
 
 def _scaled(

@@ -9,10 +9,18 @@ from numpy.typing import NDArray
 
 from warpjld.covering.binding import STATIONS, Anchors
 from warpjld.rotations import unit
-from warpjld.skeleton.kinematics import Poses
+from warpjld.skeleton.kinematics import Poses, vertical_flexion
 from warpjld.skeleton.tree import CHANNELS, Skeleton
 
-__all__ = ["Drivers", "closing_logarithm", "drive", "flexion_ratio", "halfway_rotations", "virtual_lengths"]
+__all__ = [
+    "Drivers",
+    "closing_logarithm",
+    "drive",
+    "flexion_ratio",
+    "halfway_rotations",
+    "initial_ratio",
+    "virtual_lengths",
+]
 
 
 @dataclass(frozen=True, eq=False)
@@ -59,6 +67,14 @@ def flexion_ratio(skeleton: Skeleton, flexion: NDArray[np.float64]) -> NDArray[n
     largest = skeleton.limits[:, CHANNELS.index("flexion"), 1]
     moves = (largest > 1e-6) & (skeleton.parents >= 0)
     return np.where(moves, np.clip(flexion / np.where(moves, largest, 1.0), 0.0, 1.0), 0.0)
+
+
+def initial_ratio(skeleton: Skeleton) -> NDArray[np.float64]:
+    """FR of every joint at rest, shape (J,): 0 where it is straight there (R25)."""
+    if skeleton.initial_turns is None:
+        return np.zeros(len(skeleton))
+    still = np.tile([0.0, 0.0, 0.0, 1.0], (len(skeleton), 1))
+    return flexion_ratio(skeleton, vertical_flexion(skeleton, still))
 
 
 def closing_logarithm(

@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from warpjld.covering.covering import Covering
 from warpjld.covering.device import checked_device
-from warpjld.covering.drivers import Drivers, drive
+from warpjld.covering.drivers import Drivers, drive, initial_ratio
 from warpjld.covering.fields import Fields, OperatorKernel
 from warpjld.covering.paper import PaperCovering
 from warpjld.covering.parameters import Parameters
@@ -162,6 +162,15 @@ class Differentiable:
         unit = Padded.of(rows.muscles)
         by_vector = unit.sums(_gradient(step.values.muscle), len(rows.muscles.data))
         muscle_slope = (by_vector * rows.heights).sum(axis=1)  # by what scales the height: amplitude × field
+        initial = initial_ratio(covering.skeleton)
+        if initial.any():  # offsets are those of straight joints, and follow from the amplitudes
+            ratio = np.concatenate([initial, np.zeros(rows.scales.shape[1] - joints)])
+            by_offset = _gradient(step.values.offset) / (1.0 + rows.scales @ ratio)[:, None]
+            vertex = np.repeat(np.arange(vertices), np.diff(rows.scales.indptr))
+            scale_slope -= (by_offset * rows.offset).sum(axis=1)[vertex] * ratio[rows.scales.indices]
+            vertex = np.repeat(np.arange(vertices), np.diff(rows.muscles.indptr))
+            driven = 0.5 * initial[anchors.ends].sum(axis=1)[rows.muscles.indices]
+            muscle_slope -= (by_offset[vertex] * rows.heights).sum(axis=1) * driven
         by_rounding = sp.csr_array((scale_slope, rows.scales.indices, rows.scales.indptr), shape=rows.scales.shape)
         by_rounding = by_rounding.tocsc()[:, :joints].toarray()
         by_muscle = sp.csr_array((muscle_slope, rows.muscles.indices, rows.muscles.indptr), shape=rows.muscles.shape)

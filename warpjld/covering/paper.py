@@ -12,7 +12,7 @@ from scipy.spatial.transform import Rotation
 
 from warpjld.covering.covering import Covering
 from warpjld.covering.device import array_on, checked_device, parameters_on
-from warpjld.covering.drivers import flexion_ratio
+from warpjld.covering.drivers import flexion_ratio, initial_ratio
 from warpjld.covering.paper_places import PaperPlaces, paper_places
 from warpjld.covering.segment_table import SegmentTable
 from warpjld.rotations import unit
@@ -133,12 +133,13 @@ class PaperCovering(Covering):
         normals = paper_normals(self.skeleton, self.places.ends, still)
         count = len(self.surface.vertices)
         outputs = [wp.empty(count, dtype=wp.vec3, device=device), wp.empty(count, dtype=float, device=device)]
-        pose = PaperPose(self.skeleton.rest[None], normals.original, normals.modified, np.zeros((1, 1)), still)
+        ratio = initial_ratio(self.skeleton)[None]
+        pose = PaperPose(self.skeleton.rest[None], normals.original, normals.modified, ratio, still)
         rest = array_on(device, self.surface.vertices, wp.vec3)
         wp.launch(
             paper.express,
             dim=count,
-            inputs=[places, parameters, rest, *pose.on(device)[:3]],
+            inputs=[places, parameters, rest, *pose.on(device)[:4]],
             outputs=outputs,
             device=device,
         )

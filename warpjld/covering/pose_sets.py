@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from warpjld.errors import InputError
 from warpjld.skeleton.hand import DIGITS
-from warpjld.skeleton.kinematics import Poses, poses_from_angles
+from warpjld.skeleton.kinematics import Poses, poses_beside_rest
 from warpjld.skeleton.tree import CHANNELS, Skeleton
 
 __all__ = ["CURL", "calibration_poses", "curled", "guard_poses"]
@@ -28,7 +28,7 @@ _ONE_BY_ONE = (0.45, 0.9)
 
 def curled(skeleton: Skeleton, amounts: NDArray[np.float64] | list[float] | tuple[float, ...]) -> Poses:
     """Index to pinky of every hand curled by fractions of ``CURL``, one a frame."""
-    return poses_from_angles(skeleton, _curls(skeleton, amounts))
+    return poses_beside_rest(skeleton, _curls(skeleton, amounts))
 
 
 def calibration_poses(skeleton: Skeleton, count: int | None = None) -> Poses:
@@ -59,7 +59,7 @@ def calibration_poses(skeleton: Skeleton, count: int | None = None) -> Poses:
     if count is not None and count < len(angles):
         turn = np.concatenate([np.arange(len(k)) + 0.1 * i for i, k in enumerate(kinds) if len(k)])
         angles = angles[np.sort(np.argsort(turn, kind="stable")[:count])]
-    return poses_from_angles(skeleton, angles)
+    return poses_beside_rest(skeleton, angles)
 
 
 def guard_poses(skeleton: Skeleton, *, seed: int = 0) -> Poses:
@@ -78,7 +78,7 @@ def guard_poses(skeleton: Skeleton, *, seed: int = 0) -> Poses:
         _alone(skeleton, limbs, largest, 0.75),
         _random(skeleton, bends, largest, seed),
     ]
-    return poses_from_angles(skeleton, np.concatenate(kinds))
+    return poses_beside_rest(skeleton, np.concatenate(kinds))
 
 
 def _range(skeleton: Skeleton) -> tuple[NDArray[np.int64], NDArray[np.float64]]:

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from warpjld.covering.binding import STATIONS, Anchors
 from warpjld.covering.device import array_on
-from warpjld.covering.drivers import Drivers
+from warpjld.covering.drivers import Drivers, initial_ratio
 from warpjld.covering.fields import Fields
 from warpjld.covering.parameters import Parameters
 from warpjld.covering.segment_table import SegmentTable
@@ -56,7 +56,8 @@ def rows_of(
     """Rows of diffused and thinned fields with these amplitudes (R58–R65).
 
     Roundings scale with the inflation of their joint, muscles with that of the joint where the segment begins, and
-    swellings with an amplitude of their own for each joint, shape (J,), without which nothing swells.
+    swellings with an amplitude of their own for each joint, shape (J,), without which nothing swells. Offsets are those
+    of straight joints: at rest the inflation of the initial angles makes the rest pose of them (C24, R25).
     """
     muscles = _times(fields.muscles, parameters.muscle[anchors.ends[:, 0]])
     scales = _times(fields.roundings, parameters.inflation)
@@ -64,14 +65,16 @@ def rows_of(
         scales = _sum(scales, _times(fields.swellings, swelling))
     table = SegmentTable.build(skeleton, anchors.ends)
     vertex = np.repeat(np.arange(muscles.shape[0]), np.diff(muscles.indptr))
-    return Rows(
-        fields.positions,
-        fields.turns,
-        sp.csr_array(sp.hstack([scales, fields.palm], format="csr")),
-        muscles,
-        table.heights(anchors.rest[vertex], muscles.indices),
-        fields.offsets(anchors.rest, skeleton.rest),
-    )
+    heights = table.heights(anchors.rest[vertex], muscles.indices)
+    offset = fields.offsets(anchors.rest, skeleton.rest)
+    ratio = initial_ratio(skeleton)
+    if ratio.any():
+        driven = muscles.data * (0.5 * ratio[anchors.ends].sum(axis=1))[muscles.indices]
+        for k in range(3):
+            offset[:, k] -= np.bincount(vertex, driven * heights[:, k], len(offset))
+        offset /= (1.0 + scales @ ratio)[:, None]
+    scales = sp.csr_array(sp.hstack([scales, fields.palm], format="csr"))
+    return Rows(fields.positions, fields.turns, scales, muscles, heights, offset)
 
 
 def _times(fields: sp.csr_array, amplitudes: NDArray[np.float64]) -> sp.csr_array:
@@ -161,7 +164,7 @@ def rows_on(device: Any, rows: Rows, *, requires_grad: bool = False) -> Any:
     ):
         setattr(out, f"{name}_input", array_on(device, padded.column + shift, wp.int32))
         setattr(out, name, array_on(device, padded.value, kind, requires_grad=requires_grad))
-    out.offset = array_on(device, rows.offset, wp.vec3)
+    out.offset = array_on(device, rows.offset, wp.vec3, requires_grad=requires_grad)
     return out
 
 

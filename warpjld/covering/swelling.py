@@ -19,7 +19,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from warpjld.covering.drivers import drive
+from warpjld.covering.drivers import drive, initial_ratio
 from warpjld.covering.parameters import default_parameters
 from warpjld.covering.quality import closing_fans
 from warpjld.covering.rows import Rows, rows_of, scalar_inputs
@@ -80,7 +80,7 @@ def volume_keeping(covering: Covering) -> NDArray[np.float64]:
 def _measured(skeleton: Skeleton, joint: int, largest: float) -> NDArray[np.float64]:
     """Angles of the poses that one joint is measured in, shape (F, J, channels): flexed; and where it goes further to
     its sides than it flexes, as a thumb does, with both at once."""
-    angles = np.zeros((len(_PARTS), len(skeleton), len(CHANNELS)))
+    angles = np.repeat(skeleton.initial[None], len(_PARTS), axis=0)
     angles[:, joint, _FLEXION] = largest * np.array(_PARTS)
     sideways = skeleton.limits[joint, _ABDUCTION]
     if sideways[1] <= largest:
@@ -134,6 +134,8 @@ class _Bending:
         corners = self._corners[used]
         some = np.unique(corners.indices)
         swelling = self._swellings[:, [joint]].toarray().ravel()[some]
+        initial = initial_ratio(skeleton)
+        grown = 1.0 + rows.scales[some][:, : len(initial)] @ initial
         entries = np.repeat(np.isin(np.arange(len(self._rest)), some), np.diff(rows.muscles.indptr))
         return _Part(
             skeleton.rest[joint],
@@ -141,6 +143,7 @@ class _Bending:
             number[faces],
             corners[:, some],
             swelling,
+            initial[joint] * swelling / grown,
             Rows(
                 rows.positions[some],
                 rows.turns[some],
@@ -152,16 +155,22 @@ class _Bending:
         )
 
 
+_Line = tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]
+"""A frame: what does not grow, the offsets as they inflate without swelling, and what they swell by for an amplitude of
+1, shapes (n, 3)."""
+
+
 @dataclass(frozen=True, eq=False)
 class _Part:
     """What changes its shape with one joint: n vertices, which ``corners`` turns into those of faces, and the field of
-    the swelling."""
+    the swelling, alone and times the flexion ratio at rest, as a part of what else inflates there."""
 
     pivot: NDArray[np.float64]
     rest: NDArray[np.float64]
     faces: NDArray[np.int64]
     corners: sp.csr_array
     swelling: NDArray[np.float64]
+    at_rest: NDArray[np.float64]
     rows: Rows
 
     def amplitude(
@@ -173,7 +182,7 @@ class _Part:
     ) -> float:
         """The one that leaves the least error of volume, by squares over frames of which inputs are given."""
         rows, before = self.rows, self._volume(self.rest - self.pivot)
-        lines = []
+        lines: list[_Line] = []
         for k in range(len(ratio)):
             turn = unit(rows.turns @ turns[k])
             out = rotate(turn, rows.offset)
@@ -181,22 +190,28 @@ class _Part:
             vertex = np.repeat(np.arange(len(rows.offset)), np.diff(rows.muscles.indptr))
             driven = rows.muscles.data * scalars[k, rows.scales.shape[1] :][rows.muscles.indices]
             muscle = [np.bincount(vertex, driven * height, len(rows.offset)) for height in rows.heights.T]
-            base = rows.positions @ positions[k] - self.pivot + grown * out + rotate(turn, np.stack(muscle, axis=1))
-            lines.append((base, (ratio[k] * self.swelling)[:, None] * out))
-        gained = np.array([self._volume(base) for base, _ in lines]) - before
+            base = rows.positions @ positions[k] - self.pivot + rotate(turn, np.stack(muscle, axis=1))
+            lines.append((base, grown * out, (ratio[k] * self.swelling)[:, None] * out))
+        gained = self._volumes(lines, 0.0) - before
         # to one side a thumb may gain what it loses to the other: that is not made up for
         loses = gained.reshape(-1, len(_PARTS)).sum(axis=1) < 0.0
         lines = [line for line, counts in zip(lines, np.repeat(loses, len(_PARTS)), strict=True) if counts]
         best = 0.0
         for _ in range(_STEPS if lines else 0):
-            lost = np.array([self._volume(base + best * out) for base, out in lines]) - before
+            lost = self._volumes(lines, best) - before
             step = 1e-3
-            slope = np.array([self._volume(base + (best + step) * out) for base, out in lines]) - before - lost
+            slope = self._volumes(lines, best + step) - before - lost
             square = float(slope @ slope) / step
             if square <= 0.0:
                 return 0.0
             best = min(max(best - float(slope @ lost) / square, 0.0), _MOST)
         return best
+
+    def _volumes(self, lines: list[_Line], amplitude: float) -> NDArray[np.float64]:
+        """Of every frame, shape (n,): what swells is as much thinner where the joint is straight as it swells at
+        rest."""
+        thinner = (1.0 + amplitude * self.at_rest)[:, None]
+        return np.array([self._volume(base + (own + amplitude * out) / thinner) for base, own, out in lines])
 
     def _volume(self, points: NDArray[np.float64]) -> float:
         a, b, c = ((self.corners @ points)[self.faces[:, k]] for k in range(3))

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from enum import IntEnum
 
 import numpy as np
@@ -27,9 +27,9 @@ class Status(IntEnum):
         return (
             "converged",
             "no contact within the joint's limits",
-            "already inside the object",
+            "inside the object, and not out of it within the joint's limits",
             "the joint is at its limit",
-            "slips in through an opening of the object's surface",
+            "slips through an opening of the object's surface",
             "stopped by another digit or the palm",
         )[self]
 
@@ -40,7 +40,8 @@ class Found:
 
     Attributes:
         status: Values of ``Status``, shape (N,).
-        closing: How far the chain closed [rad at rate 1], shape (N,); the closest approach where there is no contact.
+        closing: How far the chain closed [rad at rate 1], shape (N,), negative where ``FlexionSearch.nearest`` turned
+            it the other way; the closest approach where there is no contact.
         angles: Flexion of the joints there [rad], shape (N, 4); for a single joint the first column.
         distance: Signed distance there [m], shape (N,): the true residual is this less the distance asked for.
         facet: Facet touched or nearest, shape (N,).
@@ -58,6 +59,14 @@ class Found:
     point: NDArray[np.float32]
     evaluations: NDArray[np.int32]
 
+    def where(self, first: NDArray[np.bool_], other: Found) -> Found:
+        """These results, and in the rows that are not chosen those of others of the same searches."""
+        pick = {}
+        for field in fields(self):
+            own, its = getattr(self, field.name), getattr(other, field.name)
+            pick[field.name] = np.where(first.reshape(-1, *[1] * (own.ndim - 1)), own, its)
+        return Found(**pick)
+
     def message(self, n: int = 0) -> str:
         """What became of a search, for people."""
         status = Status(int(self.status[n]))
@@ -68,7 +77,7 @@ class Found:
         if status is Status.NO_CONTACT:
             return f"{status.message}; closest approach {distance:.2f} mm at {angle:.2f}°"
         if status is Status.INSIDE:
-            return f"{status.message} by {-distance:.2f} mm at {angle:.2f}°"
+            return f"{status.message}; least deep, {-distance:.2f} mm, at {angle:.2f}°"
         if status is Status.OPENING:
             return f"{status.message} at {angle:.2f}°"
         return f"{status.message}, {angle:.2f}°; {distance:.2f} mm away"

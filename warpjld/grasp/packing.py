@@ -16,6 +16,7 @@ from warpjld.covering.device import array_on
 from warpjld.covering.drivers import flexion_ratio, virtual_lengths
 from warpjld.covering.rows import Padded
 from warpjld.errors import InputError
+from warpjld.rotations import conjugate, multiply
 from warpjld.skeleton import CHANNELS, Poses, Skeleton
 
 __all__ = ["Chains", "drives_on", "posture_on", "skin_on"]
@@ -124,13 +125,16 @@ def drives_on(device: Any, skeleton: Skeleton, poses: Poses, angles: NDArray[np.
     direction, axis = skeleton.directions[j], skeleton.axes[j]
     normal = np.cross(direction, axis)
     before = _about(normal, mirror * channels[..., CHANNELS.index("abduction")])
+    if skeleton.initial_turns is not None:  # turns count from rest
+        before = multiply(conjugate(skeleton.initial_turns[j]), before)
     bend = _turn(_about(direction, mirror * channels[..., CHANNELS.index("pivot")]), axis)
     after = _about(direction, -mirror * channels[..., CHANNELS.index("twisting")])
     local = Rotation.from_quat(_flat(before)) * Rotation.from_quat(_flat(_about(bend, channels[..., _FLEXION])))
     local = local * Rotation.from_quat(_flat(after))
     carried = Rotation.from_quat(_flat(poses.rotations[frame[:, None], j])) * local.inv()
     world = (carried * Rotation.from_quat(_flat(before))).apply(bend.reshape(-1, 3)).reshape(bend.shape)
-    upright = direction - axis * (direction * axis).sum(axis=-1, keepdims=True)
+    straight, level = (vectors[j] for vectors in skeleton.straight)
+    upright = straight - level * (straight * level).sum(axis=-1, keepdims=True)
     length = np.linalg.norm(upright, axis=-1, keepdims=True)
     upright = np.where(length > 1e-6, upright / np.maximum(length, 1e-12), 0.0)
     largest = skeleton.limits[j, _FLEXION, 1]
@@ -150,7 +154,7 @@ def drives_on(device: Any, skeleton: Skeleton, poses: Poses, angles: NDArray[np.
         ("after", after, wp.quat),
         ("direction", direction, wp.vec3),
         ("upright", upright, wp.vec3),
-        ("level", np.cross(axis, upright), wp.vec3),
+        ("level", np.cross(level, upright), wp.vec3),
         ("largest", np.where(moves, 1.0 / np.where(moves, largest, 1.0), 0.0), float),
         ("depth", _depths(skeleton, joints), wp.int32),
     ):

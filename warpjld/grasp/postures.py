@@ -79,7 +79,7 @@ def posture_angles(skeleton: Skeleton, side: str, posture: str) -> NDArray[np.fl
     """
     if posture not in POSTURES:
         raise InputError(f"no posture '{posture}'; there are {', '.join(POSTURES)}")
-    angles = np.zeros((len(skeleton), len(CHANNELS)))
+    angles = skeleton.initial.copy()
     wanted: Mapping[str, Mapping[str, float]] = POSTURES[posture]
     for name, channels in wanted.items():
         joint = f"{side}.{name}"

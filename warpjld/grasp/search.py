@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -13,9 +14,10 @@ from warpjld.covering.device import array_on
 from warpjld.errors import InputError
 from warpjld.grasp.distance import ObjectSet
 from warpjld.grasp.facet import inside_facets
-from warpjld.grasp.found import Found
+from warpjld.grasp.found import Found, Status
 from warpjld.grasp.objects import Places
 from warpjld.grasp.packing import drives_on, posture_on, skin_on
+from warpjld.grasp.sampled_search import is_sampled, sampled_search
 from warpjld.grasp.searches import Rows, Searches, search_rows
 from warpjld.skeleton import CHANNELS, Poses
 from warpjld.threads import in_threads, threads_for
@@ -32,11 +34,11 @@ class FlexionSearch:
     """Searches for one surface among some objects; keeps what does not change from call to call.
 
     Args:
-        coverings: The covering, or parameter sets of it (``with_parameters``); the smooth method.
+        coverings: The covering, or parameter sets of it (``with_parameters``); of the smooth or the paper's method.
         objects: Search structures; the searches run on their device.
 
     Raises:
-        InputError: No covering, one of another method, or coverings of different surfaces.
+        InputError: No covering, or coverings of different surfaces or methods.
     """
 
     def __init__(self, coverings: Covering | Sequence[Covering], objects: ObjectSet) -> None:
@@ -44,7 +46,7 @@ class FlexionSearch:
         if not self.coverings:
             raise InputError("coverings: want at least one")
         self.objects = objects
-        self._skin = skin_on(objects.device, self.coverings)
+        self._skin = None if is_sampled(self.coverings) else skin_on(objects.device, self.coverings)
 
     def run(
         self,
@@ -59,9 +61,9 @@ class FlexionSearch:
         """All searches in one launch; each gives bit for bit what it gives alone.
 
         Only the vertex asked for is mapped (R74). A search moves the vertex by steps no longer than its distance
-        allows until the distance, less the one asked for, changes its sign; that bracket is halved until
-        |DIST(α) − DIST| < ε. Contacts that last for less than a 64th of the joint's range and go less than
-        about a millimetre deep may be missed.
+        allows until the distance, less the one asked for, changes its sign, from outside in or from inside out; that
+        bracket is halved until |DIST(α) − DIST| < ε. Contacts that last for less than a 64th of the joint's range and
+        go less than about a millimetre deep may be missed.
 
         Args:
             poses: F poses to start from.
@@ -75,11 +77,8 @@ class FlexionSearch:
             InputError: No search, a vertex, joint, frame, object, facet or place that does not exist, joints that do
                 not lie one beyond the other, or numbers that are not finite.
         """
-        import warp as wp
-        from warpjld_kernels.flexion_search import search
-
         self._check(poses, angles, tolerance)
-        device, skeleton = self.objects.device, self.coverings[0].skeleton
+        skeleton = self.coverings[0].skeleton
         if places is None:
             places = self.objects.places(np.arange(len(self.objects)))
         rows = search_rows(
@@ -87,10 +86,28 @@ class FlexionSearch:
             skeleton,
             angles,
             self.objects.objects,
-            vertices=self._skin.vertices,
+            vertices=len(self.coverings[0].surface.vertices),
             coverings=len(self.coverings),
             places=len(places),
         )
+        if self._skin is None:
+            found = sampled_search(self.coverings, self.objects, poses, angles, rows, places, tolerance)
+            return replace(found, inside=self._inside(rows, found.point))
+        return self._launched(rows, poses, angles, places, tolerance, threads)
+
+    def _launched(
+        self,
+        rows: Rows,
+        poses: Poses,
+        angles: NDArray[np.float64],
+        places: Places,
+        tolerance: float,
+        threads: int | None,
+    ) -> Found:
+        import warp as wp
+        from warpjld_kernels.flexion_search import search
+
+        device, skeleton = self.objects.device, self.coverings[0].skeleton
         origin = poses.positions[:, 0]
         inputs = [
             self.objects.solids,
@@ -112,6 +129,33 @@ class FlexionSearch:
         bent = rows.chains[rows.drive].angles(closing.astype(np.float64))
         return Found(status, closing, bent, distance, facet, self._inside(rows, point), point, evaluations)
 
+    def nearest(
+        self,
+        poses: Poses,
+        angles: NDArray[np.float64],
+        searches: Searches,
+        *,
+        places: Places | None = None,
+        tolerance: float = 1e-6,
+        threads: int | None = None,
+    ) -> Found:
+        """As ``run``, either way from where the joints are: of two contacts that of the smaller turn (A §7.3, R142).
+
+        Where neither way leads to one, the closer approach.
+        """
+        if searches.stop is not None:
+            raise InputError("searches: a stop belongs to one direction; a search either way ends at the limits")
+        with_rate, against = (
+            self.run(poses, angles, replace(searches, rate=rate), places=places, tolerance=tolerance, threads=threads)
+            for rate in (np.asarray(searches.rate, dtype=np.float64), -np.asarray(searches.rate, dtype=np.float64))
+        )
+        wanted = np.broadcast_to(np.asarray(searches.distance, dtype=np.float64), with_rate.distance.shape)
+        hits = [found.status == int(Status.CONVERGED) for found in (with_rate, against)]
+        off = [np.abs(found.distance - wanted) for found in (with_rate, against)]
+        nearer = with_rate.closing <= against.closing
+        first = np.where(hits[0] & hits[1], nearer, np.where(hits[0] | hits[1], hits[0], off[0] <= off[1]))
+        return with_rate.where(first, replace(against, closing=-against.closing))
+
     def _check(self, poses: Poses, angles: NDArray[np.float64], tolerance: float) -> None:
         self.coverings[0].check(poses)
         shape = (len(poses), len(self.coverings[0].skeleton), len(CHANNELS))
@@ -129,7 +173,7 @@ class FlexionSearch:
         device = self.objects.device
         return [
             array_on(device, rows.drive, wp.int32),
-            array_on(device, rows.covering * self._skin.vertices + rows.vertex, wp.int32),
+            array_on(device, rows.covering * len(self.coverings[0].surface.vertices) + rows.vertex, wp.int32),
             array_on(device, rows.thing, wp.int32),
             array_on(device, rows.facet, wp.int32),
             array_on(device, rows.distance, float),

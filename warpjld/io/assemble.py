@@ -15,6 +15,7 @@ from warpjld.io.source import SourceRig
 from warpjld.lengths import check_reach, check_size
 from warpjld.limits import check_limit
 from warpjld.rig import Rig, Skin
+from warpjld.skeleton.initial import with_initial
 from warpjld.skeleton.recognise.canonical import Canonical, canonical_skeleton
 from warpjld.skeleton.recognise.flesh import flesh_shares
 from warpjld.skeleton.recognise.painted import Painted
@@ -87,13 +88,16 @@ def _assemble(
         limits=source.limits,
         placed=source.placed,
     )
+    number = {joint: j for j, joint in enumerate(found.sources) if joint >= 0}
+    stated = {number[joint]: angles for joint, angles in source.initial.items() if joint in number}
+    skeleton, bent = with_initial(found.skeleton, stated)
     skin, bare = None, 0
     if source.joints is not None and source.weights is not None:
         skin, bare = _skin(source.joints, source.weights, found.owner, len(found.skeleton), surface)
     rigid, rigid_notes = rigid_parts(surface, found.skeleton, skin, _rigid(source, found.owner, surface))
     return Rig(
         name=source.path.stem.encode("utf-8", "replace").decode(),  # files may be called by bytes that are no text
-        skeleton=found.skeleton,
+        skeleton=skeleton,
         surface=surface,
         skin=skin,
         path=source.path,
@@ -102,7 +106,7 @@ def _assemble(
         owner=_movers(source, found),
         placing=source.placing,
         rigid=rigid,
-        notes=(*source.notes, *found.notes, *_bare(bare, skin), *rigid_notes),
+        notes=(*source.notes, *found.notes, *bent, *_bare(bare, skin), *rigid_notes),
         suspicious=(*source.suspicious, *found.suspicious),
     )
 

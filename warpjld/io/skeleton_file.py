@@ -6,12 +6,13 @@
       "joints": [
         {"name": "left.wrist", "parent": null, "position": [0, 0, 0]},
         {"name": "left.index.base", "parent": "left.wrist", "position": [0, 0, -0.09],
-         "axis": [-1, 0, 0], "limits": {"flexion": [-45, 90]}}
+         "axis": [-1, 0, 0], "limits": {"flexion": [-45, 90]}, "initial": {"flexion": 12}}
       ]
     }
 
 Positions are in the surface's own unit and axes. Names may be canonical or of any convention that is recognised;
-``axis`` (the flexion axis) and ``limits`` (degrees, per channel) are optional and overrule what is worked out.
+``axis`` (the flexion axis), ``limits`` (degrees, per channel) and ``initial`` (degrees, per channel: the angles of the
+digitised pose, counted from the straight joint) are optional and overrule what is worked out.
 """
 
 from __future__ import annotations
@@ -37,7 +38,7 @@ from warpjld.whole_file import whole_file
 
 __all__ = ["read_skeleton_file", "write_skeleton_file"]
 
-_KEYS = ("name", "parent", "position", "axis", "limits")
+_KEYS = ("name", "parent", "position", "axis", "limits", "initial")
 
 
 def read_skeleton_file(path: str | Path, mesh: MeshFile) -> SourceRig:
@@ -74,6 +75,7 @@ def _rig(path: Path, content: Any, mesh: MeshFile) -> SourceRig:
     parents = np.full(len(names), -1)
     axes: dict[int, NDArray[np.float64]] = {}
     limits: dict[int, dict[str, tuple[float, float]]] = {}
+    initial: dict[int, dict[str, float]] = {}
     for j, entry in enumerate(entries):
         frames[j, :3, 3] = _vector(entry.get("position"), names[j], "position")
         above = entry.get("parent")
@@ -89,6 +91,8 @@ def _rig(path: Path, content: Any, mesh: MeshFile) -> SourceRig:
                 raise InputError(f"joint '{names[j]}': its axis has no length")
         if entry.get("limits") is not None:
             limits[j] = _limits(entry["limits"], names[j])
+        if entry.get("initial") is not None:
+            initial[j] = _initial(entry["initial"], names[j])
     _check_loops(names, parents)
     # the 87 by their own or their canonical names, other joints beside them
     spelled = next((way for way in (list(CANONICAL), list(CANONICAL.values())) if number.keys() >= set(way)), None)
@@ -102,6 +106,7 @@ def _rig(path: Path, content: Any, mesh: MeshFile) -> SourceRig:
         parts=mesh.parts,
         axes=axes,
         limits=limits,
+        initial=initial,
         placed=spelled is not None,
         stated={} if spelled is None else dict(zip(CANONICAL.values(), map(number.__getitem__, spelled), strict=True)),
         notes=(*mesh.notes, f"joints from {path.name}"),
@@ -131,6 +136,17 @@ def _limits(value: Any, name: str) -> dict[str, tuple[float, float]]:
             )
         out[channel] = (float(np.radians(pair[0])), float(np.radians(pair[1])))
     return out
+
+
+def _initial(value: Any, name: str) -> dict[str, float]:
+    if not isinstance(value, Mapping):
+        raise InputError(f"joint '{name}': initial wants {{\"flexion\": degrees, …}}")
+    for channel, angle in value.items():
+        if channel not in CHANNELS:
+            raise InputError(f"joint '{name}': no channel '{channel}'{did_you_mean(channel, CHANNELS)}")
+        if not isinstance(angle, int | float) or isinstance(angle, bool) or not -360 <= angle <= 360:
+            raise InputError(f"joint '{name}': initial {channel} wants degrees, −360 to 360, got {angle!r:.40}")
+    return {channel: float(np.radians(angle)) for channel, angle in value.items()}
 
 
 def _check_loops(names: list[str], parents: NDArray[np.int64]) -> None:
@@ -164,6 +180,10 @@ def write_skeleton_file(path: str | Path, skeleton: Skeleton) -> None:
                 "limits": {
                     channel: [round(float(x), 3) for x in np.degrees(pair)]
                     for channel, pair in zip(CHANNELS, skeleton.limits[j], strict=True)
+                },
+                "initial": {
+                    channel: round(float(np.degrees(angle)), 6)
+                    for channel, angle in zip(CHANNELS, skeleton.initial[j], strict=True)
                 },
             }
         )

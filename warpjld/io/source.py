@@ -31,6 +31,7 @@ class SourceRig:
         weights: Their weights, rows summing to one, shape (W, K).
         axes: Flexion axes the file states, by joint number.
         limits: Channel limits [rad] the file states, by joint number then channel.
+        initial: Angles of the rest pose [rad] the file states, by joint number then channel.
         placing: Similarity that brought vertices and joints from the file's units and axes to these, shape (4, 4).
         rigid: Joint of ``tree`` that a vertex follows rigidly (a mesh that hangs on a joint), -1 for flesh, shape
             (W,); None where all is flesh.
@@ -53,6 +54,7 @@ class SourceRig:
     weights: NDArray[np.float64] | None = None
     axes: dict[int, NDArray[np.float64]] = field(default_factory=dict)
     limits: dict[int, dict[str, tuple[float, float]]] = field(default_factory=dict)
+    initial: dict[int, dict[str, float]] = field(default_factory=dict)
     placing: NDArray[np.float64] = field(default_factory=lambda: np.eye(4))
     rigid: NDArray[np.int64] | None = None
     metres: float | None = None

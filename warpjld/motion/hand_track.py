@@ -164,5 +164,6 @@ def _flex(
     """Rotation about the flexion axis, within the limits, that brings a bone nearest to the wanted direction."""
     axis = skeleton.axes[joint]
     a, b = bone - axis * (axis @ bone), wanted - np.outer(wanted @ axis, axis)
-    angle = np.arctan2(np.cross(a, b) @ axis, b @ a).clip(*skeleton.limits[joint, 0])
+    limits = skeleton.limits[joint, 0] - skeleton.initial[joint, 0]  # as the angle, from rest
+    angle = np.arctan2(np.cross(a, b) @ axis, b @ a).clip(*limits)
     return np.concatenate([np.sin(angle / 2.0)[:, None] * axis, np.cos(angle / 2.0)[:, None]], axis=-1)

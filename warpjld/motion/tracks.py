@@ -155,8 +155,9 @@ class Motion:
         for name in canonical_channels(channel):
             self.tracks.setdefault(name, Track(name)).set(key)
 
-    def value(self, channel: str, frame: ArrayLike) -> NDArray[np.float64]:
-        """Values [rad or m] at any key or in-between frame (R4), in the shape of ``frame``; 0 if nothing is keyed.
+    def value(self, channel: str, frame: ArrayLike, initial: float = 0.0) -> NDArray[np.float64]:
+        """Values [rad or m] at any key or in-between frame (R4), in the shape of ``frame``; ``initial`` if nothing is
+        keyed.
 
         The side may be left out where only one side has keys.
         """
@@ -165,7 +166,7 @@ class Motion:
         if name not in self.tracks and len(sided) == 1:
             name = sided[0]
         track = self.tracks.get(name)
-        return np.zeros(np.shape(frame)) if track is None else track.spline(frame)
+        return np.full(np.shape(frame), initial) if track is None else track.spline(frame)
 
     @property
     def frame_range(self) -> tuple[float, float]:
@@ -229,7 +230,7 @@ class Motion:
         at = np.atleast_1d(np.asarray(frames, dtype=np.float64))
         if at.ndim != 1 or not np.isfinite(at).all():
             raise InputError(f"frames: want finite numbers, shape (n,), got shape {at.shape}")
-        angles = np.zeros((len(at), len(skeleton), len(CHANNELS)))
+        angles = np.repeat(skeleton.initial[None], len(at), axis=0)
         for name, (joint, channel) in self._places(skeleton).items():
             angles[:, joint, channel] = self.tracks[name].spline(at)
         root = np.stack([self.value(name, at) for name in ROOT_CHANNELS], axis=-1)

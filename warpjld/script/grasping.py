@@ -76,9 +76,18 @@ def placed_at(scene: Scene, prop: Prop, key: float) -> GraspObject:
 
 
 def search_flexion(
-    scene: Scene, actor: Actor, prop: Prop, key: float, joint: int, vertex: int, facet: int, distance: float
+    scene: Scene,
+    actor: Actor,
+    prop: Prop,
+    key: float,
+    joint: int,
+    vertex: int,
+    facet: int,
+    distance: float,
+    within: float,
 ) -> tuple[Found, str]:
-    """The flexion of a joint at which a vertex touches an object at a key, and what it does not solve (R77)."""
+    """The flexion of a joint, nearest to where it is, at which a vertex is so far from an object at a key, and what it
+    does not solve (R77)."""
     from warpjld.grasp import FlexionSearch, ObjectSet, Searches
     from warpjld.grasp.intersection import intersection
     from warpjld.skeleton import poses_from_angles
@@ -86,8 +95,8 @@ def search_flexion(
     covering = cover(actor)
     poses, angles = posture(scene, actor, key)
     thing = placed_at(scene, prop, key)
-    search = FlexionSearch(covering, ObjectSet(thing))
-    found = search.run(poses, angles, Searches(vertex=vertex, joint=joint, facet=facet, distance=distance))
+    wanted = Searches(vertex=vertex, joint=joint, facet=facet, distance=distance)
+    found = FlexionSearch(covering, ObjectSet(thing)).nearest(poses, angles, wanted, tolerance=within)
     angles[0, joint, 0] = found.angles[0, 0]
     _, root = actor.motion.sample(np.array([key]), actor.skeleton)
     bent = actor.placement.apply(poses_from_angles(actor.skeleton, angles, root_position=root), np.array([key]))
@@ -121,7 +130,7 @@ def close_digits(
     for name in closed.digits:
         for joint in chains[name]:
             channel = f"{actor.skeleton.names[joint]}.flexion"
-            before = float(actor.motion.value(channel, first))
+            before = actor.value(channel, first)
             grip[channel] = before
             actor.set_keys(channel, [first], before, scene.spline)
             actor.set_keys(channel, [last], float(closed.angles[0, joint, 0]), scene.spline)

@@ -74,7 +74,7 @@ def flexions_of_grip(
         joint, _, kind = channel.rpartition(".")
         if kind != CHANNELS[_FLEXION]:
             continue
-        now = float(actor.motion.value(channel, frame))
+        now = actor.value(channel, frame)
         low, high = actor.skeleton.limits[actor.skeleton.index(joint), _FLEXION]
         if now > 1e-9 or not joint.endswith(("knuckle2", "knuckle3")):
             yield channel, now, (float(low), float(high))

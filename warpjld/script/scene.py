@@ -12,6 +12,7 @@ from warpjld.errors import InputError
 from warpjld.script.outputs import Camera, Output
 from warpjld.script.placement import Placement
 from warpjld.simulation.specification import ContactSpecification, SourceLocation
+from warpjld.skeleton.channels import CHANNELS
 from warpjld.suggest import did_you_mean
 
 if TYPE_CHECKING:
@@ -76,6 +77,13 @@ class Actor:
         """Set one value [rad] at several frames of a channel such as ``left.index.base.flexion``."""
         for key in keys:
             self.motion.set_key(channel, key, value, **asdict(spline))
+
+    def value(self, channel: str, frame: float) -> float:
+        """Angle [rad] of a channel such as ``left.index.base.flexion`` at any frame; that at rest where it has no
+        key."""
+        joint, _, kind = channel.rpartition(".")
+        initial = self.skeleton.initial[self.skeleton.names.index(joint), CHANNELS.index(kind)]
+        return float(self.motion.value(channel, frame, initial))
 
     @property
     def key_frames(self) -> list[float]:

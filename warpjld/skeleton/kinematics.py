@@ -8,12 +8,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from warpjld.errors import InputError
-from warpjld.rotations import about, conjugate, multiply, rotate
-from warpjld.skeleton.tree import CHANNELS, Skeleton
+from warpjld.rotations import conjugate, multiply, rotate
+from warpjld.skeleton.channels import CHANNELS, channel_rotations
+from warpjld.skeleton.tree import Skeleton
 
 __all__ = [
     "Poses",
     "joint_rotations",
+    "poses_beside_rest",
     "poses_from_angles",
     "poses_from_rotations",
     "poses_from_world",
@@ -70,7 +72,8 @@ def poses_from_angles(
 
     A joint turns its bone by twisting about the segment, then flexion about the pivoted axis (R27), then abduction
     about the normal; pivot, twisting and abduction are mirrored on the left side, so that equal angles give mirrored
-    hands: positive pivot and abduction lean to the thumb's side, positive twisting is inward rotation.
+    hands: positive pivot and abduction lean to the thumb's side, positive twisting is inward rotation. Angles count
+    from straight joints: those of the rest pose are the skeleton's initial ones (R25).
 
     Args:
         skeleton: The rest skeleton.
@@ -101,7 +104,7 @@ def poses_from_angles(
 def joint_rotations(
     skeleton: Skeleton, angles: NDArray[np.float64], *, joints: NDArray[np.integer] | None = None
 ) -> NDArray[np.float64]:
-    """Rotations of joints relative to their parents' bones, in the axes of the rest pose, shape (F, K, 4).
+    """Rotations of joints from rest relative to their parents' bones, in the axes of the rest pose, shape (F, K, 4).
 
     Args:
         skeleton: The rest skeleton.
@@ -110,11 +113,10 @@ def joint_rotations(
     """
     chosen = slice(None) if joints is None else joints
     axes, directions, mirror = skeleton.axes[chosen], skeleton.directions[chosen], skeleton.mirror[chosen, None]
-    normals = np.cross(directions, axes)
-    flexion, pivot, twisting, abduction = (angles[..., k, None] for k in range(len(CHANNELS)))
-    pivoted = rotate(about(mirror * pivot * directions), axes)
-    local = multiply(about(mirror * abduction * normals), about(flexion * pivoted))
-    return np.asarray(multiply(local, about(-mirror * twisting * directions)))
+    turned = channel_rotations(angles, axes, directions, mirror)
+    if skeleton.initial_turns is None:
+        return turned
+    return np.asarray(multiply(conjugate(skeleton.initial_turns[chosen]), turned))
 
 
 def poses_from_rotations(
@@ -169,7 +171,12 @@ def poses_from_world(skeleton: Skeleton, positions: NDArray[np.float64], rotatio
 
 def rest_poses(skeleton: Skeleton, frames: int = 1) -> Poses:
     """The rest pose, ``frames`` times."""
-    return poses_from_angles(skeleton, np.zeros((frames, len(skeleton), len(CHANNELS))))
+    return poses_from_angles(skeleton, np.repeat(skeleton.initial[None], frames, axis=0))
+
+
+def poses_beside_rest(skeleton: Skeleton, angles: NDArray[np.float64]) -> Poses:
+    """Poses in which some joints have angles [rad], shape (F, J, 4); those whose angles are all 0 are at rest."""
+    return poses_from_angles(skeleton, np.where(angles.any(axis=-1, keepdims=True), angles, skeleton.initial))
 
 
 def _compose(
@@ -195,19 +202,19 @@ def _compose(
 
 
 def vertical_flexion(skeleton: Skeleton, local: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Angle [rad] between a joint's rest segment and the projection of its final segment on the plane normal to the
+    """Angle [rad] between a joint's straight segment and the projection of its final segment on the plane normal to the
     unpivoted flexion axis, shape (F, J) (A §3, R28, R29).
 
     Args:
         skeleton: The rest skeleton.
         local: Joint rotations relative to the parent's bone, quaternions x, y, z, w, shape (F, J, 4).
     """
-    axes, directions = skeleton.axes, skeleton.directions
-    initial = directions - axes * (axes * directions).sum(axis=1, keepdims=True)
+    straight, axes = skeleton.straight
+    initial = straight - axes * (axes * straight).sum(axis=1, keepdims=True)
     length = np.linalg.norm(initial, axis=1, keepdims=True)
     bends = length[:, 0] >= 1e-6  # elsewhere the axis lies along the segment
     initial = initial / np.where(length >= 1e-6, length, 1.0)
-    moved = rotate(local, directions)
+    moved = rotate(local, skeleton.directions)
     angle = np.arctan2((moved * np.cross(axes, initial)).sum(axis=-1), (moved * initial).sum(axis=-1))
     return np.asarray(np.where(bends, angle, 0.0))
 

@@ -2,22 +2,18 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 
 from warpjld.errors import InputError
-from warpjld.rotations import unit
+from warpjld.rotations import conjugate, rotate, unit
+from warpjld.skeleton.channels import CHANNELS, channel_rotations
 from warpjld.suggest import did_you_mean
 
 __all__ = ["ALONG", "CHANNELS", "Segment", "Skeleton"]
-
-CHANNELS = ("flexion", "pivot", "twisting", "abduction")
-"""Angles of a joint, in the order of their last array axis. Abduction is this project's addition: the paper's
-pivot turns the flexion axis about the segment (R27) and so moves nothing while the joint is straight."""
-
 
 ALONG = 0.1
 """Sine of the angle to a joint's own segment below which an axis only twists it: no flexion axis (R20)."""
@@ -53,6 +49,8 @@ class Skeleton:
             segment × axis points to the external side (R20).
         limits: Smallest and largest angle [rad] of each channel, shape (J, 4, 2), channels as in ``CHANNELS``.
         palms: Per hand its palm segments as (proximal, distal) pairs, ulnar to radial; neighbours are adjacent.
+        initial: Angles of the rest pose, counted from straight joints [rad], shape (J, 4) (R25): what all angles are
+            where nothing moves. Zero unless given.
 
     Examples:
         >>> skeleton = wj.build_hand("left", resolution=1500).skeleton
@@ -68,22 +66,26 @@ class Skeleton:
     axes: NDArray[np.float64]
     limits: NDArray[np.float64]
     palms: tuple[tuple[tuple[int, int], ...], ...] = ()
+    initial: NDArray[np.float64] = field(default_factory=lambda: np.zeros((0, len(CHANNELS))))
 
     def __post_init__(self) -> None:
         count = len(self.names)
+        if not len(self.initial):
+            object.__setattr__(self, "initial", np.zeros((count, len(CHANNELS))))
         wants = {
             "parents": (count,),
             "rest": (count, 3),
             "axes": (count, 3),
             "limits": (count, len(CHANNELS), 2),
+            "initial": (count, len(CHANNELS)),
         }
-        for field, shape in wants.items():
-            array = getattr(self, field)
+        for what, shape in wants.items():
+            array = getattr(self, what)
             if array.shape != shape:
-                raise InputError(f"skeleton {field}: want shape {shape}, got {array.shape}")
+                raise InputError(f"skeleton {what}: want shape {shape}, got {array.shape}")
             if not np.isfinite(array).all():
                 bad = int(np.argwhere(~np.isfinite(array))[0][0])
-                raise InputError(f"skeleton {field}: joint '{self.names[bad]}' is not finite")
+                raise InputError(f"skeleton {what}: joint '{self.names[bad]}' is not finite")
         if len(set(self.names)) != count:
             twice = next(name for name in self.names if self.names.count(name) > 1)
             raise InputError(f"skeleton: two joints are called '{twice}'")
@@ -150,6 +152,26 @@ class Skeleton:
     def mirror(self) -> NDArray[np.float64]:
         """-1 for joints of the left side, +1 elsewhere, shape (J,): the sign of turns that mirror images share."""
         return np.array([-1.0 if name.startswith("left.") else 1.0 for name in self.names])
+
+    @cached_property
+    def initial_turns(self) -> NDArray[np.float64] | None:
+        """Rotation of every bone from where its joint is straight to rest, about the parent's bone, quaternions
+        x, y, z, w, shape (J, 4); None where all joints are straight at rest.
+
+        In the axes of the rest pose: a rotation looks the same from before and after it.
+        """
+        if not self.initial.any():
+            return None
+        return channel_rotations(self.initial, self.axes, self.directions, self.mirror[:, None])
+
+    @cached_property
+    def straight(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Unit directions and flexion axes of the bones where each joint is straight and its parent at rest, shapes
+        (J, 3)."""
+        if self.initial_turns is None:
+            return self.directions, self.axes
+        back = conjugate(self.initial_turns)
+        return rotate(back, self.directions), rotate(back, self.axes)
 
     def with_axes(self, axes: NDArray[np.float64]) -> Skeleton:
         """The same skeleton with other flexion axes (R21)."""

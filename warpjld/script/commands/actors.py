@@ -8,12 +8,14 @@ from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 
+from warpjld.errors import InputError
 from warpjld.io.placement import METRES
 from warpjld.script.arguments import Arguments
 from warpjld.script.keys import SIDES, read_joint
 from warpjld.script.registry import command
 from warpjld.script.scene import Scene
 from warpjld.skeleton import CHANNELS
+from warpjld.skeleton.initial import check_initial
 from warpjld.skeleton.tree import ALONG
 
 if TYPE_CHECKING:
@@ -177,6 +179,33 @@ def limit(scene: Scene, arguments: Arguments) -> None:
     limits = chosen.skeleton.limits.copy()
     limits[joint, CHANNELS.index(channel.lower())] = math.radians(low), math.radians(high)
     chosen.skeleton = replace(chosen.skeleton, limits=limits)
+
+
+@command(
+    "INITIAL",
+    syntax="INITIAL <joint> <FLEXION/PIVOT/TWISTING/ABDUCTION> <degrees>",
+    help="Angle of a joint in the digitised pose: limits, keys and inflation count from the straight joint.",
+    group="Actors",
+)
+def initial(scene: Scene, arguments: Arguments) -> None:
+    """R25."""
+    chosen, joint = read_joint(scene, arguments)
+    channel = arguments.choice("the angle", [c.upper() for c in CHANNELS])
+    degrees = arguments.number("the angle at rest in degrees", minimum=-360, maximum=360)
+    if chosen.recorded is not None or chosen.keyed:
+        raise arguments.error(
+            f"actor {chosen.name} is in motion already: INITIAL comes before its keys and its MOTION",
+            arguments.position,
+        )
+    angles = chosen.skeleton.initial.copy()
+    angles[joint, CHANNELS.index(channel.lower())] = math.radians(degrees)
+    bent = replace(chosen.skeleton, initial=angles)
+    try:
+        check_initial(bent)
+    except InputError as error:
+        change = f"LIMIT {chosen.skeleton.names[joint]} {channel} <smallest> <largest> changes that"
+        raise arguments.error(f"{error.message}; {change}") from None
+    chosen.skeleton = bent
 
 
 def _options(arguments: Arguments) -> dict[str, object]:

@@ -18,13 +18,13 @@ if TYPE_CHECKING:
     from warpjld.script.props import Prop
     from warpjld.script.scene import Actor
 
-_AUTO = "<key> [LEFT/RIGHT] {}<hand vertex or PAD> <object> <facet or NEAREST> [DISTANCE <metres>]"
+_AUTO = "<key> [LEFT/RIGHT] {}<hand vertex or PAD> <object> <facet or NEAREST> [DISTANCE <metres>] [WITHIN <metres>]"
 
 
 @command(
     "AUTO_WRIST",
     syntax=f"AUTO_WRIST {_AUTO.format('')}",
-    help="Flexion of the wrist at a key with which a vertex of the hand touches an object.",
+    help="Wrist flexion that brings a vertex to an object: the nearest, either way, or out of it; WITHIN: how exactly.",
     group="Grasping",
 )
 def auto_wrist(scene: Scene, arguments: Arguments) -> None:
@@ -133,7 +133,7 @@ def _grasp_auto(  # type: ignore[no-untyped-def]
 def _leave_keys(
     scene: Scene, actor: Actor, prop: Prop, side: str, first: float, last: float, digits: Sequence[str]
 ) -> None:
-    """Keys where a grasp would have them, all of no flexion: what follows it in the script can be checked."""
+    """Keys where a grasp would have them, all as the joints are: what follows it in the script can be checked."""
     from warpjld.grasp.digits import digit_chains
     from warpjld.script.grasping import Attempt
 
@@ -141,8 +141,9 @@ def _leave_keys(
     grip = {}
     for joint in (joint for chain in digit_chains(actor.skeleton, wanted).values() for joint in chain):
         channel = f"{actor.skeleton.names[joint]}.flexion"
-        actor.set_keys(channel, [first, last], 0.0, scene.spline)
-        grip[channel] = 0.0
+        rest = actor.value(channel, first)
+        actor.set_keys(channel, [first, last], rest, scene.spline)
+        grip[channel] = rest
     scene.grips[actor.name] = scene.grips.get(actor.name, {}) | grip
     message = "not searched: nothing is computed by --check"
     scene.attempts.append(Attempt(f"GRASP {prop.name}", last, actor.name, prop.name, "NOT_SEARCHED", message, {}))
@@ -163,7 +164,7 @@ def release(scene: Scene, arguments: Arguments) -> None:
     for channel, value in scene.grips.pop(actor.name).items():
         keys = actor.motion.tracks[channel].keys
         # the last key's own value, to the bit: only then do splines hold it
-        held = keys[-1].value if keys[-1].frame <= first else float(actor.motion.value(channel, first))
+        held = keys[-1].value if keys[-1].frame <= first else actor.value(channel, first)
         actor.set_keys(channel, [first], held, scene.spline)
         actor.set_keys(channel, [last], value, scene.spline)
 
@@ -171,6 +172,7 @@ def release(scene: Scene, arguments: Arguments) -> None:
 def _search(scene: Scene, arguments: Arguments, name: str, key: float, side: str, joint_name: str, finger: str) -> None:
     from warpjld.grasp import NEAREST, Status
     from warpjld.grasp.digits import pad_vertex
+    from warpjld.grasp.search import FINEST
     from warpjld.script.binding import cover
     from warpjld.script.grasping import Attempt, search_flexion
 
@@ -187,12 +189,15 @@ def _search(scene: Scene, arguments: Arguments, name: str, key: float, side: str
         facet = NEAREST
     else:
         facet = arguments.integer("the facet (its number, or NEAREST)", minimum=0, maximum=len(prop.thing.faces) - 1)
-    options = arguments.options(distance=lambda: arguments.number("the distance in metres"))
-    distance = float(cast(float, options.get("distance", 0.0)))
+    options = arguments.options(
+        distance=lambda: arguments.number("the distance in metres"),
+        within=lambda: arguments.number("how exactly, in metres", minimum=FINEST, maximum=0.1),
+    )
+    distance, within = (float(cast(float, options.get(k, v))) for k, v in (("distance", 0.0), ("within", 1e-6)))
     if scene.dry:
         actor.set_keys(f"{actor.skeleton.names[joint]}.{CHANNELS[0]}", [key], 0.0, scene.spline)
         return
-    found, inside = search_flexion(scene, actor, prop, key, joint, vertex, facet, distance)
+    found, inside = search_flexion(scene, actor, prop, key, joint, vertex, facet, distance, within)
     status = Status(int(found.status[0]))
     message = found.message()
     if status is Status.CONVERGED:

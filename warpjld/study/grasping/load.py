@@ -118,7 +118,7 @@ def opened_hand(choice: HandChoice, posture: Posture) -> Opened:
 
 
 def _angles(skeleton: Skeleton, posture: tuple[tuple[str, str, float], ...], name: str) -> NDArray[np.float64]:
-    angles = np.zeros((len(skeleton), len(CHANNELS)))
+    angles = skeleton.initial.copy()
     for joint, channel, degrees in posture:
         j, k = skeleton.index(joint), CHANNELS.index(channel)
         low, high = np.degrees(skeleton.limits[j, k])

@@ -1,0 +1,178 @@
+"""Flexion searches by samples, for coverings that no search kernel maps: the paper's own operators (A §7.3, R76).
+
+The same search as the kernel's: the first change of sign on the chain's way, else the closest approach. Samples of a
+span are mapped in one batch, and the span that holds the change of sign is divided by as many again.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from warpjld.covering import Covering
+from warpjld.covering.paper import PaperCovering
+from warpjld.errors import InputError
+from warpjld.grasp.distance import ObjectSet
+from warpjld.grasp.facet import facet_distance
+from warpjld.grasp.found import Found, Status
+from warpjld.grasp.objects import Places
+from warpjld.grasp.packing import Chains
+from warpjld.grasp.searches import Rows
+from warpjld.rotations import conjugate, multiply
+from warpjld.skeleton import CHANNELS, Poses, poses_from_angles
+
+__all__ = ["is_sampled", "sampled_search"]
+
+_FLEXION = CHANNELS.index("flexion")
+_STEPS = 64  # of the whole way
+_PARTS = 16  # of a span that is narrowed
+_NARROWEST = 1e-7  # closing; float32 places vertices no better
+_CLOSEST = 1e-5  # closing to which the closest approach is refined
+
+
+def is_sampled(coverings: Sequence[Covering]) -> bool:
+    """Whether these coverings are searched here.
+
+    Raises:
+        InputError: Coverings of different methods, surfaces or skeletons.
+    """
+    first = coverings[0]
+    kinds = {isinstance(covering, PaperCovering) for covering in coverings}
+    if len(kinds) > 1:
+        raise InputError("coverings: want one method, smooth or paper, for all")
+    if any(c.skeleton is not first.skeleton or len(c.anchors) != len(first.anchors) for c in coverings):
+        raise InputError("coverings: want parameter sets of one surface on one skeleton (with_parameters)")
+    return kinds == {True}
+
+
+def sampled_search(
+    coverings: Sequence[Covering],
+    objects: ObjectSet,
+    poses: Poses,
+    angles: NDArray[np.float64],
+    rows: Rows,
+    places: Places,
+    tolerance: float,
+) -> Found:
+    """What ``FlexionSearch.run`` finds, search after search; arguments as there."""
+    ended = [
+        _Search(coverings[rows.covering[k]], objects, poses, angles, rows, places, k).run(tolerance)
+        for k in range(len(rows))
+    ]
+    closing = np.array([end.closing for end in ended], dtype=np.float32)
+    return Found(
+        status=np.array([end.status for end in ended], dtype=np.int32),
+        closing=closing,
+        angles=rows.chains[rows.drive].angles(closing.astype(np.float64)),
+        distance=np.array([end.distance for end in ended], dtype=np.float32),
+        facet=np.array([end.facet for end in ended], dtype=np.int32),
+        inside=np.ones(len(ended), dtype=bool),
+        point=np.array([end.point for end in ended], dtype=np.float32),
+        evaluations=np.array([end.evaluations for end in ended], dtype=np.int32),
+    )
+
+
+@dataclass(frozen=True, eq=False)
+class _End:
+    status: Status
+    closing: float
+    distance: float
+    facet: int
+    point: NDArray[np.float64]
+    evaluations: int
+
+
+class _Search:
+    """One row of searches."""
+
+    def __init__(
+        self,
+        covering: Covering,
+        objects: ObjectSet,
+        poses: Poses,
+        angles: NDArray[np.float64],
+        rows: Rows,
+        places: Places,
+        number: int,
+    ) -> None:
+        self._covering, self._objects = covering, objects
+        self._vertex, self._thing = int(rows.vertex[number]), int(rows.thing[number])
+        self._facet, self._target = int(rows.facet[number]), float(rows.distance[number])
+        self._place = places[np.array([rows.place[number]])]
+        self._chain: Chains = rows.chains[rows.drive[number : number + 1]]
+        frame = int(rows.frame[number])
+        self._angles = angles[frame]
+        still = poses_from_angles(covering.skeleton, self._angles[None])
+        self._turn = multiply(poses.rotations[frame, :1], conjugate(still.rotations[0, :1]))
+        self._shift = poses.positions[frame, :1] - covering.skeleton.rest[:1]
+        self._seen = 0
+
+    def run(self, tolerance: float) -> _End:
+        reach = float(self._chain.reach[0])
+        (start,) = self._gaps(np.zeros(1))
+        side = -1.0 if start < 0.0 else 1.0
+        if abs(start) < tolerance:
+            return self._end(Status.CONVERGED, 0.0)
+        if reach < 1e-6:
+            return self._end(Status.AT_LIMIT if side > 0.0 else Status.INSIDE, 0.0)
+        at = np.linspace(0.0, reach, _STEPS + 1)
+        gaps = side * self._gaps(at)
+        closest = at[0]
+        while True:
+            good = np.abs(gaps) < tolerance
+            past = good | (gaps < 0.0)
+            if past.any():
+                first = int(past.argmax())
+                if good[first]:
+                    return self._end(Status.CONVERGED, at[first])
+                if at[first] - at[first - 1] < _NARROWEST:
+                    return self._end(Status.OPENING, at[first])
+                span = at[first - 1], at[first]
+            else:
+                least = int(gaps.argmin())
+                closest = at[least]
+                span = at[max(least - 1, 0)], at[min(least + 1, len(at) - 1)]
+                if span[1] - span[0] < _CLOSEST:
+                    return self._end(Status.NO_CONTACT if side > 0.0 else Status.INSIDE, closest)
+            at = np.linspace(*span, _PARTS + 1)
+            gaps = side * self._gaps(at)
+
+    def _points(self, closings: NDArray[np.float64]) -> NDArray[np.float32]:
+        """The vertex on its way, shape (n, 3)."""
+        count = len(closings)
+        posed = np.repeat(self._angles[None], count, axis=0)
+        for k, joint in enumerate(self._chain.joints[0].tolist()):
+            if joint >= 0:
+                own = self._chain[np.zeros(count, dtype=np.int64)].angles(closings)
+                posed[:, joint, _FLEXION] = own[:, k]
+        poses = poses_from_angles(
+            self._covering.skeleton,
+            posed,
+            root_position=np.repeat(self._shift, count, axis=0),
+            root_rotation=np.repeat(self._turn, count, axis=0),
+        )
+        return self._covering.points(poses, [self._vertex])[:, 0]
+
+    def _gaps(self, closings: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Distances less the one asked for [m], shape (n,)."""
+        self._seen += len(closings)
+        return np.array([d for d, _, _ in self._hits(closings)]) - self._target
+
+    def _hits(self, closings: NDArray[np.float64]) -> list[tuple[float, int, NDArray[np.float64]]]:
+        """Distance, facet, and nearest point in the object's frame or place in the facet's basis."""
+        points = self._points(closings)
+        if self._facet >= 0:
+            at = facet_distance(points, self._objects.objects[self._thing], self._facet, self._place)
+            return [(float(p[1]), self._facet, p) for p in at.coordinates]
+        found = self._objects.distances(points, which=self._thing, places=self._place, nearest=True)
+        assert found.point is not None
+        own = self._place.to_local(found.point[0])[0]
+        return [(float(d), int(f), p) for d, f, p in zip(found.distance[0], found.face[0], own, strict=True)]
+
+    def _end(self, status: Status, closing: float) -> _End:
+        # as single precision, in which it is told, has it
+        ((distance, facet, point),) = self._hits(np.array([float(np.float32(closing))]))
+        return _End(status, float(closing), distance, facet, point, self._seen)

@@ -1,0 +1,35 @@
+"""Angles of a joint, and the rotation that they make of its bone."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from warpjld.rotations import about, multiply, rotate
+
+__all__ = ["CHANNELS", "channel_rotations"]
+
+CHANNELS = ("flexion", "pivot", "twisting", "abduction")
+"""Angles of a joint, in the order of their last array axis. Abduction is this project's addition: the paper's
+pivot turns the flexion axis about the segment (R27) and so moves nothing while the joint is straight."""
+
+
+def channel_rotations(
+    angles: NDArray[np.float64],
+    axes: NDArray[np.float64],
+    directions: NDArray[np.float64],
+    mirror: NDArray[np.float64],
+) -> NDArray[np.float64]:
+    """Rotations of K bones by their joints' angles, in the axes that these directions are in, shape (…, K, 4).
+
+    Args:
+        angles: [rad], shape (…, K, 4), channels as in ``CHANNELS``.
+        axes: Unit flexion axes, shape (K, 3).
+        directions: Unit directions of the bones, shape (K, 3).
+        mirror: -1 for the left side, else 1, shape (K, 1).
+    """
+    normals = np.cross(directions, axes)
+    flexion, pivot, twisting, abduction = (angles[..., k, None] for k in range(len(CHANNELS)))
+    pivoted = rotate(about(mirror * pivot * directions), axes)
+    local = multiply(about(mirror * abduction * normals), about(flexion * pivoted))
+    return np.asarray(multiply(local, about(-mirror * twisting * directions)))

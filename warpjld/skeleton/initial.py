@@ -1,0 +1,91 @@
+"""Initial angles: how far the joints of the digitised pose are bent (A §3, R25).
+
+Limits and flexion ratios are those of joints that count from straight. Where the elbow or the knee of a rest pose is
+bent (an A-pose's elbows mostly are), the angle between upper and lower limb says by how much; of other joints segments
+say little: at rest a hip or the base of a finger is no straight line, and knuckles are placed to a few degrees.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from warpjld.errors import InputError
+from warpjld.rotations import unit
+from warpjld.skeleton.channels import CHANNELS
+from warpjld.skeleton.tree import Skeleton
+
+__all__ = ["bent_limbs", "check_initial", "with_initial"]
+
+_HINGES = {"elbow": ("shoulder", "wrist"), "knee": ("hip", "ankle")}
+_PLAIN = np.radians(1.0)
+"""Bends below are how exactly joints are placed."""
+_FLEXION = CHANNELS.index("flexion")
+_SLACK = 1e-6  # rad: limits in files are in degrees
+
+
+def with_initial(skeleton: Skeleton, given: Mapping[int, Mapping[str, float]]) -> tuple[Skeleton, tuple[str, ...]]:
+    """A skeleton with the angles of its rest pose, and what is to be said of them. Elbows and knees of which nothing is
+    stated take theirs from where the joints are.
+
+    Args:
+        skeleton: With limits.
+        given: Angles [rad] that are stated, by joint then channel.
+
+    Raises:
+        InputError: A stated angle is beyond its joint's limits.
+    """
+    initial = np.zeros((len(skeleton), len(CHANNELS)))
+    for joint, channels in given.items():
+        for channel, angle in channels.items():
+            initial[joint, CHANNELS.index(channel)] = angle
+    found = {joint: angle for joint, angle in bent_limbs(skeleton).items() if joint not in given}
+    limits = skeleton.limits.copy()
+    for joint, angle in found.items():
+        initial[joint, _FLEXION] = angle
+        limits[joint, _FLEXION, 1] = max(limits[joint, _FLEXION, 1], angle)
+    if not initial.any():
+        return skeleton, ()
+    bent = replace(skeleton, initial=initial, limits=limits)
+    check_initial(bent)
+    names = ", ".join(f"{skeleton.names[joint]} by {np.degrees(angle):.1f}°" for joint, angle in found.items())
+    return bent, (f"bent at rest: {names}; angles count from the straight joint",) if found else ()
+
+
+def bent_limbs(skeleton: Skeleton) -> dict[int, float]:
+    """Flexion [rad] of the elbows and knees that are bent at rest: the angle between upper and lower limb about the
+    flexion axis."""
+    places = {name: joint for joint, name in enumerate(skeleton.names)}
+    out = {}
+    for name, joint in places.items():
+        side, _, part = name.rpartition(".")
+        ends = [places[f"{side}.{end}"] for end in _HINGES.get(part, ()) if f"{side}.{end}" in places]
+        if len(ends) < 2:
+            continue
+        before, after = (unit(v) for v in np.diff(skeleton.rest[[ends[0], joint, ends[1]]], axis=0))
+        axis = skeleton.axes[joint]
+        before, after = (unit(v - axis * (axis @ v)) for v in (before, after))
+        angle = float(np.arctan2(np.cross(before, after) @ axis, before @ after))
+        if angle > _PLAIN:
+            out[joint] = angle
+    return out
+
+
+def check_initial(skeleton: Skeleton) -> None:
+    """Raise InputError where an initial angle is beyond its joint's limits."""
+    low, high = np.moveaxis(skeleton.limits, -1, 0)
+    beyond = (skeleton.initial != 0.0) & ~_within(skeleton.initial, low, high)
+    for joint, channel in np.argwhere(beyond).tolist():
+        least, most = np.degrees(skeleton.limits[joint, channel])
+        angle = np.degrees(skeleton.initial[joint, channel])
+        raise InputError(
+            f"joint '{skeleton.names[joint]}': initial {CHANNELS[channel]} {angle:g}° is beyond its limits, "
+            f"{least:.4g}° to {most:.4g}°"
+        )
+
+
+def _within(angle: NDArray[np.float64], low: NDArray[np.float64], high: NDArray[np.float64]) -> NDArray[np.bool_]:
+    return np.asarray((angle >= low - _SLACK) & (angle <= high + _SLACK))
