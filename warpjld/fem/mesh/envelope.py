@@ -9,9 +9,15 @@ from numpy.typing import ArrayLike
 
 from warpjld.errors import InputError
 from warpjld.fem.arrays import Array, Ints, Ints32
+from warpjld.fem.launch import shared
 from warpjld.rotations import unit
+from warpjld.threads import in_threads, threads_for
 
 __all__ = ["Envelope", "checked_surface"]
+
+
+_THREAD = 500
+"""Points that are worth another thread."""
 
 
 @dataclass(frozen=True)
@@ -72,18 +78,23 @@ class Envelope:
         import warp as wp
         from warpjld_kernels import fem_inside
 
-        count = len(points)
+        count, mesh = len(points), self._mesh.id
         local = np.ascontiguousarray((points - self._origin) / self.size, dtype=np.float32)
         distance = np.empty(count, np.float32)
         closest = np.empty((count, 3), np.float32)
         face = np.empty(count, np.int32)
-        outputs = [
-            wp.array(distance, dtype=float, device="cpu", copy=False),
+        taken = [
+            wp.array(local, dtype=wp.vec3, device="cpu", copy=False),
+            shared(distance),
             wp.array(closest, dtype=wp.vec3, device="cpu", copy=False),
-            wp.array(face, dtype=wp.int32, device="cpu", copy=False),
+            shared(face),
         ]
-        inputs = [self._mesh.id, 10.0, wp.array(local, dtype=wp.vec3, device="cpu")]
-        wp.launch(fem_inside.signed_distance, dim=count, inputs=[*inputs, *outputs], device="cpu")
+
+        def span(begin: int, end: int) -> None:
+            inputs = [mesh, 10.0, *(values[begin:end] for values in taken)]
+            wp.launch(fem_inside.signed_distance, dim=end - begin, inputs=inputs, device="cpu")
+
+        in_threads(span, count, threads_for(count, _THREAD), fem_inside.signed_distance, "cpu")
         return _Answer(
             distance.astype(np.float64) * self.size,
             closest.astype(np.float64) * self.size + self._origin,
