@@ -47,6 +47,9 @@ class Envelope:
         self.open_edges = int((uses == 1).sum())
         self.crowded_edges = int((uses > 2).sum())
         points, triangles = _capped(points, triangles)
+        self.closed = _closed(triangles)
+        """Whether nothing of it is open, fans included, nor looks the other way: inside and outside are told apart
+        everywhere."""
         corners = points[triangles]
         away = corners - points.mean(axis=0)
         volume = float(np.einsum("ti,ti->", away[:, 0], np.cross(away[:, 1], away[:, 2]))) / 6.0
@@ -113,6 +116,14 @@ def checked_surface(vertices: ArrayLike, faces: ArrayLike) -> tuple[Array, Ints3
     if triangles.min() < 0 or triangles.max() >= len(points):
         raise InputError(f"surface: triangle indices must lie in 0…{len(points) - 1}")
     return points, triangles
+
+
+def _closed(triangles: Ints32) -> bool:
+    """Whether every edge is passed as often one way as the other."""
+    edges = triangles[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2).astype(np.int64)
+    count = np.int64(edges.max() + 1)
+    _, pair = np.unique(edges.min(axis=1) * count + edges.max(axis=1), return_inverse=True)
+    return not np.bincount(pair, np.where(edges[:, 0] < edges[:, 1], 1.0, -1.0)).any()
 
 
 def _capped(points: Array, triangles: Ints32) -> tuple[Array, Ints32]:
