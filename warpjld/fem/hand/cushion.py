@@ -78,15 +78,15 @@ def cushions(hand: FleshHand) -> tuple[Cushion, ...]:
     return tuple(out)
 
 
-def coarse_note(hand: FleshHand, spacing: float, digits: Sequence[str] = ()) -> str | None:
+def coarse_note(found: Sequence[Cushion], spacing: float, digits: Sequence[str] = ()) -> str | None:
     """What to tell people of a hand's elements that are too large, if they are.
 
     Args:
-        hand: Where its rig rests.
+        found: Its ``cushions``.
         spacing: Edge length of its elements [m].
         digits: Those that matter, as ``index``; none for all.
     """
-    thin = [one for one in cushions(hand) if not one.enough and (not digits or one.segment.split(".")[-2] in digits)]
+    thin = [one for one in found if not one.enough and (not digits or one.segment.split(".")[-2] in digits)]
     if not thin:
         return None
     worst: dict[str, Cushion] = {}

@@ -162,8 +162,8 @@ class _Room:
         places = np.stack(np.nonzero(some), axis=1)
         ask = _Halves(envelope, grid, spacing)
         middle = ask.depth(2 * places + 1)
-        # a surface may pass between corners that are all inside: the gap between two fingers; nowhere near a middle that
-        # is deep enough
+        # a surface may pass between corners that are all inside: the gap between two fingers; nowhere near a middle
+        # that is deep enough
         least = np.minimum(middle, 1.0)
         across = np.where(middle > _MARGIN, 1.0, -1.0)[None].repeat(3, axis=0)
         for offset in (np.array(p) - 1 for p in np.ndindex(3, 3, 3) if 1 in p and p != (1, 1, 1)):
