@@ -18,7 +18,7 @@ __all__ = ["CACHE_VARIABLE", "keep", "kept_folder", "used"]
 CACHE_VARIABLE = "WARPJLD_CACHE"
 """Environment variable: the folder in which bindings and hands are kept, or ``off``."""
 
-_MOST = 32  # files in the folder, and
+_MOST = 64  # files in the folder, and
 _MOST_BYTES = 2**30  # all together
 
 

@@ -57,7 +57,7 @@ def test_bones_of_fingers_are_where_they_are_said_to_be(hand: FleshHand) -> None
 
 
 def test_elements_too_large_for_the_flesh_are_told(hand: FleshHand) -> None:
-    assert coarse_note(hand, 0.003) is None
+    assert coarse_note(cushions(hand), 0.003) is None
     found = {one.segment: one for one in cushions(hand)}
     assert len(found) == 14
     assert found["left.index.distal"].elements == 2
@@ -65,11 +65,11 @@ def test_elements_too_large_for_the_flesh_are_told(hand: FleshHand) -> None:
     from warpjld.hand import build_hand
 
     coarse = build_flesh_hand(build_hand("left", resolution=4000), 0.005)
-    note = coarse_note(coarse, 0.005)
+    note = coarse_note(cushions(coarse), 0.005)
     assert note is not None
     assert note.startswith("elements of 5 mm are too large for the flesh over the bones")
     assert "index (at most 3." in note
-    only = coarse_note(coarse, 0.005, ["index"])
+    only = coarse_note(cushions(coarse), 0.005, ["index"])
     assert only is not None
     assert "pinky" in note
     assert "pinky" not in only

@@ -4,9 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.sparse import csr_array
 
 from warpjld.fem.hand.flesh_hand import FleshHand
 from warpjld.fem.mesh.envelope import Envelope
@@ -58,6 +60,7 @@ def cushions(hand: FleshHand) -> tuple[Cushion, ...]:
     middles = mesh.nodes[quads].mean(axis=1)
     mine = hand.weights[quads].sum(axis=1).argmax(axis=1)
     under = -Envelope(hand.surface.vertices, hand.surface.faces).ask(middles).distance
+    links = _links(mesh.elements, len(mesh.nodes))
     out = []
     for number, (shaft, near) in enumerate(zip(flesh.shafts, flesh.parents, strict=True)):
         name = hand.segments[number].split(".")
@@ -69,21 +72,21 @@ def cushions(hand: FleshHand) -> tuple[Cushion, ...]:
         facing = off @ palm > _PALMAR * size * np.linalg.norm(palm)
         over = facing & (mine == number) & (share > shaft.near) & (share < shaft.far)
         if over.any():
-            levels = _levels(mesh.elements, hand.bone_nodes[number], len(mesh.nodes))[quads[over]]
+            levels = _levels(links, hand.bone_nodes[number], quads[over])
             depth = float(np.median((size + under - radius)[over]))
             out.append(Cushion(hand.segments[number], int(np.median(levels)), depth, float(np.median(under[over]))))
     return tuple(out)
 
 
-def coarse_note(hand: FleshHand, spacing: float, digits: Sequence[str] = ()) -> str | None:
+def coarse_note(found: Sequence[Cushion], spacing: float, digits: Sequence[str] = ()) -> str | None:
     """What to tell people of a hand's elements that are too large, if they are.
 
     Args:
-        hand: Where its rig rests.
+        found: Its ``cushions``.
         spacing: Edge length of its elements [m].
         digits: Those that matter, as ``index``; none for all.
     """
-    thin = [one for one in cushions(hand) if not one.enough and (not digits or one.segment.split(".")[-2] in digits)]
+    thin = [one for one in found if not one.enough and (not digits or one.segment.split(".")[-2] in digits)]
     if not thin:
         return None
     worst: dict[str, Cushion] = {}
@@ -93,15 +96,23 @@ def coarse_note(hand: FleshHand, spacing: float, digits: Sequence[str] = ()) -> 
     return f"elements of {1e3 * spacing:g} mm are too large for the flesh over the bones, forces may be far off: {told}"
 
 
-def _levels(elements: NDArray[np.int32], start: NDArray[np.integer], count: int) -> NDArray[np.int64]:
-    """Edges of elements between each node and the nearest of the start nodes, shape (N,)."""
-    edges = np.unique(elements[:, EDGES].reshape(-1, 2), axis=0)
-    out = np.full(count, -1)
+def _links(elements: NDArray[np.int32], count: int) -> Any:
+    """Which of ``count`` nodes an edge of an element joins, symmetric ``csr_array``."""
+    one, other = elements[:, EDGES].reshape(-1, 2).T
+    links = csr_array((np.ones(len(one), np.float32), (one, other)), shape=(count, count))
+    return csr_array(links + links.T)
+
+
+def _levels(links: Any, start: NDArray[np.integer], wanted: NDArray[np.integer]) -> NDArray[np.int64]:
+    """Edges between each wanted node and the nearest of the start nodes, -1 where there is no way, in their shape."""
+    out = np.full(links.shape[0], -1)
     out[start] = 0
-    level = 0
-    while (out == level).any():
-        reached = out >= 0
+    level, front = 0, np.zeros(len(out), np.float32)
+    while (out[wanted] < 0).any():
+        front[:] = out == level
         level += 1
-        for one, other in (edges.T, edges.T[::-1]):
-            out[other[reached[one] & ~reached[other]]] = level
-    return out
+        fresh = (out < 0) & (links @ front > 0.0)
+        if not fresh.any():
+            break
+        out[fresh] = level
+    return np.asarray(out[wanted])

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from warpjld.fem.mesh.hexmesh import EDGES, HexMesh
+from warpjld.fem.mesh.hexmesh import HexMesh
 
 __all__ = ["bone_weights"]
 
@@ -26,8 +26,7 @@ def bone_weights(mesh: HexMesh, bones: Sequence[NDArray[np.int32]]) -> NDArray[n
     from scipy.sparse.linalg import splu
 
     count = len(mesh.nodes)
-    edges = np.unique(np.sort(mesh.elements[:, EDGES].reshape(-1, 2), axis=1), axis=0)
-    edges = edges[edges[:, 0] != edges[:, 1]]
+    edges = mesh.edges()
     stiff = 1.0 / np.linalg.norm(mesh.nodes[edges[:, 1]] - mesh.nodes[edges[:, 0]], axis=1)
     rows, columns = np.concatenate([edges, edges[:, ::-1]]).T
     links = coo_array((np.concatenate([stiff, stiff]), (rows, columns)), shape=(count, count)).tocsr()

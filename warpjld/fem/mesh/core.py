@@ -100,6 +100,8 @@ _PATH = 0.15
 _BARE = 1.8
 """Distance from the nearest cell taken, in spacings, from which on a path is laid."""
 _ROUNDS = 6
+_BLOCK = 6
+"""Nodes along each edge of the blocks of a grid that one node may answer for."""
 _LARGEST = 60_000_000
 
 
@@ -120,8 +122,8 @@ def core_of(envelope: Envelope, spacing: float, notes: list[str]) -> tuple[Mask,
         raise InputError(f"spacing: {spacing:g} m would make a grid of {int(counts.prod()):,} nodes")
     lines = [low[k] + spacing * np.arange(counts[k]) for k in range(3)]
     grid = np.stack(np.meshgrid(*lines, indexing="ij"), axis=-1)
-    depth = -envelope.ask(grid.reshape(-1, 3)).distance.reshape(counts)
-    room = _Room(envelope, grid, depth, spacing)
+    deep, inside = _sides(envelope, grid, _MARGIN * spacing)
+    room = _Room(envelope, grid, deep, inside, spacing)
     banned = np.zeros([n - 1 for n in counts], dtype=bool)
     spare = room.middle > _PATH
     cells = make_manifold(room.inside, spare)
@@ -154,21 +156,29 @@ class _Room:
         middle: Depth of the cells' middles in spacings, -1 where no corner is inside, shape (ni, nj, nk).
     """
 
-    def __init__(self, envelope: Envelope, grid: Array, depth: Array, spacing: float) -> None:
-        self.inside = core_cells(depth > _MARGIN * spacing)
-        some = ~core_cells(depth <= 0.0)
+    def __init__(self, envelope: Envelope, grid: Array, deep: Mask, inside: Mask, spacing: float) -> None:
+        self.inside = core_cells(deep)
+        some = ~core_cells(~inside)
         places = np.stack(np.nonzero(some), axis=1)
-        # a surface may pass between corners that are all inside: the gap between two fingers
-        offsets = np.array([p for p in np.ndindex(3, 3, 3) if 1 in p], dtype=np.float64) / 2.0
-        points = grid[tuple(places.T)][:, None] + spacing * offsets
-        found = -envelope.ask(points.reshape(-1, 3)).distance.reshape(len(places), len(offsets)) / spacing
-        self.inside[tuple(places.T)] &= found.min(axis=1) > _MARGIN
+        ask = _Halves(envelope, grid, spacing)
+        middle = ask.depth(2 * places + 1)
+        # a surface may pass between corners that are all inside: the gap between two fingers; nowhere near a middle
+        # that is deep enough
+        least = np.minimum(middle, 1.0)
+        across = np.where(middle > _MARGIN, 1.0, -1.0)[None].repeat(3, axis=0)
+        for offset in (np.array(p) - 1 for p in np.ndindex(3, 3, 3) if 1 in p and p != (1, 1, 1)):
+            away = 0.5 * float(np.linalg.norm(offset))
+            near = np.flatnonzero((middle > _MARGIN) & ~((middle > away + 2.0 * _MARGIN) & envelope.closed))
+            depth = ask.depth(2 * places[near] + 1 + offset)
+            least[near] = np.minimum(least[near], depth)
+            if np.abs(offset).sum() == 1 and offset.sum() == 1:
+                across[int(np.argmax(offset)), near] = depth
+        at = tuple(places.T)
+        self.inside[at] &= least > _MARGIN
         self.middle = np.full(self.inside.shape, -1.0)
-        self.middle[tuple(places.T)] = found[:, (offsets == 0.5).all(axis=1)][:, 0]
+        self.middle[at] = middle
         self._across = np.full((3, *self.inside.shape), -1.0)
-        for axis in range(3):
-            face = (offsets == np.where(np.arange(3) == axis, 1.0, 0.5)).all(axis=1)
-            self._across[axis][tuple(places.T)] = found[:, face][:, 0]
+        self._across[:, *at] = across
 
     def reached(self, cells: Mask, banned: Mask) -> Mask:
         """Cells with paths added that join pieces, and that lead where surface is far from any cell."""
@@ -201,6 +211,50 @@ class _Room:
                 break
             paths.add(out, target)
         return out | left
+
+
+class _Halves:
+    """Depths at a grid's nodes and half way between them, by twice their places; each is asked for once."""
+
+    def __init__(self, envelope: Envelope, grid: Array, spacing: float) -> None:
+        self._envelope, self._grid, self._spacing = envelope, grid, spacing
+        self._shape = [2 * n for n in grid.shape[:3]]
+        self._keys, self._depths = np.empty(0, np.int64), np.empty(0)
+
+    def depth(self, places: Ints) -> Array:
+        """Depth under the surface at twice the places (n, 3), in spacings, shape (n,)."""
+        wanted, rows = np.unique(np.ravel_multi_index(tuple(places.T), self._shape), return_inverse=True)
+        fresh = wanted[~np.isin(wanted, self._keys, assume_unique=True)]
+        twice = np.stack(np.unravel_index(fresh, self._shape), axis=1)
+        whole = self._grid[tuple((twice // 2).T)]
+        depths = -self._envelope.ask(whole + 0.5 * self._spacing * (twice % 2)).distance / self._spacing
+        keys = np.concatenate([self._keys, fresh])
+        order = np.argsort(keys)
+        self._keys, self._depths = keys[order], np.concatenate([self._depths, depths])[order]
+        out: Array = self._depths[np.searchsorted(self._keys, wanted)][rows]
+        return out
+
+
+def _sides(envelope: Envelope, grid: Array, margin: float) -> tuple[Mask, Mask]:
+    """Which nodes of a grid (ni, nj, nk, 3) are deeper than a margin [m] inside a surface, and which are inside at all.
+
+    Where a surface is closed its distance differs by no more than points are apart: a node far from it answers for
+    those around.
+    """
+    shape = grid.shape[:3]
+    distance = np.full(shape, np.nan)
+    if envelope.closed:
+        first = tuple(slice(_BLOCK // 2, None, _BLOCK) for _ in shape)
+        coarse = np.full(shape, np.nan)
+        coarse[first] = envelope.ask(grid[first].reshape(-1, 3)).distance.reshape(grid[first].shape[:3])
+        i, j, k = (np.minimum(np.arange(n) // _BLOCK * _BLOCK + _BLOCK // 2, n - 1) for n in shape)
+        for centre in np.unique(i):
+            slab, one = i == centre, np.ix_([centre], j, k)
+            apart = np.linalg.norm(grid[slab] - grid[one], axis=-1)
+            distance[slab] = np.where(np.abs(coarse[one]) > apart + 2.0 * margin, coarse[one], np.nan)
+    left = np.isnan(distance)
+    distance[left] = envelope.ask(grid[left]).distance
+    return -distance > margin, distance < 0.0
 
 
 class _Paths:

@@ -9,9 +9,15 @@ from numpy.typing import ArrayLike
 
 from warpjld.errors import InputError
 from warpjld.fem.arrays import Array, Ints, Ints32
+from warpjld.fem.launch import shared
 from warpjld.rotations import unit
+from warpjld.threads import in_threads, threads_for
 
 __all__ = ["Envelope", "checked_surface"]
+
+
+_THREAD = 500
+"""Points that are worth another thread."""
 
 
 @dataclass(frozen=True)
@@ -41,6 +47,9 @@ class Envelope:
         self.open_edges = int((uses == 1).sum())
         self.crowded_edges = int((uses > 2).sum())
         points, triangles = _capped(points, triangles)
+        self.closed = _closed(triangles)
+        """Whether nothing of it is open, fans included, nor looks the other way: inside and outside are told apart
+        everywhere."""
         corners = points[triangles]
         away = corners - points.mean(axis=0)
         volume = float(np.einsum("ti,ti->", away[:, 0], np.cross(away[:, 1], away[:, 2]))) / 6.0
@@ -72,18 +81,23 @@ class Envelope:
         import warp as wp
         from warpjld_kernels import fem_inside
 
-        count = len(points)
+        count, mesh = len(points), self._mesh.id
         local = np.ascontiguousarray((points - self._origin) / self.size, dtype=np.float32)
         distance = np.empty(count, np.float32)
         closest = np.empty((count, 3), np.float32)
         face = np.empty(count, np.int32)
-        outputs = [
-            wp.array(distance, dtype=float, device="cpu", copy=False),
+        taken = [
+            wp.array(local, dtype=wp.vec3, device="cpu", copy=False),
+            shared(distance),
             wp.array(closest, dtype=wp.vec3, device="cpu", copy=False),
-            wp.array(face, dtype=wp.int32, device="cpu", copy=False),
+            shared(face),
         ]
-        inputs = [self._mesh.id, 10.0, wp.array(local, dtype=wp.vec3, device="cpu")]
-        wp.launch(fem_inside.signed_distance, dim=count, inputs=[*inputs, *outputs], device="cpu")
+
+        def span(begin: int, end: int) -> None:
+            inputs = [mesh, 10.0, *(values[begin:end] for values in taken)]
+            wp.launch(fem_inside.signed_distance, dim=end - begin, inputs=inputs, device="cpu")
+
+        in_threads(span, count, threads_for(count, _THREAD), fem_inside.signed_distance, "cpu")
         return _Answer(
             distance.astype(np.float64) * self.size,
             closest.astype(np.float64) * self.size + self._origin,
@@ -102,6 +116,14 @@ def checked_surface(vertices: ArrayLike, faces: ArrayLike) -> tuple[Array, Ints3
     if triangles.min() < 0 or triangles.max() >= len(points):
         raise InputError(f"surface: triangle indices must lie in 0…{len(points) - 1}")
     return points, triangles
+
+
+def _closed(triangles: Ints32) -> bool:
+    """Whether every edge is passed as often one way as the other."""
+    edges = triangles[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2).astype(np.int64)
+    count = np.int64(edges.max() + 1)
+    _, pair = np.unique(edges.min(axis=1) * count + edges.max(axis=1), return_inverse=True)
+    return not np.bincount(pair, np.where(edges[:, 0] < edges[:, 1], 1.0, -1.0)).any()
 
 
 def _capped(points: Array, triangles: Ints32) -> tuple[Array, Ints32]:

@@ -90,6 +90,14 @@ class HexMesh:
         index = np.flatnonzero(single)
         return np.stack([index // 6, index % 6], axis=1).astype(np.int32)
 
+    def edges(self) -> Ints32:
+        """The nodes that an edge of an element joins, the lower first, each pair once and in order, shape (n, 2)."""
+        ends = np.sort(self.elements[:, EDGES].reshape(-1, 2), axis=1).astype(np.int64)
+        count = len(self.nodes)
+        keys = np.unique(ends[:, 0] * count + ends[:, 1])
+        ends = np.stack([keys // count, keys % count], axis=1).astype(np.int32)
+        return np.ascontiguousarray(ends[ends[:, 0] != ends[:, 1]])
+
     def quads(self, faces: Ints32) -> Ints32:
         """Corners of faces given as (element, local face), anticlockwise seen from outside, shape (F, 4)."""
         return self.elements[faces[:, :1], FACES[faces[:, 1]]]

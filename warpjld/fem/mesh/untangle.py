@@ -76,17 +76,25 @@ class _ShapeMeasure:
         from warpjld_kernels import fem_shape_measure
 
         self.x = np.ascontiguousarray(x)
-        self._flat = elements.ravel()
-        self._costs, self._slopes = np.empty(len(elements)), np.empty((len(elements), 8, 3))
-        x_, slopes = (wp.array(a, dtype=wp.vec3d, device="cpu", copy=False) for a in (self.x, self._slopes))
-        inputs = [shared(np.ascontiguousarray(elements)), wp.float64(softness), x_, shared(self._costs), slopes]
-        self._launch = Launch(fem_shape_measure.measure, len(elements), inputs, threads=threads_of())
+        flat = elements.ravel()
+        starts = np.zeros(len(x) + 1, np.int32)
+        np.cumsum(np.bincount(flat, minlength=len(x)), out=starts[1:])
+        corners = np.argsort(flat, kind="stable").astype(np.int32)
+        self._costs, self._slope = np.empty(len(elements)), np.empty((len(x), 3))
+        slopes = np.empty((len(elements), 8, 3))
+        x_, each, slope = (wp.array(a, dtype=wp.vec3d, device="cpu", copy=False) for a in (self.x, slopes, self._slope))
+        inputs = [shared(np.ascontiguousarray(elements)), wp.float64(softness), x_, shared(self._costs), each]
+        parts = [shared(starts), shared(corners), each.flatten(), slope]
+        self._launches = [
+            Launch(fem_shape_measure.measure, len(elements), inputs, threads=threads_of()),
+            Launch(fem_shape_measure.gather, len(x), parts, threads=threads_of()),
+        ]
 
     def at(self, x: Array) -> tuple[float, Array]:
         self.x[:] = x
-        self._launch()
-        each = [np.bincount(self._flat, self._slopes[:, :, k].ravel(), minlength=len(x)) for k in range(3)]
-        return float(self._costs.sum()), np.stack(each, axis=1)
+        for launch in self._launches:
+            launch()
+        return float(self._costs.sum()), self._slope.copy()
 
 
 def as_far(mesh: HexMesh, start: Array, goal: Array, least: float | Array, shorter: float) -> HexMesh:

@@ -177,7 +177,7 @@ def minimal_residuals(
             ahead.append(precondition(basis[k]))
             new = product(ahead[k])
             for _ in range(2):  # twice is enough (Parlett)
-                along = np.array([v @ new for v in basis])
+                along = np.array([dot(v, new) for v in basis])
                 table[: k + 1, k] += along
                 for part, v in zip(along, basis, strict=True):
                     new = new - part * v

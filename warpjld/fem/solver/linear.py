@@ -15,6 +15,7 @@ from warpjld.fem.arrays import Array, Mask, norm
 from warpjld.fem.assembly.block_matrix import BlockMatrix, IndefiniteError, padded
 from warpjld.fem.launch import Launch, shared, threads_of
 from warpjld.fem.mesh.hexmesh import HexMesh
+from warpjld.fem.solver.factor import Factor
 from warpjld.fem.solver.hierarchy import hierarchy_of
 from warpjld.fem.solver.krylov import Iteration, Status, conjugate_gradients, minimal_residuals
 from warpjld.fem.solver.multigrid import Multigrid
@@ -39,10 +40,11 @@ class LinearSolver:
         mesh: Where a multigrid hierarchy comes from.
         method: ``multigrid`` (geometric where the mesh allows, otherwise on a regular grid laid around it),
             ``aggregation`` (smoothed aggregation with rigid-body modes, from pyamg), ``jacobi`` (3×3 blocks),
-            ``direct`` (SuperLU), or ``auto``.
+            ``direct`` (a sparse Cholesky factor, or SuperLU), or ``auto``.
         precision: ``float64``, or ``float32`` with float64 residual refinement.
         poisson: Highest Poisson's ratio: how much smoothing pays.
         hierarchy: Weights from an earlier solver for the same mesh.
+        reuse: An earlier solver that is not needed any more: its factor is written over.
         definite: Whether ``direct`` insists on a positive definite matrix.
         threads: Threads, by default all.
 
@@ -61,6 +63,7 @@ class LinearSolver:
         precision: str = "float64",
         poisson: float = 0.3,
         hierarchy: list[Any] | None = None,
+        reuse: LinearSolver | None = None,
         definite: bool = True,
         threads: int | None = None,
     ) -> None:
@@ -95,8 +98,16 @@ class LinearSolver:
         elif method == "jacobi":
             inverse = block_inverse(stiffness, free)
             self._precondition = lambda r: np.einsum("nij,nj->ni", inverse, r.reshape(-1, 3)).ravel().astype(r.dtype)
+        elif definite:
+            before = None if reuse is None else reuse.factor
+            self._factor: Factor | _General = Factor(stiffness, free, threads=self.threads, reuse=before)
         else:
-            self._factor = _factor(stiffness, free, definite)
+            self._factor = _General(stiffness, free)
+
+    @property
+    def factor(self) -> Factor | None:
+        """Its Cholesky factor, where it has one."""
+        return self._factor if self.method == "direct" and isinstance(self._factor, Factor) else None
 
     def of(self, stiffness: BlockMatrix) -> LinearSolver:
         """A solver for a matrix that differs little from this one's: the preconditioner stays, a factor does not."""
@@ -135,11 +146,7 @@ class LinearSolver:
             return self.masked_product(x) + mask * (nonsymmetric @ x)
 
         def precondition(r: Array) -> Array:
-            if self.method != "direct":
-                return np.asarray(self._precondition(r))
-            x = np.zeros_like(r)
-            x[self.free] = self._factor.solve(r[self.free])
-            return x
+            return self._factor.solve(r) if self.method == "direct" else np.asarray(self._precondition(r))
 
         return minimal_residuals(product, precondition, right, tolerance=tolerance, iterations=iterations)
 
@@ -192,9 +199,8 @@ class LinearSolver:
             return Iteration(x, Status.NOT_FINITE, 0, float("nan"), np.empty(0))
         if size == 0.0:
             return Iteration(x, Status.CONVERGED, 0, 0.0, np.empty(0))
-        x[self.free] = self._factor.solve(b[self.free])
-        r = b - self.masked_product(x)
-        x[self.free] += self._factor.solve(r[self.free])
+        x = self._factor.solve(b)
+        x = x + self._factor.solve(b - self.masked_product(x))
         residual = norm(b - self.masked_product(x)) / size
         if not np.isfinite(residual):
             return Iteration(x, Status.NOT_FINITE, 0, residual, np.empty(0))
@@ -220,13 +226,20 @@ class _Product:
         return self._y.copy()
 
 
-def _factor(stiffness: BlockMatrix, free: Mask, definite: bool) -> Any:
-    inside = stiffness.to_scipy().tocsr()[free][:, free].tocsc()
-    pivoting = 0.0 if definite else 0.1
-    try:
-        factor = splu(inside, permc_spec="MMD_AT_PLUS_A", options={"SymmetricMode": True}, diag_pivot_thresh=pivoting)
-    except RuntimeError as error:
-        raise IndefiniteError(f"the stiffness is singular: {error}") from error
-    if definite and (factor.U.diagonal() <= 0.0).any():
-        raise IndefiniteError("the stiffness is not positive definite")
-    return factor
+class _General:
+    """LU factors of a matrix that need not be positive definite."""
+
+    def __init__(self, stiffness: BlockMatrix, free: Mask) -> None:
+        inside = stiffness.to_scipy().tocsr()[free][:, free].tocsc()
+        options = {"SymmetricMode": True}
+        try:
+            self._factor = splu(inside, permc_spec="MMD_AT_PLUS_A", options=options, diag_pivot_thresh=0.1)
+        except RuntimeError as error:
+            raise IndefiniteError(f"the stiffness is singular: {error}") from error
+        self._free = free
+
+    def solve(self, right: Array) -> Array:
+        """K11⁻¹ b, zero where prescribed, shape (3N,)."""
+        x = np.zeros_like(right)
+        x[self._free] = self._factor.solve(right[self._free])
+        return x

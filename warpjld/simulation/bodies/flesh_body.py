@@ -15,11 +15,12 @@ from warpjld.fem import Body, Material, Prescribed
 from warpjld.fem.hand.alone import FleshAlone
 from warpjld.fem.hand.blend import Moves
 from warpjld.fem.hand.cushion import coarse_note
-from warpjld.fem.hand.flesh_hand import FleshHand, build_flesh_hand
+from warpjld.fem.hand.flesh_hand import FleshHand
 from warpjld.fem.hand.laws import hand_laws
 from warpjld.simulation.animation import ActorAnimation
 from warpjld.simulation.bodies.deformable_body import DeformableBody, History, Surroundings
-from warpjld.simulation.bodies.rest_shape import RestShape, cut_to_digits, rest_in_pose
+from warpjld.simulation.bodies.kept_flesh import resting_flesh
+from warpjld.simulation.bodies.rest_shape import RestShape, cut_to_digits
 from warpjld.simulation.bodies.skin_parts import SkinParts, skin_parts
 from warpjld.simulation.specification import FleshMaterial, located
 from warpjld.skeleton import Poses, Skeleton
@@ -170,16 +171,16 @@ def build_flesh_body(actor: ActorAnimation, material: FleshMaterial, start: floa
     """
     poses, skin, notes = actor.pose(start), actor.skin(start), []
     try:
-        built = build_flesh_hand(actor.rig, material.element, name=actor.name.lower())
+        flesh = resting_flesh(actor.rig, material.element, actor.name.lower(), poses, skin)
     except InputError as error:
         what = error.message.replace("spacing:", "ELEMENT:")
         raise located(InputError(f"FLESH {actor.name}: {what}"), material.where) from error
-    if (coarse := coarse_note(built, material.element, material.digits)) is not None:
+    notes += [f"{actor.name}: {note}" for note in flesh.notes]
+    if (coarse := coarse_note(flesh.cushions, material.element, material.digits)) is not None:
         notes.append(f"{actor.name}: {coarse}")
-    hand, gap = rest_in_pose(built, poses, skin)
-    if gap > 0.5 * material.element:
-        notes.append(f"{actor.name}: the volume stays up to {1e3 * gap:.1f} mm off the skin where it folds")
-    shape = cut_to_digits(hand, poses, skin, material.digits)
+    if flesh.gap > 0.5 * material.element:
+        notes.append(f"{actor.name}: the volume stays up to {1e3 * flesh.gap:.1f} mm off the skin where it folds")
+    shape = cut_to_digits(flesh.hand, poses, skin, material.digits)
     laws = hand_laws(
         shape.hand.mesh.region_names,
         flesh=material.flesh,
@@ -188,7 +189,7 @@ def build_flesh_body(actor: ActorAnimation, material: FleshMaterial, start: floa
         stiffening=material.stiffening,
     )
     bones = BoneMotion(shape.hand, actor, start)
-    return flesh_body(actor.name, shape, laws, material, bones, skin_parts(built)), notes
+    return flesh_body(actor.name, shape, laws, material, bones, skin_parts(flesh.built)), notes
 
 
 def flesh_body(

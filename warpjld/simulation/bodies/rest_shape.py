@@ -259,9 +259,7 @@ def _harmonic(
     from scipy.sparse.linalg import splu
 
     count = len(mesh.nodes)
-    corners = [[0, 1], [1, 2], [2, 3], [3, 0], [4, 5], [5, 6], [6, 7], [7, 4], [0, 4], [1, 5], [2, 6], [3, 7]]
-    edges = np.unique(np.sort(mesh.elements[:, corners].reshape(-1, 2), axis=1), axis=0)
-    edges = edges[edges[:, 0] != edges[:, 1]]
+    edges = mesh.edges()
     stiff = 1.0 / np.linalg.norm(mesh.nodes[edges[:, 1]] - mesh.nodes[edges[:, 0]], axis=1)
     rows, columns = np.concatenate([edges, edges[:, ::-1]]).T
     links = coo_array((np.concatenate([stiff, stiff]), (rows, columns)), shape=(count, count)).tocsr()

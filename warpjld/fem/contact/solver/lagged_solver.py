@@ -1,4 +1,4 @@
-"""Linear solves with a lagged preconditioner: one made for an earlier matrix is kept while it serves."""
+"""Linear solves of a contact problem: by a factor where that is cheap, else with a lagged preconditioner."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ from dataclasses import replace
 from typing import Any
 
 from warpjld.fem.arrays import Array, Mask
-from warpjld.fem.assembly.block_matrix import BlockMatrix
+from warpjld.fem.assembly.block_matrix import BlockMatrix, IndefiniteError
 from warpjld.fem.body import Body
 from warpjld.fem.solver.krylov import Iteration, Status
 from warpjld.fem.solver.linear import LinearSolver
@@ -18,10 +18,15 @@ _MOST = 150
 """Iterations of a solve that is not symmetric."""
 _PATIENCE = 25
 """Iterations after which a preconditioner made for an earlier matrix has served its time."""
+_NODES, _WORK = 40_000, 2e10
+"""Free nodes, and multiplications, up to which a factor costs less than multigrid's iterations."""
 
 
 class LaggedSolver:
     """Solves with the matrices of a contact problem, one like the other.
+
+    Where a sparse factor of K is cheap every matrix gets its own; what is added to K and not symmetric then takes a few
+    iterations. Else, or where K is not positive definite, a multigrid preconditioner is kept while it serves.
 
     Args:
         body: All bodies, merged.
@@ -33,6 +38,8 @@ class LaggedSolver:
         self._mesh = body.mesh
         self._hierarchy: list[Any] | None = None
         self._solver: LinearSolver | None = None
+        self._direct: LinearSolver | None = None
+        self._large = False
 
     def begin(self) -> None:
         """A new step: its first matrix gets a preconditioner of its own."""
@@ -46,6 +53,13 @@ class LaggedSolver:
         Raises:
             IndefiniteError: K is not positive definite.
         """
+        factor = self._factor(matrix, free)
+        if factor is not None:
+            if nonsymmetric is None:
+                return factor.solve(right)
+            done = factor.solve_nonsymmetric(nonsymmetric, right, tolerance=_INNER, iterations=_PATIENCE)
+            if done.status is Status.CONVERGED:
+                return done
         if nonsymmetric is not None:
             return self._nonsymmetric(matrix, free, right, nonsymmetric)
         sofar = None
@@ -64,6 +78,19 @@ class LaggedSolver:
         else:
             done = solver.solve(right, tolerance=_INNER)
         return self._kept(solver, done)
+
+    def _factor(self, matrix: BlockMatrix, free: Mask) -> LinearSolver | None:
+        """A direct solver; None where it costs too much, or K is not positive definite."""
+        if self._large or int(free.reshape(-1, 3).any(axis=1).sum()) > _NODES:
+            return None
+        options = {**self._options, "reuse": self._direct}
+        try:
+            self._direct = LinearSolver(matrix, free, self._mesh, method="direct", **options)
+        except IndefiniteError:
+            return None
+        factor = self._direct.factor
+        self._large = factor is not None and factor.elimination.work > _WORK
+        return self._direct
 
     def _nonsymmetric(self, matrix: BlockMatrix, free: Mask, right: Array, nonsymmetric: Any) -> Iteration:
         if self._solver is not None:

@@ -1,0 +1,231 @@
+"""In which order the nodes of a sparse matrix are eliminated, and the fronts that do it (see ``fem_factor``)."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from scipy.sparse import csc_array, csr_array, diags_array
+from scipy.sparse.linalg import splu
+
+from warpjld.fem.arrays import Ints, Ints32, Mask
+
+__all__ = ["Elimination", "eliminate"]
+
+_LANES = 8  # as in warpjld_kernels.fem_factor
+_NARROW = 8
+"""Nodes of a front up to which it joins the one above whatever zeros that takes, and"""
+_ZEROS = 0.15
+"""share of a front's numbers that may be zeros where it joins."""
+_SHARE = 0.7
+"""Work of what is done side by side, over all; the rest is done after it."""
+
+
+@dataclass(frozen=True, eq=False)
+class Elimination:
+    """An order, and fronts of it; members as in the kernel's ``Fronts`` and ``Blocks``.
+
+    Attributes:
+        order: Nodes in the order of elimination, shape (n,).
+        place: Place of every node in it, -1 where it takes no part, shape (N,).
+        tables: The kernel's tables of fronts, by name.
+        early: Fronts that are done side by side, and where each part of them begins.
+        late: The others.
+        size: Numbers in the panels.
+        room: Numbers of what is left over, at once.
+        work: Multiplications.
+    """
+
+    order: Ints32
+    place: Ints32
+    tables: dict[str, Any]
+    early: tuple[Ints32, Ints32]
+    late: tuple[Ints32, Ints32]
+    size: int
+    room: int
+    work: float
+
+
+def eliminate(rows: Ints32, columns: Ints32, active: Mask) -> Elimination:
+    """An order of least degree (Liu 1985), and its fronts.
+
+    Args:
+        rows: Where each row of a symmetric pattern begins, shape (N + 1,).
+        columns: Its columns.
+        active: Nodes that are eliminated, shape (N,).
+    """
+    nodes = np.flatnonzero(active)
+    full = csr_array((np.ones(len(columns)), columns, rows), shape=(len(active),) * 2)
+    pattern = csr_array(full[nodes][:, nodes])
+    place = np.full(len(active), -1, np.int32)
+    mine, lower = _ordered(pattern)
+    place[nodes] = mine
+    order = np.empty(len(nodes), np.int32)
+    order[mine] = nodes
+    first, lists = _fronts(lower)
+    return _tables(order, place, first, lists)
+
+
+def _ordered(pattern: Any) -> tuple[Ints32, Any]:
+    """Place of each node, and the factor's lower triangle in that order, ``csc_array``: a Laplacian's is found."""
+    count = pattern.shape[0]
+    laplacian = csc_array(diags_array(pattern.sum(axis=1) + 1.0) - pattern)
+    found = splu(laplacian, permc_spec="MMD_AT_PLUS_A", options={"SymmetricMode": True}, diag_pivot_thresh=0.0)
+    lower = csc_array(found.L)
+    lower.sort_indices()
+    assert lower.shape == (count, count)
+    return np.asarray(found.perm_c, np.int32), lower
+
+
+def _fronts(lower: Any) -> tuple[Ints, list[Ints32]]:
+    """First columns of the fronts, shape (F + 1,), and the rows of each, its own columns first."""
+    count = lower.shape[0]
+    sizes = np.diff(lower.indptr)
+    second = np.full(count, count)
+    some = sizes > 1
+    second[some] = lower.indices[lower.indptr[:-1][some] + 1]
+    begins = np.ones(count + 1, dtype=bool)
+    begins[1:-1] = (second[:-1] != np.arange(1, count)) | (sizes[1:] != sizes[:-1] - 1)
+    starts = np.flatnonzero(begins)
+    # where the next front is this one's parent they may become one
+    kept: list[tuple[int, int, int, Ints32]] = []  # first, last column + 1, zeros, rows below
+    for low, high in zip(starts[:-1].tolist(), starts[1:].tolist(), strict=True):
+        rows = lower.indices[lower.indptr[high - 1] + 1 : lower.indptr[high]]
+        zeros = 0
+        while kept and len(kept[-1][3]) and kept[-1][3][0] < high and kept[-1][1] == low:
+            begin, end, held, below = kept[-1]
+            more = held + zeros + (end - begin) * (high - low + len(rows) - len(below))
+            wide = high - begin
+            if wide > _NARROW and more > _ZEROS * wide * (0.5 * wide + len(rows)):
+                break
+            low, zeros = begin, more
+            kept.pop()
+        kept.append((low, high, zeros, rows))
+    lists = [np.concatenate([np.arange(a, b, dtype=np.int32), rows]) for a, b, _, rows in kept]
+    return np.array([a for a, *_ in kept] + [count]), lists
+
+
+def _tables(order: Ints32, place: Ints32, first: Ints, lists: list[Ints32]) -> Elimination:
+    count = len(lists)
+    own = np.diff(first)
+    every = np.array([len(rows) for rows in lists])
+    owner = np.repeat(np.arange(count), own)
+    parent = np.array([owner[rows[k]] if len(rows) > k else -1 for rows, k in zip(lists, own, strict=True)])
+    children = np.flatnonzero(parent >= 0)
+    children = children[np.argsort(parent[children], kind="stable")]
+    child = np.zeros(count + 1, np.int32)
+    np.cumsum(np.bincount(parent[parent >= 0], minlength=count), out=child[1:])
+    high, wide, rest = _padded(3 * every), 3 * own, _padded(3 * (every - own))
+    panel = np.concatenate([[0], np.cumsum(high * wide)])
+    n, m = wide.astype(float), 3.0 * every
+    work = n * (m * (m - n) + n * n / 3.0)
+    below = work.copy()
+    for front in range(count):  # children come before their parents
+        if parent[front] >= 0:
+            below[parent[front]] += below[front]
+    parts = _parted(parent, below, work)
+    left, room, sizes = np.zeros(count, np.int64), 0, rest * 3 * (every - own)
+    parts = [_sequence(part, parent, sizes) for part in parts]
+    for part in parts:
+        room = _stacked(part, parent, sizes, left, room)
+    tables = {
+        "first": first.astype(np.int32),
+        "starts": np.concatenate([[0], np.cumsum(every)]).astype(np.int32),
+        "rows": np.concatenate(lists).astype(np.int32),
+        "child": child,
+        "children": children.astype(np.int32),
+        "panel": panel[:-1].astype(np.int64),
+        "left": left,
+    }
+    *early, late = parts
+    ends = np.cumsum([0, *map(len, early)]).astype(np.int32)
+    sides = (np.concatenate(early).astype(np.int32), ends), (late.astype(np.int32), np.array([0, len(late)], np.int32))
+    return Elimination(order, place, tables, *sides, int(panel[-1]), room, float(work.sum()))
+
+
+def _padded(count: Ints) -> Ints:
+    return (count + _LANES - 1) // _LANES * _LANES
+
+
+def _parted(parent: Ints, below: Any, work: Any) -> list[Ints]:
+    """Fronts of whole branches in two parts of like work, and what is above them; the same however many threads."""
+    roots = np.flatnonzero(parent < 0).tolist()
+    branches, above = roots, 0.0
+    total = float(work.sum())
+    kids: dict[int, list[int]] = {}
+    for front, up in enumerate(parent.tolist()):
+        kids.setdefault(up, []).append(front)
+    while True:
+        sums, sides = [0.0, 0.0], [[], []]
+        for branch in sorted(branches, key=lambda one: (-below[one], one)):
+            side = int(sums[1] < sums[0])
+            sums[side] += below[branch]
+            sides[side].append(branch)
+        largest = max(branches, key=lambda one: (below[one], -one), default=None)
+        if largest is None or min(sums) >= 0.8 * max(sums) or above > (1.0 - _SHARE) * total:
+            break
+        if not kids.get(largest):
+            break
+        above += float(work[largest])
+        branches = [one for one in branches if one != largest] + kids[largest]
+    side_of = np.full(len(parent), 2)
+    for side, roots_of in enumerate(sides):
+        side_of[roots_of] = side
+    for front in range(len(parent) - 1, -1, -1):  # parents come after their children
+        if side_of[front] == 2 and parent[front] >= 0:
+            side_of[front] = side_of[parent[front]] if side_of[parent[front]] != 2 else 2
+    return [np.flatnonzero(side_of == side) for side in range(3)]
+
+
+def _sequence(part: Ints, parent: Ints, sizes: Ints) -> Ints:
+    """Fronts of a part in an order, children first, in which what waits takes least room (Liu 1986)."""
+    inside = np.zeros(len(parent), dtype=bool)
+    inside[part] = True
+    ups, size = parent.tolist(), sizes.tolist()
+    kids: dict[int, list[int]] = {}
+    peak: dict[int, int] = {}
+    tops = []
+    for front in part.tolist():
+        waiting, most = 0, 0
+        kids.setdefault(front, []).sort(key=lambda one: (size[one] - peak[one], one))
+        for child in kids[front]:
+            most = max(most, waiting + peak[child])
+            waiting += size[child]
+        peak[front] = max(most, waiting + size[front])
+        if ups[front] >= 0 and inside[ups[front]]:
+            kids.setdefault(ups[front], []).append(front)
+        else:
+            tops.append(front)
+    out, todo = [], tops
+    while todo:  # parents before children, last child first: the other way round
+        front = todo.pop()
+        out.append(front)
+        todo += kids[front]
+    return np.array(out[::-1], np.int64)
+
+
+def _stacked(part: Ints, parent: Ints, sizes: Ints, left: Ints, start: int) -> int:
+    """Places of what fronts leave over: two stacks, for those an odd and an even number of fronts below the top, so
+    that what is used up is always on top of the other one. Returns where the stacks end."""
+    inside = np.zeros(len(parent), dtype=bool)
+    inside[part] = True
+    depth = np.zeros(len(parent), np.int64)
+    for front in part[::-1].tolist():
+        up = parent[front]
+        depth[front] = depth[up] + 1 if up >= 0 and inside[up] else 0
+    for measured in (True, False):
+        heights, tops = [0, 0], [0, 0]
+        waiting: list[list[tuple[int, int]]] = [[], []]
+        for front in part.tolist():
+            parity = int(depth[front] % 2)
+            other = waiting[1 - parity]
+            while other and parent[other[-1][0]] == front:
+                heights[1 - parity] = other.pop()[1]
+            if not measured:
+                left[front] = start + (tops_of[0] if parity else 0) + heights[parity]
+            waiting[parity].append((front, heights[parity]))
+            heights[parity] += int(sizes[front])
+            tops[parity] = max(tops[parity], heights[parity])
+        tops_of = tops
+    return start + sum(tops_of) + _LANES

@@ -1,0 +1,95 @@
+"""Cholesky factor of a sparse block matrix, for direct solves and as a preconditioner (see ``fem_factor``)."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from warpjld.fem.arrays import Array, Mask
+from warpjld.fem.assembly.block_matrix import BlockMatrix, IndefiniteError
+from warpjld.fem.launch import Launch, grouped, on_rows, shared
+from warpjld.fem.solver.elimination import Elimination, eliminate
+
+__all__ = ["Factor"]
+
+
+class Factor:
+    """L of K11 = L Lᵀ.
+
+    Args:
+        matrix: Full K, float64.
+        free: Free degrees of freedom, shape (3N,).
+        threads: Threads.
+        reuse: A factor that is not needed any more: its memory is written over, and its order is kept where it has room
+            for all that this matrix has.
+
+    Attributes:
+        elimination: The order and the fronts.
+
+    Raises:
+        IndefiniteError: K11 is not positive definite.
+    """
+
+    def __init__(self, matrix: BlockMatrix, free: Mask, *, threads: int, reuse: Factor | None = None) -> None:
+        self._free = free
+        found = False
+        if reuse is not None and np.array_equal(reuse._free, free):
+            self.elimination, self._panels, self._work = reuse.elimination, reuse._panels, reuse._work
+            found = self._factorised(matrix, threads)
+        if not found:
+            active = free.reshape(-1, 3).any(axis=1)
+            self.elimination = eliminate(matrix.rows, matrix.columns, active)
+            self._panels, self._work = np.empty(self.elimination.size + 8), np.empty(self.elimination.room + 8)
+            self._factorised(matrix, threads)
+        elimination = self.elimination
+        degrees = (3 * elimination.order[:, None].astype(np.int64) + np.arange(3)).ravel()
+        self._degrees = degrees
+        self._x = np.empty(len(degrees))
+        from warpjld_kernels import fem_factor
+
+        widest = int(np.diff(elimination.tables["starts"]).max(initial=0))
+        inputs = [self._fronts(elimination, elimination.late), shared(self._panels), shared(np.empty(3 * widest + 8))]
+        self._launch = Launch(fem_factor.solve, 1, [*inputs, shared(self._x)])
+
+    def solve(self, right: Array) -> Array:
+        """K11⁻¹ b, zero where prescribed, shape (3N,)."""
+        self._x[:] = right[self._degrees]
+        self._launch()
+        out = np.zeros_like(right)
+        out[self._degrees] = self._x
+        return np.where(self._free, out, 0.0)
+
+    @staticmethod
+    def _fronts(elimination: Elimination, part: tuple[Any, Any]) -> Any:
+        from warpjld_kernels import fem_factor
+
+        return grouped(fem_factor.Fronts, **elimination.tables, todo=part[0], parts=part[1])
+
+    def _factorised(self, matrix: BlockMatrix, threads: int) -> bool:
+        """Find the panels; false where the matrix has what the fronts have no room for."""
+        from warpjld_kernels import fem_factor
+
+        elimination = self.elimination
+        blocks = grouped(
+            fem_factor.Blocks,
+            rows=matrix.rows,
+            columns=matrix.columns,
+            values=matrix.values.reshape(-1),
+            order=elimination.order,
+            place=elimination.place,
+            free=self._free.astype(np.float64),
+        )
+        for part in (elimination.early, elimination.late):
+            count = len(part[1]) - 1
+            number = np.full((count, len(elimination.place)), -1, np.int32)
+            failed = np.zeros(count, np.int32)
+            memory = [shared(a) for a in (number.reshape(-1), self._work, self._panels, failed)]
+            inputs = [self._fronts(elimination, part), blocks, *memory]
+            on_rows(fem_factor.factorise, count, inputs, threads=threads, least=2)
+            if (failed < 0).any():
+                return False
+            if (failed > 0).any():
+                node = int(failed[failed > 0][0]) - 1
+                raise IndefiniteError(f"the stiffness is not positive definite (found at node {node})")
+        return True

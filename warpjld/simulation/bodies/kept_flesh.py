@@ -1,0 +1,105 @@
+"""Meshes of flesh kept in files: making one takes many seconds, reading it a tenth of one."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from warpjld.fem.flesh import Flesh
+from warpjld.fem.hand.blend import Moves
+from warpjld.fem.hand.cushion import Cushion, cushions
+from warpjld.fem.hand.flesh_hand import FleshHand, build_flesh_hand
+from warpjld.fem.mesh.bones import Bone
+from warpjld.fem.mesh.embedding import Embedding
+from warpjld.fem.mesh.fit import Fit
+from warpjld.fem.mesh.hexmesh import HexMesh
+from warpjld.kept_values import hash_of, kept_value
+from warpjld.rig import Rig
+from warpjld.simulation.bodies.rest_shape import rest_in_pose
+from warpjld.skeleton import Poses
+
+__all__ = ["RestingFlesh", "resting_flesh"]
+
+
+@dataclass(frozen=True, eq=False)
+class RestingFlesh:
+    """A hand's flesh where contact begins.
+
+    Attributes:
+        built: As it was meshed, at the rig's rest.
+        hand: At rest in the pose.
+        gap: Greatest distance of its mesh's skin nodes from the skin there [m].
+        cushions: Flesh under the phalanges, at the rig's rest.
+        notes: Of files that could not be used.
+    """
+
+    built: FleshHand
+    hand: FleshHand
+    gap: float
+    cushions: tuple[Cushion, ...]
+    notes: tuple[str, ...]
+
+
+@dataclass(frozen=True, eq=False)
+class _Meshed:
+    """All of a ``FleshHand`` that its rig does not have already."""
+
+    flesh: Flesh
+    place: Moves
+    weights: NDArray[np.float64]
+    skin_faces: NDArray[np.int32]
+    skin_labels: NDArray[np.int32]
+    label_names: tuple[str, ...]
+    excluded: NDArray[np.bool_]
+    skin_fringes: NDArray[np.float64]
+    cushions: tuple[Cushion, ...]
+
+
+@dataclass(frozen=True, eq=False)
+class _Posed:
+    """What a pose changes of a mesh; the greatest distance from the skin."""
+
+    nodes: NDArray[np.float64]
+    node_sets: dict[str, NDArray[np.int32]]
+    gap: float
+
+
+_CLASSES = (_Meshed, Flesh, HexMesh, Bone, Embedding, Fit, Moves, Cushion)
+_SHARED = ("place", "weights", "skin_faces", "skin_labels", "label_names", "excluded", "skin_fringes")
+
+
+def resting_flesh(rig: Rig, element: float, name: str, poses: Poses, skin: NDArray[np.float64]) -> RestingFlesh:
+    """A rig's flesh, meshed at its rest and carried to a pose; out of files where that was done before.
+
+    Args:
+        rig: Surface and skeleton.
+        element: Edge length of the elements [m].
+        name: As of ``build_flesh_hand``.
+        poses: One pose.
+        skin: Its surface there [m], shape (V, 3).
+
+    Raises:
+        InputError: It cannot be meshed, or not in that pose.
+    """
+
+    def mesh() -> _Meshed:
+        hand = build_flesh_hand(rig, element, name=name)
+        parts = {part: getattr(hand, part) for part in _SHARED}
+        return _Meshed(flesh=hand.flesh, cushions=cushions(hand), **parts)
+
+    key = hash_of(rig.surface.vertices, rig.surface.faces, rig.skeleton, element, name)
+    meshed, notes = kept_value("flesh", key, _CLASSES, mesh)
+    parts = {part: getattr(meshed, part) for part in _SHARED}
+    built = FleshHand(name=name, flesh=meshed.flesh, skeleton=rig.skeleton, surface=rig.surface, **parts)
+
+    def pose() -> _Posed:
+        hand, gap = rest_in_pose(built, poses, skin)
+        return _Posed(hand.mesh.nodes, hand.mesh.node_sets, gap)
+
+    key = hash_of(key, poses, skin)
+    posed, more = kept_value("rest", key, (_Posed,), pose)
+    moved = replace(built.mesh, nodes=posed.nodes, node_sets=posed.node_sets)
+    hand = replace(built, flesh=replace(built.flesh, mesh=moved))
+    return RestingFlesh(built, hand, posed.gap, meshed.cushions, (*notes, *more))
