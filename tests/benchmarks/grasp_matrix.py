@@ -75,6 +75,7 @@ def main() -> None:
     parser.add_argument("--objects", nargs="+", default=[*OBJECTS, *(f"{o}.{y}" for o in DEFORMABLE for y in YOUNG)])
     parser.add_argument("--tasks", nargs="+", choices=TASKS, default=list(TASKS))
     parser.add_argument("--coarse", type=float, default=0.003, help="edge length of the flesh's elements [m]")
+    parser.add_argument("--digits", nargs="+", default=[], help="digits whose flesh is solved; the whole hand if left out")
     parser.add_argument("--limit", type=float, default=900.0, help="seconds a case may take")
     parser.add_argument("--again", action="store_true", help="run cases again that have a row")
     parser.add_argument("--script", default="", help="lines added to every script, as FRICTION 0.3")
@@ -99,7 +100,7 @@ def main() -> None:
 def lines(hand: str, thing: str, task: str, arguments: argparse.Namespace) -> str:
     """The script of a case."""
     name, _, kind = thing.partition(".")
-    side = HANDS[hand].split()[1]
+    side, digits = HANDS[hand].split()[1], " ".join(arguments.digits).upper()
     physical = kind or ("stiff" if task == "lift" else "")
     script = [HANDS[hand], f"OBJECT THING {OBJECTS[name]} AT 0 0 0", f"FRAMES 0 {LAST}", "SPLINE 1"]
     if physical:
@@ -110,7 +111,7 @@ def lines(hand: str, thing: str, task: str, arguments: argparse.Namespace) -> st
         "force": [f"SQUEEZE 24 {LAST} {side} FORCE 4"],
         "lift": [f"LIFT 24 {LAST} {side} THING"],
     }[task]
-    script += [f"FLESH {side} ELEMENT {arguments.coarse:g}", f"PRESS 20 {LAST} EVERY 2", *arguments.script.split(";")]
+    script += [f"FLESH {side} {digits} ELEMENT {arguments.coarse:g}", f"PRESS 20 {LAST} EVERY 2", *arguments.script.split(";")]
     return "\n".join(script)
 
 
@@ -217,7 +218,7 @@ def worst_balance(found: Any) -> tuple[float, float]:
 def apart(hand: str, thing: str, task: str, arguments: argparse.Namespace) -> dict[str, Any]:
     """Run one in a process of its own."""
     command = [sys.executable, __file__, "--one", hand, thing, task, "--coarse", str(arguments.coarse)]
-    command += ["--script", arguments.script]
+    command += ["--script", arguments.script, *(["--digits", *arguments.digits] if arguments.digits else [])]
     if arguments.pictures is not None:
         arguments.pictures.mkdir(parents=True, exist_ok=True)
         command += ["--pictures", str(arguments.pictures)]

@@ -26,6 +26,8 @@ from warpjld.skeleton import Poses, Skeleton
 
 __all__ = ["FLESHED", "BoneMotion", "FleshBody", "build_flesh_body", "flesh_body"]
 
+_SIZES = (1.0, 0.96, 0.91, 0.86)
+"""Edges of elements that are tried, over the one that is asked for."""
 FLESHED = 0.5
 """Share of the flesh in skin from which on it has flesh to give way with."""
 
@@ -139,11 +141,6 @@ class FleshBody(DeformableBody):
         """Where points (n, 3) [m] go that go along with the hand as a whole."""
         return self.moves(before).to(self.moves(time)).of(np.zeros(len(points), np.int64), points)
 
-    def skin_points(self, displacement: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Nodes of the skin under a displacement (N, 3) [m], shape (n, 3)."""
-        skin = np.unique(self.mesh.quads(self.hand.skin_faces))
-        return self.mesh.nodes[skin] + displacement[skin]
-
     def way(
         self, times: Sequence[float], displacement: NDArray[np.float64], nodes: NDArray[np.integer]
     ) -> list[NDArray[np.float64]]:
@@ -169,15 +166,14 @@ def build_flesh_body(actor: ActorAnimation, material: FleshMaterial, start: floa
         InputError: It cannot be meshed in that pose; names the line of its FLESH.
     """
     poses, skin, notes = actor.pose(start), actor.skin(start), []
-    try:
-        built = build_flesh_hand(actor.rig, material.element, name=actor.name.lower())
-    except InputError as error:
-        what = error.message.replace("spacing:", "ELEMENT:")
-        raise located(InputError(f"FLESH {actor.name}: {what}"), material.where) from error
-    if (coarse := coarse_note(built, material.element, material.digits)) is not None:
+    built, hand, gap, element = _meshed(actor, material, poses, skin)
+    if element != material.element:
+        notes.append(
+            f"{actor.name}: elements of {1e3 * element:.3g} mm, since of {1e3 * material.element:g} mm one is distorted"
+        )
+    if (coarse := coarse_note(built, element, material.digits)) is not None:
         notes.append(f"{actor.name}: {coarse}")
-    hand, gap = rest_in_pose(built, poses, skin)
-    if gap > 0.5 * material.element:
+    if gap > 0.5 * element:
         notes.append(f"{actor.name}: the volume stays up to {1e3 * gap:.1f} mm off the skin where it folds")
     shape = cut_to_digits(hand, poses, skin, material.digits)
     laws = hand_laws(
@@ -189,6 +185,30 @@ def build_flesh_body(actor: ActorAnimation, material: FleshMaterial, start: floa
     )
     bones = BoneMotion(shape.hand, actor, start)
     return flesh_body(actor.name, shape, laws, material, bones, skin_parts(built)), notes
+
+
+def _meshed(
+    actor: ActorAnimation, material: FleshMaterial, poses: Poses, skin: NDArray[np.float64]
+) -> tuple[FleshHand, FleshHand, float, float]:
+    """A hand where its rig rests and in a pose, how far its volume then stays off the skin, and its elements' edge [m].
+
+    Whether some element at a cut or between two digits comes out distorted hangs on where the grid happens to lie: a
+    grid a little finer has it elsewhere.
+
+    Raises:
+        InputError: It cannot be meshed at any of these sizes: what was wrong with the one that was asked for.
+    """
+    failure: InputError | None = None
+    for share in _SIZES:
+        element = share * material.element
+        try:
+            built = build_flesh_hand(actor.rig, element, name=actor.name.lower())
+            return built, *rest_in_pose(built, poses, skin), element
+        except InputError as error:
+            failure = failure or error
+    assert failure is not None
+    what = failure.message.replace("spacing:", "ELEMENT:")
+    raise located(InputError(f"FLESH {actor.name}: {what}"), material.where) from failure
 
 
 def flesh_body(
