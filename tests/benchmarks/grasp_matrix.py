@@ -1,7 +1,7 @@
 """Hands × objects × ways to grip: how many end plausibly, how the others end, and what it takes.
 
-    PYTHONPATH=.:kernels python tests/benchmarks/grasp_matrix.py --out matrix.csv [--hands left small] [--objects can box]
-        [--tasks squeeze force lift] [--coarse 0.005] [--limit 900] [--again] [--script "<extra lines>"]
+    PYTHONPATH=.:kernels python tests/benchmarks/grasp_matrix.py --out matrix.csv [--hands left small]
+        [--objects can box] [--tasks squeeze force lift] [--coarse 0.005] [--limit 900] [--again]
 
 Every case is GRASP … AUTO, then one of: ``squeeze``, SQUEEZE by 3°; ``force``, SQUEEZE FORCE 4; ``lift``, LIFT the
 object's weight. Objects are rigid, or soft (20 kPa) or stiff (1 MPa) PHYSICAL ones (``ball.soft``); what is lifted is
@@ -10,11 +10,12 @@ that have a row are left out, so that a run that was cut off goes on. The table 
 
 Data of others is looked for in ``shared/data`` beside the repository; without it only built-in hands and objects run.
 
-Columns: ``end``: how it ended, ``plausible``, or the first of the following that does not hold. Every frame asked for was
-solved (else the solver's status); no digit bears more than its muscles can (``muscles``); no pressure is above 1 MPa
-(``crushed``); no object that a hand touches is left with a net force above a third of what presses on it
-(``unbalanced``); something is touched (``untouched``). ``newton``: Newton iterations of the load steps that were found, mean
-and the 90th percentile; ``lost``: iterations of searches that failed; ``seconds``: processor time of the contact solve.
+Columns: ``end``: how it ended, ``plausible``, or the first of the following that does not hold. Every frame was solved
+(else the solver's status); no pressure is above 1 MPa (``crushed``); no digit bears more than its muscles can
+(``muscles``); something is touched (``untouched``); no object is left with a net force of the hand above a third of what
+presses on it, and above what it would weigh if it were of water (``unbalanced``). ``newton``: linear solves of the
+searches that found an equilibrium, mean and 90th percentile; ``lost``: those of searches in vain; ``seconds``: processor
+time of the contact solve.
 """
 
 from __future__ import annotations
@@ -75,7 +76,9 @@ def main() -> None:
     parser.add_argument("--objects", nargs="+", default=[*OBJECTS, *(f"{o}.{y}" for o in DEFORMABLE for y in YOUNG)])
     parser.add_argument("--tasks", nargs="+", choices=TASKS, default=list(TASKS))
     parser.add_argument("--coarse", type=float, default=0.003, help="edge length of the flesh's elements [m]")
-    parser.add_argument("--digits", nargs="+", default=[], help="digits whose flesh is solved; the whole hand if left out")
+    parser.add_argument(
+        "--digits", nargs="+", default=[], help="digits whose flesh is solved; the whole hand if left out"
+    )
     parser.add_argument("--limit", type=float, default=900.0, help="seconds a case may take")
     parser.add_argument("--again", action="store_true", help="run cases again that have a row")
     parser.add_argument("--script", default="", help="lines added to every script, as FRICTION 0.3")
@@ -111,7 +114,11 @@ def lines(hand: str, thing: str, task: str, arguments: argparse.Namespace) -> st
         "force": [f"SQUEEZE 24 {LAST} {side} FORCE 4"],
         "lift": [f"LIFT 24 {LAST} {side} THING"],
     }[task]
-    script += [f"FLESH {side} {digits} ELEMENT {arguments.coarse:g}", f"PRESS 20 {LAST} EVERY 2", *arguments.script.split(";")]
+    script += [
+        f"FLESH {side} {digits} ELEMENT {arguments.coarse:g}",
+        f"PRESS 20 {LAST} EVERY 2",
+        *arguments.script.split(";"),
+    ]
     return "\n".join(script)
 
 
@@ -164,7 +171,7 @@ def judged(found: Any) -> dict[str, Any]:
 
     frames, rows = found.solved.frames, found.rows
     finite = [r.share for r in rows if np.isfinite(r.share)]
-    net, total = worst_balance(found)
+    net, total, weight = worst_balance(found)
     asked = len([f for f in range(20, LAST + 1, 2) if f > found.solved.start])
     out: dict[str, Any] = {
         "frames": len(frames),
@@ -187,22 +194,24 @@ def judged(found: Any) -> dict[str, Any]:
         end = "muscles"
     elif out["most_n"] == 0.0:
         end = "untouched"
-    elif net > UNBALANCED * total:
+    elif net > max(UNBALANCED * total, weight):
         end = "unbalanced"
     else:
         end = "plausible"
     return out | {"end": end}
 
 
-def worst_balance(found: Any) -> tuple[float, float]:
-    """Net force of the hand on what it touches at the last frame, and what presses in all: the pair of the worst share."""
+def worst_balance(found: Any) -> tuple[float, float, float]:
+    """Net force of the hand on what it touches at the last frame, what presses in all, and what the object would weigh
+    if it were of water [N]: of the pair with the worst share."""
     import numpy as np
+    import trimesh
 
     if not found.solved.frames:
-        return 0.0, 0.0
+        return 0.0, 0.0, 0.0
     last, model = found.solved.frames[-1], found.model
     hands = {hand.name for hand in model.hands}
-    worst = (0.0, 0.0)
+    worst = (0.0, 0.0, 0.0)
     for owner, nodal in zip(model.owners, last.nodal, strict=True):
         if owner.slave in hands and owner.master in hands:
             continue
@@ -211,7 +220,11 @@ def worst_balance(found: Any) -> tuple[float, float]:
         total = float(np.linalg.norm(force, axis=1).sum())
         net = float(np.linalg.norm(force.sum(axis=0)))
         if net * worst[1] >= worst[0] * total and total > 0.0:
-            worst = (net, total)
+            other = owner.master if hand == owner.slave else owner.slave
+            weight = 0.0
+            if other in model.obstacles:
+                weight = 9810.0 * abs(float(trimesh.Trimesh(*model.obstacles[other].mesh(0.0), process=False).volume))
+            worst = (net, total, weight)
     return worst
 
 

@@ -18,6 +18,7 @@ from warpjld.simulation.solve.bone_clearance import TIGHT, BoneClearance, TightB
 from warpjld.simulation.solve.branch import solve_onward
 from warpjld.simulation.solve.checkpoint import Checkpoint, CheckpointFile
 from warpjld.simulation.solve.force_limit import ForceLimits, Stop
+from warpjld.simulation.solve.grasp_balance import weight_of
 from warpjld.simulation.solve.missed_contacts import MissedContact, missed_contacts
 from warpjld.simulation.solve.solved_frame import SolvedFrame, solved_frame
 from warpjld.simulation.solve.substeps import Substeps
@@ -135,7 +136,10 @@ class _Run:
     def __post_init__(self) -> None:
         self.substeps = Substeps(self.model)
         self.clearance = BoneClearance(self.model)
-        self.limits = ForceLimits(self.contact.strength, self.request.pressure, self.clearance)
+        weights = {
+            name: weight_of(obstacle) for name, obstacle in self.model.obstacles.items() if name in self.contact.grasped
+        }
+        self.limits = ForceLimits(self.contact.strength, self.request.pressure, weights, self.clearance)
 
     def resume(self, found: Checkpoint) -> None:
         """Go on from what another run left."""

@@ -238,6 +238,7 @@ class ContactSpecification:
         strength: Largest force of digits [N], by actor and digit, where it is not the default.
         grips: Grips to find, in the order of their frames.
         pressing: What to solve, if anything.
+        grasped: Objects that digits have closed on: hands alone are to hold them.
     """
 
     physical: dict[str, ObjectMaterial] = field(default_factory=dict)
@@ -251,6 +252,7 @@ class ContactSpecification:
     strength: dict[str, dict[str, float]] = field(default_factory=dict)
     grips: list[GripSpecification] = field(default_factory=list)
     pressing: SolveSpecification | None = None
+    grasped: tuple[str, ...] = ()
 
     def check(self) -> None:
         """Refuse numbers that are none.

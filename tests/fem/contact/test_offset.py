@@ -48,8 +48,8 @@ def test_offsets_of_both_sides_add_up() -> None:
 
 def test_slivers_are_no_constraint_however_far_skin_lies_outside() -> None:
     """A block is drawn off another sideways, .2 above it: what a node of the lower one shares with it shrinks to a
-    sliver and to nothing. Skin half an edge outside each touches there as long as the share is whole, lets go ever more
-    as the share fades, and is nowhere a constraint where hardly anything is left (one of 3e-4 edge² had no solution)."""
+    sliver and to nothing. Skin half an edge outside each touches there as long as the share is whole, lets go ever
+    more as it fades, and is nowhere a constraint where hardly anything is left (one of 3e-4 edge² had no solution)."""
     mesh = merge(named(block(), "a"), named(block(), "b", (0.0, 0.0, 1.2)))
     offset = np.full(len(mesh.nodes), 0.5 / 3.0)
     interface = Interface(mesh, Pair("a.z+", "b.z-", offset=offset), 1)

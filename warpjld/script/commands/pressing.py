@@ -37,9 +37,11 @@ def press(scene: Scene, arguments: Arguments) -> None:
         stop=lambda: True,
         correct=lambda: True,
         rigid=lambda: True,
-        pressure=lambda: arguments.number("the pressure that skin bears in pascals", above=0.0),
+        bears=lambda: arguments.number("the pressure that skin bears in pascals", above=0.0),
         state=lambda: arguments.output_name("the file of the state", (".npz",)),
     )
+    if "bears" in options:
+        options["pressure"] = options.pop("bears")
     if options.get("aitken") and options.get("method") != "paper":
         raise arguments.error("AITKEN relaxes the paper's loop: it goes with METHOD PAPER")
     if sum(bool(options.get(name)) for name in ("stop", "correct", "rigid")) > 1:

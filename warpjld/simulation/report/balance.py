@@ -8,14 +8,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from warpjld.simulation.bodies.model import ContactModel
+from warpjld.simulation.solve.grasp_balance import allowed_net, weight_of
 from warpjld.simulation.solve.solved_frame import SolvedFrame
 
 __all__ = ["ObjectBalance", "balances"]
 
 _OPPOSED = 0.1
 """Share of what presses that has to meet a counterforce for an object to be grasped, and not merely pushed."""
-_LEFT_OVER = 1.0 / 3.0
-"""Net force over what presses, from which on a grasp does not balance."""
 _SLIGHT = 0.1
 """Forces below this are not told [N]."""
 
@@ -31,6 +30,7 @@ class ObjectBalance:
         moment: About the centre of what presses [N m], shape (3,).
         pressing: Sum of their sizes [N].
         by_hands: Whether nothing but hands touches it.
+        weight: What it may weigh [N].
         borne: Whether something else holds it: its animation, HOLD, a support, or its own weight.
     """
 
@@ -40,6 +40,7 @@ class ObjectBalance:
     moment: NDArray[np.float64]
     pressing: float
     by_hands: bool
+    weight: float
     borne: bool
 
     @property
@@ -55,7 +56,7 @@ class ObjectBalance:
     @property
     def unbalanced(self) -> bool:
         """Whether a grasp pushes it away."""
-        return self.grasped and self.net > max(_LEFT_OVER * self.pressing, _SLIGHT)
+        return self.grasped and self.net > max(allowed_net(self.pressing, self.weight), _SLIGHT)
 
     @property
     def text(self) -> str:
@@ -93,7 +94,8 @@ def balances(model: ContactModel, solved: SolvedFrame) -> list[ObjectBalance]:
         moment = np.cross(x - centre, forces).sum(axis=0)
         one = bodies.get(name)
         borne = one is None or bool(one.states) or one.support is not None or any(model.loads.gravity)
-        out.append(ObjectBalance(name, solved.frame, force, moment, pressing, others <= hands, borne))
+        weight = weight_of(model.obstacles[name], solved.frame - model.start) if one is None else 0.0
+        out.append(ObjectBalance(name, solved.frame, force, moment, pressing, others <= hands, weight, borne))
     return out
 
 

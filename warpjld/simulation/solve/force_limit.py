@@ -50,6 +50,10 @@ _HALVINGS = 2
 _SPENT = 0.25
 """Share of the flesh over a bone that is left where a digit stops whatever its load: pressures are far beyond any limit
 there, and equilibria hard to find."""
+_SQUEEZED = 0.15
+"""Share of the flesh over a bone by which one step squeezes it at most: forces double meanwhile."""
+_PARTS = (1.0, 0.5, 0.25, 0.125)
+"""Parts of what it lags behind by that a digit may make up for in a step."""
 _LOOKS = 8
 """Places on a step's way at which that is looked for."""
 
@@ -71,6 +75,26 @@ class Stop:
     why: str
 
 
+@dataclass(frozen=True)
+class _Ramp:
+    """The most that joints of a digit flex by, at two times and straight between them.
+
+    Attributes:
+        begin, end: The times.
+        most: Flexions there [rad], by joint.
+    """
+
+    begin: float
+    end: float
+    most: Mapping[int, tuple[float, float]]
+
+    def at(self, joint: int, time: float) -> float:
+        """At a time, the nearer end's outside."""
+        one, other = self.most[joint]
+        share = (time - self.begin) / (self.end - self.begin) if self.end > self.begin else 1.0
+        return one + min(1.0, max(0.0, share)) * (other - one)
+
+
 @dataclass(eq=False)
 class ForceLimits:
     """Which digits have stopped, and where.
@@ -78,15 +102,17 @@ class ForceLimits:
     Attributes:
         strength: Largest forces of digits [N], by actor and digit, where they are not the default.
         pressure: What skin bears [Pa].
+        weights: What objects may weigh that hands alone are to hold, by name [N].
         clearance: Of the bones.
         stops: Digits that stopped, the first time each.
     """
 
     strength: Mapping[str, Mapping[str, float]]
     pressure: float
+    weights: Mapping[str, float]
     clearance: BoneClearance
     stops: list[Stop] = field(default_factory=list)
-    _caps: dict[_Key, dict[int, float]] = field(default_factory=dict)
+    _caps: dict[_Key, _Ramp] = field(default_factory=dict)
     _loads: dict[_Key, DigitLoad] = field(default_factory=dict)
     _stuck: set[_Key] = field(default_factory=set)
 
@@ -94,10 +120,9 @@ class ForceLimits:
         self, model: ContactModel, history: History, before: ContactSolution | None, times: Sequence[float]
     ) -> ContactSolution:
         """Equilibria at rising times, as ``solve_onward`` has them; digits that reach their limits stop on the way."""
-        self._relax()
         reached: list[ContactInstant] = []
         now = 0.0 if before is None else before.last.time
-        for time in times:
+        for time in self._finer(model, now, times):
             found = self._step(model, history, before, now, time)
             if not found.converged:
                 return replace(found, instants=(*reached, found.last))
@@ -109,7 +134,7 @@ class ForceLimits:
     def content(self) -> dict[str, Any]:
         """As plain values, for a run that goes on."""
         return {
-            "caps": [[*key, list(joints.items())] for key, joints in self._caps.items()],
+            "caps": [[*key, ramp.begin, ramp.end, list(ramp.most.items())] for key, ramp in self._caps.items()],
             "loads": [asdict(load) for load in self._loads.values()],
             "stuck": sorted(self._stuck),
             "stops": [asdict(stop) for stop in self.stops],
@@ -117,7 +142,10 @@ class ForceLimits:
 
     def restore(self, content: Mapping[str, Any]) -> None:
         """Go on from what ``content`` gave."""
-        self._caps = {(actor, digit): dict(map(tuple, joints)) for actor, digit, joints in content.get("caps", [])}
+        self._caps = {
+            (actor, digit): _Ramp(begin, end, {joint: tuple(most) for joint, most in joints})
+            for actor, digit, begin, end, joints in content.get("caps", [])
+        }
         loads = [DigitLoad(**load) for load in content.get("loads", [])]
         self._loads = {(load.actor, load.digit): load for load in loads}
         self._stuck = {(actor, digit) for actor, digit in content.get("stuck", [])}
@@ -143,10 +171,28 @@ class ForceLimits:
         caps = dict(self._caps)  # as they are now
         return replace(hand, moves=lambda time: hand.bones.moves_of(_angles(hand, time, caps), time))
 
+    def _finer(self, model: ContactModel, now: float, times: Sequence[float]) -> list[float]:
+        """Times with others between, so that in no step a bone's flesh is squeezed by too much."""
+        out: list[float] = []
+        driven = self.driven(model)
+        left = self._left(driven, now)
+        for time in times:
+            then = self._left(driven, time)
+            squeezed = max((left.get(place, 1.0) - max(share, _SPENT) for place, share in then.items()), default=0.0)
+            count = max(1, int(np.ceil(squeezed / _SQUEEZED - _SAME)))
+            out += [now + (time - now) * (k + 1) / count for k in range(count - 1)] + [time]
+            left, now = then, time
+        return out
+
+    def _left(self, model: ContactModel, time: float) -> dict[tuple[str, str, str], float]:
+        """Share of flesh that is left before bones, by actor, digit and object."""
+        return {(one.actor, one.digit, one.object): one.left for one in self.clearance.nearest(model, time)}
+
     def _step(
         self, model: ContactModel, history: History, before: ContactSolution | None, now: float, time: float
     ) -> ContactSolution:
         """One step; again with digits that stop earlier, until none is over its limit that still closes."""
+        self._relax(model, now, time)
         self._spare_bones(model, now, time)
         for tried in range(_TRIES + 1):
             closing = self._closing(model, now, time)
@@ -200,7 +246,7 @@ class ForceLimits:
         out = {}
         for hand in _bendable(model):
             angles = self._angles(hand, found.last.time)
-            loads = digit_loads(model, hand, angles, found.last, self.strength.get(hand.name))
+            loads = digit_loads(model, hand, angles, found.last, self.strength.get(hand.name), self.weights)
             out |= {(hand.name, digit): load for digit, load in loads.items()}
         return out
 
@@ -220,30 +266,50 @@ class ForceLimits:
         """Keep a digit's flexions from a time on."""
         hand = next(one for one in model.hands if one.name == key[0])
         angles = self._angles(hand, time)
-        self._caps[key] = {joint: float(angles[joint, _FLEXION]) for joint in _digits(hand.bones.skeleton)[key[1]]}
+        joints = _digits(hand.bones.skeleton)[key[1]]
+        self._caps[key] = _Ramp(time, time, {joint: (float(angles[joint, _FLEXION]),) * 2 for joint in joints})
         if not any((one.actor, one.digit) == key for one in self.stops):
             self.stops.append(Stop(*key, model.start + time, why))
 
-    def _relax(self) -> None:
-        """Let digits go on whose load has fallen; those beyond which there was no equilibrium when they are free."""
-        for key in list(self._caps):
+    def _relax(self, model: ContactModel, now: float, time: float) -> None:
+        """Let digits go on in a step whose load has fallen, by no more than squeezes flesh little; those beyond which
+        there was no equilibrium when they are free."""
+        for key, ramp in list(self._caps.items()):
+            here = {joint: (ramp.at(joint, now),) * 2 for joint in ramp.most}
+            self._caps[key] = held = _Ramp(now, time, here)
             share = self._share(key)
-            if share == 0.0 or (share < _RELAXED and key not in self._stuck):
+            if share >= _RELAXED or (key in self._stuck and share > 0.0):
+                continue
+            self._stuck.discard(key)
+            hand = next(one for one in model.hands if one.name == key[0])
+            wanted = hand.bones.angles(time)[:, _FLEXION]
+            if all(most <= ramp.at(joint, now) for joint, most in enumerate(wanted) if joint in ramp.most):
                 del self._caps[key]
-                self._stuck.discard(key)
+                continue
+            left = self._left(self.driven(model), now)
+            for part in _PARTS:
+                ends = {
+                    joint: (most, most + part * max(0.0, wanted[joint] - most)) for joint, (most, _) in here.items()
+                }
+                self._caps[key] = _Ramp(now, time, ends)
+                then = self._left(self.driven(model), time)
+                if all(left.get(place, 1.0) - share <= _SQUEEZED for place, share in then.items()):
+                    break
+            else:
+                self._caps[key] = held
 
 
 def _bendable(model: ContactModel) -> list[FleshBody]:
     return [hand for hand in model.hands if hand.bones.bendable]
 
 
-def _angles(hand: FleshBody, time: float, caps: Mapping[_Key, Mapping[int, float]]) -> NDArray[np.float64]:
+def _angles(hand: FleshBody, time: float, caps: Mapping[_Key, _Ramp]) -> NDArray[np.float64]:
     """Joint angles [rad], shape (J, 4), of a hand some of whose digits have stopped."""
     angles = np.array(hand.bones.angles(time))
-    for (actor, _), joints in caps.items():
+    for (actor, _), ramp in caps.items():
         if actor == hand.name:
-            for joint, most in joints.items():
-                angles[joint, _FLEXION] = min(angles[joint, _FLEXION], most)
+            for joint in ramp.most:
+                angles[joint, _FLEXION] = min(angles[joint, _FLEXION], ramp.at(joint, time))
     return angles
 
 
