@@ -10,12 +10,12 @@ that have a row are left out, so that a run that was cut off goes on. The table 
 
 Data of others is looked for in ``shared/data`` beside the repository; without it only built-in hands and objects run.
 
-Columns: ``end``: how it ended, ``plausible``, or the first of the following that does not hold. Every frame was solved
-(else the solver's status); no pressure is above 1 MPa (``crushed``); no digit bears more than its muscles can
-(``muscles``); something is touched (``untouched``); no object is left with a net force of the hand above a third of what
-presses on it, and above what it would weigh if it were of water (``unbalanced``). ``newton``: linear solves of the
-searches that found an equilibrium, mean and 90th percentile; ``lost``: those of searches in vain; ``seconds``: processor
-time of the contact solve.
+Columns: ``end``: how it ended, ``plausible``, or the first of the following that does not hold. Every frame was
+solved (else the solver's status); no pressure is above 1 MPa (``crushed``); no digit bears more than its muscles can
+(``muscles``); something is touched (``untouched``); no object is left with a net force of the hand above a third of
+what presses on it, and above what it would weigh if it were of water (``unbalanced``). ``newton``: linear solves of the
+searches that found an equilibrium, mean and 90th percentile; ``lost``: those of searches in vain; ``seconds``:
+processor time of the contact solve.
 """
 
 from __future__ import annotations
@@ -248,17 +248,25 @@ def apart(hand: str, thing: str, task: str, arguments: argparse.Namespace) -> di
 
 
 def draw(scene: Any, found: Any, path: Path) -> None:
-    """Hand and object at the last frame that was solved, from two sides."""
-    import numpy as np
-    from PIL import Image
+    """Hand and object at the last frame that was solved, and the pressure on the hand, from two sides."""
+    from dataclasses import replace
 
-    from warpjld.render import Camera, draw_shaded  # type: ignore[attr-defined]
+    from warpjld.script.outputs import Camera, Picture
+    from warpjld.script.pictures import draw_picture
+    from warpjld.script.runner import cast
+    from warpjld.script.staging import frame_numbers
 
     if not found.solved.frames:
         return
     frame = found.solved.frames[-1].frame
-    shapes = found.surfaces.separated(frame).vertices
-    del np, Image, Camera, draw_shaded, shapes, path, scene
+    crowd = replace(cast(scene, frame_numbers(scene)), pressed=found.surfaces)
+    scene.size = (640, 480)
+    hand = found.model.hands[0].name
+    for view in ("FRONT", "BACK"):
+        camera = Camera(view.lower(), zoom=1.0)
+        for style, only in (("shaded", None), ("pressure", hand)):
+            place = path.with_name(f"{path.stem}-{view.lower()}-{style}.png")
+            draw_picture(scene, crowd, Picture(place.name, frame, style, camera, only), place)
 
 
 def read(path: Path) -> list[dict[str, Any]]:
