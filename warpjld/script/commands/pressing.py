@@ -19,8 +19,8 @@ from warpjld.simulation.specification import SolveSpecification
         '[BEARS <pascals>] [STATE "<file>.npz"]'
     ),
     help=(
-        "Solve contact at these frames. Digits close until muscles or skin (BEARS 300 kPa) can do no more; RIGID: on "
-        "regardless; STOP the run there; CORRECT: open them. A run cut off goes on from STATE."
+        "Solve contact: digits close until muscles or skin (BEARS) can do no more; RIGID: regardless; STOP there; "
+        "CORRECT: open."
     ),
     group="Contact",
 )
