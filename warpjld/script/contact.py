@@ -56,7 +56,9 @@ def run_contact(
     pressing = scene.contact.pressing
     assert pressing is not None
     try:
-        found = simulate(scene.contact, SceneAnimation(scene), folder=folder, progress=progress)
+        grasps = [attempt.object for attempt in scene.attempts if attempt.command.startswith("GRASP ")]
+        asked = replace(scene.contact, grasped=tuple(dict.fromkeys(grasps)))
+        found = simulate(asked, SceneAnimation(scene), folder=folder, progress=progress)
     except InputError as error:
         raise located(error, pressing.where) from error
     for edit in found.solved.edits:

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from warpjld import render
+from warpjld.errors import InputError
 from warpjld.script.crowd import Crowd, role_of
 from warpjld.script.folder import OutputFolder
 from warpjld.script.outputs import Camera, ContactSheet, Film, Picture, Style
@@ -91,6 +92,10 @@ def draw_picture(scene: Scene, crowd: Crowd, picture: Picture, path: Path) -> No
     shift = now.shift(picture.camera, 0)
     camera = crowd.camera(picture.camera, scene.size)
     if picture.style == "pressure":
+        solved = [] if crowd.pressed is None else [one.frame for one in crowd.pressed.frames]
+        if crowd.pressed is not None and picture.frame > max(solved, default=crowd.pressed.model.start):
+            reached = f"only up to frame {max(solved):g}" if solved else "at no frame"
+            raise InputError(f"contact was solved {reached}: nothing is known of pressure at frame {picture.frame:g}")
         view = PressureView(now, picture.only, picture.digits)
         points, values = view.at(0, now.surface(0))
         with view.stage(camera, scene.size, render.Quality(), shift) as stage_:

@@ -141,6 +141,13 @@ def run_scene(
             raise WarpjldError("; ".join(failures.lines()))
         summary.failed = failures.found
         content = summary.write(out)
+    if simulated is not None and simulated.verdict.failed:
+        frames_told = simulated.verdict.frames
+        kept = "no frame" if frames_told is None else f"frames {frames_told[0]:g} to {frames_told[1]:g}"
+        raise located(
+            InputError(f"contact was not solved: {simulated.verdict.text}; {kept} and all files are in {folder}"),
+            scene.contact.pressing.where if scene.contact.pressing is not None else None,
+        )
     if failures.found:
         raise WarpjldError(f"not made: {'; '.join(failures.lines())}; all else that was asked for is in {folder}")
     return content

@@ -125,7 +125,10 @@ def table(content: dict[str, Any], say: Callable[[str], None] = print) -> None:
         if content.get("press"):
             press = content["press"]
             console.print(f"contact: {press['verdict']}")
-            for line in [*press["grips"], *press["digits"], *press["corrections"], *press["suggestions"]]:
+            for line in [
+                *(press["grips"] + press["digits"] + press["balance"]),
+                *(press["stops"] + press["corrections"] + press["suggestions"]),
+            ]:
                 console.print(f"  {line}")
         for actor in content["actors"]:
             drive = "a motion file" if actor["recorded"] else f"{actor['keys']} keys"

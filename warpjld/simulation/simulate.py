@@ -186,7 +186,7 @@ def simulate(
     before = find_start(animation, specification, request)
     progress("meshing", 0, 1)
     model, notes = _model(specification, animation, before)
-    table = ContactTable(specification.strength)
+    table = ContactTable(specification.strength, animation)
 
     def watch(driven: ContactModel, frame: SolvedFrame) -> str | None:
         reason = table.add(driven, frame)
@@ -268,6 +268,9 @@ def _report(
         corrections=tuple(corrections),
     )
     notes = [*notes, *table.notes()]
+    for frame, bone in solved.tight:
+        if bone.left > 0.0:
+            notes.append(f"at frame {frame:g} {bone.text}: pressures there are beyond what was ever measured")
     if solved.resumed:
         notes.append(f"{solved.resumed} of {len(solved.frames)} frames were in {request.state} already")
     notes += [missed.text for missed in solved.missed]

@@ -14,9 +14,11 @@ from warpjld.simulation.bodies.deformable_body import History
 from warpjld.simulation.bodies.model import ContactModel
 from warpjld.simulation.grip.correct_frames import CorrectedFrame, correct_frame
 from warpjld.simulation.grip.find import FoundGrip, find_grip
+from warpjld.simulation.solve.bone_clearance import TIGHT, BoneClearance, TightBone
 from warpjld.simulation.solve.branch import solve_onward
 from warpjld.simulation.solve.checkpoint import Checkpoint, CheckpointFile
-from warpjld.simulation.solve.checks import explain_failure
+from warpjld.simulation.solve.force_limit import ForceLimits, Stop
+from warpjld.simulation.solve.grasp_balance import weight_of
 from warpjld.simulation.solve.missed_contacts import MissedContact, missed_contacts
 from warpjld.simulation.solve.solved_frame import SolvedFrame, solved_frame
 from warpjld.simulation.solve.substeps import Substeps
@@ -44,6 +46,8 @@ class SolveResult:
         edits: Angles that searches and corrections gave, in order.
         grips: What came of searches for a grip.
         corrections: What came of corrections.
+        stops: Digits that closed no farther.
+        tight: Bones that came nearest to objects, of every digit and object the nearest.
     """
 
     status: Status
@@ -55,6 +59,8 @@ class SolveResult:
     edits: tuple[AngleEdit, ...] = ()
     grips: tuple[FoundGrip, ...] = ()
     corrections: tuple[CorrectedFrame, ...] = ()
+    stops: tuple[Stop, ...] = ()
+    tight: tuple[tuple[float, TightBone], ...] = ()
 
     @property
     def start(self) -> float:
@@ -100,7 +106,7 @@ def solve_frames(
         if failure is not None:
             return failure
         if checkpoint is not None and run.last is not None:
-            checkpoint.save(run.done, run.last)
+            checkpoint.save(run.done, run.last, run.edits, run.limits.content())
         if reason := watch(run.model, run.done[-1]):
             return run.ended(Status.STOPPED, reason)
         for grip in contact.grips:
@@ -125,13 +131,21 @@ class _Run:
     edits: list[AngleEdit] = field(default_factory=list)
     grips: list[FoundGrip] = field(default_factory=list)
     corrections: list[CorrectedFrame] = field(default_factory=list)
+    tight: dict[tuple[str, str, str], tuple[float, TightBone]] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         self.substeps = Substeps(self.model)
+        self.clearance = BoneClearance(self.model)
+        weights = {
+            name: weight_of(obstacle) for name, obstacle in self.model.obstacles.items() if name in self.contact.grasped
+        }
+        self.limits = ForceLimits(self.contact.strength, self.request.pressure, weights, self.clearance)
 
     def resume(self, found: Checkpoint) -> None:
         """Go on from what another run left."""
         self.done, self.last, self.resumed = list(found.frames), found.solution, len(found.frames)
+        self.limits.restore(found.limits)
+        self._edit(found.edits)
         for solved in self.done:
             self._note(solved)
 
@@ -140,13 +154,23 @@ class _Run:
         model, time, before = self.model, frame - self.model.start, self.last
         now = np.zeros_like(model.body.mesh.nodes) if before is None else before.last.displacement
         steps = self.substeps.times(model, 0.0 if before is None else before.last.time, time, now)
-        solution = solve_onward(
-            model, self.history, before, steps, method=self.request.method, aitken=self.request.aitken
-        )
+        since = 0.0 if before is None else before.last.time
+        if self.request.limited:
+            solution = self.limits.solve(model, self.history, before, steps)
+            driven = self.limits.driven(model)
+        else:
+            driven = model
+            if (inside := self._bone_inside(model, steps)) is not None:
+                return self.ended(Status.BLOCKED, inside)
+            solution = solve_onward(
+                model, self.history, before, steps, method=self.request.method, aitken=self.request.aitken
+            )
         if not solution.converged:
-            ahead = [explain_failure(model, step) for step in steps if step > solution.last.time]
-            reason = next(filter(None, ahead), solution.message)
-            return self.ended(solution.status, f"at frame {frame:g}: {reason}")
+            ahead = [self._bone_inside(driven, [step]) for step in steps if step > solution.last.time]
+            reason = next(filter(None, ahead), f"at frame {frame:g}: {solution.message}")
+            return self.ended(solution.status, reason)
+        self._note_bones(driven, frame)
+        self._edit(self.limits.edits(model, since, time))
         if self.request.correct and before is not None:
             corrected = correct_frame(model, self.history, before, solution, self.contact.strength)
             self.corrections.append(corrected)
@@ -157,6 +181,21 @@ class _Run:
         self.done.append(solved_frame(float(frame), solution.instants))
         self._note(self.done[-1])
         return None
+
+    def _bone_inside(self, model: ContactModel, times: Sequence[float]) -> str | None:
+        """A bone that lies in an object at one of some times, in words: no force can part them."""
+        for time in times:
+            worst = min(self.clearance.nearest(model, time), key=lambda one: one.left, default=None)
+            if worst is not None and worst.left <= 0.0:
+                return f"at frame {model.start + time:g}: {worst.text}"
+        return None
+
+    def _note_bones(self, model: ContactModel, frame: float) -> None:
+        """Remember what bones are near to objects."""
+        for one in self.clearance.nearest(model, frame - model.start):
+            place = (one.actor, one.digit, one.object)
+            if one.left < TIGHT and (place not in self.tight or one.left < self.tight[place][1].left):
+                self.tight[place] = (frame, one)
 
     def find(self, grip: GripSpecification) -> None:
         """Look for a grip, and go on with it."""
@@ -181,6 +220,8 @@ class _Run:
             tuple(self.edits),
             tuple(self.grips),
             tuple(self.corrections),
+            tuple(self.limits.stops),
+            tuple(self.tight.values()),
         )
 
     def _edit(self, edits: Sequence[AngleEdit]) -> None:

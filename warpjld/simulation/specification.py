@@ -190,6 +190,10 @@ class SolveSpecification:
         aitken: Relaxation of the paper's loop.
         stop: Whether to stop where the muscles can do no more (R118).
         correct: Whether to open digits that bear more than their muscles can (R120).
+        rigid: Whether digits close as the animation has it, however hard they then press. Otherwise, and unless it
+            stops or corrects, a digit closes no farther than its muscles can press or its skin bears.
+        pressure: What skin bears [Pa]. By default what leaves half of a fingertip's flesh between bone and wall: beyond
+            it forces double every tenth of a millimetre, and laws of flesh were never measured.
         state: File the state is kept in, so that a stopped run goes on; None keeps none.
         where: Place in a script, for messages.
     """
@@ -203,11 +207,19 @@ class SolveSpecification:
     correct: bool = False
     state: str | None = None
     where: SourceLocation | None = None
+    rigid: bool = False
+    pressure: float = 3e5
 
     def __post_init__(self) -> None:
+        _want(0.0 < self.pressure < np.inf, "pressure", "a pressure above 0 Pa", self.pressure)
         _want(self.last > self.first, "last", f"a frame after the first ({self.first})", self.last)
         _want(self.every >= 1, "every", "1 frame or more", self.every)
         _want(self.method in ("augmented", "paper"), "method", "augmented or paper", self.method)
+
+    @property
+    def limited(self) -> bool:
+        """Whether digits stop where they can press no harder."""
+        return not (self.rigid or self.stop or self.correct or self.method == "paper")
 
 
 @dataclass(eq=False)
@@ -226,6 +238,7 @@ class ContactSpecification:
         strength: Largest force of digits [N], by actor and digit, where it is not the default.
         grips: Grips to find, in the order of their frames.
         pressing: What to solve, if anything.
+        grasped: Objects that digits have closed on: hands alone are to hold them.
     """
 
     physical: dict[str, ObjectMaterial] = field(default_factory=dict)
@@ -239,6 +252,7 @@ class ContactSpecification:
     strength: dict[str, dict[str, float]] = field(default_factory=dict)
     grips: list[GripSpecification] = field(default_factory=list)
     pressing: SolveSpecification | None = None
+    grasped: tuple[str, ...] = ()
 
     def check(self) -> None:
         """Refuse numbers that are none.

@@ -24,9 +24,10 @@ from warpjld.skeleton.hand import DIGITS
 from warpjld.skeleton.kinematics import Poses
 from warpjld.skeleton.tree import Skeleton
 
-__all__ = ["JOINT_WORDS", "DigitEffort", "Effort", "effort_of"]
+__all__ = ["JOINT_WORDS", "KNUCKLES", "DigitEffort", "Effort", "effort_of"]
 
-_KNUCKLES = ("base", "knuckle2", "knuckle3")
+KNUCKLES = ("base", "knuckle2", "knuckle3")
+"""The three joints of a digit, from its base on."""
 JOINT_WORDS = ("base", "knuckle 2", "knuckle 3")
 """What the three joints of a digit are called in texts."""
 
@@ -187,7 +188,7 @@ def _chains(skeleton: Skeleton) -> dict[str, tuple[tuple[int, int, int], int]]:
     found = {}
     for side in ("left.", "right.", ""):
         for digit in DIGITS:
-            names = [f"{side}{digit}.{k}" for k in (*_KNUCKLES, "tip")]
+            names = [f"{side}{digit}.{k}" for k in (*KNUCKLES, "tip")]
             if all(name in skeleton.names for name in names):
                 base, second, third, tip = (skeleton.names.index(name) for name in names)
                 found[f"{side}{digit}"] = ((base, second, third), tip)

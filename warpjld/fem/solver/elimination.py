@@ -214,6 +214,7 @@ def _stacked(part: Ints, parent: Ints, sizes: Ints, left: Ints, start: int) -> i
     for front in part[::-1].tolist():
         up = parent[front]
         depth[front] = depth[up] + 1 if up >= 0 and inside[up] else 0
+    tops_of = [0, 0]
     for measured in (True, False):
         heights, tops = [0, 0], [0, 0]
         waiting: list[list[tuple[int, int]]] = [[], []]

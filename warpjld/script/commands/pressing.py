@@ -15,11 +15,12 @@ from warpjld.simulation.specification import SolveSpecification
 @command(
     "PRESS",
     syntax=(
-        'PRESS <first> <last> [EVERY <frames>] [METHOD <AUGMENTED/PAPER>] [AITKEN] [STOP/CORRECT] [STATE "<file>.npz"]'
+        "PRESS <first> <last> [EVERY <frames>] [METHOD <AUGMENTED/PAPER>] [AITKEN] [STOP/CORRECT/RIGID] "
+        '[BEARS <pascals>] [STATE "<file>.npz"]'
     ),
     help=(
-        "Solve contact at these frames; where muscles can do no more, STOP, or CORRECT: open digits; a run cut "
-        "off goes on from STATE."
+        "Solve contact: digits close until muscles or skin (BEARS) can do no more; RIGID: regardless; STOP there; "
+        "CORRECT: open."
     ),
     group="Contact",
 )
@@ -35,12 +36,16 @@ def press(scene: Scene, arguments: Arguments) -> None:
         aitken=lambda: True,
         stop=lambda: True,
         correct=lambda: True,
+        rigid=lambda: True,
+        bears=lambda: arguments.number("the pressure that skin bears in pascals", above=0.0),
         state=lambda: arguments.output_name("the file of the state", (".npz",)),
     )
+    if "bears" in options:
+        options["pressure"] = options.pop("bears")
     if options.get("aitken") and options.get("method") != "paper":
         raise arguments.error("AITKEN relaxes the paper's loop: it goes with METHOD PAPER")
-    if options.get("stop") and options.get("correct"):
-        raise arguments.error("STOP or CORRECT, not both: corrected digits never bear too much")
+    if sum(bool(options.get(name)) for name in ("stop", "correct", "rigid")) > 1:
+        raise arguments.error("STOP, CORRECT or RIGID, not two of them: each says what to do where muscles can no more")
     if not (scene.contact.flesh or scene.contact.physical):
         raise arguments.error("nothing deforms: make a body do so with FLESH or PHYSICAL first", arguments.position)
     before = scene.contact.pressing

@@ -11,7 +11,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from warpjld.fem import HexMesh, Material, Prescribed
-from warpjld.fem.contact import Obstacle
 from warpjld.fem.contact.interface.pairs import Exclusion
 from warpjld.fem.mesh.embedding import Embedding
 from warpjld.simulation.bodies.skin_parts import SkinParts
@@ -38,12 +37,10 @@ class History:
 
     Attributes:
         carried: Objects that only hands hold, by the hand that holds most: they go along with it in first guesses.
-        touched: Objects that something touches.
         bearing: What supports bore when they began to let go, by object.
     """
 
     carried: Mapping[str, str] = field(default_factory=dict)
-    touched: frozenset[str] = frozenset()
     bearing: Mapping[str, Bearing] = field(default_factory=dict)
 
 
@@ -53,16 +50,10 @@ class Surroundings:
 
     Attributes:
         carry: Where the hand that alone holds it takes points (n, 3) [m]; None where none does.
-        touched: Whether anything touches it.
-        skin: Gives points of hands where they are guessed to be [m], shape (n, 3).
-        obstacles: What does not give way.
         history: What is known of the equilibria so far.
     """
 
     carry: Callable[[NDArray[np.float64]], NDArray[np.float64]] | None
-    touched: bool
-    skin: Callable[[], NDArray[np.float64]]
-    obstacles: Sequence[Obstacle]
     history: History
 
 

@@ -19,7 +19,7 @@ from warpjld.fem.hand.flesh_hand import FleshHand
 from warpjld.fem.hand.laws import hand_laws
 from warpjld.simulation.animation import ActorAnimation
 from warpjld.simulation.bodies.deformable_body import DeformableBody, History, Surroundings
-from warpjld.simulation.bodies.kept_flesh import resting_flesh
+from warpjld.simulation.bodies.kept_flesh import RestingFlesh, resting_flesh
 from warpjld.simulation.bodies.rest_shape import RestShape, cut_to_digits
 from warpjld.simulation.bodies.skin_parts import SkinParts, skin_parts
 from warpjld.simulation.specification import FleshMaterial, located
@@ -27,6 +27,8 @@ from warpjld.skeleton import Poses, Skeleton
 
 __all__ = ["FLESHED", "BoneMotion", "FleshBody", "build_flesh_body", "flesh_body"]
 
+_SIZES = (1.0, 0.96, 0.91, 0.86)
+"""Edges of elements that are tried, over the one that is asked for."""
 FLESHED = 0.5
 """Share of the flesh in skin from which on it has flesh to give way with."""
 
@@ -140,11 +142,6 @@ class FleshBody(DeformableBody):
         """Where points (n, 3) [m] go that go along with the hand as a whole."""
         return self.moves(before).to(self.moves(time)).of(np.zeros(len(points), np.int64), points)
 
-    def skin_points(self, displacement: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Nodes of the skin under a displacement (N, 3) [m], shape (n, 3)."""
-        skin = np.unique(self.mesh.quads(self.hand.skin_faces))
-        return self.mesh.nodes[skin] + displacement[skin]
-
     def way(
         self, times: Sequence[float], displacement: NDArray[np.float64], nodes: NDArray[np.integer]
     ) -> list[NDArray[np.float64]]:
@@ -170,15 +167,15 @@ def build_flesh_body(actor: ActorAnimation, material: FleshMaterial, start: floa
         InputError: It cannot be meshed in that pose; names the line of its FLESH.
     """
     poses, skin, notes = actor.pose(start), actor.skin(start), []
-    try:
-        flesh = resting_flesh(actor.rig, material.element, actor.name.lower(), poses, skin)
-    except InputError as error:
-        what = error.message.replace("spacing:", "ELEMENT:")
-        raise located(InputError(f"FLESH {actor.name}: {what}"), material.where) from error
+    flesh, element = _meshed(actor, material, poses, skin)
     notes += [f"{actor.name}: {note}" for note in flesh.notes]
-    if (coarse := coarse_note(flesh.cushions, material.element, material.digits)) is not None:
+    if element != material.element:
+        notes.append(
+            f"{actor.name}: elements of {1e3 * element:.3g} mm, since of {1e3 * material.element:g} mm one is distorted"
+        )
+    if (coarse := coarse_note(flesh.cushions, element, material.digits)) is not None:
         notes.append(f"{actor.name}: {coarse}")
-    if flesh.gap > 0.5 * material.element:
+    if flesh.gap > 0.5 * element:
         notes.append(f"{actor.name}: the volume stays up to {1e3 * flesh.gap:.1f} mm off the skin where it folds")
     shape = cut_to_digits(flesh.hand, poses, skin, material.digits)
     laws = hand_laws(
@@ -190,6 +187,29 @@ def build_flesh_body(actor: ActorAnimation, material: FleshMaterial, start: floa
     )
     bones = BoneMotion(shape.hand, actor, start)
     return flesh_body(actor.name, shape, laws, material, bones, skin_parts(flesh.built)), notes
+
+
+def _meshed(
+    actor: ActorAnimation, material: FleshMaterial, poses: Poses, skin: NDArray[np.float64]
+) -> tuple[RestingFlesh, float]:
+    """A hand where its rig rests and in a pose, and its elements' edge [m].
+
+    Whether some element at a cut or between two digits comes out distorted hangs on where the grid happens to lie: a
+    grid a little finer has it elsewhere.
+
+    Raises:
+        InputError: It cannot be meshed at any of these sizes: what was wrong with the one that was asked for.
+    """
+    failure: InputError | None = None
+    for share in _SIZES:
+        element = share * material.element
+        try:
+            return resting_flesh(actor.rig, element, actor.name.lower(), poses, skin), element
+        except InputError as error:
+            failure = failure or error
+    assert failure is not None
+    what = failure.message.replace("spacing:", "ELEMENT:")
+    raise located(InputError(f"FLESH {actor.name}: {what}"), material.where) from failure
 
 
 def flesh_body(

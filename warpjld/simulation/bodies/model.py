@@ -85,18 +85,10 @@ class ContactModel:
     ) -> NDArray[np.float64]:
         """First guess of the displacement (N, 3) at a time from that at an earlier one."""
         out = displacement.copy()
-
-        def skin() -> NDArray[np.float64]:
-            return np.concatenate(
-                [np.empty((0, 3)), *(hand.skin_points(out[self.spans[hand.name]]) for hand in self.hands)]
-            )
-
         for body in self.bodies:
             span = self.spans[body.name]
             carry = self._carry(history.carried.get(body.name), before, time)
-            touched = body.name in history.touched
-            around = Surroundings(carry, touched, skin, tuple(self.obstacles.values()), history)
-            out[span] = body.guess(before, time, displacement[span], around)
+            out[span] = body.guess(before, time, displacement[span], Surroundings(carry, history))
         known = self.prescribed(time, history)
         out.reshape(-1)[known.degrees] = known.values
         return out
@@ -130,7 +122,6 @@ class ContactModel:
         """
         hands = {hand.name for hand in self.hands}
         carried: dict[str, str] = {}
-        touched: set[str] = set()
         bearing: dict[str, Bearing] = dict(history.bearing)
         for one in self.objects:
             span = self.spans[one.name]
@@ -142,11 +133,9 @@ class ContactModel:
                 other = owner.other(one.name)
                 if other is not None and forces.any():
                     pushes[other] = pushes.get(other, 0.0) + float(np.linalg.norm(forces, axis=1).sum())
-            if pushes:
-                touched.add(one.name)
             if pushes and set(pushes) <= hands:
                 carried[one.name] = max(pushes, key=lambda name: pushes[name])
-        return History(carried, frozenset(touched), bearing)
+        return History(carried, bearing)
 
     def edited(self, edits: Sequence[AngleEdit]) -> ContactModel:
         """The same with edits laid over its animation: hands bend otherwise, and what follows them goes along."""

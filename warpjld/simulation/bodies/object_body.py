@@ -17,7 +17,6 @@ from warpjld.fem.load.loads import volumes
 from warpjld.grasp import Places
 from warpjld.simulation.animation import ObjectAnimation
 from warpjld.simulation.bodies.deformable_body import DeformableBody, History, Surroundings
-from warpjld.simulation.bodies.free_object import settle_free_object
 from warpjld.simulation.bodies.object_mesh import ObjectMesh, mesh_object
 from warpjld.simulation.bodies.support import ObjectSupport, handle_of
 from warpjld.simulation.specification import ContactSpecification, GripSpecification, located
@@ -25,8 +24,6 @@ from warpjld.simulation.state_variables import Points, PrescribedPoints
 
 __all__ = ["ObjectBody", "build_object_body", "object_body"]
 
-_ON = 2e-4
-"""An object nearer to an obstacle than this lies on it [m]."""
 _FOOT = 0.05
 """Share of a lifted object's height, from below, whose points hold it until then."""
 
@@ -103,7 +100,11 @@ class ObjectBody(DeformableBody):
     def guess(
         self, before: float, time: float, displacement: NDArray[np.float64], around: Surroundings
     ) -> NDArray[np.float64]:
-        """First guess of a displacement (N, 3): with what leads or carries it, or to where nothing pushes it."""
+        """First guess of a displacement (N, 3): with what leads or carries it; what is free is where it was.
+
+        Where hands close on it, it overlaps them there, and friction takes hold of it in that place. Put where it
+        overlaps least, as a body without friction, it was taken out of grips that could have held it.
+        """
         at = self.mesh.nodes + displacement
         if self._held(time):
             return displacement + (_rigid(self.place(before), self.place(time), at) - at)
@@ -111,17 +112,7 @@ class ObjectBody(DeformableBody):
             return displacement + _along_with(self.prescribed(time, around.history), displacement)
         if self._led:
             return displacement
-        if around.carry is not None:
-            return displacement + (around.carry(at) - at)
-        return displacement if around.touched else self._settled(at, time, around) - self.mesh.nodes
-
-    def _settled(self, at: NDArray[np.float64], time: float, around: Surroundings) -> NDArray[np.float64]:
-        """Where it goes among hands, held by nothing; friction holds it on obstacles."""
-        if any(float(obstacle.project(at, time).distance.min()) < _ON for obstacle in around.obstacles):
-            return at
-        quads = self.mesh.quads(self.mesh.face_set(self.name))
-        triangles = np.concatenate([quads[:, [0, 1, 2]], quads[:, [0, 2, 3]]])
-        return settle_free_object(at, triangles, around.skin(), around.obstacles, time).of(at)
+        return displacement if around.carry is None else displacement + (around.carry(at) - at)
 
     def way(
         self, times: Sequence[float], displacement: NDArray[np.float64], nodes: NDArray[np.integer]

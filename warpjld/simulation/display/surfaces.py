@@ -16,6 +16,7 @@ from warpjld.simulation.display.pressure_map import PressureMap, pressure_map
 from warpjld.simulation.display.refine import RefinedSurface, refine_surface
 from warpjld.simulation.display.separate import SeparatedSurfaces, VisibleSurface, separate_surfaces
 from warpjld.simulation.display.smooth import SurfaceSmoother
+from warpjld.simulation.solve.digit_loads import CRUSHING
 from warpjld.simulation.solve.solved_frame import SolvedFrame
 
 __all__ = ["DeformedSurfaces"]
@@ -127,8 +128,9 @@ class DeformedSurfaces:
 
     @cached_property
     def high(self) -> float:
-        """Highest pressure at any node and any frame that was solved [Pa]: as the table has it."""
-        return max((float(frame.pressure(self.model).max()) for frame in self.frames), default=0.0)
+        """Highest pressure at any node and any frame that was solved [Pa]: as the table has it, and no more than what
+        crushes flesh, so that what one digit is crushed with does not blank all others."""
+        return min(CRUSHING, max((float(frame.pressure(self.model).max()) for frame in self.frames), default=0.0))
 
     @cached_property
     def _maps(self) -> dict[str, tuple[RefinedSurface, PressureMap]]:

@@ -3,21 +3,26 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
-from warpjld.fem.hand.muscles import Effort
+from warpjld.fem.hand.muscles import KNUCKLES, Effort
 from warpjld.fem.hand.suggestions import suggestions
+from warpjld.simulation.animation import Animation
 from warpjld.simulation.bodies.flesh_body import FleshBody
 from warpjld.simulation.bodies.model import ContactModel
 from warpjld.simulation.bodies.skin_parts import digit_of_label
 from warpjld.simulation.report.efforts import effort_at
 from warpjld.simulation.solve.solved_frame import SolvedFrame
+from warpjld.skeleton import CHANNELS
 
 __all__ = ["ContactRow", "ContactTable", "digit_rows", "write_table"]
+
+_FLEXION = CHANNELS.index("flexion")
+"""Column of the angles."""
 
 
 @dataclass(frozen=True)
@@ -44,6 +49,8 @@ class ContactRow:
             the palm.
         sliding: Share of the area under pressure that slides; NaN where nothing touches.
         state: ``free``, ``sticking``, ``sliding``, or ``partly sliding``.
+        short_deg: How far the digit's joint that is farthest from what was asked of it stays short of it [degrees]; 0
+            where none does, and for the palm.
     """
 
     frame: float
@@ -62,6 +69,7 @@ class ContactRow:
     share: float
     sliding: float
     state: str
+    short_deg: float = 0.0
 
 
 class ContactTable:
@@ -69,13 +77,14 @@ class ContactTable:
 
     Args:
         strength: Largest forces of digits [N], by actor and digit, where they are not the default.
+        asked: The animation as it was asked for; where it is given, rows say how far digits stay short of it.
 
     Attributes:
         rows: Those so far.
     """
 
-    def __init__(self, strength: Mapping[str, Mapping[str, float]]) -> None:
-        self._strength = strength
+    def __init__(self, strength: Mapping[str, Mapping[str, float]], asked: Animation | None = None) -> None:
+        self._strength, self._asked = strength, asked
         self.rows: list[ContactRow] = []
         self._efforts: dict[str, list[tuple[float, Effort]]] = {}
 
@@ -86,9 +95,25 @@ class ContactTable:
             poses = hand.bones.animation.pose(solved.frame)
             effort = effort_at(model, hand, poses, solved, self._strength.get(hand.name))
             self._efforts.setdefault(hand.name, []).append((solved.frame, effort))
-            self.rows += digit_rows(model, hand, solved, effort)
+            short = self._short(hand, solved.frame)
+            self.rows += [
+                replace(row, short_deg=short.get(row.digit, 0.0)) for row in digit_rows(model, hand, solved, effort)
+            ]
             reason = reason or effort.stop()
         return None if reason is None else f"stopped at frame {solved.frame:g}: {reason}"
+
+    def _short(self, hand: FleshBody, frame: float) -> dict[str, float]:
+        """How far digits stay short of what was asked [degrees]."""
+        if self._asked is None or not hand.bones.bendable:
+            return {}
+        asked = self._asked.actors[hand.name].angles(frame)[:, _FLEXION]
+        missing = np.degrees(asked - hand.bones.animation.angles(frame)[:, _FLEXION])
+        out: dict[str, float] = {}
+        for joint, name in enumerate(hand.bones.skeleton.names):
+            digit, knuckle = name.split(".")[-2:] if name.count(".") else ("", name)
+            if knuckle in KNUCKLES:
+                out[digit] = max(out.get(digit, 0.0), round(float(missing[joint]), 6))
+        return out
 
     def notes(self) -> list[str]:
         """Frames at which bones' forces are estimates."""

@@ -9,13 +9,22 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from warpjld.fem import Status
+from warpjld.simulation.report.balance import ObjectBalance, balances
 from warpjld.simulation.report.table import ContactRow
 from warpjld.simulation.report.visible_overlap import RemainingOverlap
+from warpjld.simulation.solve.digit_loads import CRUSHING
 
 if TYPE_CHECKING:
     from warpjld.simulation.solve_frames import SolveResult
 
-__all__ = ["ContactVerdict", "verdict_of"]
+__all__ = ["CRUSHED", "ContactVerdict", "verdict_of"]
+
+CRUSHED = "CRUSHED"
+"""Status of what is pressed beyond what flesh bears."""
+_PUSHED = 1e-5
+"""Way of a free object that something has pushed [m]: without weight it stays where it is."""
+_BEARS = 0.05
+"""Share of what presses on an object from which on a digit counts."""
 
 
 @dataclass(frozen=True)
@@ -23,13 +32,16 @@ class ContactVerdict:
     """How a contact solve ended.
 
     Attributes:
-        status: Name of the solver's status; ``OVERLAP`` where it did not keep apart what it was to.
+        status: Name of the solver's status; ``OVERLAP`` where it did not keep apart what it was to, ``CRUSHED`` where
+            flesh is pressed beyond what any bears.
         text: One line.
         lines: One for each digit that touched.
         suggestions: What to change.
         frames: First and last frame that were solved.
         grips: What came of searches for a grip.
         corrections: What was opened, and what could not be.
+        balance: Net force and moment on every object that is touched at the last frame.
+        stops: Digits that closed no farther than they could, and how far they stay short of what was asked.
     """
 
     status: str
@@ -39,6 +51,13 @@ class ContactVerdict:
     frames: tuple[float, float] | None
     grips: tuple[str, ...] = ()
     corrections: tuple[str, ...] = ()
+    balance: tuple[str, ...] = ()
+    stops: tuple[str, ...] = ()
+
+    @property
+    def failed(self) -> bool:
+        """Whether frames that were asked for are missing, or are wrong."""
+        return self.status not in (Status.CONVERGED.name, Status.STOPPED.name, CRUSHED)
 
     def content(self) -> dict[str, Any]:
         """As plain values."""
@@ -49,6 +68,8 @@ class ContactVerdict:
             "suggestions": list(self.suggestions),
             "grips": list(self.grips),
             "corrections": list(self.corrections),
+            "balance": list(self.balance),
+            "stops": list(self.stops),
             "frames": None if self.frames is None else list(self.frames),
         }
 
@@ -85,6 +106,8 @@ def verdict_of(
             )
         lines.append(line)
     over = [row for row in rows if row.share > 1.0]
+    crushed = max((row for row in rows if 1e3 * row.peak_kpa > CRUSHING), key=lambda row: row.peak_kpa, default=None)
+    last = balances(solved.model, solved.frames[-1]) if solved.frames else []
     touched = any(row.force_n > 0.0 for row in rows)
     status = solved.status.name
     if solved.status not in (Status.CONVERGED, Status.STOPPED):
@@ -92,6 +115,12 @@ def verdict_of(
     elif overlaps:
         status = "OVERLAP"
         text = f"not solved: {overlaps[0].text}, and forces there are wrong"
+    elif crushed is not None:
+        status = CRUSHED
+        text = (
+            f"not realistic: at frame {crushed.frame:g} {crushed.actor} {crushed.digit} is crushed, pressed with "
+            f"{1e-3 * crushed.peak_kpa:.3g} MPa: hardly any flesh is left before its bone, and forces mean nothing"
+        )
     elif over:
         worst = max(over, key=lambda row: row.share)
         need = f"{100 * worst.share:.0f} % of what muscles can do"
@@ -100,6 +129,12 @@ def verdict_of(
         text = solved.message
     elif not rows:
         text = "solved"
+    elif lost := _lost(solved):
+        text = f"not held: {lost}"
+    elif pushed := next((one for one in last if one.unbalanced), None):
+        text = f"not balanced: at frame {pushed.frame:g} {pushed.text}"
+    elif slides := _slides(rows, last):
+        text = f"not held: {slides}"
     elif touched:
         share = max((row.share for row in rows if not np.isnan(row.share)), default=0.0)
         text = f"realistic: muscles do at most {100 * share:.0f} % of what they can"
@@ -107,4 +142,44 @@ def verdict_of(
         text = f"nothing touches at any frame, but between them: {solved.missed[0].text}"
     else:
         text = "nothing touches at any frame"
-    return ContactVerdict(status, text, tuple(lines), tuple(suggestions), frames)
+    balance, stops = tuple(one.text for one in last), _stops(solved, rows)
+    return ContactVerdict(status, text, tuple(lines), tuple(suggestions), frames, balance=balance, stops=stops)
+
+
+def _lost(solved: SolveResult) -> str:
+    """Free objects that slipped out of the hands that held or pushed them, in words."""
+    held: dict[str, float] = {}
+    for frame in solved.frames:
+        held |= {one.object: frame.frame for one in balances(solved.model, frame)}
+    out, last = [], solved.frames[-1]
+    for one in solved.model.objects:
+        far = float(np.linalg.norm(last.displacement[solved.model.spans[one.name]], axis=1).max())
+        if one.states or one.support is not None or held.get(one.name) == last.frame or far < _PUSHED:
+            continue
+        since = f"after frame {held[one.name]:g}" if one.name in held else "at any frame"
+        out.append(f"{one.name} is pushed aside by {1e3 * far:.2g} mm, and nothing touches it {since}")
+    return "; ".join(out)
+
+
+def _slides(rows: Sequence[ContactRow], last: Sequence[ObjectBalance]) -> str:
+    """A digit that bears much of a grasp and slides on it in whole at the last frame, in words."""
+    grasped = {one.object: one for one in last if one.grasped}
+    for row in rows:
+        for name in row.against.split("+"):
+            one = grasped.get(name)
+            if one is None or row.frame != one.frame or row.force_n <= _BEARS * one.pressing:
+                continue
+            if row.state == "sliding":
+                return f"at frame {row.frame:g} {row.actor} {row.digit} slides on {name} with all of its skin"
+    return ""
+
+
+def _stops(solved: SolveResult, rows: Sequence[ContactRow]) -> tuple[str, ...]:
+    """What was asked of digits and not reached."""
+    out = []
+    for stop in solved.stops:
+        digit = stop.digit.rpartition(".")[2]
+        short = max((r.short_deg for r in rows if (r.actor, r.digit) == (stop.actor, digit)), default=0.0)
+        if short > 0.0:
+            out.append(f"{stop.actor} {digit} stops at frame {stop.frame:.3g}, {short:.2g}° short: {stop.why}")
+    return tuple(out)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import zipfile
 from collections.abc import Sequence
-from dataclasses import dataclass, fields
+from dataclasses import asdict, dataclass, field, fields
 from pathlib import Path
 from typing import Any
 
@@ -16,6 +16,7 @@ from warpjld.fem import Loads, Status
 from warpjld.fem.contact import ContactInstant, ContactSolution
 from warpjld.fem.contact.law.contact_state import ContactState
 from warpjld.fem.contact.results.nodal_contact import NodalContact
+from warpjld.simulation.animation import AngleEdit
 from warpjld.simulation.solve.identity import differences
 from warpjld.simulation.solve.solved_frame import SolvedFrame
 from warpjld.whole_file import whole_file
@@ -34,11 +35,15 @@ class Checkpoint:
         identity: What it belongs to: hashes by name (see ``identity_of``).
         frames: In order.
         solution: Of the last of them.
+        edits: Angles that were found on the way.
+        limits: Digits that have stopped: ``ForceLimits.content``.
     """
 
     identity: dict[str, str]
     frames: tuple[SolvedFrame, ...]
     solution: ContactSolution
+    edits: tuple[AngleEdit, ...] = ()
+    limits: dict[str, Any] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)
@@ -70,13 +75,19 @@ class CheckpointFile:
             )
         return found
 
-    def save(self, frames: Sequence[SolvedFrame], solution: ContactSolution) -> None:
+    def save(
+        self,
+        frames: Sequence[SolvedFrame],
+        solution: ContactSolution,
+        edits: Sequence[AngleEdit] = (),
+        limits: dict[str, Any] | None = None,
+    ) -> None:
         """Keep what was solved so far.
 
         Raises:
             InputError: It cannot be written.
         """
-        save_checkpoint(self.path, Checkpoint(self.identity, tuple(frames), solution))
+        save_checkpoint(self.path, Checkpoint(self.identity, tuple(frames), solution, tuple(edits), limits or {}))
 
 
 def save_checkpoint(path: Path, state: Checkpoint) -> None:
@@ -89,6 +100,8 @@ def save_checkpoint(path: Path, state: Checkpoint) -> None:
         "identity": json.dumps(state.identity),
         "count": len(state.frames),
         "time": state.solution.last.time,
+        "edits": json.dumps([asdict(edit) for edit in state.edits]),
+        "limits": json.dumps(state.limits),
     }
     for k, frame in enumerate(state.frames):
         for one in fields(SolvedFrame):
@@ -131,10 +144,12 @@ def load_checkpoint(path: Path) -> Checkpoint:
                 for k in range(int(file["memories"]))
             )
             identity, time = json.loads(str(file["identity"])), float(file["time"])
-            correction_rate = file.get("course")
-    except (OSError, KeyError, ValueError, zipfile.BadZipFile) as error:
+            correction_rate = file.get("correction_rate")
+            edits = tuple(AngleEdit(**edit) for edit in json.loads(str(file["edits"])))
+            limits = json.loads(str(file["limits"]))
+    except (OSError, KeyError, ValueError, TypeError, zipfile.BadZipFile) as error:
         raise InputError(f"no state of a contact solve: {error}", path=path) from error
     last = frames[-1]
     instant = ContactInstant(time, last.displacement, last.reactions, (), last.solves, 0, 0.0)
     solution = ContactSolution(Status.CONVERGED, (instant,), "", memory, (), Loads(), correction_rate)
-    return Checkpoint(identity, tuple(frames), solution)
+    return Checkpoint(identity, tuple(frames), solution, edits, limits)

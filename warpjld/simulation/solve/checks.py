@@ -1,4 +1,4 @@
-"""What cannot work, found before it is tried, and why something did not, found afterwards."""
+"""What cannot work, found before it is tried."""
 
 from __future__ import annotations
 
@@ -21,13 +21,10 @@ from warpjld.simulation.specification import (
     located,
 )
 
-__all__ = ["check_model", "check_specification", "explain_failure"]
+__all__ = ["check_model", "check_specification"]
 
 _APART = 0.3
 """Gap, in elements, that a bond still bridges."""
-
-_DEEP = 5e-4
-"""Depth of a bone in a rigid object that the flesh between cannot bear [m]."""
 
 _ON = 2e-4
 """Gap from which on an object stands on what is below it [m]."""
@@ -161,20 +158,3 @@ def _below(model: ContactModel, surfaces: dict[str, Facets], name: str) -> str:
         if ((touching.distance < _ON) & (touching.normal @ up > 0.5)).any():
             return other
     return ""
-
-
-def explain_failure(model: ContactModel, time: float) -> str:
-    """What keeps bodies from equilibrium at a time, as far as it shows: bones inside rigid objects; or nothing."""
-    worst, found = 0.0, ""
-    for hand in model.hands:
-        known = hand.prescribed(time)
-        nodes = known.degrees[::3] // 3
-        x = hand.mesh.nodes[nodes] + known.values.reshape(-1, 3)
-        for name, obstacle in model.obstacles.items():
-            depth = -float(obstacle.project(x, time).distance.min())
-            if depth > max(worst, _DEEP):
-                worst, found = (
-                    depth,
-                    f"bones of {hand.name} are {1e3 * depth:.2g} mm inside {name}, which cannot give way",
-                )
-    return found

@@ -74,6 +74,7 @@ def _asked(contact: ContactSpecification) -> Iterator[tuple[str, Any]]:
                 yield f"{command}: {one.name}", getattr(record, one.name)
     yield "GRAVITY", contact.pull
     yield "STRENGTH", contact.strength
+    yield "GRASP", list(contact.grasped)
 
 
 def _sampled(known: Sequence[Prescribed]) -> Iterator[NDArray[Any]]:

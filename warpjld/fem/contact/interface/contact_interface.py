@@ -96,7 +96,7 @@ class Interface:
             probe = self._at_nodes(x, time) if self.pair.sites == "nodes" else self._at_faces(x, time)
             found = self._against(probe, before, time)
         else:
-            found = self.mortar.points(x, self.reach, self.slave.normals(x) if normals is None else normals)
+            return self.mortar.points(x, self.reach, self.slave.normals(x) if normals is None else normals)
         if self.pair.offset is None:
             return found
         return replace(found, gap=found.gap - abs(found.weights) @ self.pair.offset)

@@ -21,11 +21,12 @@ _FACING = -0.2
 """Facets may touch where the cosine of the angle between their normals is below this."""
 _TURN = 0.4
 """They do so fully where it is less than that by this."""
-_LEAST = 1e-4
-"""Share of a node's surface below which a point is left out."""
-_SLIVER, _OFF = 0.1, 0.25
-"""Share of a node's surface below which its average hangs on a sliver, and by how many edges the least of slivers seem
-farther off than they are: what presses beside them is to hold them, not a pressure without bound on hardly any area."""
+_LEAST, _SLIVER, _OFF = 0.05, 0.1, 0.25
+"""Share of a node's surface below which a point is none, and below which its average hangs on a sliver. Between the two
+it fades out: it seems farther off than it is, by up to so many edges, and what is seen there lies no farther outside
+than the nodes. A pressure that opens a gap acts on hardly any area there, so that it would have no bound; and the
+average may overlap the more the farther the sides are parted, so that there would be no solution. What presses beside
+it is to hold it."""
 
 
 class Mortar:
@@ -105,13 +106,21 @@ class Mortar:
         normal = normals[nodes]
         gap = np.asarray(-np.einsum("mi,mi->m", normal, table @ x), np.float64)
         gap += self.sliver_offset(nodes, area[nodes])[0]
+        if self.offset is not None:
+            gap -= self.sliver_share(nodes, area[nodes])[0] * (abs(table) @ self.offset)
         return ContactPoints(nodes, table, normal, area[nodes], gap, np.zeros((len(nodes), 3)), pairs, share)
 
     def sliver_offset(self, sites: Ints, area: Array) -> tuple[Array, Array]:
         """What slivers seem farther off [m], and its derivative by their area [1/m], shape (m,) each."""
+        t, per_area = self.sliver_share(sites, area)
         edge = self.slave.edge[sites]
-        t = np.minimum(area / (_SLIVER * edge**2), 1.0)
-        return _OFF * edge * (1.0 - t) ** 2, -2.0 * _OFF * (1.0 - t) / (_SLIVER * edge)
+        return _OFF * edge * (1.0 - t) ** 2, -2.0 * _OFF * edge * (1.0 - t) * per_area
+
+    def sliver_share(self, sites: Ints, area: Array) -> tuple[Array, Array]:
+        """How far points are from being none, 0 to 1, and its derivative by their area [1/m²], shape (m,) each."""
+        whole = (_SLIVER - _LEAST) * self.slave.edge[sites] ** 2
+        t = (area - _LEAST * self.slave.edge[sites] ** 2) / whole
+        return np.clip(t, 0.0, 1.0), np.where((t > 0.0) & (t < 1.0), 1.0 / whole, 0.0)
 
     def _neighbours(self, x: Array, reach: float) -> Ints32:
         """Slave and master facets whose boxes are within ``reach``, shape (P, 2); none is left out."""

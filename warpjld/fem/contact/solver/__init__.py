@@ -18,11 +18,14 @@ keep working, and (5) takes away what overlap and slip a penalty leaves. E is wh
 mortar weights and normals (Puso & Laursen 2004), and of friction by pressure; with it GMRES takes over, preconditioned
 by K + H.
 
-A load step (``load_steps``, ``contact_newton``), from u and λ of the step before, at an extrapolated guess:
+A load step (``load_steps``, ``contact_newton``), from u and λ of the step before, at the guess that leaves the least
+force over (u carried along by what moves the bodies, alone or with last step's correction), or, where that is in vain,
+from u itself, prescribed values yet to go to their place:
 
 1. ``newton_state.assemble``: R of (1); end where (6) holds and points found afresh agree (``balanced``, ``confirmed``).
 2. ``newton_state.linearise``, ``tangent``: E; ``lagged_solver``: Δu of (4), with the preconditioner of earlier steps
    while it serves; where K + H is not positive definite ``damping`` lends it stiffness at rest (Levenberg, Marquardt).
+   A search that never comes near (|R| above .3 of the forces for ten iterations) is ended.
 3. How far along Δu (``contact_newton``): as far as points look ahead; elements keep a fifth of their Jacobians
    (``line_search.length_upright``); see 5 for the rest.
 4. ``newton_state.advance``: λ by (5); contact points anew; forces by (2), (3).
@@ -31,6 +34,7 @@ A load step (``load_steps``, ``contact_newton``), from u and λ of the step befo
    Wohlmuth 2005); the last solve's λ_n bounds friction in (3), so that each solve is a convex problem (Tresca's).
 5. *Alternating phase*, after that: λ is updated only when no point came or went; a line search along Δu settles what
    does (work, or residual where E counts); where all points slide, friction follows the present pressure (coupled).
+   A search whose points, found afresh, do not agree goes on in this phase, twice at most.
 6. Bonds whose traction is too much are broken, and the step is found again; a step that fails is taken in halves.
 
 ``contact_system`` has (2)–(5) for all interfaces, ``contact.law`` for one; ``elastic`` has f_int, f_ext and K;

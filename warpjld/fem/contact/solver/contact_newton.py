@@ -14,7 +14,7 @@ from warpjld.fem.contact.solver.damping import Damping
 from warpjld.fem.contact.solver.elastic import Elastic
 from warpjld.fem.contact.solver.lagged_solver import LaggedSolver
 from warpjld.fem.contact.solver.line_search import length_by_residual, length_by_work, length_upright
-from warpjld.fem.contact.solver.newton_state import Equilibrium, NewtonState
+from warpjld.fem.contact.solver.newton_state import Equilibrium, NewtonState, guess_held
 from warpjld.fem.contact.solver.tangent import with_contact
 from warpjld.fem.contact.solver.unconstrained import UnconstrainedBodies
 from warpjld.fem.load.prescribed import Prescribed
@@ -29,6 +29,11 @@ _STRIDE = 0.25
 """Farthest a node moves in an iteration where something presses, over what points look ahead (two edges)."""
 _FALLS = 8
 """Iterations in a row that an unconstrained body may fall for, with nothing touching it."""
+_RESTARTS = 2
+"""Times that a search may go on with points found afresh: one that comes to the same place again goes round."""
+_HOPELESS, _FAR = 10, 0.3
+"""A search is ended at that iteration if what is left over was never below this share of the forces that balance. Of
+225 searches of grasps that converged none would have been; of 1,615 iterations in vain 381 were saved."""
 
 
 class ContactNewton:
@@ -65,21 +70,44 @@ class ContactNewton:
     ) -> tuple[Status, Equilibrium | None]:
         """Equilibrium from displacement u (3N,) at ``step.before``.
 
-        It is looked for from the first of the guesses that turns no element inside out, or from u.
+        It is looked for from the guess that turns no element inside out and leaves the least force over; where that is
+        in vain, and where there is none, from u, what is prescribed yet to go to its place.
         """
+        begun = [
+            NewtonState(self._elastic, self._system, step, u, states, guess, **self._accuracy)
+            for guess in guesses
+            if self._elastic.upright(guess_held(step, guess))
+        ]
+        begun.sort(key=NewtonState.left_over)
+        status, found = Status.MAX_ITERATIONS, None
+        if begun:
+            status, found = self._search(begun[0], step)
+        if found is None and status not in (Status.UNHELD, Status.SLIDING):
+            again, found = self._search(
+                NewtonState(self._elastic, self._system, step, u, states, None, **self._accuracy), step
+            )
+            status = status if begun and found is None else again
+        return status, found
+
+    def _search(self, state: NewtonState, step: LoadStep) -> tuple[Status, Equilibrium | None]:
+        """Equilibrium from where a state is."""
         unconstrained = self._unconstrained(step.prescribed)
         self._solver.begin()
         self._damping.begin()
-        state = NewtonState(self._elastic, self._system, step, u, states, guesses, **self._accuracy)
-        falls = 0
-        for _ in range(_ITERATIONS):
+        falls, nearest = 0, np.inf
+        for turn in range(_ITERATIONS):
             state.assemble()
             if state.balanced():
                 if state.confirmed():
                     return Status.CONVERGED, state.equilibrium()
+                if state.restarts > _RESTARTS:
+                    break
                 continue
             if not np.isfinite(state.unbalanced):
                 return Status.NOT_FINITE, None
+            nearest = min(nearest, state.unbalanced)
+            if turn >= _HOPELESS and nearest > _FAR:
+                break
             state.linearise()
             done = self._solved(state, unconstrained)
             if done.status in (Status.INDEFINITE, Status.NOT_FINITE):

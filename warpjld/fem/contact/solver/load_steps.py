@@ -176,8 +176,6 @@ class LoadSteps:
         """Equilibrium of a step; again after every bond that did not hold."""
         guesses = self._guesses(step, carried)
         status, found = self.newton.find(self.u, self.states, step, *guesses)
-        if found is None and guesses and self.guess is None:
-            status, found = self.newton.find(self.u, self.states, step)
         for _ in range(_BREAKS):
             if found is None:
                 return status, None

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -21,7 +20,7 @@ from warpjld.fem.contact.solver.contact_system import (
 )
 from warpjld.fem.contact.solver.elastic import Elastic
 
-__all__ = ["Equilibrium", "NewtonState"]
+__all__ = ["Equilibrium", "NewtonState", "guess_held"]
 
 _ROUNDING = 1e-13
 """Part of stiffness times displacement that is rounding, where bodies move without a force."""
@@ -59,7 +58,8 @@ class NewtonState:
         step: The load step.
         start: Displacement at its start [m], shape (3N,).
         states: What is known of contact points there.
-        guesses: Where to begin to look, best first [m], shape (3N,): the first that turns no element inside out is.
+        guess: Where to begin to look [m], shape (3N,), no element inside out; None: at ``start``, what is prescribed
+            yet to go to its place.
         tolerance: Residual over the forces that balance.
         penetration: Overlap left, as a share of an edge.
 
@@ -72,6 +72,7 @@ class NewtonState:
         tangent: The bodies' forces and stiffness at ``u``.
         residual: Forces left over at what is free [N], shape (3N,).
         unbalanced: Their size over that of the forces that balance.
+        restarts: How often forces balanced and points, found afresh, did not agree.
     """
 
     contact: ContactForces
@@ -86,7 +87,7 @@ class NewtonState:
         step: LoadStep,
         start: Array,
         states: list[ContactState],
-        guesses: Sequence[Array],
+        guess: Array | None,
         *,
         tolerance: float,
         penetration: float,
@@ -97,29 +98,29 @@ class NewtonState:
         self.states = self._before = system.begun(states, start, step.before)
         self.jump = np.zeros_like(start)
         self._pressures: Array | None = None
-        self._iteration, self._since, self._settled = -1, 0, False
-        guess = next((held for held in map(self._held, guesses) if elastic.upright(held)), None)
+        self._iteration, self._settled = -1, False
+        self.restarts = 0
         if guess is not None:
-            self.u = guess
+            self.u = guess_held(step, guess)
             # a guess squeezes elements here and there: their false pressures would make K indefinite, those of the
             # equilibrium before do not
             self._pressures = elastic.pressures(start)
         else:
             self.u = start.copy()
-            self.jump = self._held(start) - start
+            self.jump = guess_held(step, start) - start
         self._normals = system.normals(self.u)
         self._seen = (system.points(self.u, step, self._normals), self.u)
         self.contact = self.forces(self._seen[0], self.u, ActiveSet.FROZEN)
 
     @property
     def turn(self) -> int:
-        """Iterations since the search began, or began anew."""
-        return self._iteration - self._since
+        """Iterations since the search began."""
+        return self._iteration
 
     @property
     def alternating(self) -> bool:
         """Whether the fixed-point phase is over, and steps and multipliers take turns."""
-        return self.turn >= _FIXED_POINT
+        return self.turn >= _FIXED_POINT or self.restarts > 0
 
     @property
     def predicts(self) -> ActiveSet:
@@ -145,6 +146,10 @@ class NewtonState:
         """External less internal forces of the bodies alone at displacement u [N], shape (3N,)."""
         return self.elastic.external(self.step.loads, u) - self.elastic.forces(u).forces
 
+    def left_over(self) -> float:
+        """Forces that do not balance at what is free, their size [N]."""
+        return norm(np.where(self.free, self.pull(self.u) + self.contact.forces, 0.0))
+
     def assemble(self) -> None:
         """Find the forces, and what of them is left over."""
         self._iteration += 1
@@ -169,15 +174,17 @@ class NewtonState:
         return self._quiet or self.system.settled(self.contact, self.states, self._negligible)
 
     def confirmed(self) -> bool:
-        """Whether the points see what is so; where not, the search begins anew with points that do."""
+        """Whether the points see what is so; where not, the search goes on, carefully, with points that do: it is near
+        a solution, and full steps would only lead away from it again (what touches may depend on which they are)."""
         self._normals = self.system.normals(self.u)
         fresh = self.system.points(self.u, self.step, self._normals)
         if self.step.allowed > 0.0:
             return True
         if self.system.mismatch(fresh, self.contact.points, self.contact.tractions) <= self._penetration:
             return True
-        self._seen, self._settled, self._since = (fresh, self.u), False, self._iteration
-        self.contact = self.forces(fresh, self.u, ActiveSet.FROZEN)
+        self._seen, self._settled = (fresh, self.u), False
+        self.restarts += 1
+        self.contact = self.forces(fresh, self.u, ActiveSet.TRIAL)
         return False
 
     def equilibrium(self) -> Equilibrium:
@@ -205,13 +212,13 @@ class NewtonState:
         self.u = self.u + move
         self.jump = self.jump * (1.0 - length)
         if length == 1.0:
-            self.u = self._held(self.u)
+            self.u = guess_held(self.step, self.u)
             self.jump = np.zeros_like(self.u)
         predicted = self.predicted(move)
         same = same_active_set(self.contact.tractions, predicted)
         if not alternating or same:
             self.states = self.system.updated(self.states, self.contact, predicted, move, decides)
-        points, last = self._points(predicted), self.turn + 1 >= _FIXED_POINT
+        points, last = self._points(predicted), alternating or self.turn + 1 >= _FIXED_POINT
         coupled = last and same and not any((t.active & t.sticking).any() for t in predicted)
         self.contact = self.forces(points, self.u, ActiveSet.TRIAL if last else ActiveSet.FROZEN, coupled=coupled)
 
@@ -227,9 +234,9 @@ class NewtonState:
                 self._seen, points = (fresh, self.u), fresh
         return self.system.refreshed(points, self.u, self.step) if self._settled else points
 
-    def _held(self, u: Array) -> Array:
-        """With the prescribed values where there are such."""
-        prescribed = self.step.prescribed
-        out = np.array(u, dtype=np.float64).reshape(-1)
-        out[prescribed.degrees] = prescribed.values
-        return out
+
+def guess_held(step: LoadStep, u: Array) -> Array:
+    """A displacement (3N,) with the prescribed values where there are such."""
+    out = np.array(u, dtype=np.float64).reshape(-1)
+    out[step.prescribed.degrees] = step.prescribed.values
+    return out

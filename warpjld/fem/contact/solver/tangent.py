@@ -227,9 +227,12 @@ class _Pairs:
         wider = self.own.sum(axis=3)
         mean = np.einsum("pkai,pai->pka", spread, points.normal[corner]) + (points.gap - off)[corner][:, None] * wider
         if self._mortar.offset is not None:
+            share, by_area = self._mortar.sliver_share(points.sites, points.area)
             offset = self._mortar.offset[self.column[:, ::3] // 3]
-            mean += np.einsum("pkab,pb->pka", self.own, offset[:, :4])
-            mean += np.einsum("pkab,pb->pka", self.far, offset[:, 4:])
+            outside = np.einsum("pkab,pb->pka", self.own, offset[:, :4])
+            outside += np.einsum("pkab,pb->pka", self.far, offset[:, 4:])
+            mean += share[corner][:, None] * outside
+            per_area = per_area - by_area * (abs(points.weights) @ self._mortar.offset)
         gap = per_area[corner][:, None] * wider - mean / points.area[corner][:, None]
         where = np.broadcast_to(corner[:, None] >= 0, gap.shape)
         row = np.broadcast_to(corner[:, None], gap.shape)[where]

@@ -1,0 +1,59 @@
+"""A finger that closes on a plate far beyond what its flesh bears: it stops, or is called crushed where it may not."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+from warpjld.script import Scene
+from warpjld.script.contact import run_contact
+
+FINGER = """
+OBJECT PLATE BOX 0.036 0.006 0.036 AT 0.034 -0.0275 -0.165
+MOVE LEFT 0 0 -0.001 0
+FINGER1 LEFT INDEX FLEXION AT 0 0
+FINGER1 LEFT INDEX FLEXION AT 4 7
+FLESH LEFT INDEX ELEMENT 0.004
+FRAMES 0 4
+"""
+
+
+def test_a_digit_stops_where_its_skin_bears_no_more(run: Callable[[str], Scene], tmp_path: Path) -> None:
+    scene = run(FINGER + "PRESS 0 4 BEARS 60000\nEXPORT 'e.npz'")
+    found = run_contact(scene, tmp_path)
+    rows = [row for row in found.rows if row.digit == "index"]
+    last = rows[-1]
+    assert found.verdict.status == "CONVERGED"
+    assert found.verdict.text.startswith("realistic")
+    assert max(row.peak_kpa for row in rows) < 60.0 * 1.01
+    assert last.peak_kpa > 0.7 * 60.0  # as far as it may
+    # what was asked and not reached is told, and what was reached are the keys
+    asked, reached = 7.0, scene.actor().motion.value("left.index.base.flexion", 4.0)
+    assert last.short_deg == pytest.approx(asked - 57.29577951 * float(reached), abs=1e-5)
+    assert last.short_deg > 0.5
+    (stop,) = found.verdict.stops
+    assert stop.startswith("LEFT index stops at frame ")
+    assert stop.endswith("° short: its skin is pressed with 60 kPa")
+
+
+def test_muscles_end_it_where_they_are_weaker(run: Callable[[str], Scene], tmp_path: Path) -> None:
+    scene = run(FINGER + "STRENGTH LEFT INDEX 0.5\nPRESS 0 4")
+    found = run_contact(scene, tmp_path)
+    last = [row for row in found.rows if row.digit == "index"][-1]
+    assert found.verdict.text.startswith("realistic")
+    assert 0.7 < last.share < 1.03
+    (stop,) = found.verdict.stops
+    assert stop.endswith("its muscles can do no more")
+
+
+def test_a_rigid_one_is_refused_before_it_is_solved_where_its_bone_lies_in_the_plate(
+    run: Callable[[str], Scene], tmp_path: Path
+) -> None:
+    scene = run(FINGER.replace("AT 4 7", "AT 4 14") + "PRESS 0 4 EVERY 4 RIGID")
+    found = run_contact(scene, tmp_path)
+    assert found.verdict.status == "BLOCKED"
+    assert found.verdict.failed
+    assert "the bone of LEFT index is" in found.verdict.text
+    assert "mm inside PLATE, which cannot give way" in found.verdict.text

@@ -1,0 +1,106 @@
+"""What an object is left with when all that touches it is added up: nothing, if a grasp holds it (R112)."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from warpjld.simulation.bodies.model import ContactModel
+from warpjld.simulation.solve.grasp_balance import allowed_net, weight_of
+from warpjld.simulation.solve.solved_frame import SolvedFrame
+
+__all__ = ["ObjectBalance", "balances"]
+
+_OPPOSED = 0.1
+"""Share of what presses that has to meet a counterforce for an object to be grasped, and not merely pushed."""
+_SLIGHT = 0.1
+"""Forces below this are not told [N]."""
+
+
+@dataclass(frozen=True, eq=False)
+class ObjectBalance:
+    """Contact forces on one object at one frame.
+
+    Attributes:
+        object: Name.
+        frame: Number.
+        force: Their sum [N], shape (3,).
+        moment: About the centre of what presses [N m], shape (3,).
+        pressing: Sum of their sizes [N].
+        by_hands: Whether nothing but hands touches it.
+        weight: What it may weigh [N].
+        borne: Whether something else holds it: its animation, HOLD, a support, or its own weight.
+    """
+
+    object: str
+    frame: float
+    force: NDArray[np.float64]
+    moment: NDArray[np.float64]
+    pressing: float
+    by_hands: bool
+    weight: float
+    borne: bool
+
+    @property
+    def net(self) -> float:
+        """Size of ``force`` [N]."""
+        return float(np.linalg.norm(self.force))
+
+    @property
+    def grasped(self) -> bool:
+        """Whether hands press on it from several sides, and nothing else touches it."""
+        return self.by_hands and self.pressing > _SLIGHT and self.net < (1.0 - _OPPOSED) * self.pressing
+
+    @property
+    def unbalanced(self) -> bool:
+        """Whether a grasp pushes it away."""
+        return self.grasped and self.net > max(allowed_net(self.pressing, self.weight), _SLIGHT)
+
+    @property
+    def text(self) -> str:
+        """``on BOX 61 N press, of which 38 N and 0.4 N m are left over: what holds BOX in its place bears them``."""
+        turn = float(np.linalg.norm(self.moment))
+        out = f"on {self.object} {self.pressing:.3g} N press"
+        if not self.borne or self.net < _SLIGHT:
+            return f"{out}, and balance"
+        bears = f"what holds {self.object} in its place bears them"
+        return f"{out}, of which {self.net:.3g} N and {turn:.2g} N m are left over: {bears}"
+
+
+def balances(model: ContactModel, solved: SolvedFrame) -> list[ObjectBalance]:
+    """Of every object that anything touches at a frame."""
+    hands = {hand.name for hand in model.hands}
+    bodies = {one.name: one for one in model.objects}
+    x = model.body.mesh.nodes + solved.displacement
+    out = []
+    for name in (*bodies, *model.obstacles):
+        forces = np.zeros_like(x)
+        others = set()
+        for owner, nodal in zip(model.owners, solved.nodal, strict=True):
+            other = owner.other(name)
+            if other is None or not nodal.any():
+                continue
+            others.add(other)
+            # what presses on an obstacle is known by what it presses back with
+            forces += _nodal_on(model, name, nodal) if name in bodies else -nodal
+        size = np.linalg.norm(forces, axis=1)
+        pressing = float(size.sum())
+        if pressing == 0.0:
+            continue
+        force = forces.sum(axis=0)
+        centre = size @ x / pressing
+        moment = np.cross(x - centre, forces).sum(axis=0)
+        one = bodies.get(name)
+        borne = one is None or bool(one.states) or one.support is not None or any(model.loads.gravity)
+        weight = weight_of(model.obstacles[name], solved.frame - model.start) if one is None else 0.0
+        out.append(ObjectBalance(name, solved.frame, force, moment, pressing, others <= hands, weight, borne))
+    return out
+
+
+def _nodal_on(model: ContactModel, name: str, nodal: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Forces (N, 3) on the nodes of one body, nothing on all others."""
+    out = np.zeros_like(nodal)
+    out[model.spans[name]] = nodal[model.spans[name]]
+    return out

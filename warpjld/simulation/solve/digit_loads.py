@@ -1,0 +1,124 @@
+"""What digits press with at an equilibrium, over what they may: muscles' limits, and a pressure (R118)."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from warpjld.fem.contact import ContactInstant
+from warpjld.fem.hand.bone_loads import loads_from_contact
+from warpjld.fem.hand.muscles import effort_of
+from warpjld.simulation.bodies.flesh_body import FleshBody
+from warpjld.simulation.bodies.model import ContactModel
+from warpjld.simulation.bodies.skin_parts import digit_of_label
+from warpjld.simulation.solve.grasp_balance import allowed_net
+from warpjld.simulation.solve.solved_frame import SolvedFrame, solved_frame
+
+__all__ = ["CRUSHING", "DigitLoad", "digit_loads", "peaks_of"]
+
+CRUSHING = 1e6
+"""Pressure on skin from which on flesh is crushed [Pa]: hardly any is left, and no law of it was measured there."""
+
+
+@dataclass(frozen=True)
+class DigitLoad:
+    """One digit.
+
+    Attributes:
+        actor: Whose.
+        digit: As the skeleton has it: ``left.index``, or ``index``.
+        force: Sum of the contact forces on its bones [N].
+        muscles: The largest share of the limits of its force and of its joints' torques.
+        peak: Highest pressure on its skin [Pa].
+        unopposed: Net force on the object that it pushes along with it, over what may be left over; 0 where it opposes.
+        pushed: That object.
+    """
+
+    actor: str
+    digit: str
+    force: float
+    muscles: float
+    peak: float
+    unopposed: float = 0.0
+    pushed: str = ""
+
+    def share(self, pressure: float) -> float:
+        """What it does over what it may, where its skin may be pressed with ``pressure`` [Pa]."""
+        return max(self.muscles, self.peak / pressure, self.unopposed)
+
+    def bound(self, pressure: float) -> str:
+        """What ``share`` is about, in words."""
+        if self.unopposed >= self.share(pressure):
+            return f"nothing opposes it, it would push {self.pushed} away"
+        if self.muscles >= self.peak / pressure:
+            return "its muscles can do no more"
+        return f"its skin is pressed with {1e-3 * pressure:.3g} kPa"
+
+
+def digit_loads(
+    model: ContactModel,
+    hand: FleshBody,
+    angles: NDArray[np.float64],
+    instant: ContactInstant,
+    limits: Mapping[str, float] | None,
+    weights: Mapping[str, float],
+) -> dict[str, DigitLoad]:
+    """By digit. Contact forces are handed on to the bones by nearness: no equilibrium of the flesh alone is needed.
+
+    Args:
+        model: Everything.
+        hand: Whose.
+        angles: Joint angles there [rad], shape (J, 4).
+        instant: The equilibrium.
+        limits: Digit → largest force [N], where it is not the default.
+        weights: What objects may weigh that hands alone are to hold, by name [N].
+    """
+    span = model.spans[hand.name]
+    nodal = sum((touch.nodal[span] for touch in instant.touches), np.zeros((span.stop - span.start, 3)))
+    loads = loads_from_contact(hand.hand, instant.displacement[span], nodal)
+    poses = hand.bones.posed(angles, instant.time)
+    effort = effort_of(hand.bones.skeleton, poses, loads, limits=limits)
+    pushes = _pushes(model, hand, instant, weights)
+    peaks = peaks_of(model, hand, solved_frame(0.0, [instant]))
+    out = {}
+    for one in effort.digits:
+        short = one.digit.rpartition(".")[2]
+        pushed, share = pushes.get(short, ("", 0.0))
+        out[one.digit] = DigitLoad(hand.name, one.digit, one.force, one.share, peaks.get(short, 0.0), share, pushed)
+    return out
+
+
+def _pushes(
+    model: ContactModel, hand: FleshBody, instant: ContactInstant, weights: Mapping[str, float]
+) -> dict[str, tuple[str, float]]:
+    """By digit the object that it pushes along with what is left over, and that over what may be."""
+    digit_of = _digits(hand)
+    out: dict[str, tuple[str, float]] = {}
+    for name, weight in weights.items():
+        force = np.zeros_like(instant.displacement)
+        for owner, touch in zip(model.owners, instant.touches, strict=False):
+            if owner.master == name:
+                force -= touch.nodal
+        net, pressing = force.sum(axis=0), float(np.linalg.norm(force, axis=1).sum())
+        share = float(np.linalg.norm(net)) / max(allowed_net(pressing, weight), 1e-300)
+        mine = force[model.spans[hand.name]]
+        for digit in dict.fromkeys(digit_of):
+            if digit and mine[digit_of == digit].sum(axis=0) @ net > 0.0 and share > out.get(digit, ("", 0.0))[1]:
+                out[digit] = (name, share)
+    return out
+
+
+def _digits(hand: FleshBody) -> NDArray[np.str_]:
+    """Digit of every node, or the palm; empty for nodes inside."""
+    labels = [digit_of_label(name) for name in hand.hand.label_names]
+    return np.array([*labels, ""])[hand.hand.node_labels]
+
+
+def peaks_of(model: ContactModel, hand: FleshBody, solved: SolvedFrame) -> dict[str, float]:
+    """Highest pressure on the skin of each digit, and the palm's [Pa]."""
+    digit_of = _digits(hand)
+    pressure = solved.pressure(model)[model.spans[hand.name]]
+    return {name: float(pressure[digit_of == name].max(initial=0.0)) for name in dict.fromkeys(digit_of)}
