@@ -7,7 +7,7 @@ import numpy as np
 from warpjld.fem.arrays import Array
 from warpjld.fem.body import Body
 from warpjld.fem.material.materials import NEO_HOOKE
-from warpjld.fem.mesh.shape import CENTRE_GRADIENT
+from warpjld.fem.mesh.shape import CENTRE_GRADIENT, POINTS, slope_at
 
 __all__ = ["at_nodes", "cauchy", "mises"]
 
@@ -15,7 +15,8 @@ __all__ = ["at_nodes", "cauchy", "mises"]
 def cauchy(body: Body, displacement: Array) -> Array:
     """Cauchy stress at the centre of each element [Pa], xx yy zz xy yz zx, shape (E, 6).
 
-    The pressure is the element's own (mean dilatation), which does not oscillate within it.
+    The pressure is the element's own, κ (θ − 1) or κ tr ε of its mean dilatation: that of the formulation, which does
+    not oscillate within it. The divergence at the centre is another number, and κ makes much of it near ν = ½.
     """
     u = displacement.reshape(-1, 3)[body.mesh.elements]
     x = body.mesh.nodes[body.mesh.elements]
@@ -26,7 +27,7 @@ def cauchy(body: Body, displacement: Array) -> Array:
     strain = 0.5 * (slope + slope.transpose(0, 2, 1))
     spread = np.einsum("eii->e", strain)
     linear = 4.0 * (c10 + c01)[:, None, None] * (strain - spread[:, None, None] / 3.0 * identity)
-    linear += (bulk * spread)[:, None, None] * identity
+    linear += (bulk * _mean_divergence(x, u))[:, None, None] * identity
     stress = linear + _matrix(body.initial_stress)
     large = body.kinds >= NEO_HOOKE
     if large.any():
@@ -41,6 +42,18 @@ def cauchy(body: Body, displacement: Array) -> Array:
         pressure = body.at(displacement, stiffness=False).pressures[large]
         stress[large] = tau / volume[:, None, None] + pressure[:, None, None] * identity
     return np.stack([stress[:, i, j] for i, j in ((0, 0), (1, 1), (2, 2), (0, 1), (1, 2), (2, 0))], axis=1)
+
+
+def _mean_divergence(x: Array, u: Array) -> Array:
+    """Mean of ∇·u over elements with corners x and displacements u (E, 8, 3), as B-bar has it, shape (E,)."""
+    total, volume = np.zeros(len(x)), np.zeros(len(x))
+    for local in slope_at(POINTS):
+        jacobian = np.einsum("eai,aj->eij", x, local)
+        weight = np.linalg.det(jacobian)
+        slope = np.einsum("eai,aj->eij", u, local)
+        total += weight * np.einsum("eij,eji->e", slope, np.linalg.inv(jacobian))
+        volume += weight
+    return np.asarray(total / volume)
 
 
 def mises(stress: Array) -> Array:
