@@ -12,9 +12,10 @@ from scipy.sparse import csr_array, diags_array
 from scipy.sparse.linalg import LinearOperator, onenormest, splu
 
 from warpjld.errors import InputError, WarpjldError
-from warpjld.fem.arrays import Array, Ints, norm
+from warpjld.fem.arrays import Array, Ints, Ints32, norm
 from warpjld.fem.body import Body
 from warpjld.fem.contact.interface.contact_interface import interfaces_of
+from warpjld.fem.contact.interface.contact_points import ContactPoints
 from warpjld.fem.contact.interface.pairs import Pair
 from warpjld.fem.contact.results.contact_solution import ContactSolution
 from warpjld.fem.contact.sensitivity.interface_slopes import InterfaceSlopes, interface_slopes
@@ -29,6 +30,8 @@ _STIFF = 100.0
 _NONE = "the equilibrium has no derivative"
 _SINGULAR = 1e13
 """Condition number from which on a body is free."""
+_FAR = 1e-7
+"""Way of the node that moves most in differences of what presses on nodes [m]."""
 _ROUNDS, _EXACT = 60, 1e-9
 """Updates of multipliers, and gap left over what the parameter would open."""
 
@@ -77,9 +80,10 @@ class EquilibriumTangent:
         if len(solution.states) != len(pairs) or solution.last.displacement.size != body.degrees:
             raise InputError("solution: want one of this body and these pairs")
         self._body, self._u = body, solution.last.displacement
-        interfaces = interfaces_of(body.mesh, list(pairs), body.threads)
+        self._interfaces = interfaces_of(body.mesh, list(pairs), body.threads) if pairs else []
+        self._times = last.time, solution.last.time
         rest, time = body.mesh.nodes, solution.last.time
-        known = zip(interfaces, solution.states, strict=True)
+        known = zip(self._interfaces, solution.states, strict=True)
         self.interfaces: list[InterfaceSlopes] = [
             interface_slopes(one, state, last, k, self._u, rest, time) for k, (one, state) in enumerate(known)
         ]
@@ -142,6 +146,39 @@ class EquilibriumTangent:
             tuple(pressing),
         )
 
+    @property
+    def contact(self) -> Array:
+        """Contact forces of each pair on all nodes at the equilibrium [N], shape (P, N, 3)."""
+        forces = [(o.spreading @ (o.rub - o.press[:, None] * o.normal).ravel()) for o in self.interfaces]
+        return np.array(forces).reshape(len(forces), *self._u.shape)
+
+    @property
+    def pushed(self) -> Array:
+        """What presses on every node, as ``NodalContact.force`` has it [N], shape (P, N)."""
+        nothing = np.zeros_like(self._u)
+        return self._pushed(nothing, [np.zeros(len(one.sites)) for one in self.interfaces])
+
+    def pushes(self, response: Response) -> Array:
+        """How ``pushed`` follows, shape (P, N)."""
+        step = _FAR / max(float(np.abs(response.displacement).max(initial=0.0)), _FAR)
+        ends = [
+            self._pushed(by * response.displacement, [by * pressing for pressing in response.pressing])
+            for by in (step, -step)
+        ]
+        return (ends[0] - ends[1]) / (2.0 * step)
+
+    def _pushed(self, move: Array, more: Sequence[Array]) -> Array:
+        """After a move (N, 3), where points press by so much more."""
+        out = np.zeros((len(self.interfaces), len(self._u)))
+        x = self._body.mesh.nodes + self._u + move
+        for k, (interface, one) in enumerate(zip(self._interfaces, self.interfaces, strict=True)):
+            pressing = np.zeros(len(interface.edge))
+            pressing[one.sites] = one.press + more[k]
+            points = interface.points(x, *self._times)
+            force = pressing[points.sites] * (1.0 if one.obstacle is not None else points.area)
+            out[k] = _pushing(points, interface.slave.nodes, force)
+        return out
+
     def _explicit(self, change: Perturbation) -> tuple[list[Array], list[Array]]:
         """What the parameter changes with u and multipliers held: tractions (3k,) and constraints of each interface."""
         tractions, fixed = [], []
@@ -191,6 +228,18 @@ class EquilibriumTangent:
                 return held
             before = min(before, open_)
         raise SensitivityError(f"{_NONE}: what touches does not follow the parameter")
+
+
+def _pushing(points: ContactPoints, slave: Ints32, force: Array) -> Array:
+    """What presses on every node where points press with forces (m,) [N], shape (N,); as ``touch_of`` has it."""
+    share = points.weights[:, slave].maximum(0.0)
+    weight = share.T.multiply(points.area).tocsr()
+    area = np.asarray(weight.sum(axis=1)).ravel()
+    mean = csr_array(weight.multiply(1.0 / np.where(area > 0.0, area, 1.0)[:, None]))
+    push = share.T @ force
+    out = np.asarray((mean @ (-points.weights).maximum(0.0)).T @ push, dtype=np.float64)
+    out[slave] += push
+    return out
 
 
 def _holding(one: InterfaceSlopes, stiffness: Array) -> Array:
