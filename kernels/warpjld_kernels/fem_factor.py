@@ -260,7 +260,10 @@ def factorise(
 """
 )
 def solve_all(
-    fronts: Fronts, factor: wp.array(dtype=wp.float64), scratch: wp.array(dtype=wp.float64), x: wp.array(dtype=wp.float64)
+    fronts: Fronts,
+    factor: wp.array(dtype=wp.float64),
+    scratch: wp.array(dtype=wp.float64),
+    x: wp.array(dtype=wp.float64),
 ): ...
 
 

@@ -36,6 +36,8 @@ from warpjld.simulation.report.table import ContactRow, ContactTable
 from warpjld.simulation.report.tactile import Tactile, tactile_readings
 from warpjld.simulation.report.verdict import ContactVerdict, verdict_of
 from warpjld.simulation.report.visible_overlap import remaining_overlaps, visible_overlap_notes
+from warpjld.simulation.sensitivity.gradient import Gradient, gradient_at
+from warpjld.simulation.sensitivity.parameters import Parameter
 from warpjld.simulation.solve.checkpoint import CheckpointFile
 from warpjld.simulation.solve.checks import check_model, check_specification
 from warpjld.simulation.solve.identity import identity_of
@@ -120,6 +122,31 @@ class Simulation:
             InputError: No such body.
         """
         return np.asarray(self.contact_force[:, self._span(name)].sum(axis=1))
+
+    def gradient(self, frame: float, parameters: Sequence[Parameter]) -> Gradient:
+        """Derivatives of a frame's equilibrium by joint angles, places, moduli and friction at that frame.
+
+        The frames before stay as they are, and of a frame that was solved in several load steps its last is
+        differentiated. Exact away from changes of the active set: where a point is about to touch, part, stick or slip,
+        it is one-sided (``warpjld.fem.contact.sensitivity`` has the equations).
+
+        Args:
+            frame: One of ``frames``.
+            parameters: P of ``JointAngle`` [rad], ``ObjectPlace`` [m], ``Modulus`` [1], ``Friction`` [1].
+
+        Returns:
+            Arrays by parameter: displacements (P, N, 3) [m], contact forces (P, N, 3) [N], pressures (P, N) [Pa],
+            forces and torques of digits.
+
+        Raises:
+            InputError: A frame that this run did not solve, or parameters of nothing that is there.
+            SensitivityError: The equilibrium has no derivative: a body is free to move.
+        """
+        known = self.solved.equilibria.get(float(frame))
+        if known is None:
+            solved = ", ".join(f"{one:g}" for one in self.solved.equilibria) or "none"
+            raise InputError(f"frame: want one that this run solved ({solved}), got {frame:g}")
+        return gradient_at(known.model, known.history, known.solution, parameters)
 
     def visible_pressure(self, name: str, frame: float) -> VisiblePressure:
         """Pressure on an actor's or object's visible surface at a frame.

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -24,10 +24,26 @@ from warpjld.simulation.solve.solved_frame import SolvedFrame, solved_frame
 from warpjld.simulation.solve.substeps import Substeps
 from warpjld.simulation.specification import ContactSpecification, GripSpecification, SolveSpecification
 
-__all__ = ["Progress", "SolveResult", "solve_frames"]
+__all__ = ["KnownEquilibrium", "Progress", "SolveResult", "solve_frames"]
 
 Progress = Callable[[str, int, int], None]
 """Told what is being done, how much of it is done, and how much there is."""
+
+
+@dataclass(frozen=True, eq=False)
+class KnownEquilibrium:
+    """A frame's equilibrium, and what it belongs to.
+
+    Attributes:
+        model: Everything, with the edits that held there.
+        history: What was known before it.
+        solution: Its last instant, without what touches.
+    """
+
+    model: ContactModel
+    history: History
+    solution: ContactSolution
+
 
 Watch = Callable[[ContactModel, SolvedFrame], str | None]
 
@@ -48,6 +64,7 @@ class SolveResult:
         corrections: What came of corrections.
         stops: Digits that closed no farther.
         tight: Bones that came nearest to objects, of every digit and object the nearest.
+        equilibria: Of each frame that this run solved, by its number: what it can be differentiated from.
     """
 
     status: Status
@@ -61,6 +78,7 @@ class SolveResult:
     corrections: tuple[CorrectedFrame, ...] = ()
     stops: tuple[Stop, ...] = ()
     tight: tuple[tuple[float, TightBone], ...] = ()
+    equilibria: Mapping[float, KnownEquilibrium] = field(default_factory=dict)
 
     @property
     def start(self) -> float:
@@ -132,6 +150,7 @@ class _Run:
     grips: list[FoundGrip] = field(default_factory=list)
     corrections: list[CorrectedFrame] = field(default_factory=list)
     tight: dict[tuple[str, str, str], tuple[float, TightBone]] = field(default_factory=dict)
+    equilibria: dict[float, KnownEquilibrium] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         self.substeps = Substeps(self.model)
@@ -176,6 +195,7 @@ class _Run:
             self.corrections.append(corrected)
             solution = corrected.solution
             self._edit(corrected.edits)
+        self.equilibria[float(frame)] = KnownEquilibrium(self.model, self.history, _bare(solution))
         self.missed += missed_contacts(model, None if before is None else before.last, solution.instants)
         self.last = solution
         self.done.append(solved_frame(float(frame), solution.instants))
@@ -222,6 +242,7 @@ class _Run:
             tuple(self.corrections),
             tuple(self.limits.stops),
             tuple(self.tight.values()),
+            self.equilibria,
         )
 
     def _edit(self, edits: Sequence[AngleEdit]) -> None:
@@ -231,6 +252,11 @@ class _Run:
     def _note(self, solved: SolvedFrame) -> None:
         time = solved.frame - self.model.start
         self.history = self.model.after(self.history, time, solved.displacement, solved.reactions, solved.nodal)
+
+
+def _bare(solution: ContactSolution) -> ContactSolution:
+    """The last equilibrium, without the tables of what touches: those are large, and found again."""
+    return replace(solution, instants=(replace(solution.last, touches=()),))
 
 
 def _untouched(model: ContactModel, frames: Sequence[float], watch: Watch, progress: Progress) -> SolveResult:

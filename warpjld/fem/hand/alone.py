@@ -68,13 +68,16 @@ class FleshAlone:
         body: Its own mesh and laws.
         degrees: Prescribed degrees of freedom, shape (n,): those of bones, and of nodes where flesh was cut off.
         rest: The pose in which nothing is displaced.
+
+    Attributes:
+        body, degrees: As given.
     """
 
     def __init__(self, hand: FleshHand, body: Body, degrees: NDArray[np.int64], rest: Poses) -> None:
         self.body = body
         self._hand = hand
         self._start = hand.moves(rest)
-        self._degrees = degrees
+        self.degrees = degrees
         self._free = Prescribed(degrees, np.zeros(len(degrees))).free(body.degrees)
         self._elastic = Elastic(body)
         self._solver = LaggedSolver(body, "float64")
@@ -105,8 +108,8 @@ class FleshAlone:
         for name, array in (("displacement", displacement), ("reactions", reactions), ("contact", contact)):
             if array.shape != self.body.mesh.nodes.shape:
                 raise InputError(f"{name}: want shape {self.body.mesh.nodes.shape}, got {array.shape}")
-        bones = displacement.reshape(-1)[self._degrees]
-        away = [float(np.abs(one.displacement.reshape(-1)[self._degrees] - bones).max()) for one in self._known]
+        bones = displacement.reshape(-1)[self.degrees]
+        away = [float(np.abs(one.displacement.reshape(-1)[self.degrees] - bones).max()) for one in self._known]
         nearest = int(np.argmin(away))
         if away[nearest] == 0.0 and nearest > 0:
             return self._known[nearest]
@@ -145,7 +148,7 @@ class FleshAlone:
 
     def _bones(self, poses: Poses) -> NDArray[np.float64]:
         """Where that takes the prescribed degrees of freedom, shape (n,)."""
-        nodes = self._degrees[::3] // 3
+        nodes = self.degrees[::3] // 3
         x = self.body.mesh.nodes[nodes]
         return (self._moves(poses).blended(self._hand.weights[nodes], x) - x).reshape(-1)
 
@@ -155,7 +158,7 @@ class FleshAlone:
         """Another pose by Newton's method, if that is near enough."""
         elastic, free, damping = self._elastic, self._free, self._damping
         u = self._hand.guess(self._moves(before.poses), self._moves(poses), before.displacement).reshape(-1)
-        u[self._degrees] = bones
+        u[self.degrees] = bones
         if not elastic.upright(u):
             return None
         # a guess squeezes elements here and there, an equilibrium does not

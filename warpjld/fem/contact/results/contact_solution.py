@@ -13,7 +13,7 @@ from warpjld.fem.contact.results.nodal_contact import NodalContact
 from warpjld.fem.load.loads import Loads
 from warpjld.fem.solver.krylov import Status
 
-__all__ = ["ContactError", "ContactInstant", "ContactSolution", "Touch"]
+__all__ = ["ContactError", "ContactInstant", "ContactSolution", "LastStep", "Touch"]
 
 
 @dataclass(frozen=True, eq=False)
@@ -132,6 +132,23 @@ class ContactInstant:
 
 
 @dataclass(frozen=True, eq=False)
+class LastStep:
+    """Where the load step that found an equilibrium began: what its sensitivity is taken from.
+
+    Attributes:
+        time: At its start.
+        displacement: At its start [m], shape (N, 3).
+        slips: Of each interface's sites during the step, as friction counts them [m], shape (s, 3).
+        areas: What tractions at the sites were multiplied with [m²], shape (s,).
+    """
+
+    time: float
+    displacement: Array
+    slips: tuple[Array, ...]
+    areas: tuple[Array, ...]
+
+
+@dataclass(frozen=True, eq=False)
 class ContactSolution:
     """Instants reached, and what is needed to go on from the last.
 
@@ -143,6 +160,7 @@ class ContactSolution:
         steps: Load steps taken between instants, those that halving added included, and linear solves of each.
         loads: The loads at the last instant.
         correction_rate: How fast the last step left what was expected [m per unit of time], (N, 3).
+        last_step: Where the step began that found the last instant; None where that is not known.
     """
 
     status: Status
@@ -152,6 +170,7 @@ class ContactSolution:
     steps: tuple[int, ...]
     loads: Loads
     correction_rate: Array | None = None
+    last_step: LastStep | None = None
 
     @property
     def converged(self) -> bool:

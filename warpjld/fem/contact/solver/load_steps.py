@@ -14,7 +14,7 @@ from warpjld.fem.contact.interface.contact_interface import Interface, interface
 from warpjld.fem.contact.interface.pairs import Pair
 from warpjld.fem.contact.law.contact_state import ContactState, initial_state, without_bonds
 from warpjld.fem.contact.law.return_mapping import overstrained
-from warpjld.fem.contact.results.contact_solution import ContactInstant, ContactSolution
+from warpjld.fem.contact.results.contact_solution import ContactInstant, ContactSolution, LastStep
 from warpjld.fem.contact.results.touches import touch_of
 from warpjld.fem.contact.solver.contact_newton import ContactNewton
 from warpjld.fem.contact.solver.contact_system import LoadStep
@@ -89,6 +89,7 @@ class LoadSteps:
             self.states = list(after.states)
         self.steps: list[int] = []
         self.correction_rate = None if after is None else after.correction_rate
+        self.last_step = None if after is None else after.last_step
 
     def _begin(self, interface: Interface) -> ContactState:
         """Bonds made, and the overlap noted that there is at the start."""
@@ -143,6 +144,7 @@ class LoadSteps:
                 continue
             self.steps.append(newton.solves)
             self.correction_rate = (found.displacement - carried).reshape(-1, 3) / (target - now)
+            self.last_step = self._last_step(now, found)
             self.u, self.states, now = found.displacement, found.states, target
             todo.pop(0)
             halvings = max(0, halvings - 1)
@@ -200,6 +202,14 @@ class LoadSteps:
             return plain
         return [carried + _PART * (step.time - step.before) * self.correction_rate.reshape(-1), *plain]
 
+    def _last_step(self, before: float, found: Equilibrium) -> LastStep:
+        """Where the step to an equilibrium began."""
+        slips = [np.zeros((len(interface.edge), 3)) for interface in self.interfaces]
+        areas = [np.zeros(len(interface.edge)) for interface in self.interfaces]
+        for k, points in enumerate(found.points):
+            slips[k][points.sites], areas[k][points.sites] = found.slips[k], points.area
+        return LastStep(before, self.u.reshape(-1, 3), tuple(slips), tuple(areas))
+
     def _instant(self, time: float, found: Equilibrium, solves: int, iterations: int) -> ContactInstant:
         x = self.body.mesh.nodes + found.displacement.reshape(-1, 3)
         touches = []
@@ -222,4 +232,5 @@ class LoadSteps:
             nothing = np.zeros((len(self.body.mesh.nodes), 3))
             reached = [ContactInstant(self.start, self.u.reshape(-1, 3), nothing, (), 0, 0, 0.0)]
         states, steps = tuple(self.states), tuple(self.steps)
-        return ContactSolution(status, tuple(reached), message, states, steps, step.loads, self.correction_rate)
+        rate, last = self.correction_rate, self.last_step
+        return ContactSolution(status, tuple(reached), message, states, steps, step.loads, rate, last)

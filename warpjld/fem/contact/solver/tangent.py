@@ -24,7 +24,16 @@ from warpjld.fem.contact.law.contact_state import ContactState
 from warpjld.fem.contact.law.return_mapping import ContactTractions
 from warpjld.fem.launch import on_rows, shared
 
-__all__ = ["MortarTangent", "friction_coupling", "linearise_mortar", "with_contact"]
+__all__ = [
+    "FacetPairs",
+    "MortarTangent",
+    "block_table",
+    "friction_coupling",
+    "inner_rows",
+    "linearise_mortar",
+    "normal_derivatives",
+    "with_contact",
+]
 
 
 def with_contact(
@@ -148,8 +157,8 @@ def linearise_mortar(
         return None
     edge = mortar.slave.edge[points.sites]
     rows = np.flatnonzero(tractions.active | (points.gap < _NEAR * edge))
-    pairs = _Pairs(mortar, points, rows, x, reach)
-    turning = _normal_derivatives(mortar.slave, x, points.sites, rows)
+    pairs = FacetPairs(mortar, points, rows, x, reach)
+    turning = normal_derivatives(mortar.slave, x, points.sites, rows)
     pressure = np.where(tractions.active, np.maximum(state.pressure[points.sites], 0.0), 0.0)
     carried = np.where(tractions.active[:, None], state.friction[points.sites], 0.0)
     of_weights = pairs.forces(carried - pressure[:, None] * points.normal)
@@ -158,10 +167,10 @@ def linearise_mortar(
     if not (tractions.error > _DEEP * edge).any():
         apart = np.zeros_like(points.normal)
         apart[pairs.rows] = (points.weights @ x)[pairs.rows]
-        of_gap = csr_array(pairs.gaps() - _inner(apart) @ turning)
+        of_gap = csr_array(pairs.gaps() - inner_rows(apart) @ turning)
         stiff = np.where(tractions.active, penalty, 0.0)
-        change = change + _inner(points.normal).T @ (diags_array(stiff) @ of_gap)
-    spreading = _blocks(points.weights.T @ diags_array(points.area))
+        change = change + inner_rows(points.normal).T @ (diags_array(stiff) @ of_gap)
+    spreading = block_table(points.weights.T @ diags_array(points.area))
     return MortarTangent(of_gap, csr_array(-(spreading @ change + of_weights)))
 
 
@@ -183,15 +192,15 @@ def friction_coupling(points: ContactPoints, tractions: ContactTractions, fricti
     if not slides.any():
         return None
     along = np.where(slides[:, None], tractions.friction / np.maximum(size, 1e-300)[:, None], 0.0)
-    weights = _blocks(points.weights)
-    of_gap = -_inner(points.normal) @ weights
+    weights = block_table(points.weights)
+    of_gap = -inner_rows(points.normal) @ weights
     if points.gap_derivative is not None:
         of_gap = of_gap + points.gap_derivative
-    rubs = weights.T @ _inner(points.area[:, None] * along).T
+    rubs = weights.T @ inner_rows(points.area[:, None] * along).T
     return csr_array(rubs @ (diags_array(friction * penalty) @ of_gap))
 
 
-class _Pairs:
+class FacetPairs:
     """Facet pairs of some points, and how their integrals change.
 
     Attributes:
@@ -263,7 +272,7 @@ def _differences(mortar: Mortar, at: Array, reach: float, step: float) -> Array:
     return np.asarray((found[:, 1:] - found[:, :1]) / step)
 
 
-def _normal_derivatives(surface: ContactSurface, x: Array, sites: Ints, rows: Ints) -> Any:
+def normal_derivatives(surface: ContactSurface, x: Array, sites: Ints, rows: Ints) -> Any:
     """Derivatives of the nodes' normals, ``csr_array`` (3m, 3N), zero but at ``rows``."""
     number = np.full(len(surface.nodes), -1)
     number[sites[rows]] = rows
@@ -285,12 +294,12 @@ def _normal_derivatives(surface: ContactSurface, x: Array, sites: Ints, rows: In
     return csr_array(coo_array((block[known], (row[known], column[known])), shape=shape))
 
 
-def _inner(vectors: Array) -> Any:
+def inner_rows(vectors: Array) -> Any:
     """Rows that take the inner product of each point's vector (m, 3) with three values of it, (m, 3m)."""
     count = len(vectors)
     return csr_array((vectors.ravel(), np.arange(3 * count), 3 * np.arange(count + 1)), shape=(count, 3 * count))
 
 
-def _blocks(weights: Any) -> Any:
+def block_table(weights: Any) -> Any:
     """A table of scalars (n, m) as one of 3 × 3 diagonal blocks."""
     return csr_array(kron(weights, eye_array(3), format="csr"))

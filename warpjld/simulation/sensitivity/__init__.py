@@ -1,0 +1,1 @@
+"""How contact forces, digits' forces and pressures follow joint angles, places, moduli and friction."""
