@@ -37,6 +37,11 @@ class Surface:
         corner_uv: Texture coordinates of the source faces' corners, shape (S, 3, 2), instead of ``uv`` where some
             vertex has several: the texture's seams.
         parts: The source's meshes.
+        polygons: Polygon of the source that each source face is a part of, shape (S,), counted from 0 in the source's
+            order, mesh after mesh; None where all are triangles.
+
+    People count vertices and facets as the source does: vertex ``v`` of these is ``numbers[v]`` there, and ``weld``
+    leads back; triangle ``t`` belongs to facet ``facets[t]`` (R133).
     """
 
     vertices: NDArray[np.float64]
@@ -46,6 +51,23 @@ class Surface:
     uv: NDArray[np.float32] | None = None
     corner_uv: NDArray[np.float32] | None = None
     parts: tuple[Part, ...] = ()
+    polygons: NDArray[np.int64] | None = None
+
+    @cached_property
+    def numbers(self) -> NDArray[np.int64]:
+        """Number that every welded vertex has in the source, the first of those it was welded from, shape (V,)."""
+        return np.unique(self.weld, return_index=True)[1]
+
+    @cached_property
+    def source_rows(self) -> NDArray[np.int64]:
+        """Source face of every triangle, shape (T,): those that welding flattened are left out."""
+        a, b, c = self.weld[self.source_faces].T
+        return np.flatnonzero((a != b) & (b != c) & (c != a))
+
+    @cached_property
+    def facets(self) -> NDArray[np.int64]:
+        """Facet of the source, triangle or larger polygon, that every triangle is a part of, shape (T,)."""
+        return self.source_rows if self.polygons is None else self.polygons[self.source_rows]
 
     def __repr__(self) -> str:
         return f"Surface({len(self.vertices)} vertices, {len(self.faces)} triangles, {self.size:.3g} m across)"
@@ -114,6 +136,7 @@ def weld_surface(
     uv: NDArray[np.float32] | None = None,
     corner_uv: NDArray[np.float32] | None = None,
     parts: tuple[Part, ...] = (),
+    polygons: NDArray[np.int64] | None = None,
     tolerance: float = 1e-7,
 ) -> Surface:
     """Weld source vertices that lie at the same place, within a part.
@@ -124,6 +147,7 @@ def weld_surface(
         uv: Texture coordinates, shape (W, 2).
         corner_uv: Texture coordinates of the faces' corners, shape (S, 3, 2), instead of ``uv``.
         parts: Source meshes; vertices of different parts are never welded.
+        polygons: Polygon of each source triangle, shape (S,), where the source has larger ones.
         tolerance: Distance below which two vertices are one, relative to the diagonal of the faces' bounding box.
 
     Raises:
@@ -162,4 +186,5 @@ def weld_surface(
         uv=uv,
         corner_uv=corner_uv,
         parts=parts,
+        polygons=polygons,
     )

@@ -104,7 +104,7 @@ def test_limbs(data: Path, joint: str, degrees: float) -> None:
     if not path.is_file():
         pytest.skip(f"{path} is not here")
     covering = _bound(path)
-    angles = np.zeros((1, len(covering.skeleton), len(CHANNELS)))
+    angles = covering.skeleton.initial[None].copy()  # elbows and knees of this body are bent at rest
     angles[0, covering.skeleton.index(f"left.{joint}"), CHANNELS.index("flexion")] = np.radians(degrees)
     poses = poses_from_angles(covering.skeleton, angles)
     assert abs(lost(covering, poses)[0]) < max(0.3 * abs(lost(without(covering), poses)[0]), 1e-3)

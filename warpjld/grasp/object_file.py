@@ -62,6 +62,13 @@ def load_object(
     if centre:
         vertices -= (vertices.min(axis=0) + vertices.max(axis=0)) / 2.0
     try:
-        return make_object(name or file.path.stem, vertices, file.faces, parts=file.parts, origin=str(path))
+        return make_object(
+            name or file.path.stem,
+            vertices,
+            file.faces,
+            parts=file.parts,
+            polygons=file.polygons,
+            origin=str(path),
+        )
     except InputError as error:
         raise InputError(error.message, path=path) from None

@@ -75,10 +75,13 @@ class GraspObject:
     Attributes:
         name: For messages.
         vertices: Positions in the object's frame [m], shape (n, 3).
-        faces: Triangles, anticlockwise seen from outside, shape (t, 3). A facet's number is its row.
+        faces: Triangles, anticlockwise seen from outside, shape (t, 3).
         report: What was found on the surface when it came in.
         place: Where it stands at first.
         origin: File it comes from, or the built-in shape.
+        numbers: Number that every vertex has in the file, shape (n,); None where it is its row.
+        facets: Facet of the file, triangle or larger polygon, that every triangle is a part of, shape (t,); None where
+            it is its row. People count facets so (R133); functions that take a triangle say so.
 
     Examples:
         >>> ball = wj.shapes.ball(0.065).placed((0.0, -0.05, -0.06))
@@ -94,6 +97,26 @@ class GraspObject:
     report: MeshReport = field(default_factory=MeshReport)
     place: Places = field(default_factory=Places.of)
     origin: str = ""
+    numbers: NDArray[np.int64] | None = None
+    facets: NDArray[np.int64] | None = None
+
+    def facet_of(self, triangle: int) -> int:
+        """The file's number of the facet that a triangle is a part of."""
+        return triangle if self.facets is None else int(self.facets[triangle])
+
+    def triangles_of(self, facet: int) -> NDArray[np.int64]:
+        """Triangles that make up a facet of the file.
+
+        Raises:
+            InputError: There is no such facet, or nothing is left of it.
+        """
+        facets = np.arange(len(self.faces)) if self.facets is None else self.facets
+        found = np.flatnonzero(facets == facet)
+        if not len(found):
+            if 0 <= facet <= facets.max():
+                raise InputError(f"facet {facet} of {self.name} was taken out: it has no area, or is there twice")
+            raise InputError(f"object {self.name} has facets 0 to {facets.max()}, got {facet}")
+        return found
 
     def __repr__(self) -> str:
         x, y, z = self.size
@@ -114,7 +137,7 @@ class GraspObject:
         return replace(self, vertices=self.vertices * factor)
 
     def check_facet(self, facet: int) -> int:
-        """The facet's number, or an InputError that says which there are."""
+        """The row of a triangle, or an InputError that says which there are."""
         if not 0 <= facet < len(self.faces):
             raise InputError(f"object {self.name} has facets 0 to {len(self.faces) - 1}, got {facet}")
         return int(facet)
@@ -156,6 +179,7 @@ def make_object(
     faces: ArrayLike,
     *,
     parts: tuple[Part, ...] = (),
+    polygons: NDArray[np.int64] | None = None,
     origin: str = "",
 ) -> GraspObject:
     """An object from arrays: welded, checked and mended (see ``report``).
@@ -165,6 +189,7 @@ def make_object(
         vertices: Positions [m], shape (n, 3).
         faces: Triangles, shape (t, 3).
         parts: Ranges that are welded each by itself.
+        polygons: Polygon that each triangle is a part of, shape (t,), where there are larger ones.
         origin: Where it comes from.
 
     Raises:
@@ -176,8 +201,16 @@ def make_object(
         GraspObject('wedge': 4 facets, 0.05 × 0.05 × 0.05 m)
     """
     try:
-        surface = weld_surface(vertices, faces, parts=parts)
-        points, triangles, report = mend(surface.vertices, surface.faces)
+        surface = weld_surface(vertices, faces, parts=parts, polygons=polygons)
+        mended = mend(surface.vertices, surface.faces)
     except InputError as error:
         raise InputError(f"object {name}: {error.message}", path=error.path) from None
-    return GraspObject(name, points, triangles, report, origin=origin)
+    return GraspObject(
+        name,
+        mended.vertices,
+        mended.faces,
+        mended.report,
+        origin=origin,
+        numbers=surface.numbers[mended.used],
+        facets=surface.facets[mended.rows],
+    )

@@ -14,7 +14,7 @@ from warpjld.covering.quality import enclosed_volume
 from warpjld.errors import InputError
 from warpjld.winding import winding_numbers
 
-__all__ = ["MeshReport", "mend"]
+__all__ = ["Mended", "MeshReport", "mend"]
 
 _FLAT = 1e-9  # height of a triangle over its longest edge below which it counts as degenerate
 
@@ -65,22 +65,37 @@ class MeshReport:
         return found
 
 
-def mend(
-    vertices: NDArray[np.float64], faces: NDArray[np.int32]
-) -> tuple[NDArray[np.float64], NDArray[np.int32], MeshReport]:
+@dataclass(frozen=True, eq=False)
+class Mended:
+    """A surface with degenerate and duplicate triangles taken out and all triangles looking outwards.
+
+    Attributes:
+        vertices: Those in use [m], shape (n, 3).
+        faces: Triangles, shape (t, 3).
+        report: What was found.
+        used: Vertex before, of every vertex, shape (n,).
+        rows: Triangle before, of every triangle, shape (t,).
+    """
+
+    vertices: NDArray[np.float64]
+    faces: NDArray[np.int32]
+    report: MeshReport
+    used: NDArray[np.int64]
+    rows: NDArray[np.int64]
+
+
+def mend(vertices: NDArray[np.float64], faces: NDArray[np.int32]) -> Mended:
     """A surface with degenerate and duplicate triangles taken out and all triangles looking outwards.
 
     Args:
         vertices: Welded positions [m], shape (V, 3).
         faces: Triangles, shape (T, 3).
 
-    Returns:
-        Vertices in use, triangles, and what was found.
-
     Raises:
         InputError: No triangle with an area, an edge with more than two triangles, or a one-sided (Möbius) surface.
     """
-    kept, degenerate, duplicates = _without_waste(vertices, faces)
+    rows, degenerate, duplicates = _without_waste(vertices, faces)
+    kept = faces[rows]
     if not len(kept):
         raise InputError("the surface is empty: it has no triangle with an area")
     used, compact = np.unique(kept, return_inverse=True)
@@ -92,19 +107,20 @@ def mend(
     crossing = len(crossing_faces(points, triangles).faces)
     solid = open_edges == 0 and crossing == 0 and _nested_properly(points, triangles, piece)
     report = MeshReport(degenerate, duplicates, int(turn.sum()), open_edges, int(piece.max()) + 1, crossing, solid)
-    return points, triangles, report
+    return Mended(points, triangles, report, used.astype(np.int64), rows)
 
 
-def _without_waste(vertices: NDArray[np.float64], faces: NDArray[np.int32]) -> tuple[NDArray[np.int32], int, int]:
+def _without_waste(vertices: NDArray[np.float64], faces: NDArray[np.int32]) -> tuple[NDArray[np.int64], int, int]:
+    """Rows of the faces that are kept, and how many have no area or are there twice."""
     a, b, c = (vertices[faces[:, k]] for k in range(3))
     longest = np.max([np.linalg.norm(v, axis=1) for v in (b - a, c - b, a - c)], axis=0)
     area = np.linalg.norm(np.cross(b - a, c - a), axis=1)
     flat = area <= _FLAT * longest**2
-    solid = faces[~flat]
-    _, once, times = np.unique(np.sort(solid, axis=1), axis=0, return_index=True, return_counts=True)
+    solid = np.flatnonzero(~flat)
+    _, once, times = np.unique(np.sort(faces[solid], axis=1), axis=0, return_index=True, return_counts=True)
     kept, twice = solid[np.sort(once)], (times > 1)[np.argsort(once)]
     if twice.any():  # where one of a pair would still hang on a closed surface, the pair was a fold without volume
-        kept = kept[~(twice & _on_crowded_edge(kept))]
+        kept = kept[~(twice & _on_crowded_edge(faces[kept]))]
     return kept, int(flat.sum()), len(solid) - len(kept)
 
 

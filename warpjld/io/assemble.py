@@ -72,7 +72,14 @@ def _assemble(
     source = place(source, roles, unit=unit, scale=scale, up=up)
     check_size(source.vertices[source.faces.ravel()], "the surface", "--unit or --scale")
     check_size(source.tree.positions, "the skeleton", "--unit or --scale", least=0.0)
-    surface = weld_surface(source.vertices, source.faces, uv=source.uv, corner_uv=source.corner_uv, parts=source.parts)
+    surface = weld_surface(
+        source.vertices,
+        source.faces,
+        uv=source.uv,
+        corner_uv=source.corner_uv,
+        parts=source.parts,
+        polygons=source.polygons,
+    )
     painted = None
     if source.joints is not None and source.weights is not None:
         painted = Painted(source.vertices, source.joints, source.weights)

@@ -37,6 +37,8 @@ class MeshFile:
             has several.
         parts: The file's meshes.
         notes: What was mended on the way.
+        polygons: Polygon that each triangle is a part of, shape (S,), in the file's order; None where all are
+            triangles.
     """
 
     path: Path
@@ -46,6 +48,7 @@ class MeshFile:
     corner_uv: NDArray[np.float32] | None
     parts: tuple[Part, ...]
     notes: tuple[str, ...] = ()
+    polygons: NDArray[np.int64] | None = None
 
 
 def read_mesh(path: str | Path) -> MeshFile:
@@ -71,7 +74,7 @@ def read_mesh(path: str | Path) -> MeshFile:
 def _obj(path: Path) -> MeshFile:
     file = read_obj(path)
     uv, corner_uv = one_uv_a_vertex(len(file.vertices), file.faces, file.corner_uv)
-    return MeshFile(path, file.vertices, file.faces, uv, corner_uv, file.parts, file.notes)
+    return MeshFile(path, file.vertices, file.faces, uv, corner_uv, file.parts, file.notes, file.polygons)
 
 
 def _gltf(path: Path) -> MeshFile:
@@ -122,7 +125,7 @@ def _uv(uvs: list[NDArray[np.float64] | None], parts: list[Part]) -> NDArray[np.
 
 
 def _of_polygons(path: Path, file: PlyFile) -> MeshFile:
-    triangles, _ = triangulate_polygons(file.vertices[file.corners], file.counts)
+    triangles, polygons = triangulate_polygons(file.vertices[file.corners], file.counts)
     if not len(triangles):
         raise InputError("has no triangles", path=path)
     faces = file.corners[triangles]
@@ -137,7 +140,7 @@ def _of_polygons(path: Path, file: PlyFile) -> MeshFile:
     if few:
         notes.append(f"{few} faces with fewer than three corners left out")
     whole = (Part(path.stem, slice(0, len(file.vertices)), slice(0, len(faces))),)
-    return MeshFile(path, file.vertices, faces, uv, corner_uv, whole, tuple(notes))
+    return MeshFile(path, file.vertices, faces, uv, corner_uv, whole, tuple(notes), polygons)
 
 
 _READERS: dict[str, Callable[[Path], MeshFile]] = {

@@ -38,13 +38,15 @@ class ObjFile:
         corner_uv: Texture coordinates of the triangles' corners, shape (S, 3, 2), or None.
         parts: The file's objects (``o``) where each has a run of vertices of its own, else the file as a whole.
         notes: What was mended.
+        polygons: Face of the file that each triangle is a part of, counted from 0, shape (S,).
     """
 
     vertices: NDArray[np.float64]
     faces: NDArray[np.int64]
     corner_uv: NDArray[np.float32] | None
     parts: tuple[Part, ...]
-    notes: tuple[str, ...] = ()
+    notes: tuple[str, ...]
+    polygons: NDArray[np.int64]
 
 
 @dataclass
@@ -89,7 +91,7 @@ def read_obj(path: str | Path) -> ObjFile:
     if len(parts) < 2:
         name = parts[0].name if parts else ""
         parts = (Part(name or path.stem, slice(0, len(vertices)), slice(0, len(faces))),)
-    return ObjFile(vertices, faces, corner_uv, parts, tuple(notes))
+    return ObjFile(vertices, faces, corner_uv, parts, tuple(notes), polygon)
 
 
 def _split(text: str, path: Path) -> _Lines:

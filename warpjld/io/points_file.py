@@ -68,6 +68,7 @@ def read_points_file(path: str | Path, mesh: MeshFile) -> SourceRig:
         uv=mesh.uv,
         corner_uv=mesh.corner_uv,
         parts=mesh.parts,
+        polygons=mesh.polygons,
         stated={CANONICAL[name]: number[name] for name in names},
         placed=True,
         notes=(*mesh.notes, f"{len(names)} points from {path.name}"),

@@ -27,6 +27,8 @@ class RigMesh:
         rigid: Joint that the whole mesh follows rigidly, -1 for flesh.
         uv: Texture coordinates of the vertices, shape (W, 2), or None.
         corner_uv: Those of the triangles' corners, where a vertex may have several, shape (S, 3, 2), or None.
+        polygons: Polygon that each triangle is a part of, shape (S,), or None where all are triangles.
+        polygon_count: How many polygons the file has there, with those that give no triangle.
     """
 
     name: str
@@ -37,6 +39,8 @@ class RigMesh:
     rigid: int = -1
     uv: NDArray[np.float32] | None = None
     corner_uv: NDArray[np.float32] | None = None
+    polygons: NDArray[np.int64] | None = None
+    polygon_count: int = 0
 
 
 def joined(meshes: Sequence[RigMesh]) -> dict[str, Any]:
@@ -49,6 +53,11 @@ def joined(meshes: Sequence[RigMesh]) -> dict[str, Any]:
     corner_uv = _filled([mesh.corner_uv for mesh in meshes], [(*mesh.faces.shape, 2) for mesh in meshes])
     if corner_uv is not None:
         uv, corner_uv = one_uv_a_vertex(int(vertex[-1]), faces, corner_uv)
+    polygons, known = [], 0
+    for mesh in meshes:
+        own = np.arange(len(mesh.faces)) if mesh.polygons is None else mesh.polygons
+        polygons.append(own + known)
+        known += len(mesh.faces) if mesh.polygons is None else mesh.polygon_count
     width = max(mesh.joints.shape[1] for mesh in meshes)
     return {
         "vertices": np.concatenate([mesh.vertices for mesh in meshes]),
@@ -59,6 +68,7 @@ def joined(meshes: Sequence[RigMesh]) -> dict[str, Any]:
             Part(mesh.name, slice(int(vertex[m]), int(vertex[m + 1])), slice(int(face[m]), int(face[m + 1])))
             for m, mesh in enumerate(meshes)
         ),
+        "polygons": None if all(mesh.polygons is None for mesh in meshes) else np.concatenate(polygons),
         "joints": np.concatenate([_widened(mesh.joints, width) for mesh in meshes]),
         "weights": np.concatenate([_widened(mesh.weights, width) for mesh in meshes]),
         "rigid": np.concatenate([np.full(len(mesh.vertices), mesh.rigid) for mesh in meshes]),

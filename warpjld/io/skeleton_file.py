@@ -104,6 +104,7 @@ def _rig(path: Path, content: Any, mesh: MeshFile) -> SourceRig:
         uv=mesh.uv,
         corner_uv=mesh.corner_uv,
         parts=mesh.parts,
+        polygons=mesh.polygons,
         axes=axes,
         limits=limits,
         initial=initial,

@@ -27,6 +27,7 @@ class SourceRig:
         corner_uv: Texture coordinates of the triangles' corners, shape (S, 3, 2), instead of ``uv`` where some vertex
             has several.
         parts: The file's meshes.
+        polygons: Polygon of the file that each triangle is a part of, shape (S,), or None where all are triangles.
         joints: Influencing joints of ``tree`` per vertex, shape (W, K), or None where no skin is painted.
         weights: Their weights, rows summing to one, shape (W, K).
         axes: Flexion axes the file states, by joint number.
@@ -50,6 +51,7 @@ class SourceRig:
     uv: NDArray[np.float32] | None = None
     corner_uv: NDArray[np.float32] | None = None
     parts: tuple[Part, ...] = ()
+    polygons: NDArray[np.int64] | None = None
     joints: NDArray[np.int64] | None = None
     weights: NDArray[np.float64] | None = None
     axes: dict[int, NDArray[np.float64]] = field(default_factory=dict)

@@ -15,6 +15,7 @@ from warpjld.render.camera import VIEWS, Camera
 from warpjld.render.colors import ColorScale
 from warpjld.render.files import save_picture
 from warpjld.render.film import Film
+from warpjld.render.numbers import Numbered, with_numbers
 from warpjld.render.pictures import shaded, wireframe
 from warpjld.render.scene import Image, Scene, Solid
 from warpjld.render.sheet import contact_sheet, grid
@@ -26,6 +27,7 @@ __all__ = [
     "ColorScale",
     "Film",
     "Image",
+    "Numbered",
     "Quality",
     "Scene",
     "Solid",
@@ -35,4 +37,5 @@ __all__ = [
     "save_picture",
     "shaded",
     "wireframe",
+    "with_numbers",
 ]

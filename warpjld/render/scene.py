@@ -19,6 +19,7 @@ from warpjld.render.occlusion import occlusion, shade
 from warpjld.render.skeleton import bone_faces, bone_vertices, joint_faces, joint_vertices
 from warpjld.render.style import Quality, Style
 from warpjld.render.wires import Wires
+from warpjld.rotations import unit
 
 __all__ = ["Image", "Look", "Scene", "Solid"]
 
@@ -29,6 +30,8 @@ Look = Literal["shaded", "wireframe"]
 
 # how far surfaces darken one another, as a share of the bounding box diagonal
 _REACH = 0.09
+# how far behind what is drawn a point must lie to be hidden, likewise
+_HIDDEN = 2e-3
 # dihedral angles [rad] above which an edge is meant to be seen
 _SKIN_CREASE, _SOLID_CREASE, _BONE_CREASE = 1.15, 0.7, 0.6
 
@@ -142,6 +145,28 @@ class Scene:
                 body.place(_finite("solids", moved, (len(np.asarray(solid.vertices)), 3)))
         self._clip(np.concatenate([points, *(body.corners for body in self._bodies)]))
         return self._shoot()
+
+    def seen(self, points: ArrayLike) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
+        """Where points (n, 3) [m] are on the picture drawn last, shape (n, 2) [pixels], and which nothing hides."""
+        cloud = _finite("points", points, (None, 3))
+        if self._plotter is None:
+            raise InputError("seen: draw a frame first")
+        camera, (width, height) = self._camera, self._size
+        ahead = unit(np.subtract(camera.target, camera.position))
+        right = unit(np.cross(ahead, camera.up))
+        away = cloud - camera.position
+        depth = away @ ahead
+        scale = self._focal / np.where(depth > 0.0, depth, 1.0)
+        places = np.stack([away @ right * scale, away @ np.cross(ahead, right) * scale], axis=1)
+        places += 0.5 * np.array([width, height])
+        within = (depth > 0.0) & (places >= 0.0).all(axis=1) & (places < [width, height]).all(axis=1)
+        times = self._quality.supersampling
+        drawn = -self._plotter.get_image_depth(fill_value=np.nan, reset_camera_clipping_range=False)
+        drawn = np.pad(np.where(np.isnan(drawn), np.inf, drawn)[::times, ::times], 1, mode="edge")
+        column, row = np.where(within, places.T, 0.0).astype(np.int64)
+        # of the pixels around: at the rim a point's own may show what lies behind it, or in front of a slope
+        around = np.max([drawn[row + dy, column + dx] for dy in range(3) for dx in range(3)], axis=0)
+        return places, within & (depth <= around + _HIDDEN * self._extent)
 
     def close(self) -> None:
         """Free the window; drawing again opens another."""

@@ -18,6 +18,7 @@ from warpjld.skeleton import Poses
 if TYPE_CHECKING:
     from warpjld.grasp import Found, GraspObject
     from warpjld.script.crowd import Crowd
+    from warpjld.script.facets import Facet
     from warpjld.script.props import Prop
     from warpjld.script.scene import Actor, Scene
 
@@ -82,26 +83,29 @@ def search_flexion(
     key: float,
     joint: int,
     vertex: int,
-    facet: int,
+    facet: Facet | None,
     distance: float,
     within: float,
 ) -> tuple[Found, str]:
     """The flexion of a joint, nearest to where it is, at which a vertex is so far from an object at a key, and what it
     does not solve (R77)."""
-    from warpjld.grasp import FlexionSearch, ObjectSet, Searches
+    from warpjld.grasp import NEAREST, FlexionSearch, ObjectSet, Searches
     from warpjld.grasp.intersection import intersection
     from warpjld.skeleton import poses_from_angles
 
     covering = cover(actor)
     poses, angles = posture(scene, actor, key)
     thing = placed_at(scene, prop, key)
-    wanted = Searches(vertex=vertex, joint=joint, facet=facet, distance=distance)
+    triangle = NEAREST if facet is None else int(facet.triangles[0])
+    wanted = Searches(vertex=vertex, joint=joint, facet=triangle, distance=distance)
     found = FlexionSearch(covering, ObjectSet(thing)).nearest(poses, angles, wanted, tolerance=within)
     angles[0, joint, 0] = found.angles[0, 0]
     _, root = actor.motion.sample(np.array([key]), actor.skeleton)
     bent = actor.placement.apply(poses_from_angles(actor.skeleton, angles, root_position=root), np.array([key]))
-    inside = intersection(covering, covering.deform(bent)[0], thing)
-    return found, str(inside)
+    skin = covering.deform(bent)[0]
+    if facet is not None:  # the foot may lie in any of the facet's triangles
+        found = replace(found, inside=np.array([facet.coordinates(skin[vertex], thing)[1]]))
+    return found, str(intersection(covering, skin, thing))
 
 
 def close_digits(

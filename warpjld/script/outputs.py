@@ -39,7 +39,8 @@ class Camera:
 
 @dataclass(frozen=True)
 class Picture:
-    """One frame as a PNG; coloured by pressure perhaps of one actor or object ``only``, or of its ``digits``."""
+    """One frame as a PNG; coloured by pressure perhaps of one actor or object ``only``, or of its ``digits``; or with
+    the ``numbers`` of all vertices and facets, or only its."""
 
     name: str
     frame: float
@@ -47,6 +48,7 @@ class Picture:
     camera: Camera
     only: str | None = None
     digits: tuple[str, ...] = ()
+    numbers: bool = False
 
 
 @dataclass(frozen=True)

@@ -109,7 +109,28 @@ def draw_picture(scene: Scene, crowd: Crowd, picture: Picture, path: Path) -> No
         segments=_bones(crowd, picture.style),
         solids=now.solids(shift),
     ) as stage_:
-        render.save_picture(path, stage_.draw(now.surface(0) - shift, joints=now.joints(0) - shift))
+        drawn = stage_.draw(now.surface(0) - shift, joints=now.joints(0) - shift)
+        if picture.numbers:
+            drawn = render.with_numbers(drawn, stage_, _numbered(now, picture.only, shift))
+        render.save_picture(path, drawn)
+
+
+def _numbered(now: Crowd, only: str | None, shift: NDArray[np.float64]) -> list[render.Numbered]:
+    """Actors and objects whose numbers are shown, as they are drawn."""
+    found, points, start = [], now.surface(0) - shift, 0
+    for role in now.roles:
+        surface = role.covering.surface
+        if only in (None, role.actor.name):
+            own = points[start : start + len(surface.vertices)]
+            found.append(render.Numbered(own, surface.faces, surface.numbers, surface.facets))
+        start += len(surface.vertices)
+    for prop, own in zip(now.props, now.solid_vertices(0, shift), strict=True):
+        if only in (None, prop.name):
+            thing = prop.thing
+            numbers = np.arange(len(own)) if thing.numbers is None else thing.numbers
+            facets = np.arange(len(thing.faces)) if thing.facets is None else thing.facets
+            found.append(render.Numbered(own, thing.faces, numbers, facets))
+    return found
 
 
 def draw_contact_sheet(scene: Scene, crowd: Crowd, sheet: ContactSheet, path: Path, title: str) -> None:

@@ -159,7 +159,7 @@ def pose(name: str, skeleton: Skeleton) -> Posed | None:
 
 def _by_angles(angles: Angles, limb: tuple[str, ...], skeleton: Skeleton, side: str) -> Posed | None:
     names = {n: j for j, n in enumerate(skeleton.names)}
-    array = np.zeros((1, len(skeleton), len(CHANNELS)))
+    array = skeleton.initial[None].copy()
     bent = []
     for joint, channels in angles.items():
         number = names.get(f"{side}.{joint}")

@@ -82,12 +82,22 @@ def _place(scene: FbxScene, skeleton: FbxSkeleton, mesh: FbxMesh, notes: list[st
             notes.append(f"mesh '{mesh.name}' was bound in another pose than the other meshes: brought to theirs")
     blended = np.einsum("vk,vkij->vij", weights, transforms[cluster])
     vertices = np.einsum("vij,vj->vi", blended[:, :3, :3], mesh.points) + blended[:, :3, 3]
-    triangles, _ = triangulate_polygons(mesh.points[mesh.corners], mesh.counts)
+    triangles, polygons = triangulate_polygons(mesh.points[mesh.corners], mesh.counts)
     if np.linalg.det(transforms[0, :3, :3]) < 0.0:  # a mirrored mesh turns its triangles inside out
         triangles = triangles[:, ::-1]
     corner_uv = None if mesh.uv is None else mesh.uv[triangles]
     faces = mesh.corners[triangles]
-    return RigMesh(mesh.name, vertices, faces, joints[cluster], weights, rigid, corner_uv=corner_uv)
+    return RigMesh(
+        mesh.name,
+        vertices,
+        faces,
+        joints[cluster],
+        weights,
+        rigid,
+        corner_uv=corner_uv,
+        polygons=polygons,
+        polygon_count=len(mesh.counts),
+    )
 
 
 def _lower_detail(scene: FbxScene, node: int) -> bool:

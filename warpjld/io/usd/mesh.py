@@ -23,11 +23,15 @@ class UsdMesh:
         points: Vertex positions, shape (V, 3).
         faces: Triangles, anticlockwise seen from outside, shape (S, 3).
         uv: Texture coordinates of every triangle's corners, shape (S, 3, 2), or None.
+        polygons: Face of the file that each triangle is a part of, shape (S,).
+        polygon_count: How many faces the file has.
     """
 
     points: NDArray[np.float64]
     faces: NDArray[np.int64]
     uv: NDArray[np.float32] | None
+    polygons: NDArray[np.int64]
+    polygon_count: int
 
 
 def read_usd_mesh(file: UsdFile, prim: Any) -> UsdMesh:
@@ -57,13 +61,14 @@ def read_usd_mesh(file: UsdFile, prim: Any) -> UsdMesh:
     corners, owner = triangulate_polygons(points[indices], counts)
     holes = mesh.GetHoleIndicesAttr().Get()
     if holes:
-        corners = corners[~np.isin(owner, np.array(holes))]
+        filled = ~np.isin(owner, np.array(holes))
+        corners, owner = corners[filled], owner[filled]
     if (counts < 3).any():
         file.notes.append(f"{where}: {int((counts < 3).sum())} faces with fewer than three corners left out")
     if mesh.GetOrientationAttr().Get() == UsdGeom.Tokens.leftHanded:
         corners = corners[:, ::-1]
     uv = _corner_uv(file, prim, where, indices)
-    return UsdMesh(points, indices[corners], None if uv is None else uv[corners])
+    return UsdMesh(points, indices[corners], None if uv is None else uv[corners], owner, len(counts))
 
 
 def default_or_first(attribute: Any) -> Any:

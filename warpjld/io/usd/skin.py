@@ -107,4 +107,6 @@ def _skinned(file: UsdFile, skeleton: UsdSkeleton, query: Any) -> RigMesh | None
         joints=joints,
         weights=weights,
         rigid=rigid,
+        polygons=mesh.polygons,
+        polygon_count=mesh.polygon_count,
     )

@@ -5,11 +5,23 @@ from __future__ import annotations
 from warpjld.errors import InputError
 from warpjld.script import show
 from warpjld.script.arguments import Arguments
+from warpjld.script.commands.physical import read_object
+from warpjld.script.facets import read_facet, read_vertex
 from warpjld.script.registry import all_commands, command
 from warpjld.script.scene import Scene
 from warpjld.script.statements import Word
 
-_TOPICS = ("VALUES", "WIREFRAME", "SHADED", "ACTORS", "JOINTS", "PARAMETERS", "OUTPUTS")
+_TOPICS = (
+    "VALUES",
+    "WIREFRAME",
+    "SHADED",
+    "DISTANCE",
+    "INTERSECTION",
+    "ACTORS",
+    "JOINTS",
+    "PARAMETERS",
+    "OUTPUTS",
+)
 
 
 @command(
@@ -36,8 +48,11 @@ def print_(scene: Scene, arguments: Arguments) -> None:
 
 @command(
     "SHOW",
-    syntax="SHOW VALUES <frame> or SHOW <WIREFRAME/SHADED> <frame> or SHOW <ACTORS/JOINTS/PARAMETERS/OUTPUTS>",
-    help="Values at any frame; a picture of it, whose path is printed; or what is on stage.",
+    syntax=(
+        "SHOW VALUES <frame>, SHOW <WIREFRAME/SHADED> <frame>, SHOW DISTANCE <frame> <hand vertex> <object> <facet>, "
+        "SHOW INTERSECTION <frame> <segment> <object> or SHOW <ACTORS/JOINTS/PARAMETERS/OUTPUTS>"
+    ),
+    help="Values or a picture of a frame, a vertex beside a facet, what of a segment is in an object, or what there is.",
     group="Flow",
 )
 def show_(scene: Scene, arguments: Arguments) -> None:
@@ -55,6 +70,8 @@ def show_(scene: Scene, arguments: Arguments) -> None:
             frame = arguments.number("the frame")
             scene.actor()  # says what to do where there is none
             scene.say(str(preview(scene, frame, "shaded" if topic == "SHADED" else "wireframe")))
+        case "DISTANCE" | "INTERSECTION":
+            _measure(scene, arguments, topic)
         case "ACTORS":
             scene.say(show.actors(scene))
         case "JOINTS":
@@ -63,6 +80,29 @@ def show_(scene: Scene, arguments: Arguments) -> None:
             scene.say(show.parameters(scene.actor()))
         case "OUTPUTS":
             scene.say("\n".join(output.name for output in scene.outputs) or "nothing asked for yet")
+
+
+def _measure(scene: Scene, arguments: Arguments, topic: str) -> None:
+    """R73, R75, R132."""
+    from warpjld.script import measures
+
+    frame = arguments.number("the frame")
+    actor = scene.actor()
+    if topic == "DISTANCE":
+        vertex = read_vertex(actor, arguments, "the hand vertex (its number in the file)")
+        prop = read_object(scene, arguments)
+        facet = read_facet(prop, arguments, "the facet (its number in the file)")
+        if not scene.dry:
+            scene.say(measures.distance(scene, actor, frame, vertex, prop, facet))
+        return
+    segment, where = arguments.name("a segment or a digit"), arguments.last
+    prop = read_object(scene, arguments)
+    if scene.dry:
+        return
+    try:
+        scene.say(measures.intersection(scene, actor, frame, segment, prop))
+    except InputError as error:
+        raise arguments.error(error.message, where) from None
 
 
 @command("HELP", syntax="HELP [<command>]", help="All commands, or one.", group="Flow")

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, cast
 
 from warpjld.script.arguments import Arguments
 from warpjld.script.commands.physical import read_object
+from warpjld.script.facets import read_facet, read_vertex
 from warpjld.script.grips import read_frames, read_side
 from warpjld.script.keys import FINGERS, named_joint
 from warpjld.script.registry import command
@@ -170,7 +171,7 @@ def release(scene: Scene, arguments: Arguments) -> None:
 
 
 def _search(scene: Scene, arguments: Arguments, name: str, key: float, side: str, joint_name: str, finger: str) -> None:
-    from warpjld.grasp import NEAREST, Status
+    from warpjld.grasp import Status
     from warpjld.grasp.digits import pad_vertex
     from warpjld.grasp.search import FINEST
     from warpjld.script.binding import cover
@@ -181,14 +182,13 @@ def _search(scene: Scene, arguments: Arguments, name: str, key: float, side: str
     if arguments.keyword("PAD"):
         vertex = -1 if scene.dry else pad_vertex(cover(actor), f"{side}.{finger}".lower())
     else:
-        last = len(actor.rig.surface.vertices) - 1
-        vertex = arguments.integer("the hand vertex (its number, or PAD)", minimum=0, maximum=last)
+        vertex = read_vertex(actor, arguments, "the hand vertex (its number in the file, or PAD)")
     prop = read_object(scene, arguments)
     _check_size(actor, prop, arguments)
     if arguments.keyword("NEAREST"):
-        facet = NEAREST
+        facet = None
     else:
-        facet = arguments.integer("the facet (its number, or NEAREST)", minimum=0, maximum=len(prop.thing.faces) - 1)
+        facet = read_facet(prop, arguments, "the facet (its number in the file, or NEAREST)")
     options = arguments.options(
         distance=lambda: arguments.number("the distance in metres"),
         within=lambda: arguments.number("how exactly, in metres", minimum=FINEST, maximum=0.1),
@@ -205,13 +205,14 @@ def _search(scene: Scene, arguments: Arguments, name: str, key: float, side: str
         actor.set_keys(channel, [key], float(found.angles[0, 0]), scene.spline)
         if inside != "no vertex inside":
             message += f"; not solved: {inside}"
+    number = int(actor.rig.surface.numbers[vertex])
     values = {
         "joint": actor.skeleton.names[joint],
-        "vertex": vertex,
-        "facet": int(found.facet[0]),
+        "vertex": number,
+        "facet": prop.thing.facet_of(int(found.facet[0])) if found.facet[0] >= 0 else -1,
         "angle_degrees": round(math.degrees(found.angles[0, 0]), 4),
         "distance_mm": round(1e3 * float(found.distance[0]), 4),
         "collisions": inside,
     }
-    what = f"{name} {actor.skeleton.names[joint]} vertex {vertex} {prop.name}"
+    what = f"{name} {actor.skeleton.names[joint]} vertex {number} {prop.name}"
     scene.attempts.append(Attempt(what, key, actor.name, prop.name, status.name, message, values))

@@ -54,15 +54,19 @@ def size(scene: Scene, arguments: Arguments) -> None:
 
 @command(
     "PICTURE",
-    syntax=f'PICTURE <frame> "<name>.png" {_SHOWN}',
-    help="A picture of a frame; PRESSURE colours what touches: all, or one actor, digit or object alone.",
+    syntax=f'PICTURE <frame> "<name>.png" {_SHOWN[:-1]}/NUMBERS [<actor or object>]]',
+    help="A picture of a frame; PRESSURE colours what touches; NUMBERS are the files' own, of vertices and facets.",
     group="Output",
 )
 def picture(scene: Scene, arguments: Arguments) -> None:
     """R5, R66, R67."""
     frame = arguments.number("the frame")
     name = arguments.output_name("the picture's name", PICTURES)
-    style = _style(arguments)
+    if arguments.keyword("NUMBERS"):
+        only = _shown_alone(scene, arguments) if arguments else None
+        ask_for(scene, arguments, Picture(name, frame, "shaded", scene.camera, only, numbers=True))
+        return
+    style = _style(arguments, "NUMBERS")
     ask_for(scene, arguments, Picture(name, frame, style, scene.camera, *_only(scene, arguments, style)))
 
 
@@ -120,24 +124,29 @@ def export_motion(scene: Scene, arguments: Arguments) -> None:
     ask_for(scene, arguments, MotionFile(name, actor))
 
 
-def _style(arguments: Arguments) -> Style:
-    return cast(Style, arguments.choice("the style", _STYLES).lower()) if arguments else "shaded"
+def _style(arguments: Arguments, *beside: str) -> Style:
+    return cast(Style, arguments.choice("the style", _STYLES, beside).lower()) if arguments else "shaded"
 
 
 def _only(scene: Scene, arguments: Arguments, style: Style) -> tuple[str | None, tuple[str, ...]]:
     """What is shown alone, and which digits of it."""
     if style != "pressure" or not arguments:
         return None, ()
-    name = arguments.name("an actor's or an object's name").upper()
-    known = [*scene.actors, *scene.props]
-    if name not in known:
-        raise arguments.error(f"there is no actor or object {name}{did_you_mean(name, known)}")
+    name = _shown_alone(scene, arguments)
     digits: list[str] = []
     while name in scene.actors and arguments:
         digits.append(arguments.choice("a digit", (*FINGERS, "PALM")).lower())
     if digits and name not in scene.contact.flesh:
         raise arguments.error(f"{name} has no flesh whose digits can be shown: FLESH {name} makes it so")
     return name, tuple(dict.fromkeys(digits))
+
+
+def _shown_alone(scene: Scene, arguments: Arguments) -> str:
+    name = arguments.name("an actor's or an object's name").upper()
+    known = [*scene.actors, *scene.props]
+    if name not in known:
+        raise arguments.error(f"there is no actor or object {name}{did_you_mean(name, known)}")
+    return name
 
 
 def ask_for(scene: Scene, arguments: Arguments, output: Output) -> None:
