@@ -150,3 +150,18 @@ class Mortar:
             arguments = [*(shared(t) for t in tables), _FACING, _TURN, reach, shared(out.reshape(-1))]
             on_rows(contact_mortar.integrate, len(pairs), arguments, threads=self.threads, least=200)
         return out
+
+    def derivatives(self, pairs: Ints32, x: Array, reach: float) -> Array:
+        """Of the integrals of pairs (P, 2), by the coordinates of their corners, the slave's first, shape (P, 24, 33).
+
+        Each pair's own: corners that pairs share are moved one pair at a time.
+        """
+        from warpjld_kernels import contact_mortar
+
+        out = np.empty((len(pairs), 24, 33))
+        if len(pairs):
+            kept = (pairs, self.slave.quads, self.master.quads, x)
+            tables = [shared(np.ascontiguousarray(a).reshape(-1)) for a in kept]
+            arguments = [*tables, _FACING, _TURN, reach, shared(out.reshape(-1))]
+            on_rows(contact_mortar.differentiate, len(pairs), arguments, threads=self.threads, least=50)
+        return out

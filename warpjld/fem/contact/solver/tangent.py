@@ -2,8 +2,8 @@
 
 The points' weights and normals change too. With pressure as high as the flesh is stiff that is no small matter: pads of
 fingers roll and slide on each other, each facet then presses on other nodes, and Newton's method without these
-derivatives goes to and fro. Those of the weights are differences, one facet pair at a time (Puso & Laursen 2004 give
-them in closed form); those of the normals are exact.
+derivatives goes to and fro. Both are exact: those of the weights one facet pair at a time, by numbers that carry their derivatives through the
+integrals (Puso & Laursen 2004 give them in closed form).
 """
 
 from __future__ import annotations
@@ -100,8 +100,6 @@ def _int(values: NDArray[Any]) -> Ints32:
     return np.ascontiguousarray(values, dtype=np.int32)
 
 
-_STEP = 1e-6
-"""Of the differences, over an edge."""
 _NEAR, _DEEP = 0.5, 0.05
 """Edges within which a gap may close in an iteration; and of overlap from which on how gaps change says little of where
 to go: its facets will not meet."""
@@ -215,7 +213,7 @@ class _Pairs:
         self.corner = number[slave.corners[facets[:, 0]]]
         self.column = (3 * nodes[:, :, None] + np.arange(3)).reshape(-1, 24)
         self._mortar, self._points, self._at, self._size = mortar, points, x[nodes], x.size
-        change = _differences(mortar, self._at, reach, _STEP * float(np.median(slave.edge)))
+        change = mortar.derivatives(facets, x, reach)
         change *= share[:, None, None]
         self.own, self.far = (change[:, :, k : k + 16].reshape(-1, 24, 4, 4) for k in (0, 16))
 
@@ -245,19 +243,6 @@ class _Pairs:
         column = np.broadcast_to(self.column[:, :, None], block.shape)
         shape = (self._size, self._size)
         return csr_array(coo_array((block.ravel(), (row.ravel(), column.ravel())), shape=shape))
-
-
-def _differences(mortar: Mortar, at: Array, reach: float, step: float) -> Array:
-    """Derivatives of each facet pair's integrals by the coordinates of its corners at (P, 8, 3), shape (P, 24, 33)."""
-    count = len(at)
-    moved = np.tile(at[:, None], (1, 25, 1, 1)).reshape(count, 25, 24)
-    k = np.arange(24)
-    moved[:, 1 + k, k] += step
-    corners = np.arange(count * 25 * 8, dtype=np.int32).reshape(-1, 2, 4)
-    pairs = np.repeat(np.arange(count * 25, dtype=np.int32)[:, None], 2, axis=1)
-    found = mortar.integrals(pairs, corners[:, 0], corners[:, 1], moved, reach)
-    found = found.reshape(count, 25, 33)
-    return np.asarray((found[:, 1:] - found[:, :1]) / step)
 
 
 def _normal_derivatives(surface: ContactSurface, x: Array, sites: Ints, rows: Ints) -> Any:
