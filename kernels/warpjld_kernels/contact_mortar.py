@@ -263,8 +263,7 @@ _PAIR = """
 and the point."""
 
 _STILL = """
-    auto followed = [](const Real (*)[2], const Real&, const Real&, const double*, double, double, double, double, double,
-                       Real*) {};
+    auto followed = [](const Real (*)[2], Real, Real, const double*, double, double, double, double, double, Real*) {};
 """
 _FOLLOWING = """
     auto followed = [](const Real (*p)[2], const Real& x, const Real& y, const double* n, double a, double b, double c,

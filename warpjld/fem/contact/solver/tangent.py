@@ -2,8 +2,8 @@
 
 The points' weights and normals change too. With pressure as high as the flesh is stiff that is no small matter: pads of
 fingers roll and slide on each other, each facet then presses on other nodes, and Newton's method without these
-derivatives goes to and fro. Both are exact: those of the weights one facet pair at a time, by numbers that carry their derivatives through the
-integrals (Puso & Laursen 2004 give them in closed form).
+derivatives goes to and fro. Both are exact: those of the weights one facet pair at a time, by numbers that carry their
+derivatives through the integrals (Puso & Laursen 2004 give them in closed form).
 """
 
 from __future__ import annotations
@@ -220,7 +220,7 @@ class _Pairs:
     def gaps(self) -> Any:
         """How the points' gaps change with their weights, ``csr_array`` (m, 3N)."""
         points, corner, at = self._points, self.corner, self._at
-        spread = np.einsum("pkab,pbi->pkai", self.own, at[:, :4]) - np.einsum("pkab,pbi->pkai", self.far, at[:, 4:])
+        spread = np.matmul(self.own, at[:, None, :4]) - np.matmul(self.far, at[:, None, 4:])
         off, per_area = self._mortar.sliver_offset(points.sites, points.area)
         wider = self.own.sum(axis=3)
         mean = np.einsum("pkai,pai->pka", spread, points.normal[corner]) + (points.gap - off)[corner][:, None] * wider
@@ -237,10 +237,13 @@ class _Pairs:
     def forces(self, traction: Array) -> Any:
         """How nodal forces of tractions (m, 3) change with the points' weights [N/m], ``csr_array`` (3N, 3N)."""
         known = np.where(self.corner[:, :, None] >= 0, traction[self.corner], 0.0)
-        pushed = [np.einsum("pkab,pai->pkbi", part, known) for part in (self.own, -self.far)]
-        block = np.concatenate(pushed, axis=2).reshape(-1, 24, 24)  # by what moves, then by what is pushed
-        row = np.broadcast_to(self.column[:, None, :], block.shape)
-        column = np.broadcast_to(self.column[:, :, None], block.shape)
+        some = known.any(axis=(1, 2))
+        known, column = known[some], self.column[some]
+        # by what moves, then by what is pushed
+        pushed = [np.matmul(part[some].transpose(0, 1, 3, 2), known[:, None]) for part in (self.own, -self.far)]
+        block = np.concatenate(pushed, axis=2).reshape(-1, 24, 24)
+        row = np.broadcast_to(column[:, None, :], block.shape)
+        column = np.broadcast_to(column[:, :, None], block.shape)
         shape = (self._size, self._size)
         return csr_array(coo_array((block.ravel(), (row.ravel(), column.ravel())), shape=shape))
 
