@@ -2,7 +2,9 @@
 
 import warp as wp
 
-wp.set_module_options({"enable_backward": False})
+from warpjld_kernels.lanes import VECTORISED
+
+wp.set_module_options(VECTORISED)
 
 
 @wp.kernel

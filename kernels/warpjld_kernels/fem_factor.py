@@ -11,12 +11,9 @@ the lower triangle means anything.
 
 import warp as wp
 
-wp.set_module_options(
-    {
-        "enable_backward": False,
-        "cpu_compiler_flags": "-march=native -ffp-contract=fast -mprefer-vector-width=512",
-    }
-)
+from warpjld_kernels.lanes import VECTORISED
+
+wp.set_module_options(VECTORISED)
 
 
 @wp.struct
@@ -56,8 +53,8 @@ class Blocks:
     """
     typedef double Eight __attribute__((ext_vector_type(8)));
     typedef double Loose __attribute__((ext_vector_type(8), aligned(8)));
-    // C −= A Bᵀ, by columns: c (m × n), a (m × depth), b (n × depth), m a multiple of 8, n of 3; of column j of c what is
-    // not above row top + j
+    // C −= A Bᵀ, by columns: c (m × n), a (m × depth), b (n × depth), m a multiple of 8, n of 3; of column j of c what
+    // is not above row top + j
     auto tile = [](auto high, auto wide, double* c, size_t sc, const double* a, const double* b, size_t s, int depth) {
         constexpr int H = sizeof(*high), W = sizeof(*wide);
         Eight sum[W][H];

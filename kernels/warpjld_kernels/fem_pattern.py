@@ -6,7 +6,9 @@ its own marker, so ranges may run side by side.
 
 import warp as wp
 
-wp.set_module_options({"enable_backward": False})
+from warpjld_kernels.lanes import VECTORISED
+
+wp.set_module_options(VECTORISED)
 
 
 @wp.struct

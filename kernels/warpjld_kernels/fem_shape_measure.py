@@ -2,10 +2,9 @@
 
 import warp as wp
 
-# a lane a corner; not contracted, so that every machine has the same bits
-wp.set_module_options(
-    {"enable_backward": False, "cpu_compiler_flags": "-march=native -ffp-contract=off -mprefer-vector-width=512"}
-)
+from warpjld_kernels.lanes import VECTORISED
+
+wp.set_module_options(VECTORISED)
 
 SIZE = 0.05
 """Weight w of an element's size."""
@@ -33,6 +32,7 @@ def _gathered() -> str:
 
 @wp.func_native(
     f"""
+#pragma clang fp contract(off)
     const int* corners = elements.data + 8 * size_t(element);
     double* slope = (double*)(slopes.data + 8 * size_t(element));
     const double soft = softness * softness, size_weight = {SIZE}, root27 = 3.0 * sqrt(3.0);

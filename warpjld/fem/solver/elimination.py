@@ -157,7 +157,8 @@ def _parted(parent: Ints, below: Any, work: Any) -> list[Ints]:
     for front, up in enumerate(parent.tolist()):
         kids.setdefault(up, []).append(front)
     while True:
-        sums, sides = [0.0, 0.0], [[], []]
+        sums = [0.0, 0.0]
+        sides: list[list[int]] = [[], []]
         for branch in sorted(branches, key=lambda one: (-below[one], one)):
             side = int(sums[1] < sums[0])
             sums[side] += below[branch]
@@ -214,19 +215,16 @@ def _stacked(part: Ints, parent: Ints, sizes: Ints, left: Ints, start: int) -> i
     for front in part[::-1].tolist():
         up = parent[front]
         depth[front] = depth[up] + 1 if up >= 0 and inside[up] else 0
-    tops_of = [0, 0]
-    for measured in (True, False):
-        heights, tops = [0, 0], [0, 0]
-        waiting: list[list[tuple[int, int]]] = [[], []]
-        for front in part.tolist():
-            parity = int(depth[front] % 2)
-            other = waiting[1 - parity]
-            while other and parent[other[-1][0]] == front:
-                heights[1 - parity] = other.pop()[1]
-            if not measured:
-                left[front] = start + (tops_of[0] if parity else 0) + heights[parity]
-            waiting[parity].append((front, heights[parity]))
-            heights[parity] += int(sizes[front])
-            tops[parity] = max(tops[parity], heights[parity])
-        tops_of = tops
-    return start + sum(tops_of) + _LANES
+    heights, tops = [0, 0], [0, 0]
+    waiting: list[list[tuple[int, int]]] = [[], []]  # fronts on a stack, and how high it was below them
+    for front in part.tolist():
+        parity = int(depth[front] % 2)
+        other = waiting[1 - parity]
+        while other and parent[other[-1][0]] == front:
+            heights[1 - parity] = other.pop()[1]
+        left[front] = start + heights[parity]
+        waiting[parity].append((front, heights[parity]))
+        heights[parity] += int(sizes[front])
+        tops[parity] = max(tops[parity], heights[parity])
+    left[part[depth[part] % 2 == 1]] += tops[0]
+    return start + sum(tops) + _LANES

@@ -5,8 +5,9 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
+from scipy.sparse import csr_array
 
-from warpjld.fem.arrays import Array, Mask
+from warpjld.fem.arrays import Array, Ints32, Mask
 from warpjld.fem.assembly.block_matrix import BlockMatrix, IndefiniteError
 from warpjld.fem.launch import Launch, grouped, on_rows, shared
 from warpjld.fem.solver.elimination import Elimination, eliminate
@@ -33,15 +34,24 @@ class Factor:
 
     def __init__(self, matrix: BlockMatrix, free: Mask, *, threads: int, reuse: Factor | None = None) -> None:
         self._free = free
-        found = False
+        pattern = matrix.rows, matrix.columns
         if reuse is not None and np.array_equal(reuse._free, free):
-            self.elimination, self._panels, self._work = reuse.elimination, reuse._panels, reuse._work
-            found = self._factorised(matrix, threads)
-        if not found:
-            active = free.reshape(-1, 3).any(axis=1)
-            self.elimination = eliminate(matrix.rows, matrix.columns, active)
-            self._panels, self._work = np.empty(self.elimination.size + 8), np.empty(self.elimination.room + 8)
-            self._factorised(matrix, threads)
+            self._take(reuse.elimination, reuse._pattern, (reuse._panels, reuse._work))
+            if self._factorised(matrix, threads):
+                self._prepare()
+                return
+            pattern = _both(pattern, reuse._pattern)
+        found = eliminate(*pattern, np.asarray(free.reshape(-1, 3).any(axis=1)))
+        self._take(found, pattern, (np.empty(found.size + 8), np.empty(found.room + 8)))
+        self._factorised(matrix, threads)
+        self._prepare()
+
+    def _take(self, elimination: Elimination, pattern: tuple[Ints32, Ints32], memory: tuple[Array, Array]) -> None:
+        self.elimination, self._pattern = elimination, pattern
+        self._panels, self._work = memory
+
+    def _prepare(self) -> None:
+        """Record the solve."""
         elimination = self.elimination
         degrees = (3 * elimination.order[:, None].astype(np.int64) + np.arange(3)).ravel()
         self._degrees = degrees
@@ -93,3 +103,22 @@ class Factor:
                 node = int(failed[failed > 0][0]) - 1
                 raise IndefiniteError(f"the stiffness is not positive definite (found at node {node})")
         return True
+
+
+_ROOM = 1.15
+"""Entries of an earlier pattern and the present one together, over the present one's, up to which both get room: what
+touched a moment ago will touch again."""
+
+
+def _both(pattern: tuple[Ints32, Ints32], before: tuple[Ints32, Ints32]) -> tuple[Ints32, Ints32]:
+    """Rows and columns of two patterns of one size together, unless there are far more of them than of the first."""
+    count = len(pattern[0]) - 1
+    one, other = (
+        csr_array((np.ones(len(columns), np.int8), columns, rows), shape=(count, count))
+        for rows, columns in (pattern, before)
+    )
+    sum_ = csr_array(one + other)
+    if sum_.nnz > _ROOM * one.nnz:
+        return pattern
+    sum_.sort_indices()
+    return sum_.indptr.astype(np.int32), sum_.indices.astype(np.int32)

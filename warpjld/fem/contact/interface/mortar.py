@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -27,6 +28,29 @@ it fades out: it seems farther off than it is, by up to so many edges, and what 
 than the nodes. A pressure that opens a gap acts on hardly any area there, so that it would have no bound; and the
 average may overlap the more the farther the sides are parted, so that there would be no solution. What presses beside
 it is to hold it."""
+
+
+_AHEAD = 0.25
+"""Way of a node, over the reach, after which pairs of facets are looked for again."""
+
+
+@dataclass(frozen=True, eq=False)
+class _Near:
+    """Pairs of facets (P, 2) that may come within ``reach`` as long as no node is far from where it was, x (N, 3)."""
+
+    x: Array
+    reach: float
+    pairs: Ints32
+
+    def serves(self, x: Array, *surfaces: ContactSurface) -> bool:
+        way = max(float(np.abs(x[one.nodes] - self.x[one.nodes]).max()) for one in surfaces)
+        return way < 0.99 * _AHEAD * self.reach
+
+
+def _boxes(x: Array, surface: ContactSurface) -> tuple[Array, Array]:
+    """Lowest and highest coordinates of each facet [m], shape (F, 3) each."""
+    corners = x[surface.quads]
+    return corners.min(axis=1), corners.max(axis=1)
 
 
 class Mortar:
@@ -76,6 +100,8 @@ class Mortar:
         self.joined = joined
         self.fringe = None if exclusion is None else exclusion.fringe
         self._never = never
+        self._near: _Near | None = None
+        self._last: tuple[Array, float, Ints32, Array] | None = None
 
     def points(self, x: Array, reach: float, normals: Array) -> ContactPoints:
         """Points at positions x (N, 3) with slave normals (m, 3).
@@ -83,10 +109,7 @@ class Mortar:
         Of facets face to face, no farther apart than ``reach``, nor deeper.
         """
         slave, master = self.slave, self.master
-        pairs = self._neighbours(x, reach)
-        found = self.integrals(pairs, slave.quads, master.quads, x, reach)
-        some = found[:, 32] > 0.0
-        pairs, found = pairs[some], found[some]
+        pairs, found = self._facing(x, reach)
         share = counted_share(self, pairs, found, normals, x, reach)
         some = share > 0.0
         pairs, share = pairs[some], share[some]
@@ -122,20 +145,39 @@ class Mortar:
         t = (area - _LEAST * self.slave.edge[sites] ** 2) / whole
         return np.clip(t, 0.0, 1.0), np.where((t > 0.0) & (t < 1.0), 1.0 / whole, 0.0)
 
+    def _facing(self, x: Array, reach: float) -> tuple[Ints32, Array]:
+        """Pairs of facets face to face, and their integrals; the last place that was asked for is remembered."""
+        if self._last is None or self._last[1] != reach or not np.array_equal(self._last[0], x):
+            pairs = self._neighbours(x, reach)
+            found = self.integrals(pairs, self.slave.quads, self.master.quads, x, reach)
+            some = found[:, 32] > 0.0
+            self._last = x.copy(), reach, pairs[some], found[some]
+        return self._last[2], self._last[3]
+
     def _neighbours(self, x: Array, reach: float) -> Ints32:
-        """Slave and master facets whose boxes are within ``reach``, shape (P, 2); none is left out."""
+        """Slave and master facets whose boxes are within ``reach``, shape (P, 2), in order; none is left out.
+
+        Pairs a little farther apart are kept, and looked through, until a node has moved so far that others may come.
+        """
+        near = self._near
+        if near is None or near.reach != reach or not near.serves(x, self.slave, self.master):
+            near = self._near = _Near(x.copy(), reach, self._within(x, reach + 2.0 * _AHEAD * reach))
+        (low, high), (other_low, other_high) = (_boxes(x, surface) for surface in (self.slave, self.master))
+        mine, other = near.pairs.T
+        met = (low[mine] - reach <= other_high[other]) & (high[mine] + reach >= other_low[other])
+        return near.pairs[met.all(axis=1)]
+
+    def _within(self, x: Array, reach: float) -> Ints32:
+        """Slave and master facets whose boxes are within ``reach``, shape (P, 2), by slave and by master."""
         import warp as wp
         from warpjld_kernels import contact_mortar
 
         origin = x[self.slave.nodes].mean(axis=0)
-        boxes = []
-        for surface, margin in ((self.slave, reach), (self.master, 0.0)):
-            corners = x[surface.quads] - origin
-            boxes.append((corners.min(axis=1) - margin, corners.max(axis=1) + margin))
-        low, high = (np.ascontiguousarray(b, dtype=np.float32) for b in boxes[1])
-        bvh = wp.Bvh(*(wp.array(b, dtype=wp.vec3, device="cpu") for b in (low, high)))
+        boxes = [_boxes(x - origin, surface) for surface in (self.slave, self.master)]
+        bvh = wp.Bvh(*(wp.array(b.astype(np.float32), dtype=wp.vec3, device="cpu") for b in boxes[1]))
         count = len(self.slave.quads)
-        lower, upper = (wp.array(b.astype(np.float32), dtype=wp.vec3, device="cpu") for b in boxes[0])
+        sides = (boxes[0][0] - reach, boxes[0][1] + reach)
+        lower, upper = (wp.array(b.astype(np.float32), dtype=wp.vec3, device="cpu") for b in sides)
         mine, other, never = (shared(a) for a in (*self.labels, self._never))
         starts, counts = np.zeros(count + 1, np.int32), np.zeros(count, np.int32)
         inputs: list[Any] = [bvh.id, lower, upper, mine, other, never]
@@ -147,7 +189,8 @@ class Mortar:
             arguments = [*inputs, shared(starts), fill, shared(counts), shared(out)]
             wp.launch(contact_mortar.facet_pairs, dim=count, inputs=arguments, device="cpu")
         facet = np.repeat(np.arange(count, dtype=np.int32), counts)
-        return np.stack([facet, out[: len(facet)]], axis=1)
+        pairs = np.stack([facet, out[: len(facet)]], axis=1)
+        return pairs[np.lexsort((pairs[:, 1], pairs[:, 0]))]
 
     def integrals(self, pairs: Ints32, slave: Ints32, master: Ints32, x: Array, reach: float) -> Array:
         """Of pairs (P, 2) of quadrilaterals with corners at x (n, 3), see the kernel, shape (P, 33)."""
@@ -158,4 +201,19 @@ class Mortar:
             tables = [np.ascontiguousarray(a).reshape(-1) for a in (pairs, slave, master, x)]
             arguments = [*(shared(t) for t in tables), _FACING, _TURN, reach, shared(out.reshape(-1))]
             on_rows(contact_mortar.integrate, len(pairs), arguments, threads=self.threads, least=200)
+        return out
+
+    def derivatives(self, pairs: Ints32, x: Array, reach: float) -> Array:
+        """Of the integrals of pairs (P, 2), by the coordinates of their corners, the slave's first, shape (P, 24, 33).
+
+        Each pair's own: corners that pairs share are moved one pair at a time.
+        """
+        from warpjld_kernels import contact_mortar
+
+        out = np.empty((len(pairs), 24, 33))
+        if len(pairs):
+            kept = (pairs, self.slave.quads, self.master.quads, x)
+            tables = [shared(np.ascontiguousarray(a).reshape(-1)) for a in kept]
+            arguments = [*tables, _FACING, _TURN, reach, shared(out.reshape(-1))]
+            on_rows(contact_mortar.differentiate, len(pairs), arguments, threads=self.threads, least=50)
         return out

@@ -2,8 +2,8 @@
 
 The points' weights and normals change too. With pressure as high as the flesh is stiff that is no small matter: pads of
 fingers roll and slide on each other, each facet then presses on other nodes, and Newton's method without these
-derivatives goes to and fro. Those of the weights are differences, one facet pair at a time (Puso & Laursen 2004 give
-them in closed form); those of the normals are exact.
+derivatives goes to and fro. Both are exact: those of the weights one facet pair at a time, by numbers that carry their
+derivatives through the integrals (Puso & Laursen 2004 give them in closed form).
 """
 
 from __future__ import annotations
@@ -109,8 +109,6 @@ def _int(values: NDArray[Any]) -> Ints32:
     return np.ascontiguousarray(values, dtype=np.int32)
 
 
-_STEP = 1e-6
-"""Of the differences, over an edge."""
 _NEAR, _DEEP = 0.5, 0.05
 """Edges within which a gap may close in an iteration; and of overlap from which on how gaps change says little of where
 to go: its facets will not meet."""
@@ -224,14 +222,14 @@ class FacetPairs:
         self.corner = number[slave.corners[facets[:, 0]]]
         self.column = (3 * nodes[:, :, None] + np.arange(3)).reshape(-1, 24)
         self._mortar, self._points, self._at, self._size = mortar, points, x[nodes], x.size
-        change = _differences(mortar, self._at, reach, _STEP * float(np.median(slave.edge)))
+        change = mortar.derivatives(facets, x, reach)
         change *= share[:, None, None]
         self.own, self.far = (change[:, :, k : k + 16].reshape(-1, 24, 4, 4) for k in (0, 16))
 
     def gaps(self) -> Any:
         """How the points' gaps change with their weights, ``csr_array`` (m, 3N)."""
         points, corner, at = self._points, self.corner, self._at
-        spread = np.einsum("pkab,pbi->pkai", self.own, at[:, :4]) - np.einsum("pkab,pbi->pkai", self.far, at[:, 4:])
+        spread = np.matmul(self.own, at[:, None, :4]) - np.matmul(self.far, at[:, None, 4:])
         off, per_area = self._mortar.sliver_offset(points.sites, points.area)
         wider = self.own.sum(axis=3)
         mean = np.einsum("pkai,pai->pka", spread, points.normal[corner]) + (points.gap - off)[corner][:, None] * wider
@@ -251,25 +249,15 @@ class FacetPairs:
     def forces(self, traction: Array) -> Any:
         """How nodal forces of tractions (m, 3) change with the points' weights [N/m], ``csr_array`` (3N, 3N)."""
         known = np.where(self.corner[:, :, None] >= 0, traction[self.corner], 0.0)
-        pushed = [np.einsum("pkab,pai->pkbi", part, known) for part in (self.own, -self.far)]
-        block = np.concatenate(pushed, axis=2).reshape(-1, 24, 24)  # by what moves, then by what is pushed
-        row = np.broadcast_to(self.column[:, None, :], block.shape)
-        column = np.broadcast_to(self.column[:, :, None], block.shape)
+        some = known.any(axis=(1, 2))
+        known, column = known[some], self.column[some]
+        # by what moves, then by what is pushed
+        pushed = [np.matmul(part[some].transpose(0, 1, 3, 2), known[:, None]) for part in (self.own, -self.far)]
+        block = np.concatenate(pushed, axis=2).reshape(-1, 24, 24)
+        row = np.broadcast_to(column[:, None, :], block.shape)
+        column = np.broadcast_to(column[:, :, None], block.shape)
         shape = (self._size, self._size)
         return csr_array(coo_array((block.ravel(), (row.ravel(), column.ravel())), shape=shape))
-
-
-def _differences(mortar: Mortar, at: Array, reach: float, step: float) -> Array:
-    """Derivatives of each facet pair's integrals by the coordinates of its corners at (P, 8, 3), shape (P, 24, 33)."""
-    count = len(at)
-    moved = np.tile(at[:, None], (1, 25, 1, 1)).reshape(count, 25, 24)
-    k = np.arange(24)
-    moved[:, 1 + k, k] += step
-    corners = np.arange(count * 25 * 8, dtype=np.int32).reshape(-1, 2, 4)
-    pairs = np.repeat(np.arange(count * 25, dtype=np.int32)[:, None], 2, axis=1)
-    found = mortar.integrals(pairs, corners[:, 0], corners[:, 1], moved, reach)
-    found = found.reshape(count, 25, 33)
-    return np.asarray((found[:, 1:] - found[:, :1]) / step)
 
 
 def normal_derivatives(surface: ContactSurface, x: Array, sites: Ints, rows: Ints) -> Any:
