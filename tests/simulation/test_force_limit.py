@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Callable
 from pathlib import Path
 
 import pytest
 
+from warpjld.errors import InputError
 from warpjld.script import Scene
 from warpjld.script.contact import run_contact
+from warpjld.script.runner import run_scene
 
 FINGER = """
 OBJECT PLATE BOX 0.036 0.006 0.036 AT 0.034 -0.0275 -0.165
@@ -51,9 +54,12 @@ def test_muscles_end_it_where_they_are_weaker(run: Callable[[str], Scene], tmp_p
 def test_a_rigid_one_is_refused_before_it_is_solved_where_its_bone_lies_in_the_plate(
     run: Callable[[str], Scene], tmp_path: Path
 ) -> None:
-    scene = run(FINGER.replace("AT 4 7", "AT 4 14") + "PRESS 0 4 EVERY 4 RIGID")
-    found = run_contact(scene, tmp_path)
-    assert found.verdict.status == "BLOCKED"
-    assert found.verdict.failed
-    assert "the bone of LEFT index is" in found.verdict.text
-    assert "mm inside PLATE, which cannot give way" in found.verdict.text
+    scene = run(FINGER.replace("AT 4 7", "AT 4 14") + "PRESS 0 4 EVERY 4 RIGID\nEXPORT 'e.npz'")
+    with pytest.raises(
+        InputError, match=r"^contact was not solved: no equilibrium: at frame 4: the bone of LEFT index"
+    ):
+        run_scene(scene, tmp_path)
+    summary = json.loads((tmp_path / "summary.json").read_text(encoding="utf-8"))
+    assert summary["press"]["status"] == "BLOCKED"
+    assert "mm inside PLATE, which cannot give way" in summary["press"]["verdict"]
+    assert (tmp_path / "e.npz").is_file()  # what can be made is

@@ -170,7 +170,7 @@ def build_flesh_body(actor: ActorAnimation, material: FleshMaterial, start: floa
     built, hand, gap, element = _meshed(actor, material, poses, skin)
     if element != material.element:
         notes.append(
-            f"{actor.name}: elements of {1e3 * element:.3g} mm, since {1e3 * material.element:g} mm make no good mesh of it"
+            f"{actor.name}: elements of {1e3 * element:.3g} mm, {1e3 * material.element:g} mm make no good mesh"
         )
     if (coarse := coarse_note(built, element, material.digits)) is not None:
         notes.append(f"{actor.name}: {coarse}")
