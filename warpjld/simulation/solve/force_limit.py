@@ -18,6 +18,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from warpjld.errors import WarpjldError
 from warpjld.fem.contact import ContactInstant, ContactSolution
 from warpjld.fem.hand.muscles import KNUCKLES
 from warpjld.simulation.animation import AngleEdit
@@ -29,7 +30,12 @@ from warpjld.simulation.solve.branch import solve_onward
 from warpjld.simulation.solve.digit_loads import DigitLoad, digit_loads
 from warpjld.skeleton import CHANNELS, DIGITS, Skeleton
 
-__all__ = ["ForceLimits", "Stop"]
+__all__ = ["BoneInsideError", "ForceLimits", "Stop"]
+
+
+class BoneInsideError(WarpjldError):
+    """A bone that would lie in an object, in words with the frame."""
+
 
 _FLEXION = CHANNELS.index("flexion")
 """Column of the angles."""
@@ -120,7 +126,13 @@ class ForceLimits:
     def solve(
         self, model: ContactModel, history: History, before: ContactSolution | None, times: Sequence[float]
     ) -> ContactSolution:
-        """Equilibria at rising times, as ``solve_onward`` has them; digits that reach their limits stop on the way."""
+        """Equilibria at rising times, as ``solve_onward`` has them; digits that reach their limits stop on the way.
+
+        Raises:
+            BoneInsideError: A bone would come to lie in an object by no closing of its digit.
+        """
+        if not _bendable(model):
+            return solve_onward(model, history, before, times)
         reached: list[ContactInstant] = []
         now = 0.0 if before is None else before.last.time
         for time in self._finer(model, now, times):
@@ -195,6 +207,8 @@ class ForceLimits:
         """One step; again with digits that stop earlier, until none is over its limit that still closes."""
         self._relax(model, now, time)
         self._spare_bones(model, now, time)
+        if (inside := self.clearance.inside(self.driven(model), time)) is not None:
+            raise BoneInsideError(inside)
         for tried in count():  # ends: from some try on, whatever is over its limit no longer closes in the next
             closing = self._closing(model, now, time)
             found = solve_onward(self.driven(model), history, before, [time], halvings=_HALVINGS if closing else None)
