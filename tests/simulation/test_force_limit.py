@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable
+from dataclasses import asdict, replace
 from pathlib import Path
 
 import pytest
@@ -12,6 +13,8 @@ from warpjld.errors import InputError
 from warpjld.script import Scene
 from warpjld.script.contact import run_contact
 from warpjld.script.runner import run_scene
+from warpjld.simulation.solve.digit_loads import DigitLoad
+from warpjld.simulation.solve.force_limit import ForceLimits, Stop
 
 FINGER = """
 OBJECT PLATE BOX 0.036 0.006 0.036 AT 0.034 -0.0275 -0.165
@@ -63,3 +66,19 @@ def test_a_rigid_one_is_refused_before_it_is_solved_where_its_bone_lies_in_the_p
     assert summary["press"]["status"] == "BLOCKED"
     assert "mm inside PLATE, which cannot give way" in summary["press"]["verdict"]
     assert (tmp_path / "e.npz").is_file()  # what can be made is
+
+
+def test_what_has_stopped_is_kept_for_a_run_that_goes_on() -> None:
+    load = DigitLoad("LEFT", "left.index", 12.0, 0.2, 2.9e5, 0.5, "CAN")
+    content = {
+        "caps": [["LEFT", "left.index", 2.0, 3.0, [[7, [0.3, 0.31]], [8, [0.5, 0.5]]]]],
+        "loads": [asdict(load)],
+        "stuck": [["LEFT", "left.index"]],
+        "stops": [asdict(Stop("LEFT", "left.index", 26.5, "its muscles can do no more"))],
+    }
+    limits = ForceLimits({}, 3e5, {}, None)  # type: ignore[arg-type]
+    limits.restore(json.loads(json.dumps(content)))
+    assert json.loads(json.dumps(limits.content())) == content
+    assert load.share(3e5) == pytest.approx(2.9 / 3.0)
+    assert load.bound(3e5) == "its skin is pressed with 300 kPa"
+    assert replace(load, unopposed=1.2).bound(3e5) == "nothing opposes it, it would push CAN away"
