@@ -2,13 +2,19 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Callable
+from dataclasses import asdict, replace
 from pathlib import Path
 
 import pytest
 
+from warpjld.errors import InputError
 from warpjld.script import Scene
 from warpjld.script.contact import run_contact
+from warpjld.script.runner import run_scene
+from warpjld.simulation.solve.digit_loads import DigitLoad
+from warpjld.simulation.solve.force_limit import ForceLimits, Stop
 
 FINGER = """
 OBJECT PLATE BOX 0.036 0.006 0.036 AT 0.034 -0.0275 -0.165
@@ -51,9 +57,28 @@ def test_muscles_end_it_where_they_are_weaker(run: Callable[[str], Scene], tmp_p
 def test_a_rigid_one_is_refused_before_it_is_solved_where_its_bone_lies_in_the_plate(
     run: Callable[[str], Scene], tmp_path: Path
 ) -> None:
-    scene = run(FINGER.replace("AT 4 7", "AT 4 14") + "PRESS 0 4 EVERY 4 RIGID")
-    found = run_contact(scene, tmp_path)
-    assert found.verdict.status == "BLOCKED"
-    assert found.verdict.failed
-    assert "the bone of LEFT index is" in found.verdict.text
-    assert "mm inside PLATE, which cannot give way" in found.verdict.text
+    scene = run(FINGER.replace("AT 4 7", "AT 4 14") + "PRESS 0 4 EVERY 4 RIGID\nEXPORT 'e.npz'")
+    with pytest.raises(
+        InputError, match=r"^contact was not solved: no equilibrium: at frame 4: the bone of LEFT index"
+    ):
+        run_scene(scene, tmp_path)
+    summary = json.loads((tmp_path / "summary.json").read_text(encoding="utf-8"))
+    assert summary["press"]["status"] == "BLOCKED"
+    assert "mm inside PLATE, which cannot give way" in summary["press"]["verdict"]
+    assert (tmp_path / "e.npz").is_file()  # what can be made is
+
+
+def test_what_has_stopped_is_kept_for_a_run_that_goes_on() -> None:
+    load = DigitLoad("LEFT", "left.index", 12.0, 0.2, 2.9e5, 0.5, "CAN")
+    content = {
+        "caps": [["LEFT", "left.index", 2.0, 3.0, [[7, [0.3, 0.31]], [8, [0.5, 0.5]]]]],
+        "loads": [asdict(load)],
+        "stuck": [["LEFT", "left.index"]],
+        "stops": [asdict(Stop("LEFT", "left.index", 26.5, "its muscles can do no more"))],
+    }
+    limits = ForceLimits({}, 3e5, {}, None)  # type: ignore[arg-type]
+    limits.restore(json.loads(json.dumps(content)))
+    assert json.loads(json.dumps(limits.content())) == content
+    assert load.share(3e5) == pytest.approx(2.9 / 3.0)
+    assert load.bound(3e5) == "its skin is pressed with 300 kPa"
+    assert replace(load, unopposed=1.2).bound(3e5) == "nothing opposes it, it would push CAN away"

@@ -182,9 +182,9 @@ def write_keys(actor: Actor, edit: AngleEdit) -> None:
     channel = f"{actor.skeleton.names[edit.joint]}.{CHANNELS[_FLEXION]}"
     track = actor.motion.tracks[channel]
     if edit.frame is None:
-        was = next(key.value for key in track.keys if key.frame == edit.kept)
-        for key in track.keys:
-            if key.frame > edit.kept and key.value == was:
+        later = sorted((key for key in track.keys if key.frame > edit.kept), key=lambda key: key.frame)
+        for key in later:  # the angle that the first of them holds may be more than a digit that stopped has come to
+            if key.value == later[0].value:
                 track.set(replace(key, value=edit.value))
         return
     first = min(key.frame for key in track.keys)

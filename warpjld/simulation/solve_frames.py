@@ -17,7 +17,7 @@ from warpjld.simulation.grip.find import FoundGrip, find_grip
 from warpjld.simulation.solve.bone_clearance import TIGHT, BoneClearance, TightBone
 from warpjld.simulation.solve.branch import solve_onward
 from warpjld.simulation.solve.checkpoint import Checkpoint, CheckpointFile
-from warpjld.simulation.solve.force_limit import ForceLimits, Stop
+from warpjld.simulation.solve.force_limit import BoneInsideError, ForceLimits, Stop
 from warpjld.simulation.solve.grasp_balance import weight_of
 from warpjld.simulation.solve.missed_contacts import MissedContact, missed_contacts
 from warpjld.simulation.solve.solved_frame import SolvedFrame, solved_frame
@@ -155,9 +155,9 @@ class _Run:
     def __post_init__(self) -> None:
         self.substeps = Substeps(self.model)
         self.clearance = BoneClearance(self.model)
-        weights = {
-            name: weight_of(obstacle) for name, obstacle in self.model.obstacles.items() if name in self.contact.grasped
-        }
+        asked = any(grip.force is not None for grip in self.contact.grips)  # for a force, whatever opposes it
+        held = [] if asked else [name for name in self.model.obstacles if name in self.contact.grasped]
+        weights = {name: weight_of(self.model.obstacles[name]) for name in held}
         self.limits = ForceLimits(self.contact.strength, self.request.pressure, weights, self.clearance)
 
     def resume(self, found: Checkpoint) -> None:
@@ -175,7 +175,10 @@ class _Run:
         steps = self.substeps.times(model, 0.0 if before is None else before.last.time, time, now)
         since = 0.0 if before is None else before.last.time
         if self.request.limited:
-            solution = self.limits.solve(model, self.history, before, steps)
+            try:
+                solution = self.limits.solve(model, self.history, before, steps)
+            except BoneInsideError as error:
+                return self.ended(Status.BLOCKED, str(error))
             driven = self.limits.driven(model)
         else:
             driven = model
@@ -204,11 +207,8 @@ class _Run:
 
     def _bone_inside(self, model: ContactModel, times: Sequence[float]) -> str | None:
         """A bone that lies in an object at one of some times, in words: no force can part them."""
-        for time in times:
-            worst = min(self.clearance.nearest(model, time), key=lambda one: one.left, default=None)
-            if worst is not None and worst.left <= 0.0:
-                return f"at frame {model.start + time:g}: {worst.text}"
-        return None
+        found = (self.clearance.inside(model, time) for time in times)
+        return next(filter(None, found), None)
 
     def _note_bones(self, model: ContactModel, frame: float) -> None:
         """Remember what bones are near to objects."""

@@ -27,8 +27,9 @@ from warpjld.skeleton import Poses, Skeleton
 
 __all__ = ["FLESHED", "BoneMotion", "FleshBody", "build_flesh_body", "flesh_body"]
 
-_SIZES = (1.0, 0.96, 0.91, 0.86)
-"""Edges of elements that are tried, over the one that is asked for."""
+_SIZES = (1.0, 0.96, 0.9, 0.8, 0.68, 0.55)
+"""Edges of elements that are tried, over the one that is asked for: where thin parts of a hand would not be meshed,
+smaller ones are needed."""
 FLESHED = 0.5
 """Share of the flesh in skin from which on it has flesh to give way with."""
 
@@ -171,7 +172,7 @@ def build_flesh_body(actor: ActorAnimation, material: FleshMaterial, start: floa
     notes += [f"{actor.name}: {note}" for note in flesh.notes]
     if element != material.element:
         notes.append(
-            f"{actor.name}: elements of {1e3 * element:.3g} mm, since of {1e3 * material.element:g} mm one is distorted"
+            f"{actor.name}: elements of {1e3 * element:.3g} mm, {1e3 * material.element:g} mm make no good mesh"
         )
     if (coarse := coarse_note(flesh.cushions, element, material.digits)) is not None:
         notes.append(f"{actor.name}: {coarse}")
@@ -195,7 +196,7 @@ def _meshed(
     """A hand where its rig rests and in a pose, and its elements' edge [m].
 
     Whether some element at a cut or between two digits comes out distorted hangs on where the grid happens to lie: a
-    grid a little finer has it elsewhere.
+    grid a little finer has it elsewhere. Thin parts want smaller elements.
 
     Raises:
         InputError: It cannot be meshed at any of these sizes: what was wrong with the one that was asked for.

@@ -29,7 +29,7 @@ class ObjectBalance:
         force: Their sum [N], shape (3,).
         moment: About the centre of what presses [N m], shape (3,).
         pressing: Sum of their sizes [N].
-        by_hands: Whether nothing but hands touches it.
+        by_hands: Whether nothing but hands touches it or, by a HOLD or a support, keeps it in its place.
         weight: What it may weigh [N].
         borne: Whether something else holds it: its animation, HOLD, a support, or its own weight.
     """
@@ -93,9 +93,12 @@ def balances(model: ContactModel, solved: SolvedFrame) -> list[ObjectBalance]:
         centre = size @ x / pressing
         moment = np.cross(x - centre, forces).sum(axis=0)
         one = bodies.get(name)
-        borne = one is None or bool(one.states) or one.support is not None or any(model.loads.gravity)
+        kept = one is not None and (bool(one.states) or one.support is not None)
+        borne = one is None or kept or any(model.loads.gravity)
         weight = weight_of(model.obstacles[name], solved.frame - model.start) if one is None else 0.0
-        out.append(ObjectBalance(name, solved.frame, force, moment, pressing, others <= hands, weight, borne))
+        out.append(
+            ObjectBalance(name, solved.frame, force, moment, pressing, others <= hands and not kept, weight, borne)
+        )
     return out
 
 

@@ -68,6 +68,11 @@ class BoneClearance:
         """By hand: nodes, number of their digit, flesh over them [m], names of the digits."""
         return {hand.name: _bones_of(hand) for hand in self._model.hands}
 
+    def inside(self, model: ContactModel, time: float) -> str | None:
+        """A bone that lies in an object at a time, in words with the frame: no force can part them."""
+        worst = min(self.nearest(model, time), key=lambda one: one.left, default=None)
+        return None if worst is None or worst.left > 0.0 else f"at frame {model.start + time:.4g}: {worst.text}"
+
     def nearest(self, model: ContactModel, time: float) -> list[TightBone]:
         """Of every digit and obstacle the bone that has least flesh left at a time; those with all of it are left
         out."""

@@ -12,11 +12,13 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, field, replace
+from itertools import count
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from warpjld.errors import WarpjldError
 from warpjld.fem.contact import ContactInstant, ContactSolution
 from warpjld.fem.hand.muscles import KNUCKLES
 from warpjld.simulation.animation import AngleEdit
@@ -28,7 +30,12 @@ from warpjld.simulation.solve.branch import solve_onward
 from warpjld.simulation.solve.digit_loads import DigitLoad, digit_loads
 from warpjld.skeleton import CHANNELS, DIGITS, Skeleton
 
-__all__ = ["ForceLimits", "Stop"]
+__all__ = ["BoneInsideError", "ForceLimits", "Stop"]
+
+
+class BoneInsideError(WarpjldError):
+    """A bone that would lie in an object, in words with the frame."""
+
 
 _FLEXION = CHANNELS.index("flexion")
 """Column of the angles."""
@@ -43,8 +50,8 @@ _AIM = 0.97
 """Share of the limits at which digits stop: the table's loads differ from those by nearness by a few percent."""
 _RELAXED = 0.8
 """Share of them below which a digit that has stopped goes on."""
-_TRIES = 4
-"""Times a step is looked for again with digits that stop earlier; then they stay as they are before it."""
+_TRIES = 3
+"""Times a step is looked for again with digits that stop in its course; then they stay as they were before it."""
 _HALVINGS = 2
 """Times a step may be halved as long as digits could stop instead."""
 _SPENT = 0.25
@@ -119,7 +126,13 @@ class ForceLimits:
     def solve(
         self, model: ContactModel, history: History, before: ContactSolution | None, times: Sequence[float]
     ) -> ContactSolution:
-        """Equilibria at rising times, as ``solve_onward`` has them; digits that reach their limits stop on the way."""
+        """Equilibria at rising times, as ``solve_onward`` has them; digits that reach their limits stop on the way.
+
+        Raises:
+            BoneInsideError: A bone would come to lie in an object by no closing of its digit.
+        """
+        if not _bendable(model):
+            return solve_onward(model, history, before, times)
         reached: list[ContactInstant] = []
         now = 0.0 if before is None else before.last.time
         for time in self._finer(model, now, times):
@@ -179,8 +192,8 @@ class ForceLimits:
         for time in times:
             then = self._left(driven, time)
             squeezed = max((left.get(place, 1.0) - max(share, _SPENT) for place, share in then.items()), default=0.0)
-            count = max(1, int(np.ceil(squeezed / _SQUEEZED - _SAME)))
-            out += [now + (time - now) * (k + 1) / count for k in range(count - 1)] + [time]
+            pieces = max(1, int(np.ceil(squeezed / _SQUEEZED - _SAME)))
+            out += [now + (time - now) * (k + 1) / pieces for k in range(pieces - 1)] + [time]
             left, now = then, time
         return out
 
@@ -194,26 +207,26 @@ class ForceLimits:
         """One step; again with digits that stop earlier, until none is over its limit that still closes."""
         self._relax(model, now, time)
         self._spare_bones(model, now, time)
-        for tried in range(_TRIES + 1):
+        if (inside := self.clearance.inside(self.driven(model), time)) is not None:
+            raise BoneInsideError(inside)
+        for tried in count():  # ends: from some try on, whatever is over its limit no longer closes in the next
             closing = self._closing(model, now, time)
-            halvings = _HALVINGS if closing else None
-            found = solve_onward(self.driven(model), history, before, [time], halvings=halvings)
-            if not closing:
-                break
+            found = solve_onward(self.driven(model), history, before, [time], halvings=_HALVINGS if closing else None)
             if not found.converged:
+                if not closing:
+                    return found
                 self._stop_what_presses(model, closing, now)
                 continue
             loads = self._found(model, found)
             over = [key for key in closing if loads[key].share(self.pressure) > 1.0]
             if not over:
-                break
+                self._loads = loads
+                return found
             for key in over:
                 was, would = self._share(key), loads[key].share(self.pressure)
-                part = (_AIM - was) / (would - was) if was < _AIM and tried < _TRIES - 1 else 0.0
+                part = (_AIM - was) / (would - was) if was < _AIM and tried < _TRIES else 0.0
                 self._stop(model, key, now + part * (time - now), loads[key].bound(self.pressure))
-        if found.converged:
-            self._loads = self._found(model, found)
-        return found
+        raise AssertionError
 
     def _spare_bones(self, model: ContactModel, now: float, time: float) -> None:
         """Stop digits on whose way a bone comes too near to an object."""
@@ -243,7 +256,7 @@ class ForceLimits:
 
     def _found(self, model: ContactModel, found: ContactSolution) -> dict[_Key, DigitLoad]:
         """Loads of all digits at an equilibrium."""
-        out = {}
+        out: dict[_Key, DigitLoad] = {}
         for hand in _bendable(model):
             angles = self._angles(hand, found.last.time)
             loads = digit_loads(model, hand, angles, found.last, self.strength.get(hand.name), self.weights)
