@@ -29,8 +29,8 @@ __all__ = ["FoundGrip", "SupportRelease", "find_grip", "write_grips"]
 
 _START = math.radians(0.5)
 """First step of a search [rad]."""
-_NEAR = 0.08
-"""How near to the gentlest grip, as a share of its angle."""
+_NEAR = 0.03
+"""How near to the gentlest grip, as a share of its force."""
 
 _PRESSES = 0.01
 """A digit presses with more than this share of the strongest: flesh between two digits hands a little on to both."""
@@ -190,8 +190,10 @@ def _firm(request: GripSpecification, squeeze: Squeeze, most: float) -> FoundGri
         instants[grip] = closed.last
         effort = squeeze.effort(grip, closed.last)
         worst = max(effort.digits, key=lambda digit: digit.share)
-        mine = sum(d.force for d in effort.digits if d.digit.rpartition(".")[2] in counted)
-        return PressedForce(mine, worst.share, worst.digit)
+        mine = [d.digit for d in effort.digits if d.digit.rpartition(".")[2] in counted]
+        slopes = squeeze.slopes(grip, closed) if closed.last.touches else None
+        slope = None if slopes is None else sum(slopes[digit].force for digit in mine)
+        return PressedForce(sum(effort[digit].force for digit in mine), worst.share, worst.digit, slope)
 
     found = force_grip(press, 0.0, most, request.force, start=min(_START, most))
     text = f"{' + '.join(counted)}: {found.text}"

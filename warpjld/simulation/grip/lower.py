@@ -159,7 +159,7 @@ class _Way:
         last = free or self.places[-1].solution
         borne = max(one.borne for one in self.places)
         if free is not None:
-            borne = 1.0 + 0.5 * (1.0 / max(self._weight.used(free.last), _LEFT) - 1.0)
+            borne = self._weight.most(free.last)
         instants = [instant for one in self.places[1:] for instant in one.solution.instants]
         sunk = self._weight.sunk(self._begin, self._weight.height(last.last))
         path = tuple((one.sunk, one.borne) for one in self.places)

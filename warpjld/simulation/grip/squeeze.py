@@ -8,6 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from warpjld.fem.contact import ContactInstant, ContactSolution
+from warpjld.fem.contact.sensitivity.equilibrium_tangent import EquilibriumTangent, SensitivityError
+from warpjld.fem.contact.sensitivity.perturbation import Perturbation
 from warpjld.fem.hand.blend import Moves
 from warpjld.fem.hand.muscles import Effort
 from warpjld.simulation.bodies.deformable_body import History
@@ -15,6 +17,8 @@ from warpjld.simulation.bodies.flesh_body import FleshBody
 from warpjld.simulation.bodies.model import ContactModel
 from warpjld.simulation.grip.correct import FLEXION
 from warpjld.simulation.report.efforts import effort_at
+from warpjld.simulation.sensitivity.effort_slope import DigitSlope, EffortTangent
+from warpjld.simulation.sensitivity.parameters import angles_perturbed
 from warpjld.simulation.solve.branch import solve_branch
 
 __all__ = ["TRAVEL", "Squeeze"]
@@ -78,6 +82,36 @@ class Squeeze:
         if found.converged:
             self._closed[grip] = found
         return found
+
+    def tangent(self, grip: float, closed: ContactSolution) -> tuple[EquilibriumTangent, Perturbation]:
+        """Of the equilibrium at a grip, and what a firmer one changes [per rad].
+
+        Raises:
+            SensitivityError: No derivative.
+        """
+        model, time = self.model, self._time
+        known = model.prescribed(time, self.history).degrees
+        change = angles_perturbed(model, self.hand, self.angles(grip), time, self.along(grip))
+        return EquilibriumTangent(model.body, model.pairs, closed, known), change
+
+    def along(self, grip: float) -> NDArray[np.float64]:
+        """How the angles change with the grip, shape (J, 4): joints at their limits stay."""
+        out = np.zeros_like(self._start)
+        out[self._joints, FLEXION] = self._start[self._joints, FLEXION] + grip < self._high
+        return out
+
+    def slopes(self, grip: float, closed: ContactSolution) -> dict[str, DigitSlope] | None:
+        """How digits' efforts change with the grip [per rad]; None where that is not known."""
+        bones, along, angles = self.hand.bones, self.along(grip), self.angles(grip)
+        try:
+            tangent, change = self.tangent(grip, closed)
+            contact, limits = tangent.contact.sum(axis=0), self._limits
+            poses = bones.posed(angles, self._time)
+            efforts = EffortTangent(self.model, self.hand, closed.last, contact, poses, limits)
+            response = tangent.response(change)
+            return efforts.slopes(response, change, lambda by: bones.posed(angles + by * along, self._time))
+        except SensitivityError:
+            return None
 
     def stays(self, grip: float) -> tuple[str, Callable[[float], Moves]]:
         """The hand as it is at a grip, for a branch."""
