@@ -28,6 +28,7 @@ class ForceStatus(Enum):
     LIMIT = "unreachable: the digits are bent as far as they may"
     NO_CONTACT = "nothing is touched however far the digits bend"
     NO_SOLUTION = "contact could not be solved at a firmer grip"
+    INTERRUPTED = "the search was interrupted before the force was reached"
 
 
 @dataclass(frozen=True)
@@ -94,7 +95,10 @@ def force_grip(
     trials: list[tuple[float, PressedForce]] = []
     bracket, grip, lost = Bracket(low, high, force, step), low, 0
     for _ in range(_ROUNDS):
-        found = press(grip)
+        try:
+            found = press(grip)
+        except KeyboardInterrupt:
+            return _ended(ForceStatus.INTERRUPTED, force, low, trials)
         if found is None:
             lost += 1
             bracket.lose(grip)

@@ -47,14 +47,16 @@ class WeightTrials(ABC):
 
     Args:
         weight: The object's weight, and what bears it.
+        body: Hand and object, merged.
+        pairs: What may touch.
 
     Attributes:
         found: The equilibria of every grip tried, those on the way included.
         lowered: How the object was lowered at every grip whose pressures could bear it.
     """
 
-    def __init__(self, weight: SharedWeight) -> None:
-        self.weight = weight
+    def __init__(self, weight: SharedWeight, body: Body, pairs: Sequence[Pair]) -> None:
+        self.weight, self.body, self.pairs = weight, body, list(pairs)
         self.found: dict[float, ContactSolution] = {}
         self.lowered: dict[float, Lowering] = {}
         self._begun: dict[float, float] = {}
@@ -80,6 +82,7 @@ class WeightTrials(ABC):
             lambda after, height: self.moved(grip, after, height),
             lambda after: self.released(grip, after),
             predicted=self._predicted(grip),
+            rate=lambda after: self._sinking(grip, after),
         )
         self.lowered[grip] = lowered
         instants = (*closed.instants, *bare.instants, *lowered.instants)
@@ -101,6 +104,19 @@ class WeightTrials(ABC):
     @abstractmethod
     def released(self, grip: float, after: ContactSolution) -> ContactSolution:
         """After another: without the handle."""
+
+    def _sinking(self, grip: float, after: ContactSolution) -> float | None:
+        """How much more of the weight the hand bears per metre that the handle goes down; None where not known."""
+        known = np.append(self.held(grip), 3 * self.weight.handle + self.weight.axis)
+        try:
+            tangent = EquilibriumTangent(self.body, self.pairs, after, known, steadied=True)
+            return self.weight.relief(tangent)
+        except SensitivityError:
+            return None
+
+    @abstractmethod
+    def held(self, grip: float) -> NDArray[np.int64]:
+        """Prescribed degrees of freedom while the object has nothing but hand and handle, the handle's left out."""
 
     @abstractmethod
     def tangent(self, grip: float, closed: ContactSolution) -> tuple[EquilibriumTangent, Perturbation]:
@@ -173,11 +189,17 @@ class HandTrials(WeightTrials):
         holding = [k for k, owner in enumerate(model.owners) if owner.other(one.name) == squeeze.hand.name]
         nodes = np.arange(self._span.start, self._span.stop)
         weight = SharedWeight(model.body, nodes, model.pairs, holding, model.loads.gravity)
-        super().__init__(weight)
+        super().__init__(weight, model.body, model.pairs)
 
     def closed(self, grip: float) -> ContactSolution:
         """Joints flexed by the grip."""
         return self.squeeze.closed(grip)
+
+    def held(self, grip: float) -> NDArray[np.int64]:
+        """Those of the hand, and of all other bodies."""
+        squeeze, span = self.squeeze, self._span
+        known = squeeze.model.prescribed(squeeze.time, squeeze.history).degrees
+        return np.asarray(known[(known < 3 * span.start) | (known >= 3 * span.stop)])
 
     def tangent(self, grip: float, closed: ContactSolution) -> tuple[EquilibriumTangent, Perturbation]:
         """Joints that flex on, all alike."""
@@ -272,22 +294,31 @@ class PrescribedTrials(WeightTrials):
         mesh = body.mesh
         if name not in mesh.region_names:
             raise InputError(f"name: there is no region '{name}'; there are {', '.join(mesh.region_names)}")
-        self.body, self.prescribed, self.pairs, self._share = body, prescribed, [*pairs, *others], share
+        self.prescribed, self._share = prescribed, share
         self._loads = loads or Loads()
         self._heavy = replace(self._loads, gravity=gravity)
+        self._closed: dict[float, ContactSolution] = {}
         own = np.unique(mesh.elements[mesh.regions == mesh.region_names.index(name)])
-        super().__init__(SharedWeight(body, own, self.pairs, range(len(pairs)), gravity))
+        touching = [*pairs, *others]
+        super().__init__(SharedWeight(body, own, touching, range(len(pairs)), gravity), body, touching)
 
     def closed(self, grip: float) -> ContactSolution:
         """What is prescribed of the grip is reached, without gravity."""
-        return self._press(lambda time: self._at(grip, time), self._loads, 1.0)
+        if grip not in self._closed:
+            self._closed[grip] = self._press(lambda time: self._at(grip, time), self._loads, 1.0)
+        return self._closed[grip]
+
+    def held(self, grip: float) -> NDArray[np.int64]:
+        """Those of the grip."""
+        return np.asarray(self._at(grip, 1.0).degrees)
 
     def tangent(self, grip: float, closed: ContactSolution) -> tuple[EquilibriumTangent, Perturbation]:
         """What is prescribed goes on in proportion."""
         known, step = self._at(grip, 1.0), _STEP * max(grip, 1e-9)
         change = np.zeros(self.body.degrees)
         change[known.degrees] = (self._at(grip + step, 1.0).values - known.values) / step
-        return EquilibriumTangent(self.body, self.pairs, closed, known.degrees), Perturbation(prescribed=change)
+        tangent = EquilibriumTangent(self.body, self.pairs, closed, known.degrees, steadied=True)
+        return tangent, Perturbation(prescribed=change)
 
     def bared(self, grip: float, closed: ContactSolution) -> ContactSolution:
         """The weight comes on, and the handle keeps its height."""

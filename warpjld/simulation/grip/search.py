@@ -23,7 +23,7 @@ import numpy as np
 from warpjld.errors import InputError
 from warpjld.simulation.grip.bracket import Bracket, checked_step
 
-__all__ = ["Grip", "GripStatus", "InterruptedSearch", "Trial", "TrialOutcome", "gentlest_grip"]
+__all__ = ["Grip", "GripStatus", "Trial", "TrialOutcome", "gentlest_grip"]
 
 _SAME = 0.02
 _AMPLE = 4.0
@@ -151,9 +151,11 @@ def gentlest_grip(
         tolerance: How near to the gentlest, as a share of the force.
         most: Trials; after that the gentlest that held is given.
 
+    Returns:
+        What was tried until then with ``GripStatus.INTERRUPTED``, where Ctrl-C ends it.
+
     Raises:
         InputError: A range that is none.
-        InterruptedSearch: Ctrl-C; it has what was tried.
     """
     step = checked_step(low, high, start)
     if not 0.0 < tolerance < 1.0:
@@ -164,16 +166,8 @@ def gentlest_grip(
     needed = weight / friction if friction else np.inf
     try:
         return search.run(needed, most)
-    except KeyboardInterrupt as stop:
-        raise InterruptedSearch(search.best(GripStatus.INTERRUPTED)) from stop
-
-
-class InterruptedSearch(KeyboardInterrupt):
-    """Ctrl-C while grips were tried; ``grip`` is the gentlest that held, or the last one tried."""
-
-    def __init__(self, grip: Grip) -> None:
-        self.grip = grip
-        super().__init__(grip.text)
+    except KeyboardInterrupt:
+        return search.interrupted()
 
 
 class _Search:
@@ -207,11 +201,14 @@ class _Search:
         held = [one for one in self.trials if one[1].held]
         if held:
             return self._ended(GripStatus.HELD, *min(held, key=lambda one: one[0]))
-        if not self.trials:
-            return Grip(
-                otherwise, self._bracket.low, Trial(TrialOutcome.UNSOLVED, float("nan"), 0.0), (), otherwise.value
-            )
         return self._ended(otherwise, *self.trials[-1])
+
+    def interrupted(self) -> Grip:
+        """What was tried until now."""
+        if not self.trials:
+            nothing = Trial(TrialOutcome.UNSOLVED, float("nan"), 0.0)
+            return Grip(GripStatus.INTERRUPTED, self._bracket.low, nothing, (), GripStatus.INTERRUPTED.value)
+        return self._ended(GripStatus.INTERRUPTED, *self.trials[-1])
 
     def _note(self, grip: float, trial: Trial) -> None:
         if not trial.held and 0.0 < trial.borne < 1.0 < trial.able:  # it takes more than friction's sum
@@ -233,7 +230,7 @@ class _Search:
         return share <= self._tolerance
 
     def _ended(self, status: GripStatus, grip: float, trial: Trial) -> Grip:
-        if trial.held and trial.share > 1.0:
+        if trial.held and trial.share > 1.0 and status is not GripStatus.INTERRUPTED:
             status = GripStatus.TOO_WEAK
         return Grip(status, grip, trial, tuple(self.trials), _text(status, trial))
 

@@ -113,6 +113,17 @@ class SharedWeight:
             return None
         return float(tangent.pushes(tangent.response(change))[self._holding][:, self._nodes].sum()) / pushed
 
+    def relief(self, tangent: EquilibriumTangent) -> float:
+        """How much less of the weight the handle bears per metre that it goes down [1/m].
+
+        Raises:
+            SensitivityError: The equilibrium does not follow it.
+        """
+        down = np.zeros(tangent.free.size)
+        down[3 * self.handle + self.axis] = self._down
+        follows = tangent.response(Perturbation(prescribed=down)).reactions[self.handle, self.axis]
+        return self._down * float(follows) / self.weight
+
     def sliding(self, instant: ContactInstant) -> float:
         """Share of the contact that slides, 0 … 1; NaN where nothing touches."""
         touches = [touch for touch in self._touches(instant) if touch.contact_area > 0.0]

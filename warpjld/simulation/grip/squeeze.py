@@ -39,6 +39,10 @@ class Squeeze:
         joints: Those that flex, as the skeleton numbers them.
         after: Equilibrium to begin at.
         limits: Digit → largest force [N], where it is not the default.
+
+    Attributes:
+        model, history, hand: As given.
+        time: Of that equilibrium [frames].
     """
 
     def __init__(
@@ -53,7 +57,7 @@ class Squeeze:
         self.model, self.history, self.hand = model, history, hand
         self._joints, self._limits = list(joints), limits
         self._start = hand.bones.angles(after.last.time)
-        self._time = after.last.time
+        self.time = after.last.time
         self._closed: dict[float, ContactSolution] = {0.0: after}
 
     @property
@@ -75,9 +79,9 @@ class Squeeze:
         before = max(known for known in self._closed if known <= grip + _SAME)
 
         def on(share: float) -> Moves:
-            return self.hand.bones.moves_of(self.angles(before + share * (grip - before)), self._time)
+            return self.hand.bones.moves_of(self.angles(before + share * (grip - before)), self.time)
 
-        steps = self.hand.bones.steps([(self.angles(one), self._time) for one in (before, grip)], TRAVEL)
+        steps = self.hand.bones.steps([(self.angles(one), self.time) for one in (before, grip)], TRAVEL)
         found = solve_branch(self.model, self.history, self._closed[before], steps, moves=(self.hand.name, on))
         if found.converged:
             self._closed[grip] = found
@@ -89,10 +93,10 @@ class Squeeze:
         Raises:
             SensitivityError: No derivative.
         """
-        model, time = self.model, self._time
+        model, time = self.model, self.time
         known = model.prescribed(time, self.history).degrees
         change = angles_perturbed(model, self.hand, self.angles(grip), time, self.along(grip))
-        return EquilibriumTangent(model.body, model.pairs, closed, known), change
+        return EquilibriumTangent(model.body, model.pairs, closed, known, steadied=True), change
 
     def along(self, grip: float) -> NDArray[np.float64]:
         """How the angles change with the grip, shape (J, 4): joints at their limits stay."""
@@ -106,21 +110,21 @@ class Squeeze:
         try:
             tangent, change = self.tangent(grip, closed)
             contact, limits = tangent.contact.sum(axis=0), self._limits
-            poses = bones.posed(angles, self._time)
+            poses = bones.posed(angles, self.time)
             efforts = EffortTangent(self.model, self.hand, closed.last, contact, poses, limits)
             response = tangent.response(change)
-            return efforts.slopes(response, change, lambda by: bones.posed(angles + by * along, self._time))
+            return efforts.slopes(response, change, lambda by: bones.posed(angles + by * along, self.time))
         except SensitivityError:
             return None
 
     def stays(self, grip: float) -> tuple[str, Callable[[float], Moves]]:
         """The hand as it is at a grip, for a branch."""
-        there = self.hand.bones.moves_of(self.angles(grip), self._time)
+        there = self.hand.bones.moves_of(self.angles(grip), self.time)
         return self.hand.name, lambda share: there
 
     def effort(self, grip: float, instant: ContactInstant) -> Effort:
         """What the muscles do at a grip."""
-        poses = self.hand.bones.posed(self.angles(grip), self._time)
+        poses = self.hand.bones.posed(self.angles(grip), self.time)
         return effort_at(self.model, self.hand, poses, instant, self._limits)
 
     @property
