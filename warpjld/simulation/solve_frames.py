@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from functools import partial
 
 import numpy as np
 
@@ -130,7 +131,9 @@ def solve_frames(
         for grip in contact.grips:
             if grip.first == frame:
                 progress(f"looking for a grip, frame {frame:g}", len(run.done), len(frames))
-                run.find(grip)
+                searched = run.find(grip, partial(_tell, progress, frame, len(run.done), len(frames)))
+                if searched.interrupted:
+                    return run.ended(Status.STOPPED, f"at frame {frame:g}: {searched.text}")
     return run.ended(Status.CONVERGED, Status.CONVERGED.value)
 
 
@@ -217,16 +220,17 @@ class _Run:
             if one.left < TIGHT and (place not in self.tight or one.left < self.tight[place][1].left):
                 self.tight[place] = (frame, one)
 
-    def find(self, grip: GripSpecification) -> None:
-        """Look for a grip, and go on with it."""
+    def find(self, grip: GripSpecification, tell: Callable[[str], None]) -> FoundGrip:
+        """Look for a grip, and go on with it; ``tell`` hears of every grip that is tried."""
         assert self.last is not None
         limits = self.contact.strength.get(grip.actor, {})
-        found = find_grip(self.model, self.history, grip, self.last, limits)
+        found = find_grip(self.model, self.history, grip, self.last, limits, tell)
         self.grips.append(found)
         self._edit(found.edits)
         if found.release is not None:
             objects = [found.release.applied(one) for one in self.model.objects]
             self.model = replace(self.model, objects=tuple(objects))
+        return found
 
     def ended(self, status: Status, message: str) -> SolveResult:
         """All of it."""
@@ -252,6 +256,11 @@ class _Run:
     def _note(self, solved: SolvedFrame) -> None:
         time = solved.frame - self.model.start
         self.history = self.model.after(self.history, time, solved.displacement, solved.reactions, solved.nodal)
+
+
+def _tell(progress: Progress, frame: float, done: int, total: int, line: str) -> None:
+    """One grip that was tried."""
+    progress(f"looking for a grip, frame {frame:g}: {line}", done, total)
 
 
 def _bare(solution: ContactSolution) -> ContactSolution:

@@ -1,14 +1,180 @@
-"""Bracketing, which all searches for angles of a grip share: outwards in growing steps, then inside along a line."""
+"""The one search that grips are found by: Newton's method on what rises with the grip, guarded by a bracket.
+
+What digits press with rises ever faster from the first touch on, about as the square of the way (Hertz: to the power
+1.5, thin pulp: 2 and more). Its root y = √value is therefore nearly straight, and Newton's method is used on that: from
+one point along its slope; between two by the cubic that has both their values and slopes (inverse Hermite
+interpolation, F. Stummel, K. Hainer, Praktische Mathematik, 1982). Where no slope is known, the chord does; where
+nothing has been touched, steps grow. No step leaves the bracket, and one that lost an equilibrium is gone half of.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+import math
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from warpjld.errors import InputError
 
-__all__ = ["checked_step", "clipped_inside", "outward"]
+__all__ = ["Bracket", "checked_step"]
+
+_MARGIN = 0.03
+"""Part of a bracket, at either end, that is left alone."""
+_FARTHEST = 12.0
+"""How many times the last step outwards a Newton step may be."""
+_SLOW = 0.6
+"""Part of its bracket that a step should leave at most, or the next halves it."""
+
+
+@dataclass(frozen=True)
+class _Point:
+    """A grip that was tried: what it measures, and the slope of that by the grip, where known."""
+
+    grip: float
+    value: float
+    slope: float | None
+
+    @property
+    def root(self) -> float:
+        return math.sqrt(max(self.value, 0.0))
+
+    @property
+    def ahead(self) -> float | None:
+        """dgrip / droot."""
+        if self.slope is None or not self.slope > 0.0 or not self.value > 0.0:
+            return None
+        return 2.0 * self.root / self.slope
+
+
+class Bracket:
+    """Where to look for the grip at which something that rises comes to a target.
+
+    Args:
+        low, high: Range of grips.
+        target: Value that is wanted.
+        step: First step above ``low``, where nothing is known.
+    """
+
+    def __init__(self, low: float, high: float, target: float, step: float) -> None:
+        self.low, self.high, self.target = low, high, target
+        self._step = step
+        self._below: list[_Point] = []
+        self._above: list[_Point] = []
+        self._lost: list[float] = []
+        self._width = math.inf
+
+    def note(self, grip: float, value: float, slope: float | None, *, enough: bool) -> None:
+        """A grip was tried; whether its value is enough is for the caller to say. One that contradicts what was known
+        before (digits that push one another do) is believed."""
+        point = _Point(grip, value, slope)
+        if enough:
+            self._below = [one for one in self._below if one.grip < grip]
+            self._above.append(point)
+        else:
+            self._above = [one for one in self._above if one.grip > grip]
+            self._below.append(point)
+
+    def lose(self, grip: float) -> None:
+        """A grip at which no equilibrium was found."""
+        self._lost.append(grip)
+
+    @property
+    def below(self) -> _Point | None:
+        """The firmest that was not enough."""
+        return max(self._below, key=lambda one: one.grip, default=None)
+
+    @property
+    def above(self) -> _Point | None:
+        """The gentlest that was enough."""
+        return min(self._above, key=lambda one: one.grip, default=None)
+
+    @property
+    def width(self) -> float:
+        """Of the bracket; infinite where it is open."""
+        below, above = self.below, self.above
+        return math.inf if below is None or above is None else above.grip - below.grip
+
+    def next(self) -> float | None:
+        """The grip to try; None where there is none left: the range is at its end, or lost on both sides."""
+        below, above = self.below, self.above
+        floor = self.low if below is None else below.grip
+        top = self.high if above is None else above.grip
+        if not top > floor:
+            return None
+        lost = [one for one in self._lost if floor < one <= top]
+        wished = self._wished(below, above)
+        narrow = self.width
+        if above is not None and below is not None:
+            if narrow > _SLOW * self._width:  # the last step left most of the bracket
+                wished = 0.5 * (floor + top)
+            self._width = narrow
+            room = _MARGIN * (top - floor)
+            wished = float(np.clip(wished, floor + room, top - room))
+        elif above is None:
+            wished = min(wished, self.high)
+        else:
+            wished = max(wished, self.low)
+        if lost and wished >= min(lost):
+            wished = 0.5 * (floor + min(lost))
+        return wished
+
+    def _wished(self, below: _Point | None, above: _Point | None) -> float:
+        """Where the value is foreseen to be the target."""
+        aim = math.sqrt(self.target)
+        if below is not None and above is not None:
+            return _between(self._sloped(below, self._below), self._sloped(above, self._above), aim)
+        known = below if above is None else above
+        if known is None:
+            return self.low
+        if known.ahead is not None:
+            far = (aim - known.root) * known.ahead
+            if above is None:
+                return known.grip + min(max(far, 0.1 * self._step), _FARTHEST * self._step)
+            return known.grip + min(far, 0.0)
+        return self._inward(known) if below is None else self._outward(known)
+
+    @staticmethod
+    def _sloped(end: _Point, side: list[_Point]) -> _Point:
+        """An end of the bracket with a slope from the next point on its side, where it has none of its own."""
+        others = [one for one in side if one.grip != end.grip and one.root > 0.0]
+        if end.ahead is not None or not others:
+            return end
+        near = min(others, key=lambda one: abs(one.grip - end.grip))
+        rise = (near.root - end.root) / (near.grip - end.grip)
+        return replace(end, slope=2.0 * end.root * rise) if rise > 0.0 else end
+
+    def _inward(self, first: _Point) -> float:
+        """Gentler by a longer step each time; along the chord where two points rise."""
+        step, self._step = self._step, 2.0 * self._step
+        sloped = self._sloped(first, self._above)
+        if sloped.ahead is None:
+            return first.grip - step
+        return first.grip - max((first.root - math.sqrt(self.target)) * sloped.ahead, 0.1 * step)
+
+    def _outward(self, last: _Point) -> float:
+        """Farther on by a longer step each time; along the chord where two points rise."""
+        others = [one for one in self._below if one.grip < last.grip]
+        step, self._step = self._step, 2.0 * self._step
+        before = max(others, key=lambda one: one.grip, default=None)
+        if before is not None and last.root > before.root:
+            line = (last.grip - before.grip) / (last.root - before.root)
+            return last.grip + min(max((math.sqrt(self.target) - last.root) * line, 0.1 * step), _FARTHEST * step)
+        return last.grip + step
+
+
+def _between(below: _Point, above: _Point, aim: float) -> float:
+    """Inside a bracket, by what is known at its ends; its middle where that does not rise."""
+    rise = above.root - below.root
+    if not (math.isfinite(rise) and rise > 0.0 and 0.0 < below.root < aim <= above.root):
+        nearest = [one for one in (below, above) if one.ahead is not None and math.isfinite(one.root)]
+        guesses = [one.grip + (aim - one.root) * (one.ahead or 0.0) for one in nearest]
+        inside = [guess for guess in guesses if below.grip < guess < above.grip]
+        return inside[-1] if inside else 0.5 * (below.grip + above.grip)  # where touch begins is not known
+    width, share = above.grip - below.grip, (aim - below.root) / rise
+    chord = width / rise
+    first, last = (chord if one.ahead is None else min(one.ahead, 3.0 * chord) for one in (below, above))
+    t = share
+    return below.grip + width * t * t * (3.0 - 2.0 * t) + rise * t * (1.0 - t) * (first * (1.0 - t) - last * t)
 
 
 def checked_step(low: float, high: float, start: float | None) -> float:
@@ -23,27 +189,3 @@ def checked_step(low: float, high: float, start: float | None) -> float:
     if not 0.0 < step <= high - low:
         raise InputError(f"grip: want a first step above 0 within the range, got {step}")
     return step
-
-
-def outward(low: float, high: float, step: float, growth: float, *, from_low: bool) -> Iterator[float]:
-    """Places from ``low`` to ``high``, farther and farther apart.
-
-    Args:
-        low: The first.
-        high: The last.
-        step: First step.
-        growth: How much longer the next is.
-        from_low: Whether steps are taken from ``low``, not from the place before.
-    """
-    at = low
-    yield at
-    while at < high:
-        at = min(high, (low if from_low else at) + step)
-        step *= growth
-        yield at
-
-
-def clipped_inside(at: float, below: float, above: float, margin: float) -> float:
-    """A place in a bracket, no nearer to its ends than a share of it."""
-    room = margin * (above - below)
-    return float(np.clip(at, below + room, above - room))

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from enum import Enum
 
@@ -11,17 +11,22 @@ from numpy.typing import NDArray
 
 from warpjld.errors import InputError
 from warpjld.fem.hand.muscles import Effort
-from warpjld.simulation.grip.bracket import clipped_inside
+from warpjld.simulation.grip.bracket import Bracket
 from warpjld.skeleton.tree import CHANNELS, Skeleton
 
-__all__ = ["FLEXION", "KNUCKLES", "CorrectedPose", "Correction", "correct_angles"]
+__all__ = ["FLEXION", "KNUCKLES", "CorrectedPose", "Correction", "Slopes", "correct_angles"]
 
 FLEXION = CHANNELS.index("flexion")
 """Column of the angles."""
 KNUCKLES = ("base", "knuckle2", "knuckle3")
 """Joints of a digit that open."""
 _FIRST = 0.04
-"""Share of the way back that is tried first."""
+"""Share of the way back that is tried first, where no slope is known."""
+_NARROW = 1e-3
+"""Share of the way within which an opening is known well enough."""
+
+Slopes = Callable[[NDArray[np.float64], Mapping[str, NDArray[np.float64]]], Mapping[str, float] | None]
+"""Angles (J, 4) that were solved, and for each digit a direction (J, 4) → derivative of its share along that."""
 
 
 class Correction(Enum):
@@ -62,11 +67,12 @@ def correct_angles(
     aim: float = 1.0,
     tolerance: float = 0.05,
     solves: int = 12,
+    slopes: Slopes | None = None,
 ) -> CorrectedPose:
     """Open the digits that bear too much until each bears ``aim`` of its limit, or a little less.
 
     A digit opens along the way back to its open posture. All digits are corrected in the same solves; each one's
-    way is found by the secant rule inside a bracket, so the loop ends.
+    way is found by ``Bracket``, so the loop ends.
 
     Args:
         solve: Effort at joint angles (J, 4), or None where contact could not be solved there.
@@ -76,6 +82,7 @@ def correct_angles(
         aim: Share of the limits that digits may reach.
         tolerance: How much below ``aim`` a corrected digit may be, as a share.
         solves: Contact solutions allowed.
+        slopes: How shares follow the digits, where that is known.
 
     Raises:
         InputError: Angles of another shape, or an aim that is none.
@@ -93,7 +100,7 @@ def correct_angles(
     best, at_best = None, angles.copy()
     trial, effort = angles, first
     for number in range(1, solves + 1):
-        digits.note(effort)
+        digits.note(effort, None if slopes is None else slopes(trial, digits.ways))
         if all(d.share <= aim for d in effort.digits):
             best, at_best = effort, trial
             if digits.done:
@@ -102,7 +109,7 @@ def correct_angles(
             return _ended(Correction.TOO_STRONG_WHEN_OPEN, angles, trial, effort, skeleton, number)
         if number == solves:
             break
-        trial = digits.opened(effort)
+        trial = digits.opened()
         found = solve(trial)
         if found is None:
             return _ended(Correction.NO_SOLUTION, angles, trial, best, skeleton, number + 1)
@@ -126,77 +133,80 @@ class _Digits:
     ) -> None:
         self._skeleton, self._angles, self._open = skeleton, angles, open_angles
         self._aim, self._tolerance = aim, tolerance
-        self._ways = {digit.digit: _Way(digit.share) for digit in first.digits}
+        wanted = aim * (1.0 - 0.5 * tolerance)
+        self._closings = {digit.digit: _Closing(wanted) for digit in first.digits}
 
-    def note(self, effort: Effort) -> None:
+    @property
+    def ways(self) -> dict[str, NDArray[np.float64]]:
+        """How angles change as each digit closes from its open posture, per share of the way, shape (J, 4)."""
+        out = {}
+        for digit in self._closings:
+            joints, now, back = self._ends(digit)
+            out[digit] = np.zeros_like(self._angles)
+            out[digit][joints, FLEXION] = now - back
+        return out
+
+    def note(self, effort: Effort, slopes: Mapping[str, float] | None) -> None:
         """Take note of what digits bear where they are."""
         for digit in effort.digits:
-            self._ways[digit.digit].seen(digit.share, self._aim)
+            slope = None if slopes is None else slopes.get(digit.digit)
+            self._closings[digit.digit].seen(digit.share, slope, self._aim)
 
     @property
     def done(self) -> bool:
         """Whether none needs to be opened by less."""
-        return all(way.done(self._tolerance, self._aim) for way in self._ways.values())
+        return all(one.done(self._tolerance, self._aim) for one in self._closings.values())
 
     @property
     def stuck(self) -> bool:
         """Whether one cannot be opened farther."""
-        return any(way.low >= 1.0 for way in self._ways.values())
+        return any(one.stuck for one in self._closings.values())
 
-    def opened(self, effort: Effort) -> NDArray[np.float64]:
+    def opened(self) -> NDArray[np.float64]:
         """The angles to try next, shape (J, 4)."""
-        trial, column = self._angles.copy(), FLEXION
-        for digit in effort.digits:
-            way = self._ways[digit.digit]
-            way.step(self._aim * (1.0 - 0.5 * self._tolerance))
-            joints = [self._skeleton.index(f"{digit.digit}.{k}") for k in KNUCKLES]
-            now = self._angles[joints, column]
-            back = np.minimum(self._open[joints, column], now)
-            trial[joints, column] = now + way.at * (back - now)
+        trial = self._angles.copy()
+        for digit, closing in self._closings.items():
+            joints, now, back = self._ends(digit)
+            trial[joints, FLEXION] = back + closing.next() * (now - back)
         return trial
 
+    def _ends(self, digit: str) -> tuple[list[int], NDArray[np.float64], NDArray[np.float64]]:
+        """A digit's joints, their flexions, and those they open to [rad]."""
+        joints = [self._skeleton.index(f"{digit}.{k}") for k in KNUCKLES]
+        now = self._angles[joints, FLEXION]
+        return joints, now, np.minimum(self._open[joints, FLEXION], now)
 
-class _Way:
-    """How far a digit is opened, 0 … 1, and the shares met so far."""
 
-    def __init__(self, share: float) -> None:
-        self.at = 0.0
+class _Closing:
+    """How much of its way a digit is closed, 0 … 1, and the shares met so far.
+
+    Digits that push one another may contradict what was known: what was seen last is believed.
+    """
+
+    def __init__(self, wanted: float) -> None:
+        self.at, self.share = 1.0, 0.0
+        self._bracket = Bracket(0.0, 1.0, wanted, _FIRST)
+
+    def seen(self, share: float, slope: float | None, aim: float) -> None:
         self.share = share
-        self.before, self.before_share = -1.0, share  # the opening before that one
-        self.low, self.low_share = -1.0, share  # the widest opening that was not enough
-        self.high, self.high_share = 2.0, 0.0  # the smallest that was
+        self._bracket.note(self.at, share, slope, enough=share > aim)
 
-    def seen(self, share: float, aim: float) -> None:
-        """Narrow the bracket. Digits that push one another may contradict it: then it is opened again."""
-        self.share = share
-        if share > aim:
-            if self.at >= self.high:
-                self.high = 2.0
-            if self.at > self.low:
-                self.before, self.before_share = self.low, self.low_share
-                self.low, self.low_share = self.at, share
-        else:
-            if self.at <= self.low:
-                self.low = -1.0
-            if self.at < self.high:
-                self.high, self.high_share = self.at, share
+    @property
+    def stuck(self) -> bool:
+        above = self._bracket.above
+        return above is not None and above.grip <= 0.0
 
     def done(self, tolerance: float, aim: float) -> bool:
-        return self.high == 0.0 or self.share >= aim * (1.0 - tolerance) or self.high - max(self.low, 0.0) < 1e-3
+        above, below = self._bracket.above, self._bracket.below
+        if above is None:  # never too much as far as it closed
+            return below is not None and below.grip >= 1.0
+        return aim * (1.0 - tolerance) <= self.share <= aim or self._bracket.width < _NARROW
 
-    def step(self, wanted: float) -> None:
-        if self.low < 0.0:
-            self.at = 0.0
-        elif self.high > 1.0:
-            # Force rises ever faster from the first touch on, so a straight line through what is known opens too
-            # little: half as much again.
-            line = (self.low - self.before) / max(self.before_share - self.low_share, 1e-9)
-            reach = 1.5 * (self.low_share - wanted) * line if self.before >= 0.0 else _FIRST
-            self.at = min(1.0, self.low + float(np.clip(reach, _FIRST, 1.0)))
-        else:
-            steep = (self.high_share - self.low_share) / (self.high - self.low)
-            guess = self.low + (wanted - self.low_share) / steep
-            self.at = clipped_inside(guess, self.low, self.high, 0.05)
+    def next(self) -> float:
+        if self._bracket.above is not None:
+            ahead = self._bracket.next()
+            self.at = self.at if ahead is None else ahead
+        return self.at
 
 
 def _ended(

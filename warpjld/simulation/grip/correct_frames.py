@@ -5,11 +5,13 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
 
 from warpjld.fem.contact import ContactSolution
+from warpjld.fem.contact.sensitivity.equilibrium_tangent import EquilibriumTangent, SensitivityError
 from warpjld.fem.hand.muscles import JOINT_WORDS, Effort
 from warpjld.simulation.animation import AngleEdit
 from warpjld.simulation.bodies.deformable_body import History
@@ -18,7 +20,10 @@ from warpjld.simulation.bodies.model import ContactModel
 from warpjld.simulation.grip.correct import FLEXION, KNUCKLES, CorrectedPose, Correction, correct_angles
 from warpjld.simulation.grip.squeeze import TRAVEL
 from warpjld.simulation.report.efforts import effort_at
+from warpjld.simulation.sensitivity.effort_slope import EffortTangent
+from warpjld.simulation.sensitivity.parameters import angles_perturbed
 from warpjld.simulation.solve.branch import solve_branch
+from warpjld.skeleton import Poses
 
 __all__ = ["CorrectedDigit", "CorrectedFrame", "correct_frame", "worst_digits"]
 
@@ -138,7 +143,11 @@ class _Hand:
             tried.append((angles.copy(), solution))
             return self._effort(angles, solution)
 
-        corrected = correct_angles(solve, bones.skeleton, wanted, opened, aim=_AIM)
+        def slopes(angles: NDArray[np.float64], ways: Mapping[str, NDArray[np.float64]]) -> dict[str, float] | None:
+            solution = next(found for known, found in reversed(tried) if np.array_equal(known, angles))
+            return self._slopes(angles, solution, ways)
+
+        corrected = correct_angles(solve, bones.skeleton, wanted, opened, aim=_AIM, slopes=slopes)
         chosen = [solution for angles, solution in tried if np.array_equal(angles, corrected.angles)]
         frame = self.model.start + time
         if corrected.status is not Correction.CORRECTED or not chosen:
@@ -175,6 +184,35 @@ class _Hand:
         )
         return solve_branch(self.model, self.history, self.before, steps, moves=moves, duration=duration)
 
+    def _slopes(
+        self, angles: NDArray[np.float64], solution: ContactSolution, ways: Mapping[str, NDArray[np.float64]]
+    ) -> dict[str, float] | None:
+        """How each digit's share follows its own way; None where that is not known."""
+        model, hand, time = self.model, self.hand, solution.last.time
+        if solution.last_step is None:
+            return None
+        try:
+            known = model.prescribed(time, self.history).degrees
+            tangent = EquilibriumTangent(model.body, model.pairs, solution, known, steadied=True)
+            contact, poses = tangent.contact.sum(axis=0), hand.bones.posed(angles, time)
+            efforts = EffortTangent(model, hand, solution.last, contact, poses, self.limits)
+            now, out = self._effort(angles, solution), {}
+            for digit, way in ways.items():
+                change = angles_perturbed(model, hand, angles, time, way)
+                ahead = partial(_posed_along, hand, angles, way, time)
+                found = efforts.slopes(tangent.response(change), change, ahead)
+                out[digit] = float(found[digit].shares[int(now[digit].shares.argmax())])
+            return out
+        except SensitivityError:
+            return None
+
     def _effort(self, angles: NDArray[np.float64], solution: ContactSolution) -> Effort:
         poses = self.hand.bones.posed(angles, solution.last.time)
         return effort_at(self.model, self.hand, poses, solution.last, self.limits)
+
+
+def _posed_along(
+    hand: FleshBody, angles: NDArray[np.float64], way: NDArray[np.float64], time: float, by: float
+) -> Poses:
+    """The pose so far along a way."""
+    return hand.bones.posed(angles + by * way, time)

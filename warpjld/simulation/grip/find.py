@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import csv
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -29,8 +29,11 @@ __all__ = ["FoundGrip", "SupportRelease", "find_grip", "write_grips"]
 
 _START = math.radians(0.5)
 """First step of a search [rad]."""
-_NEAR = 0.08
-"""How near to the gentlest grip, as a share of its angle."""
+_NEAR = 0.03
+"""How near to the gentlest grip, as a share of its force."""
+
+_TRIALS = 10
+"""Grips that are tried at most: as a rule three or four are enough."""
 
 _PRESSES = 0.01
 """A digit presses with more than this share of the strongest: flesh between two digits hands a little on to both."""
@@ -92,6 +95,11 @@ class FoundGrip:
     edits: tuple[AngleEdit, ...] = ()
     release: SupportRelease | None = None
 
+    @property
+    def interrupted(self) -> bool:
+        """Whether Ctrl-C ended it."""
+        return self.status == GripStatus.INTERRUPTED.name
+
     def content(self) -> dict[str, Any]:
         """As plain values."""
         return {
@@ -116,8 +124,11 @@ def find_grip(
     request: GripSpecification,
     after: ContactSolution,
     limits: Mapping[str, float],
+    tell: Callable[[str], None] = lambda line: None,
 ) -> FoundGrip:
     """Search, from the equilibrium at its first frame.
+
+    Ctrl-C ends it with what was tried until then.
 
     Args:
         model: Everything.
@@ -125,12 +136,13 @@ def find_grip(
         request: What is asked.
         after: The equilibrium.
         limits: Digit → largest force [N], where it is not the default.
+        tell: Told a line about every grip that was tried.
     """
     hand = next(one for one in model.hands if one.name == request.actor)
     joints = [hand.bones.skeleton.index(channel.rpartition(".")[0]) for channel in request.channels]
     squeeze = Squeeze(model, history, hand, joints, after, limits)
     most = max(min(request.most, squeeze.room), 1e-6)
-    found = _gentlest(request, squeeze, most) if request.lift else _firm(request, squeeze, most)
+    found = _gentlest(request, squeeze, most, tell) if request.lift else _firm(request, squeeze, most, tell)
     release = None
     if found.lowered is not None:
         begins, free = request.middle - model.start, request.last - model.start
@@ -150,7 +162,7 @@ def _edits(hand: FleshBody, request: GripSpecification, joints: Sequence[int], g
     )
 
 
-def _gentlest(request: GripSpecification, squeeze: Squeeze, most: float) -> FoundGrip:
+def _gentlest(request: GripSpecification, squeeze: Squeeze, most: float, tell: Callable[[str], None]) -> FoundGrip:
     model = squeeze.model
     one = next(body for body in model.objects if body.name == request.object)
     friction = max(
@@ -160,7 +172,14 @@ def _gentlest(request: GripSpecification, squeeze: Squeeze, most: float) -> Foun
     )
     trials = HandTrials(squeeze, one)
     heavy = trials.weight.weight
-    found = gentlest_grip(trials, 0.0, most, weight=heavy, friction=friction, start=min(_START, most), tolerance=_NEAR)
+
+    def hold(grip: float) -> Trial:
+        trial = trials(grip)
+        tell(f"{math.degrees(grip):.2f}°: {trial.force:.3g} N, {trial.outcome.value}")
+        return trial
+
+    start = min(_START, most)
+    found = gentlest_grip(hold, 0.0, most, weight=heavy, friction=friction, start=start, tolerance=_NEAR, most=_TRIALS)
     taken = trials.taken(found.grip) if found.status in _HELD else None
     instant = squeeze.closed(found.grip).last if taken is None else taken[1]
     text = f"{heavy:.3g} N of {request.object}: {found.text}"
@@ -178,7 +197,7 @@ def _gentlest(request: GripSpecification, squeeze: Squeeze, most: float) -> Foun
     return FoundGrip(request, found.status.name, text, grip, lowered, found.trial.force, digits, tuple(rows))
 
 
-def _firm(request: GripSpecification, squeeze: Squeeze, most: float) -> FoundGrip:
+def _firm(request: GripSpecification, squeeze: Squeeze, most: float, tell: Callable[[str], None]) -> FoundGrip:
     assert request.force is not None
     counted = request.digits or tuple(dict.fromkeys(channel.split(".")[-3] for channel in request.channels))
     instants: dict[float, ContactInstant] = {}
@@ -190,8 +209,12 @@ def _firm(request: GripSpecification, squeeze: Squeeze, most: float) -> FoundGri
         instants[grip] = closed.last
         effort = squeeze.effort(grip, closed.last)
         worst = max(effort.digits, key=lambda digit: digit.share)
-        mine = sum(d.force for d in effort.digits if d.digit.rpartition(".")[2] in counted)
-        return PressedForce(mine, worst.share, worst.digit)
+        mine = [d.digit for d in effort.digits if d.digit.rpartition(".")[2] in counted]
+        slopes = squeeze.slopes(grip, closed) if closed.last.touches else None
+        slope = None if slopes is None else sum(slopes[digit].force for digit in mine)
+        force = sum(effort[digit].force for digit in mine)
+        tell(f"{math.degrees(grip):.2f}°: {force:.3g} N of {request.force:.3g} N")
+        return PressedForce(force, worst.share, worst.digit, slope)
 
     found = force_grip(press, 0.0, most, request.force, start=min(_START, most))
     text = f"{' + '.join(counted)}: {found.text}"

@@ -9,11 +9,14 @@ from enum import Enum
 import numpy as np
 
 from warpjld.errors import InputError
-from warpjld.simulation.grip.bracket import checked_step, clipped_inside, outward
+from warpjld.simulation.grip.bracket import Bracket, checked_step
 
 __all__ = ["ForceGrip", "ForceStatus", "PressedForce", "force_grip"]
 
-_ROUNDS = 16
+_ROUNDS = 24
+"""Grips tried at most: where slopes are known, three or four are enough."""
+_LOST = 3
+"""Times an equilibrium may not be found."""
 
 
 class ForceStatus(Enum):
@@ -25,15 +28,24 @@ class ForceStatus(Enum):
     LIMIT = "unreachable: the digits are bent as far as they may"
     NO_CONTACT = "nothing is touched however far the digits bend"
     NO_SOLUTION = "contact could not be solved at a firmer grip"
+    INTERRUPTED = "the search was interrupted before the force was reached"
 
 
 @dataclass(frozen=True)
 class PressedForce:
-    """What a grip presses with: force [N], the largest share of the muscles' limits, and the digit that has it."""
+    """What a grip presses with.
+
+    Attributes:
+        force: [N]
+        share: The largest share of the muscles' limits.
+        who: The digit that has it.
+        slope: Derivative of the force by the grip, where it is known.
+    """
 
     force: float
     share: float = 0.0
     who: str = ""
+    slope: float | None = None
 
 
 @dataclass(frozen=True)
@@ -64,14 +76,14 @@ def force_grip(
     start: float | None = None,
     tolerance: float = 0.02,
 ) -> ForceGrip:
-    """Close until a force is reached: steps that grow, then regula falsi between the last two.
+    """Close until a force is reached (see ``Bracket``).
 
     Args:
         press: What a grip presses with, more the firmer; None where contact could not be solved.
         low: Gentlest grip.
         high: Firmest grip allowed.
         force: Wished [N].
-        start: First step above ``low``, by default a sixteenth of the range; steps grow by half from there.
+        start: First step above ``low`` where nothing is touched, by default a sixteenth of the range.
         tolerance: Of the force, as a share.
 
     Raises:
@@ -81,65 +93,43 @@ def force_grip(
     if not (np.isfinite(force) and force > 0.0 and 0.0 < tolerance < 1.0):
         raise InputError(f"grip: want a force above 0 N and a tolerance between 0 and 1, got {force}, {tolerance}")
     trials: list[tuple[float, PressedForce]] = []
-
-    def attempt(grip: float) -> PressedForce | None:
-        found = press(grip)
-        if found is not None:
+    bracket, grip, lost = Bracket(low, high, force, step), low, 0
+    for _ in range(_ROUNDS):
+        try:
+            found = press(grip)
+        except KeyboardInterrupt:
+            return _ended(ForceStatus.INTERRUPTED, force, low, trials)
+        if found is None:
+            lost += 1
+            bracket.lose(grip)
+            if lost >= _LOST or not trials:
+                break
+        else:
             trials.append((grip, found))
-        return found
-
-    below, status = None, None
-    for grip in outward(low, high, step, 1.5, from_low=False):
-        found = attempt(grip)
-        status = _outward_status(found, force, tolerance, grip >= high)
-        if status is not None or (found is not None and found.force >= force):
+            bracket.note(grip, found.force, found.slope, enough=found.force >= force)
+            status = _status(found, force, tolerance, grip, low, high)
+            if status is not None:
+                return _ended(status, force, low, trials)
+        ahead = bracket.next()
+        if ahead is None:
             break
-        below = trials[-1]
-    if status is None and below is not None:
-        status = _narrowed(attempt, below, trials[-1], force, tolerance)
-    return _ended(status or ForceStatus.HARDER_ALREADY, force, low, trials)
+        grip = ahead
+    return _ended(ForceStatus.NO_SOLUTION, force, low, trials)
 
 
-def _outward_status(found: PressedForce | None, force: float, tolerance: float, last: bool) -> ForceStatus | None:
-    """How the search ends while grips become firmer; None where it goes on, outwards or inside."""
-    if found is None:
-        return ForceStatus.NO_SOLUTION
-    if abs(found.force - force) <= tolerance * force and found.share <= 1.0:
-        return ForceStatus.REACHED
-    if found.force >= force:
-        return None
+def _status(
+    found: PressedForce, force: float, tolerance: float, grip: float, low: float, high: float
+) -> ForceStatus | None:
+    """How the search ends with a grip; None where it goes on."""
+    if abs(found.force - force) <= tolerance * force:
+        return ForceStatus.REACHED if found.share <= 1.0 else ForceStatus.TOO_WEAK
+    if found.force > force:
+        return ForceStatus.HARDER_ALREADY if grip <= low else None
     if found.share > 1.0:
         return ForceStatus.TOO_WEAK
-    if last:
+    if grip >= high:
         return ForceStatus.LIMIT if found.force > 0.0 else ForceStatus.NO_CONTACT
     return None
-
-
-def _narrowed(
-    attempt: Callable[[float], PressedForce | None],
-    gentle: tuple[float, PressedForce],
-    firm: tuple[float, PressedForce],
-    force: float,
-    tolerance: float,
-) -> ForceStatus:
-    """Regula falsi (Illinois) between a grip that presses too little and one that presses too much."""
-    below, least = gentle[0], gentle[1].force - force
-    above, most = firm[0], firm[1].force - force
-    for _ in range(_ROUNDS):
-        share = clipped_inside(least / (least - most), 0.0, 1.0, 0.05)
-        grip = below + share * (above - below)
-        found = attempt(grip)
-        if found is None:
-            return ForceStatus.NO_SOLUTION
-        if abs(found.force - force) <= tolerance * force:
-            return ForceStatus.REACHED if found.share <= 1.0 else ForceStatus.TOO_WEAK
-        if found.force < force:
-            if found.share > 1.0:
-                return ForceStatus.TOO_WEAK
-            below, least, most = grip, found.force - force, 0.5 * most
-        else:
-            above, most, least = grip, found.force - force, 0.5 * least
-    return ForceStatus.NO_SOLUTION
 
 
 def _ended(status: ForceStatus, force: float, low: float, trials: list[tuple[float, PressedForce]]) -> ForceGrip:

@@ -16,6 +16,8 @@ from numpy.typing import NDArray
 from warpjld.errors import InputError
 from warpjld.fem.body import Body
 from warpjld.fem.contact import ContactInstant, ContactSolution, Pair, press
+from warpjld.fem.contact.sensitivity.equilibrium_tangent import EquilibriumTangent, SensitivityError
+from warpjld.fem.contact.sensitivity.perturbation import Perturbation
 from warpjld.fem.load.loads import Loads
 from warpjld.fem.load.prescribed import Prescribed
 from warpjld.simulation.bodies.object_body import ObjectBody
@@ -32,6 +34,11 @@ _FADING, _LETTING_GO = 3, 1
 tried then."""
 _COMES_ON = 2
 """The same of the step in which a weight comes on."""
+_HOPELESS = 0.6
+"""Share of the weight that pressures must be able to bear before its support is taken away. Not 1: as the weight comes
+on, an object drags pads along and presses them harder, by a fifth on fingertips."""
+_STEP = 1e-3
+"""Of the differences in what is prescribed, over the grip."""
 _NOTHING = Prescribed(np.empty(0, np.int64), np.empty(0))
 
 
@@ -40,15 +47,16 @@ class WeightTrials(ABC):
 
     Args:
         weight: The object's weight, and what bears it.
-        hopeless: A support that could be borne by less than this share is not taken away.
+        body: Hand and object, merged.
+        pairs: What may touch.
 
     Attributes:
         found: The equilibria of every grip tried, those on the way included.
         lowered: How the object was lowered at every grip whose pressures could bear it.
     """
 
-    def __init__(self, weight: SharedWeight, hopeless: float) -> None:
-        self.weight, self._hopeless = weight, hopeless
+    def __init__(self, weight: SharedWeight, body: Body, pairs: Sequence[Pair]) -> None:
+        self.weight, self.body, self.pairs = weight, body, list(pairs)
         self.found: dict[float, ContactSolution] = {}
         self.lowered: dict[float, Lowering] = {}
         self._begun: dict[float, float] = {}
@@ -62,7 +70,7 @@ class WeightTrials(ABC):
         if not self.weight.force(closed.last) > 0.0:
             return self._trial(grip, TrialOutcome.APART, closed.last, 0.0)
         most = self.weight.most(closed.last)
-        if most < self._hopeless:
+        if most < _HOPELESS:
             return self._trial(grip, TrialOutcome.WEAK, closed.last, most)
         bare = self.bared(grip, closed)
         if not bare.converged:
@@ -74,6 +82,7 @@ class WeightTrials(ABC):
             lambda after, height: self.moved(grip, after, height),
             lambda after: self.released(grip, after),
             predicted=self._predicted(grip),
+            rate=lambda after: self._sinking(grip, after),
         )
         self.lowered[grip] = lowered
         instants = (*closed.instants, *bare.instants, *lowered.instants)
@@ -96,6 +105,27 @@ class WeightTrials(ABC):
     def released(self, grip: float, after: ContactSolution) -> ContactSolution:
         """After another: without the handle."""
 
+    def _sinking(self, grip: float, after: ContactSolution) -> float | None:
+        """How much more of the weight the hand bears per metre that the handle goes down; None where not known."""
+        known = np.append(self.held(grip), 3 * self.weight.handle + self.weight.axis)
+        try:
+            tangent = EquilibriumTangent(self.body, self.pairs, after, known, steadied=True)
+            return self.weight.relief(tangent)
+        except SensitivityError:
+            return None
+
+    @abstractmethod
+    def held(self, grip: float) -> NDArray[np.int64]:
+        """Prescribed degrees of freedom while the object has nothing but hand and handle, the handle's left out."""
+
+    @abstractmethod
+    def tangent(self, grip: float, closed: ContactSolution) -> tuple[EquilibriumTangent, Perturbation]:
+        """Of that equilibrium, and what a firmer grip changes, per unit of it.
+
+        Raises:
+            SensitivityError: No derivative.
+        """
+
     @abstractmethod
     def strain(self, grip: float, instant: ContactInstant) -> tuple[float, str]:
         """Largest share of the muscles' limits, and the digit that has it."""
@@ -117,7 +147,22 @@ class WeightTrials(ABC):
         force, sliding = self.weight.force(instant), self.weight.sliding(instant)
         share, who = self.strain(grip, instant)
         note = self.beneath(instant) if outcome is TrialOutcome.STANDS else ""
-        return Trial(outcome, sliding, force, borne, share, who, note)
+        known = outcome is not TrialOutcome.UNSOLVED and bool(instant.touches)
+        capacity = self.weight.most(instant) if known else float("nan")
+        rate = self._rate(grip) if capacity > 0.0 else None
+        slope = None if rate is None else capacity * rate
+        return Trial(outcome, sliding, force, borne, share, who, note, capacity, slope)
+
+    def _rate(self, grip: float) -> float | None:
+        """How fast the forces between hand and object grow with the grip, as a share of them, before the weight is on;
+        None where that is not known."""
+        closed = self.closed(grip)
+        if not (closed.converged and self.weight.force(closed.last) > 0.0):
+            return None
+        try:
+            return self.weight.rate(*self.tangent(grip, closed))
+        except SensitivityError:
+            return None
 
     def _predicted(self, grip: float) -> float | None:
         """How far the object sank at the nearest grip that held it."""
@@ -144,11 +189,21 @@ class HandTrials(WeightTrials):
         holding = [k for k, owner in enumerate(model.owners) if owner.other(one.name) == squeeze.hand.name]
         nodes = np.arange(self._span.start, self._span.stop)
         weight = SharedWeight(model.body, nodes, model.pairs, holding, model.loads.gravity)
-        super().__init__(weight, hopeless=0.95)
+        super().__init__(weight, model.body, model.pairs)
 
     def closed(self, grip: float) -> ContactSolution:
         """Joints flexed by the grip."""
         return self.squeeze.closed(grip)
+
+    def held(self, grip: float) -> NDArray[np.int64]:
+        """Those of the hand, and of all other bodies."""
+        squeeze, span = self.squeeze, self._span
+        known = squeeze.model.prescribed(squeeze.time, squeeze.history).degrees
+        return np.asarray(known[(known < 3 * span.start) | (known >= 3 * span.stop)])
+
+    def tangent(self, grip: float, closed: ContactSolution) -> tuple[EquilibriumTangent, Perturbation]:
+        """Joints that flex on, all alike."""
+        return self.squeeze.tangent(grip, closed)
 
     def bared(self, grip: float, closed: ContactSolution) -> ContactSolution:
         """The points it stands on let go, all but the height of its middle."""
@@ -239,15 +294,31 @@ class PrescribedTrials(WeightTrials):
         mesh = body.mesh
         if name not in mesh.region_names:
             raise InputError(f"name: there is no region '{name}'; there are {', '.join(mesh.region_names)}")
-        self.body, self.prescribed, self.pairs, self._share = body, prescribed, [*pairs, *others], share
+        self.prescribed, self._share = prescribed, share
         self._loads = loads or Loads()
         self._heavy = replace(self._loads, gravity=gravity)
+        self._closed: dict[float, ContactSolution] = {}
         own = np.unique(mesh.elements[mesh.regions == mesh.region_names.index(name)])
-        super().__init__(SharedWeight(body, own, self.pairs, range(len(pairs)), gravity), hopeless=1.0)
+        touching = [*pairs, *others]
+        super().__init__(SharedWeight(body, own, touching, range(len(pairs)), gravity), body, touching)
 
     def closed(self, grip: float) -> ContactSolution:
         """What is prescribed of the grip is reached, without gravity."""
-        return self._press(lambda time: self._at(grip, time), self._loads, 1.0)
+        if grip not in self._closed:
+            self._closed[grip] = self._press(lambda time: self._at(grip, time), self._loads, 1.0)
+        return self._closed[grip]
+
+    def held(self, grip: float) -> NDArray[np.int64]:
+        """Those of the grip."""
+        return np.asarray(self._at(grip, 1.0).degrees)
+
+    def tangent(self, grip: float, closed: ContactSolution) -> tuple[EquilibriumTangent, Perturbation]:
+        """What is prescribed goes on in proportion."""
+        known, step = self._at(grip, 1.0), _STEP * max(grip, 1e-9)
+        change = np.zeros(self.body.degrees)
+        change[known.degrees] = (self._at(grip + step, 1.0).values - known.values) / step
+        tangent = EquilibriumTangent(self.body, self.pairs, closed, known.degrees, steadied=True)
+        return tangent, Perturbation(prescribed=change)
 
     def bared(self, grip: float, closed: ContactSolution) -> ContactSolution:
         """The weight comes on, and the handle keeps its height."""

@@ -23,11 +23,13 @@ _FIRST = 1.0 / 240.0
 _LONGER = 2.5
 _FAR, _LONGEST = 0.25, 0.25
 """An object that sinks by this share of its height is not held; and part of that way that one step may be long."""
-_MOST = 20
+_MOST = 14
 """Steps."""
 _PART, _BOUNDS = 0.5, (_FIRST, 0.06)
 """Part of the way that is predicted to take in one step, and bounds of this step, over the object's height."""
-_SHORTER, _TRIES = 1.0 / 3.0, 4
+_ALMOST = 0.9
+"""Part of the way that the tangent foresees to take in the first step."""
+_SHORTER, _TRIES = 1.0 / 3.0, 3
 """What becomes of a step that finds no equilibrium, and how many are tried."""
 _LEFT, _LITTLE = 0.01, 0.001
 """Share of the weight that may be left on the handle when it lets go; and the same where that was too much."""
@@ -73,6 +75,7 @@ class _Place:
     left: float
     elsewhere: float
     slides: bool
+    most: float
 
     @property
     def borne(self) -> float:
@@ -87,8 +90,11 @@ def lower_object(
     released: Callable[[ContactSolution], ContactSolution],
     *,
     predicted: float | None = None,
+    rate: Callable[[ContactSolution], float | None] = lambda after: None,
 ) -> Lowering:
     """Lower the handle until nothing is left on it, then let go.
+
+    How deep to go, the tangent says (``rate``), then the chord, as friction gives way.
 
     Args:
         weight: Of the object.
@@ -96,9 +102,11 @@ def lower_object(
         moved: Equilibrium after another, with the handle at a height [m].
         released: Equilibrium after another, without the handle.
         predicted: How far it sank at a grip like this one [m].
+        rate: How much more of the weight the hand bears per metre that the object sinks from an equilibrium with the
+            handle; None where that is not known.
     """
     way = _Way(weight, bare, moved)
-    first = _FIRST if predicted is None else float(np.clip(_PART * predicted / weight.tall, *_BOUNDS))
+    first = _first(weight, way.places[0], predicted, rate)
     step, enough = first * weight.tall, _LEFT
     while len(way.places) < _MOST:
         here = way.places[-1]
@@ -120,6 +128,21 @@ def lower_object(
     return way.ended(TrialOutcome.UNSOLVED)
 
 
+def _first(
+    weight: SharedWeight,
+    here: _Place,
+    predicted: float | None,
+    rate: Callable[[ContactSolution], float | None],
+) -> float:
+    """First step down, over the object's height."""
+    if predicted is not None:
+        return float(np.clip(_PART * predicted / weight.tall, *_BOUNDS))
+    slope = rate(here.solution) if here.left > _LEFT else None
+    if slope is None or not slope > 0.0:
+        return _FIRST
+    return float(np.clip(_ALMOST * here.left / slope / weight.tall, *_BOUNDS))
+
+
 class _Way:
     """Places that the object went through on its way down."""
 
@@ -137,7 +160,8 @@ class _Way:
         there = solution.last
         sunk = self._weight.sunk(self._begin, self._weight.height(there))
         slides = self._weight.sliding(there) >= _ALL
-        return _Place(solution, sunk, self._weight.left(there), self._weight.elsewhere(there), slides)
+        left, elsewhere, most = self._weight.left(there), self._weight.elsewhere(there), self._weight.most(there)
+        return _Place(solution, sunk, left, elsewhere, slides, most)
 
     def onward(self, here: _Place, step: float) -> _Place | None:
         """Deeper by a step [m], or by less where that finds no equilibrium or goes too far."""
@@ -159,7 +183,7 @@ class _Way:
         last = free or self.places[-1].solution
         borne = max(one.borne for one in self.places)
         if free is not None:
-            borne = 1.0 + 0.5 * (1.0 / max(self._weight.used(free.last), _LEFT) - 1.0)
+            borne = self._weight.most(free.last)
         instants = [instant for one in self.places[1:] for instant in one.solution.instants]
         sunk = self._weight.sunk(self._begin, self._weight.height(last.last))
         path = tuple((one.sunk, one.borne) for one in self.places)
@@ -177,6 +201,8 @@ def _outcome(weight: SharedWeight, places: list[_Place], far: float) -> TrialOut
         return TrialOutcome.APART
     if len(places) > 1 and here.slides and places[-2].slides:
         return TrialOutcome.SLIDES if max(_slope(places), 0.0) * (far - here.sunk) < here.left else None
+    if len(places) > 1 and here.most < 1.0 and _presses(places) * (far - here.sunk) < 1.0 - here.most:
+        return TrialOutcome.WEAK
     if here.borne < max(one.borne for one in places) - _LESS:
         return TrialOutcome.GIVES
     return TrialOutcome.SANK if here.sunk > far else None
@@ -191,6 +217,12 @@ def _step(places: list[_Place], step: float, far: float) -> float:
         return _PROBE * far
     longest, slope = min(_LONGER * step, _LONGEST * far), _slope(places)
     return min((here.left + _SPARE * here.slides) / slope, longest) if slope > 0.0 else longest
+
+
+def _presses(places: list[_Place]) -> float:
+    """How much more of the weight pressures could bear for each metre that the object sank last, 0 or more."""
+    before, here = places[-2:]
+    return max((here.most - before.most) / (here.sunk - before.sunk), 0.0)
 
 
 def _slope(places: list[_Place]) -> float:

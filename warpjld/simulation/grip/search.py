@@ -1,10 +1,14 @@
 """The gentlest grip that holds: force raised until nothing slides, or a reason why none holds (R123, R124).
 
-A trial holds or it does not; the least grip is bracketed by growing, and then looked for where the share of the weight
-that trials could bear, in proportion, is all of it. Friction can carry no more than μ times the sum of the normal
-forces. While that is below a few times the weight, sliding may mean that the grip is too gentle; above it, sliding by a
-share that a doubled force does not change means that the forces pull out of their friction cones, and no grip at these
-places will hold.
+A trial holds or it does not. What is searched for is a capacity: the share of the weight that friction could bear with
+a trial's pressures, were all of it to point up. It rises with the grip, smoothly, and the tangent says how fast
+(``Bracket``). Two pads beside a block hold it from a capacity of 1 on. Other grips need more, as friction also balances
+moments, or digits that push against one another: where a trial with a capacity m slides and bears a share b < 1, m / b
+is aimed at next.
+
+While friction can carry no more than a few times the weight, sliding may mean that the grip is too gentle; above it,
+sliding by a share that a doubled force does not change means that the forces pull out of their friction cones, and no
+grip at these places will hold.
 """
 
 from __future__ import annotations
@@ -17,15 +21,15 @@ from enum import Enum
 import numpy as np
 
 from warpjld.errors import InputError
-from warpjld.simulation.grip.bracket import checked_step, clipped_inside, outward
+from warpjld.simulation.grip.bracket import Bracket, checked_step
 
 __all__ = ["Grip", "GripStatus", "Trial", "TrialOutcome", "gentlest_grip"]
 
 _SAME = 0.02
 _AMPLE = 4.0
 """Friction this many times the weight is not what is missing."""
-_INNER = 0.1
-"""Part of a bracket, at either end, within which no grip is tried."""
+_TRIALS = 24
+"""Grips tried at most: where slopes are known, three or four are enough."""
 
 
 class TrialOutcome(Enum):
@@ -55,6 +59,7 @@ class GripStatus(Enum):
     STANDS = "it stands on something else, and the hand does not hold it"
     LIMIT = "does not hold at the firmest grip that was allowed"
     NO_SOLUTION = "contact could not be solved"
+    INTERRUPTED = "the search was interrupted before a grip was found"
 
 
 @dataclass(frozen=True)
@@ -69,6 +74,9 @@ class Trial:
         share: Largest share of the muscles' limits, 0 where it is not measured.
         who: Digit that has this share.
         note: More for people, as what the object stands on.
+        capacity: Share of the weight that friction could bear with its pressures, were all of it to point up; NaN where
+            it is not known: ``borne`` counts then.
+        slope: Derivative of the capacity by the grip, where it is known.
     """
 
     outcome: TrialOutcome
@@ -78,6 +86,13 @@ class Trial:
     share: float = 0.0
     who: str = ""
     note: str = ""
+    capacity: float = float("nan")
+    slope: float | None = None
+
+    @property
+    def able(self) -> float:
+        """The capacity, or what was borne where that is not known."""
+        return self.borne if np.isnan(self.capacity) else self.capacity
 
     @property
     def held(self) -> bool:
@@ -120,6 +135,7 @@ def gentlest_grip(
     friction: float,
     start: float | None = None,
     tolerance: float = 0.02,
+    most: int = _TRIALS,
 ) -> Grip:
     """The smallest grip in low … high that holds.
 
@@ -131,8 +147,12 @@ def gentlest_grip(
         high: Firmest grip allowed.
         weight: What is to be held [N].
         friction: Coulomb's μ between hand and object.
-        start: First step above ``low``, by default a sixteenth of the range; steps double from there.
-        tolerance: How near to the gentlest, as a share of the grip's rise above ``low``.
+        start: First step above ``low`` where nothing is touched, by default a sixteenth of the range.
+        tolerance: How near to the gentlest, as a share of the force.
+        most: Trials; after that the gentlest that held is given.
+
+    Returns:
+        What was tried until then with ``GripStatus.INTERRUPTED``, where Ctrl-C ends it.
 
     Raises:
         InputError: A range that is none.
@@ -142,46 +162,77 @@ def gentlest_grip(
         raise InputError(f"grip: want a tolerance between 0 and 1, got {tolerance}")
     if not (weight >= 0.0 and np.isfinite(weight) and friction >= 0.0 and np.isfinite(friction)):
         raise InputError(f"grip: want a weight and a friction of 0 or more, got {weight} N and {friction}")
-    trials: list[tuple[float, Trial]] = []
-
-    def attempt(grip: float) -> tuple[float, Trial]:
-        trials.append((grip, hold(grip)))
-        return trials[-1]
-
-    def ended(status: GripStatus, grip: float, trial: Trial) -> Grip:
-        return Grip(status, grip, trial, tuple(trials), _text(status, trial))
-
+    search = _Search(hold, Bracket(low, high, 1.0 + 0.5 * tolerance, step), tolerance)
     needed = weight / friction if friction else np.inf
-    failed = None
-    for grip in outward(low, high, step, 2.0, from_low=True):
-        one = attempt(grip)
-        if one[1].held:
-            break
-        status = _given_up(trials, grip >= high, needed)
-        if status is not None:
-            return ended(status, *one)
-        failed = one
-    if failed is None and one[1].share <= 1.0:
-        return ended(GripStatus.HELD_AT_ONCE, *one)
-    held = _narrowed(attempt, failed or one, one, low, tolerance)
-    return ended(GripStatus.TOO_WEAK if held[1].share > 1.0 else GripStatus.HELD, *held)
+    try:
+        return search.run(needed, most)
+    except KeyboardInterrupt:
+        return search.interrupted()
 
 
-def _narrowed(
-    attempt: Callable[[float], tuple[float, Trial]],
-    failed: tuple[float, Trial],
-    held: tuple[float, Trial],
-    low: float,
-    tolerance: float,
-) -> tuple[float, Trial]:
-    """The gentlest grip that holds, between one that does not and one that does."""
-    shrank = True
-    while (room := held[0] - failed[0]) > tolerance * (held[0] - low):
-        middle = 0.5 * (failed[0] + held[0])
-        one = attempt(_between(failed, held, tolerance * (held[0] - low)) if shrank else middle)
-        failed, held = (failed, one) if one[1].held else (one, held)
-        shrank = held[0] - failed[0] <= 0.5 * room
-    return held
+class _Search:
+    """Grips tried so far."""
+
+    def __init__(self, hold: Callable[[float], Trial], bracket: Bracket, tolerance: float) -> None:
+        self._hold, self._bracket, self._tolerance = hold, bracket, tolerance
+        self._aim = bracket.target
+        self.trials: list[tuple[float, Trial]] = []
+
+    def run(self, needed: float, most: int) -> Grip:
+        bracket, grip = self._bracket, self._bracket.low
+        while len(self.trials) < most:
+            trial = self._hold(grip)
+            self.trials.append((grip, trial))
+            self._note(grip, trial)
+            if trial.held and (grip <= bracket.low or self._near(trial)):
+                return self._ended(GripStatus.HELD_AT_ONCE if grip <= bracket.low else GripStatus.HELD, grip, trial)
+            if bracket.above is None:
+                status = _given_up(self.trials, grip >= bracket.high, needed)
+                if status is not None:
+                    return self._ended(status, grip, trial)
+            ahead = bracket.next()
+            if ahead is None or self._narrow():
+                break
+            grip = ahead
+        return self.best(_at_last(self.trials[-1][1]))
+
+    def best(self, otherwise: GripStatus) -> Grip:
+        """The gentlest that held, or the last one tried, which ended so."""
+        held = [one for one in self.trials if one[1].held]
+        if held:
+            return self._ended(GripStatus.HELD, *min(held, key=lambda one: one[0]))
+        return self._ended(otherwise, *self.trials[-1])
+
+    def interrupted(self) -> Grip:
+        """What was tried until now."""
+        if not self.trials:
+            nothing = Trial(TrialOutcome.UNSOLVED, float("nan"), 0.0)
+            return Grip(GripStatus.INTERRUPTED, self._bracket.low, nothing, (), GripStatus.INTERRUPTED.value)
+        return self._ended(GripStatus.INTERRUPTED, *self.trials[-1])
+
+    def _note(self, grip: float, trial: Trial) -> None:
+        if not trial.held and 0.0 < trial.borne < 1.0 < trial.able:  # it takes more than friction's sum
+            self._bracket.target = self._aim * trial.able / trial.borne
+        self._bracket.note(grip, trial.able, trial.slope, enough=trial.held)
+
+    def _near(self, trial: Trial) -> bool:
+        """Whether little less would not hold any more, by all that is known."""
+        return trial.able <= self._bracket.target / self._aim * (1.0 + self._tolerance)
+
+    def _narrow(self) -> bool:
+        """Whether a grip that does not hold is near enough."""
+        below, above = self._bracket.below, self._bracket.above
+        if below is None or above is None:
+            return False
+        share = self._bracket.width / (above.grip - self._bracket.low)
+        if 0.0 < below.value < above.value:
+            return above.value <= (1.0 + self._tolerance) * below.value or share <= _SAME * self._tolerance
+        return share <= self._tolerance
+
+    def _ended(self, status: GripStatus, grip: float, trial: Trial) -> Grip:
+        if trial.held and trial.share > 1.0 and status is not GripStatus.INTERRUPTED:
+            status = GripStatus.TOO_WEAK
+        return Grip(status, grip, trial, tuple(self.trials), _text(status, trial))
 
 
 def _given_up(trials: list[tuple[float, Trial]], last: bool, needed: float) -> GripStatus | None:
@@ -192,18 +243,6 @@ def _given_up(trials: list[tuple[float, Trial]], last: bool, needed: float) -> G
     if _slides_for_ever(trials, needed):
         return GripStatus.SLIDES
     return _at_last(trial) if last else None
-
-
-def _between(failed: tuple[float, Trial], held: tuple[float, Trial], width: float) -> float:
-    """The grip to try next: beside the one at which all of the weight would be borne, so that the bracket closes."""
-    (low, gentle), (high, firm) = failed, held
-    lacks, spares = 1.0 - gentle.borne, firm.borne - 1.0
-    room = high - low
-    if room <= 2.0 * width or not (lacks > 0.0 and spares >= 0.0):  # NaN included
-        return 0.5 * (low + high)
-    there = low + room * lacks / (lacks + spares)
-    beside = there + 0.5 * width if high - there > there - low else there - 0.5 * width
-    return clipped_inside(beside, low, high, _INNER)
 
 
 def _at_last(trial: Trial) -> GripStatus:

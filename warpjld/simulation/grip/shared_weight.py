@@ -15,6 +15,8 @@ from warpjld.errors import InputError
 from warpjld.fem.body import Body
 from warpjld.fem.contact import ContactInstant, Pair
 from warpjld.fem.contact.results.contact_solution import Touch
+from warpjld.fem.contact.sensitivity.equilibrium_tangent import EquilibriumTangent
+from warpjld.fem.contact.sensitivity.perturbation import Perturbation
 from warpjld.fem.load.loads import volumes
 from warpjld.fem.load.prescribed import Prescribed
 from warpjld.simulation.bodies.support import handle_of
@@ -98,6 +100,29 @@ class SharedWeight:
     def force(self, instant: ContactInstant) -> float:
         """Sum of the normal forces between hand and object [N]."""
         return sum(touch.normal_force for touch in self._touches(instant))
+
+    def rate(self, tangent: EquilibriumTangent, change: Perturbation) -> float | None:
+        """How fast the normal forces between hand and object grow with a parameter, as a share of them; None where
+        there are none.
+
+        Raises:
+            SensitivityError: The equilibrium does not follow it.
+        """
+        pushed = float(tangent.pushed[self._holding][:, self._nodes].sum())
+        if not pushed > 0.0:
+            return None
+        return float(tangent.pushes(tangent.response(change))[self._holding][:, self._nodes].sum()) / pushed
+
+    def relief(self, tangent: EquilibriumTangent) -> float:
+        """How much less of the weight the handle bears per metre that it goes down [1/m].
+
+        Raises:
+            SensitivityError: The equilibrium does not follow it.
+        """
+        down = np.zeros(tangent.free.size)
+        down[3 * self.handle + self.axis] = self._down
+        follows = tangent.response(Perturbation(prescribed=down)).reactions[self.handle, self.axis]
+        return self._down * float(follows) / self.weight
 
     def sliding(self, instant: ContactInstant) -> float:
         """Share of the contact that slides, 0 … 1; NaN where nothing touches."""

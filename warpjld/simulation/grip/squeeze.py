@@ -8,6 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from warpjld.fem.contact import ContactInstant, ContactSolution
+from warpjld.fem.contact.sensitivity.equilibrium_tangent import EquilibriumTangent, SensitivityError
+from warpjld.fem.contact.sensitivity.perturbation import Perturbation
 from warpjld.fem.hand.blend import Moves
 from warpjld.fem.hand.muscles import Effort
 from warpjld.simulation.bodies.deformable_body import History
@@ -15,6 +17,8 @@ from warpjld.simulation.bodies.flesh_body import FleshBody
 from warpjld.simulation.bodies.model import ContactModel
 from warpjld.simulation.grip.correct import FLEXION
 from warpjld.simulation.report.efforts import effort_at
+from warpjld.simulation.sensitivity.effort_slope import DigitSlope, EffortTangent
+from warpjld.simulation.sensitivity.parameters import angles_perturbed
 from warpjld.simulation.solve.branch import solve_branch
 
 __all__ = ["TRAVEL", "Squeeze"]
@@ -35,6 +39,10 @@ class Squeeze:
         joints: Those that flex, as the skeleton numbers them.
         after: Equilibrium to begin at.
         limits: Digit → largest force [N], where it is not the default.
+
+    Attributes:
+        model, history, hand: As given.
+        time: Of that equilibrium [frames].
     """
 
     def __init__(
@@ -49,7 +57,7 @@ class Squeeze:
         self.model, self.history, self.hand = model, history, hand
         self._joints, self._limits = list(joints), limits
         self._start = hand.bones.angles(after.last.time)
-        self._time = after.last.time
+        self.time = after.last.time
         self._closed: dict[float, ContactSolution] = {0.0: after}
 
     @property
@@ -71,22 +79,52 @@ class Squeeze:
         before = max(known for known in self._closed if known <= grip + _SAME)
 
         def on(share: float) -> Moves:
-            return self.hand.bones.moves_of(self.angles(before + share * (grip - before)), self._time)
+            return self.hand.bones.moves_of(self.angles(before + share * (grip - before)), self.time)
 
-        steps = self.hand.bones.steps([(self.angles(one), self._time) for one in (before, grip)], TRAVEL)
+        steps = self.hand.bones.steps([(self.angles(one), self.time) for one in (before, grip)], TRAVEL)
         found = solve_branch(self.model, self.history, self._closed[before], steps, moves=(self.hand.name, on))
         if found.converged:
             self._closed[grip] = found
         return found
 
+    def tangent(self, grip: float, closed: ContactSolution) -> tuple[EquilibriumTangent, Perturbation]:
+        """Of the equilibrium at a grip, and what a firmer one changes [per rad].
+
+        Raises:
+            SensitivityError: No derivative.
+        """
+        model, time = self.model, self.time
+        known = model.prescribed(time, self.history).degrees
+        change = angles_perturbed(model, self.hand, self.angles(grip), time, self.along(grip))
+        return EquilibriumTangent(model.body, model.pairs, closed, known, steadied=True), change
+
+    def along(self, grip: float) -> NDArray[np.float64]:
+        """How the angles change with the grip, shape (J, 4): joints at their limits stay."""
+        out = np.zeros_like(self._start)
+        out[self._joints, FLEXION] = self._start[self._joints, FLEXION] + grip < self._high
+        return out
+
+    def slopes(self, grip: float, closed: ContactSolution) -> dict[str, DigitSlope] | None:
+        """How digits' efforts change with the grip [per rad]; None where that is not known."""
+        bones, along, angles = self.hand.bones, self.along(grip), self.angles(grip)
+        try:
+            tangent, change = self.tangent(grip, closed)
+            contact, limits = tangent.contact.sum(axis=0), self._limits
+            poses = bones.posed(angles, self.time)
+            efforts = EffortTangent(self.model, self.hand, closed.last, contact, poses, limits)
+            response = tangent.response(change)
+            return efforts.slopes(response, change, lambda by: bones.posed(angles + by * along, self.time))
+        except SensitivityError:
+            return None
+
     def stays(self, grip: float) -> tuple[str, Callable[[float], Moves]]:
         """The hand as it is at a grip, for a branch."""
-        there = self.hand.bones.moves_of(self.angles(grip), self._time)
+        there = self.hand.bones.moves_of(self.angles(grip), self.time)
         return self.hand.name, lambda share: there
 
     def effort(self, grip: float, instant: ContactInstant) -> Effort:
         """What the muscles do at a grip."""
-        poses = self.hand.bones.posed(self.angles(grip), self._time)
+        poses = self.hand.bones.posed(self.angles(grip), self.time)
         return effort_at(self.model, self.hand, poses, instant, self._limits)
 
     @property

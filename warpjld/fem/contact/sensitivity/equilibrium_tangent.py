@@ -27,6 +27,8 @@ __all__ = ["EquilibriumTangent", "Response", "SensitivityError"]
 
 _STIFF = 100.0
 """E over the stiffness of the nodes that a point stands on."""
+_STEADY = 1e-6
+"""Stiffness that steadies, over the nodes'."""
 _NONE = "the equilibrium has no derivative"
 _SINGULAR = 1e13
 """Condition number from which on a body is free."""
@@ -67,13 +69,23 @@ class EquilibriumTangent:
         pairs: The pairs, likewise.
         solution: Its last instant is differentiated, with the load step that found it.
         prescribed: Prescribed degrees of freedom there, shape (n,).
+        steadied: Whether bodies that may move are held by a stiffness of a millionth of their nodes': forces are known
+            then although places are not.
 
     Raises:
         InputError: A solution that does not know its last step, or of other bodies.
         SensitivityError: No derivative.
     """
 
-    def __init__(self, body: Body, pairs: Sequence[Pair], solution: ContactSolution, prescribed: Ints) -> None:
+    def __init__(
+        self,
+        body: Body,
+        pairs: Sequence[Pair],
+        solution: ContactSolution,
+        prescribed: Ints,
+        *,
+        steadied: bool = False,
+    ) -> None:
         last = solution.last_step
         if last is None:
             raise InputError("solution: want one that was solved here, not one that was read from a state")
@@ -93,6 +105,8 @@ class EquilibriumTangent:
         stiffness = elastic.at(self._u.reshape(-1), None, solution.loads).stiffness
         assert stiffness is not None
         self._stiffness = csr_array(stiffness.to_scipy().tocsr())
+        if steadied:
+            self._stiffness = self._stiffness + diags_array(_STEADY * np.repeat(elastic.stiffness, 3))
         for one in self.interfaces:
             self._stiffness = self._stiffness - one.by_force
         self._pushing = [csr_array(one.spreading @ one.of_multipliers) for one in self.interfaces]
