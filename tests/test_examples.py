@@ -59,6 +59,12 @@ def test_a_hand_digitised_half_closed(tmp_path) -> None:
     assert (tmp_path / "flat.png").stat().st_size > 1000
 
 
+def test_a_hand_of_several_meshes(tmp_path) -> None:
+    parted = runpy.run_path(str(EXAMPLES / "pieces.py"))["main"](tmp_path, (120, 90))
+    assert parted.keys() == {"SMOOTH", "PAPER"}
+    assert max(parted.values()) < 1e-3
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("name", PRESSED)
 def test_pressing(name: str, tmp_path) -> None:

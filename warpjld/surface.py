@@ -13,6 +13,8 @@ from warpjld.errors import InputError
 
 __all__ = ["Part", "Surface", "one_uv_a_vertex", "weld_surface"]
 
+_SEAM = 1e-6  # of the surface's size: borders of parts nearer than this are one, as a file's single floats leave them
+
 
 @dataclass(frozen=True)
 class Part:
@@ -137,17 +139,22 @@ def weld_surface(
     corner_uv: NDArray[np.float32] | None = None,
     parts: tuple[Part, ...] = (),
     polygons: NDArray[np.int64] | None = None,
+    joins: NDArray[np.bool_] | None = None,
     tolerance: float = 1e-7,
 ) -> Surface:
-    """Weld source vertices that lie at the same place, within a part.
+    """Weld source vertices that lie at the same place, within a part; and the borders of parts that coincide.
+
+    Joined so, the pieces of a hand, a hand and a body, or clothes and the skin that goes on from them are one surface,
+    which nothing parts (R18).
 
     Args:
         vertices: Source positions [m], shape (W, 3).
         faces: Source triangles, shape (S, 3).
         uv: Texture coordinates, shape (W, 2).
         corner_uv: Texture coordinates of the faces' corners, shape (S, 3, 2), instead of ``uv``.
-        parts: Source meshes; vertices of different parts are never welded.
+        parts: Source meshes; of different ones only border vertices are welded.
         polygons: Polygon of each source triangle, shape (S,), where the source has larger ones.
+        joins: Vertices whose border may be joined to another part's, shape (W,); all by default. What is rigid may not.
         tolerance: Distance below which two vertices are one, relative to the diagonal of the faces' bounding box.
 
     Raises:
@@ -175,6 +182,8 @@ def weld_surface(
             label = connected_parts(pairs, len(inside))
             first = np.unique(label, return_index=True)[1]
             owner[part.vertices] = part.vertices.start + first[label]
+    if len(parts) > 1:
+        owner = _joined_borders(points, owner[triangles], owner, parts, joins, _SEAM * size)
     kept, weld = np.unique(owner, return_inverse=True)
     welded = weld[triangles]
     solid = (welded[:, 0] != welded[:, 1]) & (welded[:, 1] != welded[:, 2]) & (welded[:, 2] != welded[:, 0])
@@ -188,3 +197,39 @@ def weld_surface(
         parts=parts,
         polygons=polygons,
     )
+
+
+def _joined_borders(
+    points: NDArray[np.float64],
+    faces: NDArray[np.int64],
+    owner: NDArray[np.int64],
+    parts: tuple[Part, ...],
+    joins: NDArray[np.bool_] | None,
+    distance: float,
+) -> NDArray[np.int64]:
+    """The vertex that stands for each, shape (W,), where borders of different parts within ``distance`` are one.
+
+    Args:
+        points: Source positions [m], shape (W, 3).
+        faces: Triangles over the vertices that stand for others, shape (S, 3).
+        owner: Those, shape (W,).
+        parts: The source's meshes.
+        joins: Vertices that may be joined, shape (W,); None for all.
+        distance: [m].
+    """
+    solid = faces[(faces[:, 0] != faces[:, 1]) & (faces[:, 1] != faces[:, 2]) & (faces[:, 2] != faces[:, 0])]
+    half = np.sort(np.concatenate([solid[:, [0, 1]], solid[:, [1, 2]], solid[:, [2, 0]]]), axis=1)
+    keys, times = np.unique(half[:, 0] * len(points) + half[:, 1], return_counts=True)
+    border = np.unique(np.stack(np.divmod(keys[times == 1], len(points))))
+    if joins is not None:
+        border = border[joins[border]]
+    pairs = border[close_pairs(points[border], max(distance, 1e-12))]
+    part = np.zeros(len(points), dtype=np.int64)
+    for k, one in enumerate(parts):
+        part[one.vertices] = k
+    pairs = pairs[part[pairs[:, 0]] != part[pairs[:, 1]]]
+    if not len(pairs):
+        return owner
+    label = connected_parts(pairs, len(points))
+    first = np.unique(label, return_index=True)[1]
+    return np.asarray(first[label][owner])

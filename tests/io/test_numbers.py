@@ -13,8 +13,7 @@ from warpjld.io import load_rig
 from warpjld.io.mesh_file import read_mesh
 from warpjld.surface import weld_surface
 
-# a cube of quads whose vertices 0 and 8 lie at one place, as at a seam, with a face of no area and a pentagon's worth
-# of corners on top
+# a cube whose vertices 0 and 8 lie at one place, as at a seam, with a face of no area and a pentagon on top
 CUBE = """\
 v 0 0 0
 v 1 0 0

@@ -160,3 +160,18 @@ def test_parameter_files_say_where_they_are_wrong(run, tmp_path, monkeypatch) ->
     (tmp_path / "p.json").write_text(json.dumps({"joints": {"index.base": {"inflatoin": 1}}}))
     with pytest.raises(InputError, match=r"p\.json: joint 'index.base': unknown parameter 'inflatoin'"):
         run("PARAMETERS 'p.json'")
+
+
+def test_initial_angles_count_from_the_straight_joint(run, scene) -> None:
+    """At its initial angle a joint is at rest, with none of its own it goes back by as much; unkeyed it stays."""
+    run("INITIAL index.knuckle2 FLEXION 30")
+    run("JOINT left.index.knuckle2 FLEXION AT 0 30\nJOINT left.index.knuckle2 FLEXION AT 9 0")
+    tip = scene.actor().skeleton.index("index.tip")
+    found = stage(scene.actor(), np.array([0.0, 9.0]), scene.rate).positions[:, tip]
+    np.testing.assert_allclose(found[0], scene.actor().skeleton.rest[tip], atol=1e-12)
+    plain = scene.add("plain", scene.actor().rig)
+    run("LIMIT index.knuckle2 FLEXION -40 100\nJOINT left.index.knuckle2 FLEXION AT 9 -30")
+    np.testing.assert_allclose(stage(plain, np.array([9.0]), scene.rate).positions[0, tip], found[1], atol=1e-12)
+    still = scene.add("still", plain.rig)
+    run("INITIAL index.knuckle2 FLEXION 30\nWRIST LEFT FLEXION AT 0 0")
+    np.testing.assert_allclose(stage(still, np.zeros(1), scene.rate).positions[0], still.skeleton.rest, atol=1e-12)

@@ -124,3 +124,21 @@ def test_numbers_of_welded_vertices_are_the_files(run, scene, data: Path) -> Non
     assert number > vertex
     run(f"OBJECT a BALL\nSHOW DISTANCE 0 {number} a 3")
     assert f"WEBXR vertex {number} in the basis" in scene.said[-1]
+
+
+def test_searches_take_and_tell_the_files_facets(run, scene, tmp_path: Path) -> None:
+    """A plate of quads: facet 1 looks up, and wherever the finger comes down on it, it is on the facet."""
+    corners = [(x, y, z) for y in (-1, 0) for x, z in ((0, 0), (1, 0), (1, 1), (0, 1))]
+    quads = [(1, 2, 3, 4), (5, 8, 7, 6), (1, 5, 6, 2), (2, 6, 7, 3), (3, 7, 8, 4), (4, 8, 5, 1)]
+    lines = [*("v {} {} {}".format(*c) for c in corners), *("f {} {} {} {}".format(*q) for q in quads)]
+    (tmp_path / "plate.obj").write_text("\n".join(lines))
+    for x, z in ((-0.05, -0.35), (-0.35, -0.15)):
+        name = f"p{round(-100 * x)}"
+        run(f"OBJECT {name} '{tmp_path / 'plate.obj'}' UNIT M SCALE 0.4 AT {x} -0.06 {z}")
+        run(f"AUTO_F_1 3 LEFT INDEX PAD {name} 1")
+        found = scene.attempts[-1]
+        assert found.status == "CONVERGED"
+        assert found.values["facet"] == 1
+        assert "beside the facet" not in found.message
+    run("AUTO_F_1 3 LEFT INDEX PAD p5 NEAREST")
+    assert scene.attempts[-1].values["facet"] == 1

@@ -14,7 +14,7 @@ from warpjld.errors import InputError
 from warpjld.motion import Motion
 from warpjld.rotations import rotate
 from warpjld.skeleton import CHANNELS, Skeleton, poses_from_angles, rest_poses
-from warpjld.skeleton.initial import bent_limbs, check_initial, with_initial
+from warpjld.skeleton.initial import bent_as_before, bent_limbs, check_initial, with_initial
 
 ANGLES = st.lists(st.floats(-1.2, 1.2), min_size=12, max_size=12).map(lambda x: np.array(x).reshape(3, 4))
 
@@ -85,3 +85,13 @@ def test_beyond_the_limits_is_refused() -> None:
     with pytest.raises(InputError, match=r"'left.elbow': initial flexion 160° is beyond its limits, 0° to 150°"):
         with_initial(arm(20.0), {1: {"flexion": np.radians(160.0)}})
     check_initial(arm(20.0))
+
+
+def test_moved_axes_and_joints_take_derived_angles_anew() -> None:
+    bent, _ = with_initial(arm(20.0), {})
+    tilted = bent.with_axes(np.tile([0.0, -1.0, 0.5], (3, 1)))
+    again = bent_as_before(bent, tilted)
+    assert np.degrees(again.initial[1, 0]) != pytest.approx(20.0, abs=0.1)
+    assert again.initial[1, 0] == bent_limbs(tilted)[1]
+    stated, _ = with_initial(arm(20.0), {1: {"flexion": 0.3}})
+    assert bent_as_before(stated, replace(stated, axes=tilted.axes)).initial[1, 0] == 0.3

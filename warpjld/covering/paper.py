@@ -7,6 +7,7 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
+import scipy.sparse as sp
 from numpy.typing import ArrayLike, NDArray
 from scipy.spatial.transform import Rotation
 
@@ -73,7 +74,8 @@ class PaperCovering(Covering):
     def places(self) -> PaperPlaces:
         """Where the vertices lie on their segment or palm pair, and in which area."""
         where = (self.surface.vertices, self.skeleton, self.fans, self.domains, self.parameters)
-        return paper_places(*where, self.anchors.rigid)
+        found = paper_places(*where, self.anchors.rigid)
+        return found if self.following is None else found.taken_from(_followed(self.following.follow))
 
     def points(self, poses: Poses, vertices: ArrayLike, *, device: str = "cpu") -> NDArray[np.float32]:
         """Final positions of chosen vertices only [m], shape (F, n, 3) (R74)."""
@@ -144,6 +146,17 @@ class PaperCovering(Covering):
             device=device,
         )
         return [places, parameters, *outputs]
+
+
+def _followed(follow: sp.csr_array) -> NDArray[np.int64]:
+    """The vertex whose place each vertex takes, shape (V,): of those it follows the one that counts most, the first of
+    several; its own where it follows none."""
+    out = np.arange(follow.shape[0])
+    # as rounded: of barycentric weights, no processor's last digits are to choose
+    order = np.lexsort((follow.indices, -follow.data.round(6), np.repeat(out, np.diff(follow.indptr))))
+    some = np.diff(follow.indptr) > 0
+    out[some] = follow.indices[order][follow.indptr[:-1][some]]
+    return out
 
 
 @dataclass(frozen=True, eq=False)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -40,6 +40,13 @@ class PaperPlaces:
     between: NDArray[np.bool_]
     external: NDArray[np.bool_]
     rigid: NDArray[np.int32]
+
+    def taken_from(self, vertex: NDArray[np.int64]) -> PaperPlaces:
+        """Places where every vertex moves as another does, shape (V,), for shells that lie on the skin and borders that
+        are one (R18); what is rigid keeps its own."""
+        chosen = np.where((self.rigid >= 0) | (self.rigid[vertex] >= 0), np.arange(len(vertex)), vertex)
+        moved = {name: getattr(self, name)[chosen] for name in ("segment", "ratio", "across", "between", "external")}
+        return replace(self, **moved)
 
 
 def paper_places(

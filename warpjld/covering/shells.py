@@ -38,7 +38,8 @@ class Shells:
         label: Shell of every vertex, shape (V,), numbered from 0; vertices without a face are shells of their own.
         host: Whether a shell is flesh around segments, shape (N,).
         lies: Whether a shell follows a host, shape (N,): neither host nor rigid nor without faces.
-        whole: Whether a lying shell is small against what it lies on and follows as one, shape (N,). All rows of
+        whole: Whether a lying shell is small against what it lies on, with no border vertex on it, and follows as one,
+            shape (N,). All rows of
             ``follow`` of such a shell are equal: with equal positions and rotations, and no rounding or muscle, it
             moves rigidly.
         follow: Sparse (V, V), rows non-negative and summing to one: fields X of the hosts make ``follow @ X`` those of
@@ -225,6 +226,9 @@ def _follow(
     reach = np.zeros(number)
     np.maximum.at(reach, of, np.linalg.norm(vertices[some] - middle[of], axis=1))
     whole = lies & (reach <= _SMALL * (mean @ thick) / size)
+    # whose border is sewn to the skin bends with it, or it would tear off
+    sewn = border[some] & (apart < _SEAM * float(np.linalg.norm(np.ptp(vertices[faces.ravel()], axis=0))))
+    whole[of[sewn]] = False
 
     rows = sp.csr_array((weights.ravel(), on[face].ravel(), np.arange(len(some) + 1) * 3), shape=(len(some), count))
     # one row of a small shell for all of it: mean of a few of its vertices far apart, each for those around it

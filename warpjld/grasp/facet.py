@@ -38,7 +38,7 @@ def facet_distance(points: ArrayLike, thing: GraspObject, facet: int, place: Pla
     Args:
         points: On the stage [m], shape (n, 3) or (sets, n, 3).
         thing: The object.
-        facet: Row of its faces.
+        facet: Row of its faces; ``thing.triangles_of`` leads there from the file's facet.
         place: One placement; the object's own if left out.
 
     Raises:

@@ -44,7 +44,8 @@ class Found:
             it the other way; the closest approach where there is no contact.
         angles: Flexion of the joints there [rad], shape (N, 4); for a single joint the first column.
         distance: Signed distance there [m], shape (N,): the true residual is this less the distance asked for.
-        facet: Facet touched or nearest, shape (N,).
+        facet: Triangle touched or nearest, a row of the object's faces, shape (N,); ``thing.facet_of`` has the file's
+            own number.
         inside: Whether the foot of the perpendicular lies in the facet (C19), shape (N,); true for ``NEAREST``.
         point: Nearest point in the object's frame, or the place in the chosen facet's basis [m], shape (N, 3).
         evaluations: Mappings of the vertex, shape (N,).

@@ -26,7 +26,7 @@ class Intersection:
     """What of a part lies inside an object.
 
     Attributes:
-        vertices: Vertices inside, shape (n,).
+        vertices: Vertices inside, rows of the surface's, shape (n,); ``surface.numbers`` has the file's own.
         depths: How deep [m], positive, shape (n,).
         volume: Common volume [m³]: the midpoint rule on a grid over the overlap, cells at either surface counted by
             the share that a plane at their signed distance cuts off, Σ h³ c(d_hand) c(d_object) with

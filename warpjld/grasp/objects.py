@@ -201,7 +201,9 @@ def make_object(
         GraspObject('wedge': 4 facets, 0.05 × 0.05 × 0.05 m)
     """
     try:
-        surface = weld_surface(vertices, faces, parts=parts, polygons=polygons)
+        # pieces stay as they are: where three borders meet, one surface would not be manifold
+        apart = np.zeros(len(np.asarray(vertices)), dtype=bool)
+        surface = weld_surface(vertices, faces, parts=parts, polygons=polygons, joins=apart)
         mended = mend(surface.vertices, surface.faces)
     except InputError as error:
         raise InputError(f"object {name}: {error.message}", path=error.path) from None

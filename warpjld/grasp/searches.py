@@ -27,12 +27,13 @@ class Searches:
     """What to search for; every field is one value or one for each of N searches.
 
     Attributes:
-        vertex: Vertex of the surface that is to touch.
+        vertex: Vertex of the surface that is to touch, a row; ``surface.weld`` leads there from the file's number.
         joint: Joint that bends; or, shape (N, up to 4), joints that bend together, each beyond the one before.
         frame: Pose it starts from.
         covering: Parameter set.
         thing: Object.
-        facet: Facet of the object whose plane is to be touched (R73), or ``NEAREST``.
+        facet: Triangle of the object whose plane is to be touched (R73), or ``NEAREST``; ``thing.triangles_of`` leads
+            there from the file's facet.
         distance: Distance to stop at [m] (the paper's DIST).
         place: Row of the places given with the search.
         rate: Turn of each joint for a closing of one; 1 bends, -1 stretches. Shape (N, up to 4) for several joints.

@@ -79,6 +79,7 @@ def _assemble(
         corner_uv=source.corner_uv,
         parts=source.parts,
         polygons=source.polygons,
+        joins=None if source.rigid is None else source.rigid < 0,
     )
     painted = None
     if source.joints is not None and source.weights is not None:
@@ -113,7 +114,7 @@ def _assemble(
         owner=_movers(source, found),
         placing=source.placing,
         rigid=rigid,
-        notes=(*source.notes, *found.notes, *bent, *_bare(bare, skin), *rigid_notes),
+        notes=(*source.notes, *_joined(surface), *found.notes, *bent, *_bare(bare, skin), *rigid_notes),
         suspicious=(*source.suspicious, *found.suspicious),
     )
 
@@ -173,6 +174,13 @@ def _bare(count: int, skin: Skin | None) -> tuple[str, ...]:
     if skin is None and count:
         return ("no vertex has any painted weight: the weights were left out",)
     return (f"{count} vertices without painted weight take their neighbours'",) if count else ()
+
+
+def _joined(surface: Surface) -> tuple[str, ...]:
+    """What is said of meshes whose borders are one."""
+    own = sum(len(np.unique(surface.weld[part.vertices])) for part in surface.parts)
+    shared = own - len(surface.vertices)
+    return (f"meshes joined where their borders coincide, at {shared} vertices",) if shared > 0 else ()
 
 
 def _rigid(source: SourceRig, owner: NDArray[np.int64], surface: Surface) -> NDArray[np.int32] | None:

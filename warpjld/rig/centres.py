@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from warpjld.rig import Rig
 from warpjld.rotations import unit
+from warpjld.skeleton.initial import bent_as_before
 from warpjld.skeleton.recognise.placing import in_trunk
 from warpjld.skeleton.recognise.section import cross_section, nearby
 from warpjld.skeleton.tree import Skeleton
@@ -109,4 +110,5 @@ def with_centred_joints(rig: Rig) -> Rig:
     notes = tuple(
         f"{found.name} is moved by {1e3 * found.distance:.1f} mm to the middle of its flesh" for found in moved
     )
-    return replace(rig, skeleton=replace(rig.skeleton, rest=rest), notes=(*rig.notes, *notes))
+    skeleton = bent_as_before(rig.skeleton, replace(rig.skeleton, rest=rest))
+    return replace(rig, skeleton=skeleton, notes=(*rig.notes, *notes))

@@ -18,7 +18,7 @@ from warpjld.rotations import unit
 from warpjld.skeleton.channels import CHANNELS
 from warpjld.skeleton.tree import Skeleton
 
-__all__ = ["bent_limbs", "check_initial", "with_initial"]
+__all__ = ["bent_as_before", "bent_limbs", "check_initial", "with_initial"]
 
 _HINGES = {"elbow": ("shoulder", "wrist"), "knee": ("hip", "ankle")}
 _PLAIN = np.radians(1.0)
@@ -72,6 +72,18 @@ def bent_limbs(skeleton: Skeleton) -> dict[int, float]:
         if angle > _PLAIN:
             out[joint] = angle
     return out
+
+
+def bent_as_before(before: Skeleton, after: Skeleton) -> Skeleton:
+    """A skeleton whose joints or axes were moved, with the initial angles that follow from where joints are taken anew;
+    those that were stated stay."""
+    old, new = bent_limbs(before), bent_limbs(after)
+    initial, limits = after.initial.copy(), after.limits.copy()
+    for joint, angle in old.items():
+        if before.initial[joint, _FLEXION] == angle:
+            initial[joint, _FLEXION] = new.get(joint, 0.0)
+            limits[joint, _FLEXION, 1] = max(limits[joint, _FLEXION, 1], new.get(joint, 0.0))
+    return replace(after, initial=initial, limits=limits)
 
 
 def check_initial(skeleton: Skeleton) -> None:

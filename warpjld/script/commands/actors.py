@@ -15,7 +15,7 @@ from warpjld.script.keys import SIDES, read_joint
 from warpjld.script.registry import command
 from warpjld.script.scene import Scene
 from warpjld.skeleton import CHANNELS
-from warpjld.skeleton.initial import check_initial
+from warpjld.skeleton.initial import bent_as_before, check_initial
 from warpjld.skeleton.tree import ALONG
 
 if TYPE_CHECKING:
@@ -159,7 +159,7 @@ def axis(scene: Scene, arguments: Arguments) -> None:
         )
     axes = chosen.skeleton.axes.copy()
     axes[joint] = vector
-    chosen.skeleton = chosen.skeleton.with_axes(axes)
+    chosen.skeleton = bent_as_before(chosen.skeleton, chosen.skeleton.with_axes(axes))
 
 
 @command(

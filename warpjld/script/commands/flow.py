@@ -52,7 +52,7 @@ def print_(scene: Scene, arguments: Arguments) -> None:
         "SHOW VALUES <frame>, SHOW <WIREFRAME/SHADED> <frame>, SHOW DISTANCE <frame> <hand vertex> <object> <facet>, "
         "SHOW INTERSECTION <frame> <segment> <object> or SHOW <ACTORS/JOINTS/PARAMETERS/OUTPUTS>"
     ),
-    help="Values or a picture of a frame, a vertex beside a facet, what of a segment is in an object, what there is.",
+    help="Values or a picture of a frame, a vertex beside a facet, a segment in an object, or what is on stage.",
     group="Flow",
 )
 def show_(scene: Scene, arguments: Arguments) -> None:
