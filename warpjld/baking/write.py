@@ -47,7 +47,7 @@ def check_baked(path: Path) -> None:
 def write_baked(path: Path, baked: Baked, clip: Poses | None = None, *, rate: float = 30.0) -> WrittenMotion:
     """Write a baked rig; with a clip also its joints and the shapes' weights over time.
 
-    What drives the shapes goes to a JSON file beside it (``drivers_file``), which docs/reference/baked-files.md describes.
+    What drives the shapes goes to a JSON file beside it (``drivers_file``): see docs/reference/baked-files.md.
 
     Args:
         path: The file, ``.glb`` or ``.usd``, ``.usda``, ``.usdc``.
