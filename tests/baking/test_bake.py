@@ -100,7 +100,7 @@ def test_usd_skins_as_the_model_does(baked: Baked, tmp_path: Path) -> None:
 
 
 def test_drivers_in_json_give_the_weights_in_the_clip(baked: Baked, tmp_path: Path) -> None:
-    """As docs/reference/baked-files.md says, from joint rotations alone, beside the weights that animate the GLB."""
+    """Read as docs/reference/baked-files.md says, from joint rotations alone, beside the weights in the GLB."""
     import pygltflib
 
     poses = unseen_poses(baked.rig.skeleton).poses
