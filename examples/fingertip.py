@@ -19,13 +19,12 @@ from types import SimpleNamespace
 
 import numpy as np
 
-from warpjld.fem import Body, prescribe
+import warpjld as wj
 from warpjld.fem.contact import Pair, press
 from warpjld.fem.contact.obstacles.solids import Plane
 from warpjld.fem.hand import hand_laws
 from warpjld.fem.hand.fingertip import Fingertip, build_fingertip
 from warpjld.fem.output.vtk import grid_of
-from warpjld.hand import build_hand
 
 ENOUGH = 5.0  # N
 STEP = 0.25e-3  # m
@@ -34,7 +33,7 @@ MEASURED = ((1.5e-3, 2.0e-3), 1.0, 3.5e3)  # displacement [m] at a force [N], an
 
 def pressed(tip: Fingertip, tilt: float, **law: float) -> list[SimpleNamespace]:
     """Push a plate into a fingertip until ``ENOUGH`` newtons; every instant's displacement, force, area and peak."""
-    body = Body(tip.mesh, hand_laws(tip.mesh.region_names, **law))
+    body = wj.fem.Body(tip.mesh, hand_laws(tip.mesh.region_names, **law))
     out = tip.facing(tilt)
     first = tip.mesh.nodes[int(np.argmax(tip.mesh.nodes @ out))]
     # time is the way of the plate in metres
@@ -42,7 +41,7 @@ def pressed(tip: Fingertip, tilt: float, **law: float) -> list[SimpleNamespace]:
     steps = STEP * np.arange(1, 21)
     found = press(
         body,
-        prescribe(tip.mesh, "held", x=0.0, y=0.0, z=0.0),
+        wj.fem.prescribe(tip.mesh, "held", x=0.0, y=0.0, z=0.0),
         [Pair("tip", plate, name="plate")],
         times=list(steps),
         watch=lambda instant: "enough" if instant.touches[0].normal_force > ENOUGH else None,
@@ -123,7 +122,7 @@ def plot(path: Path, curves: dict[str, list[SimpleNamespace]]) -> None:
 def main(folder: Path, spacing: float, tilt: float) -> dict[str, float]:
     """Write the results into a folder; displacement at 1 N [m], stiffness from there to 5 N [N/m], areas [m²]."""
     started = time.perf_counter()
-    tip = build_fingertip(build_hand("left"), "index", spacing)
+    tip = build_fingertip(wj.build_hand("left"), "index", spacing)
     curves = {}
     for name, law in (
         ("Fung β = 3; pulp 34 kPa, skin 80 kPa, ν .48", {}),

@@ -11,8 +11,7 @@ from pathlib import Path
 
 import numpy as np
 
-from warpjld.cli.rig_argument import open_rig
-from warpjld.fem import Body, LinearElastic, Loads, solve
+import warpjld as wj
 from warpjld.fem.flesh import flesh_of
 from warpjld.fem.output.pictures import draw
 from warpjld.fem.output.vtk import write_vtu
@@ -20,16 +19,16 @@ from warpjld.fem.output.vtk import write_vtu
 
 def main(rig_name: str, folder: Path, spacing: float) -> float:
     """Write the results into a folder and return the largest displacement of the skin [m]."""
-    rig = open_rig(rig_name)
+    rig = wj.build_hand("left") if rig_name == "builtin:left" else wj.load_rig(rig_name)
     started = time.perf_counter()
     flesh = flesh_of(rig, spacing)
     meshed = time.perf_counter()
     laws = {
-        "flesh": LinearElastic(young=60e3, poisson=0.48, density=1050.0),
-        "bone": LinearElastic(young=17e9, poisson=0.3, density=1900.0),
+        "flesh": wj.fem.LinearElastic(young=60e3, poisson=0.48, density=1050.0),
+        "bone": wj.fem.LinearElastic(young=17e9, poisson=0.3, density=1900.0),
     }
-    body = Body(flesh.mesh, laws)
-    found = solve(body, flesh.held(), Loads(gravity=(0.0, 0.0, -9.81)))
+    body = wj.fem.Body(flesh.mesh, laws)
+    found = wj.fem.solve(body, flesh.held(), wj.fem.Loads(gravity=(0.0, 0.0, -9.81)))
     solved = time.perf_counter()
 
     sag = flesh.skin.carry(found.displacement)

@@ -13,7 +13,7 @@ from pathlib import Path
 
 import numpy as np
 
-from warpjld.fem import Body, LinearElastic, Prescribed, box_hexes, merge, prescribe
+import warpjld as wj
 from warpjld.fem.contact import Pair
 from warpjld.fem.hand import hand_laws
 from warpjld.simulation.grip.hold import PrescribedTrials
@@ -29,18 +29,18 @@ GRAVITY = 9.81
 def pads_and_block(weight: float, friction: float) -> PrescribedTrials:
     """Two soft pads on rigid backs touch a block from both sides; a grip is the way [m] by which each back closes."""
     half = 0.5 * EDGE
-    block = box_hexes((EDGE, EDGE, EDGE), (3, 3, 3), origin=(-half, -half, -half), name="block")
+    block = wj.fem.box_hexes((EDGE, EDGE, EDGE), (3, 3, 3), origin=(-half, -half, -half), name="block")
     parts = [replace(block, faces={f"block.{side}": faces for side, faces in block.faces.items()})]
     for name, start, skin, back in (("left", -half - PAD[0], "x+", "x-"), ("right", half, "x-", "x+")):
-        pad = box_hexes(PAD, (2, 4, 4), origin=(start, -0.5 * PAD[1], -0.5 * PAD[2]), name=f"{name}.flesh")
+        pad = wj.fem.box_hexes(PAD, (2, 4, 4), origin=(start, -0.5 * PAD[1], -0.5 * PAD[2]), name=f"{name}.flesh")
         parts.append(replace(pad, faces={f"pad.{name}": pad.faces[skin], f"{name}.back": pad.faces[back]}))
-    mesh = merge(*parts)
-    stuff = LinearElastic(1e6, 0.3, density=weight / GRAVITY / EDGE**3)
-    body = Body(mesh, {"block": stuff} | hand_laws(mesh.region_names, poisson=0.3))
+    mesh = wj.fem.merge(*parts)
+    stuff = wj.fem.LinearElastic(1e6, 0.3, density=weight / GRAVITY / EDGE**3)
+    body = wj.fem.Body(mesh, {"block": stuff} | hand_laws(mesh.region_names, poisson=0.3))
 
-    def closed(way: float) -> Prescribed:
-        left = prescribe(mesh, "left.back", x=way, y=0.0, z=0.0)
-        return left + prescribe(mesh, "right.back", x=-way, y=0.0, z=0.0)
+    def closed(way: float) -> wj.fem.Prescribed:
+        left = wj.fem.prescribe(mesh, "left.back", x=way, y=0.0, z=0.0)
+        return left + wj.fem.prescribe(mesh, "right.back", x=-way, y=0.0, z=0.0)
 
     pads = [
         Pair("pad.left", "block.x-", friction=friction, name="pad.left"),

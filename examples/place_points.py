@@ -30,4 +30,4 @@ def main(folder: Path) -> float:
 
 
 if __name__ == "__main__":
-    print(f"{main(Path(sys.argv[1] if len(sys.argv) > 1 else 'out')):.1f} mm from the joints on the average")
+    print(f"{main(Path(sys.argv[1] if len(sys.argv) > 1 else '.')):.1f} mm from the joints on the average")

@@ -12,8 +12,6 @@ from importlib import import_module
 
 TYPE_CHECKING = False  # as type checkers know it; importing typing takes longer than all else here
 if TYPE_CHECKING:
-    from typing import Any
-
     from warpjld import fem, render
     from warpjld.baking import bake, write_baked
     from warpjld.batch.deform_file import deform_file
@@ -163,16 +161,18 @@ __all__ = [
 ]
 
 
-def __getattr__(name: str) -> Any:
-    if name in _MODULES:
-        found: Any = import_module(f"warpjld.{_MODULES[name]}")
-    elif name in _WHERE:
-        module, _, other = _WHERE[name].partition(":")
-        found = getattr(import_module(f"warpjld.{module}"), other or name)
-    else:
-        raise AttributeError(f"module 'warpjld' has no attribute '{name}'")
-    globals()[name] = found  # from now on it is an attribute like any other
-    return found
+if not TYPE_CHECKING:  # to a type checker a name that is not listed is an error
+
+    def __getattr__(name: str) -> object:
+        if name in _MODULES:
+            found = import_module(f"warpjld.{_MODULES[name]}")
+        elif name in _WHERE:
+            module, _, other = _WHERE[name].partition(":")
+            found = getattr(import_module(f"warpjld.{module}"), other or name)
+        else:
+            raise AttributeError(f"module 'warpjld' has no attribute '{name}'")
+        globals()[name] = found  # from now on it is an attribute like any other
+        return found
 
 
 def __dir__() -> list[str]:

@@ -101,5 +101,7 @@ def test_the_process_ends_with_all_that_was_printed_and_registered() -> None:
     for arguments, code in ((["--version"], 0), (["deform"], 2), (["inspect", "no such file.glb"], 1)):
         done = subprocess.run([sys.executable, "-c", script, *arguments], capture_output=True, text=True)
         assert done.returncode == code, done.stderr
-        assert done.stdout.splitlines()[-2:] == ["thread", "registered"]
+        lines = done.stdout.splitlines()
+        assert "thread" in lines  # on a slow machine before what the command prints
+        assert lines[-1] == "registered"
         assert "Traceback" not in done.stderr

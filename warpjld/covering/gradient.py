@@ -115,7 +115,7 @@ class Differentiable:
         result: NDArray[np.float32] = points.numpy().copy()
         return result
 
-    def backward(self, adjoint: NDArray) -> Gradients:
+    def backward(self, adjoint: NDArray[np.floating]) -> Gradients:
         """Derivatives of Σ adjoint · positions at the last :meth:`forward`.
 
         Args:

@@ -85,11 +85,17 @@ def bind_rig(
     domains: Literal["geometry", "skin"] = "geometry",
     method: Literal["smooth", "paper"] = "smooth",
 ) -> Covering:
-    """Bind a rig with all that it knows: its painted weights, and what of it is rigid. Arguments as of :func:`bind`.
+    """Bind a rig's surface to its skeleton (A §4), with what the rig knows: its painted weights, what of it is rigid.
 
     Args:
         rig: The rig.
         skeleton: In place of the rig's own, where limits were changed.
+        parameters: The animator's parameters; by default those that keep volume.
+        domains: "geometry" (bone heat), or "skin" for the rig's painted weights.
+        method: "smooth" (soft borders, rotations) or "paper" (its own hard-edged operators, to compare).
+
+    Raises:
+        InputError: A skeleton without segments, missing painted weights, or parameters out of range.
 
     Examples:
         >>> covering = wj.bind(wj.build_hand("left", resolution=1500))

@@ -33,7 +33,7 @@ if TYPE_CHECKING:
     group="Actors",
 )
 def hand(scene: Scene, arguments: Arguments) -> None:
-    """R7."""
+    """Bring on a hand: the built-in one, or a rig from a file. The actor is called LEFT or RIGHT unless named (R7)."""
     side: Literal["left", "right"] = "left" if arguments.choice("the side", SIDES) == "LEFT" else "right"
     if arguments.keyword("BUILTIN"):
         from warpjld.hand.kept import kept_hand
@@ -66,7 +66,7 @@ def hand(scene: Scene, arguments: Arguments) -> None:
     group="Actors",
 )
 def body(scene: Scene, arguments: Arguments) -> None:
-    """R12, R30."""
+    """Bring on a rig with any skeleton (R12, R30)."""
     if arguments.keyword("BUILTIN"):
         from warpjld.hand.figure import build_body
 
@@ -93,7 +93,7 @@ def body(scene: Scene, arguments: Arguments) -> None:
     group="Actors",
 )
 def model(scene: Scene, arguments: Arguments) -> None:
-    """R12, R17: a surface of any origin."""
+    """Bring on a bare surface with a skeleton or named points. The actor is called MODEL unless named (R12, R17)."""
     path = arguments.input_file("a surface file")
     kind = arguments.choice("SKELETON or POINTS", ("SKELETON", "POINTS")).lower()
     joints = arguments.input_file(f"a {kind} file")
@@ -109,7 +109,7 @@ def model(scene: Scene, arguments: Arguments) -> None:
     group="Actors",
 )
 def actor(scene: Scene, arguments: Arguments) -> None:
-    """R89."""
+    """Commands that follow speak to this actor where more than one could be meant (R89)."""
     scene.current = scene.actor(arguments.name("an actor's name")).name
 
 
@@ -120,7 +120,7 @@ def actor(scene: Scene, arguments: Arguments) -> None:
     group="Actors",
 )
 def motion(scene: Scene, arguments: Arguments) -> None:
-    """R110 and any recorded motion."""
+    """Drive the current actor by a motion file instead of keys, at the RATE set before (R110)."""
     from warpjld.motion import load_motion
 
     chosen = scene.actor()
@@ -145,7 +145,7 @@ def motion(scene: Scene, arguments: Arguments) -> None:
     group="Actors",
 )
 def axis(scene: Scene, arguments: Arguments) -> None:
-    """R21."""
+    """Flexion axis of a joint at rest (R21)."""
     chosen, joint = read_joint(scene, arguments)
     vector = np.array(arguments.vector("the axis"))
     if np.linalg.norm(vector) < 1e-9:
@@ -169,7 +169,7 @@ def axis(scene: Scene, arguments: Arguments) -> None:
     group="Actors",
 )
 def limit(scene: Scene, arguments: Arguments) -> None:
-    """R24, R59."""
+    """How far a joint may go, in degrees; the largest flexion also scales inflation (R24, R59)."""
     chosen, joint = read_joint(scene, arguments)
     channel = arguments.choice("the angle", [c.upper() for c in CHANNELS])
     low = arguments.number("the smallest angle", minimum=-360, maximum=360)

@@ -28,7 +28,7 @@ def _limb(scene: Scene, arguments: Arguments, joint: str, channels: Sequence[str
     group="Animation",
 )
 def shoulder(scene: Scene, arguments: Arguments) -> None:
-    """R79."""
+    """Shoulder angle at key1, key1 + step, … up to key2 (R79)."""
     _limb(scene, arguments, "shoulder", ("FLEXION", "PIVOT", "TWISTING", "ABDUCTION"))
 
 
@@ -39,7 +39,7 @@ def shoulder(scene: Scene, arguments: Arguments) -> None:
     group="Animation",
 )
 def elbow(scene: Scene, arguments: Arguments) -> None:
-    """R80."""
+    """Elbow angle (R80)."""
     _limb(scene, arguments, "elbow", ("FLEXION", "TWISTING"))
 
 
@@ -50,7 +50,7 @@ def elbow(scene: Scene, arguments: Arguments) -> None:
     group="Animation",
 )
 def wrist(scene: Scene, arguments: Arguments) -> None:
-    """R81."""
+    """Wrist angle (R81)."""
     _limb(scene, arguments, "wrist", ("FLEXION", "PIVOT", "ABDUCTION"))
 
 
@@ -61,7 +61,7 @@ def wrist(scene: Scene, arguments: Arguments) -> None:
     group="Animation",
 )
 def metacarpus(scene: Scene, arguments: Arguments) -> None:
-    """R82: joints 1 and 2."""
+    """Flexion of the ring's and the pinky's metacarpals, 0 to 20 degrees: hollows the palm (R82)."""
     (side,) = arguments.choices(SIDES)
     joints = [f"{side}.ring.carpometacarpal", f"{side}.pinky.carpometacarpal"]
     set_keys(scene.actor_with(side), joints, "FLEXION", scene.spline, arguments)
@@ -74,7 +74,7 @@ def metacarpus(scene: Scene, arguments: Arguments) -> None:
     group="Animation",
 )
 def finger1(scene: Scene, arguments: Arguments) -> None:
-    """R83."""
+    """Angle at the base of a finger. PIVOT turns the axis of flexion; ABDUCTION spreads the finger (R83)."""
     side, finger, channel = arguments.choices(SIDES, FINGERS, ("FLEXION", "PIVOT", "ABDUCTION"))
     set_keys(scene.actor_with(side), [f"{side}.{finger}.base"], channel, scene.spline, arguments)
 
@@ -86,7 +86,7 @@ def finger1(scene: Scene, arguments: Arguments) -> None:
     group="Animation",
 )
 def finger23(scene: Scene, arguments: Arguments) -> None:
-    """R84."""
+    """Flexion of a finger's second or third joint (R84)."""
     side, finger, knuckle = arguments.choices(SIDES, FINGERS, ("KNUCKLES2", "KNUCKLES3"))
     joint = f"{side}.{finger}.{knuckle.replace('KNUCKLES', 'knuckle')}"
     set_keys(scene.actor_with(side), [joint], "FLEXION", scene.spline, arguments)
@@ -99,7 +99,7 @@ def finger23(scene: Scene, arguments: Arguments) -> None:
     group="Animation",
 )
 def joint_(scene: Scene, arguments: Arguments) -> None:
-    """R10–R12: joints the printed commands do not reach."""
+    """Angle of any joint, by name (left.index.base) or, for the current actor, by number (R10–R12)."""
     actor, joint = read_joint(scene, arguments)
     channel = arguments.choice("the angle", [c.upper() for c in CHANNELS])
     set_keys(actor, [actor.skeleton.names[joint]], channel, scene.spline, arguments)
@@ -112,7 +112,7 @@ def joint_(scene: Scene, arguments: Arguments) -> None:
     group="Animation",
 )
 def move(scene: Scene, arguments: Arguments) -> None:
-    """R89: actors in a director's script."""
+    """Displacement of an actor or an object from its rest place at a key, in metres (R89)."""
     placement = scene.placement(arguments.name("an actor's or an object's name"))
     key = arguments.number("the key (a frame)")
     for axis, value in zip("xyz", arguments.vector("the displacement's"), strict=True):
@@ -126,7 +126,7 @@ def move(scene: Scene, arguments: Arguments) -> None:
     group="Animation",
 )
 def turn(scene: Scene, arguments: Arguments) -> None:
-    """R89."""
+    """Rotation of an actor about its root, an object about its origin, at a key (R89)."""
     placement = scene.placement(arguments.name("an actor's or an object's name"))
     key = arguments.number("the key (a frame)")
     for axis, value in zip("xyz", arguments.vector("the rotation about"), strict=True):
@@ -140,7 +140,7 @@ def turn(scene: Scene, arguments: Arguments) -> None:
     group="Animation",
 )
 def spline(scene: Scene, arguments: Arguments) -> None:
-    """R3."""
+    """Kochanek–Bartels constants, −1 to 1, of the keys set from here on; 0 0 0 at first (R3)."""
     tension = arguments.number("the tension", minimum=-1, maximum=1)
     if not arguments:
         scene.spline = SplineConstants(tension)
@@ -156,7 +156,7 @@ def spline(scene: Scene, arguments: Arguments) -> None:
     group="Animation",
 )
 def frames(scene: Scene, arguments: Arguments) -> None:
-    """R4."""
+    """Frames to make, both included; without it, from the first key to the last (R4)."""
     first = arguments.integer("the first frame")
     last = arguments.integer("the last frame")
     if last < first:
@@ -166,5 +166,5 @@ def frames(scene: Scene, arguments: Arguments) -> None:
 
 @command("RATE", syntax="RATE <frames a second>", help="Frames a second; 30 at first.", group="Animation")
 def rate(scene: Scene, arguments: Arguments) -> None:
-    """R2."""
+    """Frames a second; 30 at first (R2)."""
     scene.rate = arguments.number("the rate in frames a second", above=0, maximum=1000)

@@ -19,7 +19,7 @@ from warpjld.script.scene import Scene
     group="Covering",
 )
 def parameter(scene: Scene, arguments: Arguments) -> None:
-    """R22, R65."""
+    """A parameter of a joint; PROXIMITY and EXPONENTS take two values (R22, R65)."""
     side = arguments.keyword(*SIDES)
     if arguments.keyword("ALL"):
         actor = scene.actor_with(side) if side else scene.actor()
@@ -48,7 +48,7 @@ def parameter(scene: Scene, arguments: Arguments) -> None:
     group="Covering",
 )
 def parameters(scene: Scene, arguments: Arguments) -> None:
-    """R23."""
+    """All parameters of the current actor from a file, as warpjld calibrate writes it (R23)."""
     from warpjld.covering.parameters import load_parameters
 
     actor = scene.actor()
@@ -63,7 +63,7 @@ def parameters(scene: Scene, arguments: Arguments) -> None:
     group="Covering",
 )
 def method(scene: Scene, arguments: Arguments) -> None:
-    """R16."""
+    """Covering of the current actor: soft domain borders, or one segment per vertex as published (R16)."""
     actor = scene.actor()
     chosen = arguments.choice("the method", ("SMOOTH", "PAPER"))
     actor.method = "paper" if chosen == "PAPER" else "smooth"
@@ -76,7 +76,7 @@ def method(scene: Scene, arguments: Arguments) -> None:
     group="Covering",
 )
 def domains(scene: Scene, arguments: Arguments) -> None:
-    """R16."""
+    """Where the current actor's domains come from: its shape alone, or the rig's painted weights (R16)."""
     actor = scene.actor()
     chosen = arguments.choice("the source of domains", ("GEOMETRY", "SKIN"))
     if chosen == "SKIN" and actor.rig.skin is None:

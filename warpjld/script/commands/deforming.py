@@ -29,7 +29,7 @@ _SOME = ("X", "Y", "Z", "XY", "XZ", "YZ")
     group="Contact",
 )
 def points(scene: Scene, arguments: Arguments) -> None:
-    """R128."""
+    """A name for points of a physical object (R128)."""
     prop = read_object(scene, arguments)
     if prop.name not in scene.contact.physical:
         raise arguments.error(f"{prop.name} is not physical: make it so with PHYSICAL {prop.name}")
@@ -54,7 +54,7 @@ def points(scene: Scene, arguments: Arguments) -> None:
     group="Contact",
 )
 def vector(scene: Scene, arguments: Arguments) -> None:
-    """R128: three degrees of freedom prescribed."""
+    """Displacement of object points in all directions at key1, key1 + step, … up to key2 [m] (R128)."""
     state = _state(scene, arguments)
     keys, first = arguments.keys_and_value("the displacement's x")
     values = (first, arguments.number("the displacement's y"), arguments.number("the displacement's z"))
@@ -69,7 +69,7 @@ def vector(scene: Scene, arguments: Arguments) -> None:
     group="Contact",
 )
 def partial(scene: Scene, arguments: Arguments) -> None:
-    """R128: fewer than three degrees of freedom prescribed."""
+    """Displacement of object points along one or two axes only [m]; they stay free along the others (R128)."""
     state = _state(scene, arguments)
     axes = arguments.choice("the axes", _SOME).lower()
     keys, value = arguments.keys_and_value(f"the displacement's {axes[0]}")
@@ -85,7 +85,7 @@ def partial(scene: Scene, arguments: Arguments) -> None:
     group="Contact",
 )
 def hold(scene: Scene, arguments: Arguments) -> None:
-    """R129: deformable bodies are actors."""
+    """Object points go where the object goes: MOVE, TURN, OBJECTS take them along; free after the last frame (R129)."""
     state = _state(scene, arguments)
     state.held = True
     if arguments:
@@ -99,7 +99,7 @@ def hold(scene: Scene, arguments: Arguments) -> None:
     group="Contact",
 )
 def deform(scene: Scene, arguments: Arguments) -> None:
-    """R94: Barr 1984; tapered first, then twisted, then bent."""
+    """Formulas deform an object along one of its axes, by this much from end to end (R94)."""
     prop = read_object(scene, arguments)
     if prop.name in scene.contact.physical:
         raise arguments.error(f"{prop.name} is physical: forces deform it, not formulas")

@@ -31,14 +31,14 @@ _TOPICS = (
     group="Flow",
 )
 def include(scene: Scene, arguments: Arguments) -> None:
-    """R88."""
+    """Run another script here; its name is relative to this script's folder (R88)."""
     path = arguments.input_file("a script")
     arguments.interpreter.include(path, arguments.last)
 
 
 @command("PRINT", syntax='PRINT <word, number or "text"> …', help="Write a message.", group="Flow")
 def print_(scene: Scene, arguments: Arguments) -> None:
-    """R88."""
+    """Write a message (R88)."""
     words = []
     while arguments:
         value = arguments.anything()
@@ -56,7 +56,7 @@ def print_(scene: Scene, arguments: Arguments) -> None:
     group="Flow",
 )
 def show_(scene: Scene, arguments: Arguments) -> None:
-    """R4, R5."""
+    """Values at any frame; a picture of it, whose path is printed; or what is on stage (R4, R5)."""
     topic = arguments.choice("what to show", _TOPICS)
     match topic:
         case "VALUES":
@@ -107,7 +107,7 @@ def _measure(scene: Scene, arguments: Arguments, topic: str) -> None:
 
 @command("HELP", syntax="HELP [<command>]", help="All commands, or one.", group="Flow")
 def help_(scene: Scene, arguments: Arguments) -> None:
-    """R88."""
+    """All commands, or one (R88)."""
     if not arguments:
         scene.say(show.commands(all_commands()))
         return

@@ -29,7 +29,7 @@ _AUTO = "<key> [LEFT/RIGHT] {}<hand vertex or PAD> <object> <facet or NEAREST> [
     group="Grasping",
 )
 def auto_wrist(scene: Scene, arguments: Arguments) -> None:
-    """R86."""
+    """Flexion of the wrist at a key with which a vertex of the hand touches an object (R86)."""
     key = arguments.number("the key (a frame)")
     side = read_side(scene, arguments)
     _search(scene, arguments, "AUTO_WRIST", key, side, "wrist", "middle")
@@ -42,7 +42,7 @@ def auto_wrist(scene: Scene, arguments: Arguments) -> None:
     group="Grasping",
 )
 def auto_f_1(scene: Scene, arguments: Arguments) -> None:
-    """R87."""
+    """Flexion at the base of a finger with which a vertex touches an object (R87)."""
     key = arguments.number("the key (a frame)")
     side = read_side(scene, arguments)
     finger = arguments.choice("the finger", FINGERS).lower()
@@ -56,7 +56,7 @@ def auto_f_1(scene: Scene, arguments: Arguments) -> None:
     group="Grasping",
 )
 def auto_f_2_3(scene: Scene, arguments: Arguments) -> None:
-    """R87."""
+    """Flexion of a finger's second or third joint with which a vertex touches an object (R87)."""
     key = arguments.number("the key (a frame)")
     side = read_side(scene, arguments)
     finger, knuckle = arguments.choices(FINGERS, ("KNUCKLES2", "KNUCKLES3"))
@@ -75,7 +75,7 @@ def auto_f_2_3(scene: Scene, arguments: Arguments) -> None:
     group="Grasping",
 )
 def grasp(scene: Scene, arguments: Arguments) -> None:
-    """R90."""
+    """Digits close from key1 on and touch at key2 (R90)."""
     from warpjld.script.grasping import close_digits
 
     first, last = read_frames(arguments, "at which the digits begin to close", "at which they touch")
@@ -157,7 +157,7 @@ def _leave_keys(
     group="Grasping",
 )
 def release(scene: Scene, arguments: Arguments) -> None:
-    """R69: objects are let go."""
+    """Digits closed by GRASP open again from key1 on; at key2 they are as before it (R69)."""
     first, last = read_frames(arguments, "at which the digits begin to open", "at which they are open")
     actor = scene.actor_with(read_side(scene, arguments))
     if actor.name not in scene.grips:

@@ -32,7 +32,7 @@ _MOST = 20.0
     group="Contact",
 )
 def squeeze(scene: Scene, arguments: Arguments) -> None:
-    """R112: fingers may end inside the object; contact says what comes of it. R118: or a force is reached."""
+    """Closed digits bend on into the object: each joint by up to this much, or until they press with a FORCE (R112)."""
     first, last = read_frames(arguments, "from which on the digits press", "at which they press most")
     actor = gripping_actor(scene, arguments)
     if not arguments.keyword("FORCE"):
@@ -63,7 +63,7 @@ def squeeze(scene: Scene, arguments: Arguments) -> None:
     group="Contact",
 )
 def lift(scene: Scene, arguments: Arguments) -> None:
-    """R123, R124."""
+    """Closed digits take an object's weight, as gently as holds it, half-way to key2 (R123, R124)."""
     first, last = read_frames(arguments, "from which on the digits close", "at which they hold the object")
     if last - first < 4.0:
         raise arguments.error(f"LIFT wants 4 frames or more, got {last - first:g}")
@@ -93,7 +93,7 @@ def lift(scene: Scene, arguments: Arguments) -> None:
     group="Contact",
 )
 def strength(scene: Scene, arguments: Arguments) -> None:
-    """R118."""
+    """How hard a digit can press at most; thumb 69, index and ring 59, middle 82, pinky 33 at first (R118)."""
     actor = read_actor(scene, arguments)
     digit = arguments.choice("the digit", FINGERS).lower()
     newtons = arguments.number("the force in newtons", above=0.0)

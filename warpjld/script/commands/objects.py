@@ -31,7 +31,7 @@ _SHAPES = ("BALL", "BOX", "CYLINDER", "PLATE", "GLASS")
     group="Grasping",
 )
 def object_(scene: Scene, arguments: Arguments) -> None:
-    """A §7: a list of objects."""
+    """Bring on an object (A §7)."""
     from scipy.spatial.transform import Rotation
 
     from warpjld.grasp.hand_scale import doubt_of_size, hand_length
@@ -100,7 +100,7 @@ def object_(scene: Scene, arguments: Arguments) -> None:
     group="Grasping",
 )
 def objects(scene: Scene, arguments: Arguments) -> None:
-    """R69–R72, R85, C14."""
+    """An object follows a joint from one frame to another (R69–R72, R85, C14)."""
     from warpjld.grasp.attach import Association
 
     prop = read_object(scene, arguments)

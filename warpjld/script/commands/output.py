@@ -23,7 +23,7 @@ _SHOWN = "[SHADED/WIREFRAME/PRESSURE [<actor or object> [THUMB/INDEX/MIDDLE/RING
     group="Output",
 )
 def camera(scene: Scene, arguments: Arguments) -> None:
-    """R5."""
+    """Where the pictures and films after this line are taken from [m]; FOLLOW goes along with the first actor (R5)."""
     view, position, target = None, None, None
     if arguments.keyword("FROM"):
         position = arguments.vector("the camera's")
@@ -47,7 +47,7 @@ def camera(scene: Scene, arguments: Arguments) -> None:
     group="Output",
 )
 def size(scene: Scene, arguments: Arguments) -> None:
-    """R67."""
+    """Pixels of the pictures and films; 960 by 720 at first (R67)."""
     width = arguments.integer("the width in pixels", minimum=16, maximum=4096)
     scene.size = width, arguments.integer("the height in pixels", minimum=16, maximum=4096)
 
@@ -59,7 +59,7 @@ def size(scene: Scene, arguments: Arguments) -> None:
     group="Output",
 )
 def picture(scene: Scene, arguments: Arguments) -> None:
-    """R5, R66, R67."""
+    """A picture of a frame; PRESSURE colours what touches: all, or one actor, digit or object alone (R5, R66, R67)."""
     frame = arguments.number("the frame")
     name = arguments.output_name("the picture's name", PICTURES)
     if arguments.keyword("NUMBERS"):
@@ -77,7 +77,7 @@ def picture(scene: Scene, arguments: Arguments) -> None:
     group="Output",
 )
 def film(scene: Scene, arguments: Arguments) -> None:
-    """R67."""
+    """A film of all frames (R67)."""
     name = arguments.output_name("the film's name", FILMS)
     style = _style(arguments)
     ask_for(scene, arguments, Film(name, style, scene.camera, *_only(scene, arguments, style)))
@@ -90,7 +90,7 @@ def film(scene: Scene, arguments: Arguments) -> None:
     group="Output",
 )
 def contact(scene: Scene, arguments: Arguments) -> None:
-    """R67: A Figs 14 and 15."""
+    """A contact sheet: frames side by side, as wire-frame and shaded; key frames unless listed (R67)."""
     name = arguments.output_name("the sheet's name", PICTURES)
     frames = []
     while arguments:
@@ -105,7 +105,7 @@ def contact(scene: Scene, arguments: Arguments) -> None:
     group="Output",
 )
 def export(scene: Scene, arguments: Arguments) -> None:
-    """R89: to the image synthesis part."""
+    """The animated surface of an actor; of all, each in a file of its own, if none is named (R89)."""
     name = arguments.output_name("the file's name", EXPORTS)
     actor = scene.actor(arguments.name("an actor's name")).name if arguments else None
     ask_for(scene, arguments, Export(name, actor))
@@ -118,7 +118,7 @@ def export(scene: Scene, arguments: Arguments) -> None:
     group="Output",
 )
 def export_motion(scene: Scene, arguments: Arguments) -> None:
-    """R89: to programs that move the rig themselves."""
+    """The motion of an actor on its rig's own joints; of all, each in a file of its own, if none is named (R89)."""
     name = arguments.output_name("the file's name", MOTIONS)
     actor = scene.actor(arguments.name("an actor's name")).name if arguments else None
     ask_for(scene, arguments, MotionFile(name, actor))

@@ -35,7 +35,7 @@ _LAWS = tuple(law.upper() for law in LAWS)
     group="Contact",
 )
 def physical(scene: Scene, arguments: Arguments) -> None:
-    """R92, R109, R111."""
+    """An object deforms (R92, R109, R111)."""
     prop = read_object(scene, arguments)
     where = arguments.last
     if prop.deforms:
@@ -71,7 +71,7 @@ def physical(scene: Scene, arguments: Arguments) -> None:
     group="Contact",
 )
 def flesh(scene: Scene, arguments: Arguments) -> None:
-    """R91, R105, R126."""
+    """An actor's flesh deforms, of some digits or the palm only if named (R91, R105, R126)."""
     name = arguments.name("an actor's name")
     try:
         actor = scene.actor(name)
@@ -103,7 +103,7 @@ def flesh(scene: Scene, arguments: Arguments) -> None:
     group="Contact",
 )
 def friction(scene: Scene, arguments: Arguments) -> None:
-    """R122."""
+    """Coulomb's coefficient between two, or between all others; 0.6 at first (R122)."""
     if arguments.has_number():
         scene.contact.everywhere = _coefficient(arguments)
         return
@@ -118,7 +118,7 @@ def friction(scene: Scene, arguments: Arguments) -> None:
     group="Contact",
 )
 def bond(scene: Scene, arguments: Arguments) -> None:
-    """R101, R102."""
+    """Two physical objects that touch are one, until tension or shear between them is more than this (R101, R102)."""
     names = []
     for _ in range(2):
         prop = read_object(scene, arguments)
@@ -139,7 +139,7 @@ def bond(scene: Scene, arguments: Arguments) -> None:
     group="Contact",
 )
 def gravity(scene: Scene, arguments: Arguments) -> None:
-    """R97."""
+    """Acceleration that pulls at physical objects and flesh [m/s²]; 0 0 0 at first (R97)."""
     scene.contact.gravity = arguments.vector("the acceleration's")
 
 

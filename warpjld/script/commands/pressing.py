@@ -25,7 +25,7 @@ from warpjld.simulation.specification import SolveSpecification
     group="Contact",
 )
 def press(scene: Scene, arguments: Arguments) -> None:
-    """R110, R113, R118, R120."""
+    """Solve contact at these frames (R110, R113, R118, R120)."""
     first = arguments.integer("the first frame")
     last = arguments.integer("the last frame")
     if last <= first:
@@ -65,7 +65,7 @@ def press(scene: Scene, arguments: Arguments) -> None:
     group="Output",
 )
 def table(scene: Scene, arguments: Arguments) -> None:
-    """R95, R118."""
+    """A table by frame and digit (R95, R118)."""
     ask_for(scene, arguments, Table(arguments.output_name("the table's name", TABLES)))
 
 
@@ -76,7 +76,7 @@ def table(scene: Scene, arguments: Arguments) -> None:
     group="Output",
 )
 def tactile(scene: Scene, arguments: Arguments) -> None:
-    """R95, R125."""
+    """What an actor's skin feels over time, pad by pad (R95, R125)."""
     name = arguments.output_name("the name of the table or the plot", (*TABLES, *PICTURES))
     actor = scene.actor(arguments.name("an actor's name")).name if arguments else None
     ask_for(scene, arguments, Touch(name, actor))
@@ -89,5 +89,5 @@ def tactile(scene: Scene, arguments: Arguments) -> None:
     group="Output",
 )
 def volume(scene: Scene, arguments: Arguments) -> None:
-    """R95: internal stresses."""
+    """The deformed volumes with their stresses at the frames that PRESS solves, for ParaView (R95)."""
     ask_for(scene, arguments, Volume(arguments.output_name("the series' name", VOLUMES)))

@@ -23,7 +23,7 @@ _PARTS = ("PALM", "WRIST", *FINGERS)
     group="Grasping",
 )
 def reach(scene: Scene, arguments: Arguments) -> None:
-    """R90."""
+    """An arm brings palm, wrist or a digit's pad to the near side of an object or to a point; the body stays (R90)."""
     from warpjld.script.reaching import Goal, nearest_side, reach_for
 
     first, last = read_frames(arguments, "at which the arm begins to move", "at which the hand is there")
