@@ -180,7 +180,7 @@ def test_grips_hold_their_angles_until_something_is_found(run) -> None:
         ("LIFT 0 10 LEFT ball", r"LEFT has grasped nothing"),
         ("STRENGTH LEFT INDEX 0", r"the force in newtons must be greater than 0"),
         ("STRENGTH LEFT TOE 5", r"expected the digit \(THUMB/INDEX/MIDDLE/RING/PINKY\)"),
-        ("PRESS 0 10 STOP CORRECT", r"STOP or CORRECT, not both"),
+        ("PRESS 0 10 STOP CORRECT", r"STOP, CORRECT or RIGID, not two of them"),
         ("TACTILE 'touch.txt'", r"want a name that ends in \.csv, \.parquet, \.png"),
         ("PICTURE 0 'a.png' PRESSURE moon", r"there is no actor or object MOON"),
         ("PICTURE 0 'a.png' PRESSURE left INDX", r"expected a digit .*found INDX; did you mean INDEX"),

@@ -55,7 +55,7 @@ def test_a_finger_does_not_jump_through_a_plate(run: Callable[[str], Scene], tmp
     report = run_contact(scene, tmp_path)
     assert report.solved.start == 1.0
     assert report.verdict.status != "CONVERGED"
-    assert "bones of LEFT are" in report.verdict.text
+    assert "the bone of LEFT index is" in report.verdict.text
     assert "inside PLATE" in report.verdict.text
 
 
