@@ -29,6 +29,7 @@ class Status(Enum):
     SLIDING = "slides: friction is not enough to hold it"
     UNHELD = "nothing holds it"
     BLOCKED = "bodies overlap where all that meets is prescribed"
+    PASSED = "bodies would pass through each other, or lie deep in one another, and nothing parts them"
     STOPPED = "stopped as asked"
 
 

@@ -11,11 +11,11 @@ from scipy.spatial.transform import Rotation
 from warpjld.fem.contact import Obstacle
 from warpjld.fem.contact.obstacles.facets import Facets
 from warpjld.fem.contact.obstacles.meshes import RigidMesh
+from warpjld.fem.contact.obstacles.thickness import distance_past, half_thickness
 from warpjld.grasp import Places
 from warpjld.simulation.animation import ActorAnimation, Animation
 from warpjld.simulation.bodies.free_object import settle_free_object
 from warpjld.simulation.solve.friction_closure import friction_closure
-from warpjld.simulation.solve.substeps import distance_past, half_thickness
 from warpjld.simulation.specification import ContactSpecification, FleshMaterial, SolveSpecification
 
 __all__ = ["StartFrame", "find_start"]

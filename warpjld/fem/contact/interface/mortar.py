@@ -9,7 +9,7 @@ import numpy as np
 from scipy.sparse import coo_array, csr_array
 
 from warpjld.errors import InputError
-from warpjld.fem.arrays import Array, Ints, Ints32
+from warpjld.fem.arrays import Array, Ints, Ints32, Mask
 from warpjld.fem.contact.interface.contact_points import ContactPoints
 from warpjld.fem.contact.interface.pair_filter import counted_share
 from warpjld.fem.contact.interface.pairs import Pair
@@ -132,6 +132,10 @@ class Mortar:
         if self.offset is not None:
             gap -= self.sliver_share(nodes, area[nodes])[0] * (abs(table) @ self.offset)
         return ContactPoints(nodes, table, normal, area[nodes], gap, np.zeros((len(nodes), 3)), pairs, share)
+
+    def met_by(self, label: int) -> Mask:
+        """Master facets that slave facets of a label may meet, shape (G,)."""
+        return np.asarray(self._never[label, self.labels[1]] == 0)
 
     def sliver_offset(self, sites: Ints, area: Array) -> tuple[Array, Array]:
         """What slivers seem farther off [m], and its derivative by their area [1/m], shape (m,) each."""

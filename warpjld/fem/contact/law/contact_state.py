@@ -34,6 +34,7 @@ class ContactState:
         open_before: Whether the sides were apart when the step began, shape (s,).
         slip_anchor: Slip at which friction took hold of what was apart when the step began [m], shape (s, 3): on its
             way there it slid freely.
+        touched_at: Share of the step after which what was apart when it began comes to touch, shape (s,).
         sticking: Whether friction holds it, or it slides if not, shape (s,).
         bonded: Whether the bond holds, shape (s,).
         bond_gap: Gap at which the bond was made [m], shape (s,).
@@ -46,6 +47,7 @@ class ContactState:
     pressed_for: Ints32
     open_before: Mask
     slip_anchor: Array
+    touched_at: Array
     sticking: Mask
     bonded: Mask
     bond_gap: Array
@@ -61,6 +63,7 @@ def initial_state(count: int, pair: Pair) -> ContactState:
         pressed_for=np.zeros(count, np.int32),
         open_before=np.zeros(count, dtype=bool),
         slip_anchor=np.zeros((count, 3)),
+        touched_at=np.ones(count),
         sticking=np.ones(count, dtype=bool),
         bonded=np.full(count, pair.bond is not None),
         bond_gap=np.full(count, np.nan),

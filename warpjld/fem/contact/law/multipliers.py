@@ -52,7 +52,7 @@ def update_multipliers(
     seizing = (pressed_for[at] == FRICTION_FROM) & (state.pressed_for[at] < FRICTION_FROM) & state.open_before[at]
     if seizing.any() and pair.friction > 0.0:
         anchor = anchor.copy()
-        anchor[at[seizing]] = slip[seizing]
+        anchor[at[seizing]] = state.touched_at[at[seizing], None] * slip[seizing]
     return replace(
         state, pressure=normal, friction=friction, pressed_for=pressed_for, slip_anchor=anchor, sticking=sticking
     )

@@ -18,7 +18,10 @@ from warpjld.fem.contact.results.contact_solution import ContactInstant, Contact
 from warpjld.fem.contact.results.touches import touch_of
 from warpjld.fem.contact.solver.contact_newton import ContactNewton
 from warpjld.fem.contact.solver.contact_system import LoadStep
+from warpjld.fem.contact.solver.course import Course
+from warpjld.fem.contact.solver.first_touch import first_touch, slid_unheld, touched_at
 from warpjld.fem.contact.solver.newton_state import Equilibrium
+from warpjld.fem.contact.solver.passing import Passing
 from warpjld.fem.contact.solver.unconstrained import blocked
 from warpjld.fem.load.loads import Loads
 from warpjld.fem.load.prescribed import Prescribed
@@ -31,6 +34,17 @@ _HALVINGS_UNHELD = 3
 _UNHELD = (Status.SLIDING, Status.UNHELD)
 """A body that slides away, or falls, seldom does so because the step is long."""
 _BREAKS = 100
+_CUTS = 400
+"""Steps that those asked for are cut to at most, so that contact can follow."""
+_TOUCHING = 0.01
+"""Share of a step from which on it is cut where something first touches."""
+_TOUCHES, _TOUCHES_ADRIFT = 8, 2
+"""Halvings of a step at most in which friction first takes hold of what has slid by then; the same of a body that
+nothing holds, which falls however short the step is."""
+_WHOLE = 0.95
+"""Share of a step from which on it is left whole."""
+_FAR = 2.2
+"""How far contact looks, over the overlap at a start that it is to part: what is farther off than half of it fades."""
 _PART = 0.85
 """How far along the course of the step before a first guess goes: contact stiffens what it meets."""
 
@@ -75,11 +89,15 @@ class LoadSteps:
         self.halvings = halvings
         self.penetration = penetration
         self.interfaces = interfaces_of(body.mesh, pairs, body.threads)
+        self._reaches = [interface.reach for interface in self.interfaces]
         self.moduli = [contact_modulus(body, interface) for interface in self.interfaces]
+        self.course = Course(body)
+        self.passing = Passing(body, self.interfaces)
         self.newton = ContactNewton(body, self.interfaces, self.moduli, tolerance=tolerance, penetration=penetration)
         if after is None:
             self.start = 0.0
             self.u = np.zeros(body.degrees)
+            self._look_behind()
             self.states = [self._begin(interface) for interface in self.interfaces]
         else:
             if after.last.displacement.size != body.degrees:
@@ -90,6 +108,11 @@ class LoadSteps:
         self.steps: list[int] = []
         self.correction_rate = None if after is None else after.correction_rate
         self.last_step = None if after is None else after.last_step
+
+    def _look_behind(self) -> None:
+        """Let points look as far as bodies overlap at the start, until they are parted."""
+        for k, interface in enumerate(self.interfaces):
+            interface.reach = max(interface.reach, _FAR * self.passing.depth(self.u, k))
 
     def _begin(self, interface: Interface) -> ContactState:
         """Bonds made, and the overlap noted that there is at the start."""
@@ -109,7 +132,8 @@ class LoadSteps:
         known = self.prescribed
         now = known(time) if callable(known) else known.scaled(share)
         loads = self.loads(time) if callable(self.loads) else self.loads.scaled(share)
-        allowed = max(0.0, 1.0 - (time - self.start) / (self.times[0] - self.start))
+        overlap = any(state.allowance.any() for state in self.states)
+        allowed = max(0.0, 1.0 - (time - self.start) / (self.times[0] - self.start)) if overlap else 0.0
         return LoadStep(before, time, now, loads, allowed)
 
     def run(
@@ -121,13 +145,40 @@ class LoadSteps:
         reached: list[ContactInstant] = []
         todo = list(self.times)
         newton = self.newton
-        solves, iterations = 0, 0
+        solves, iterations, cuts, touches = 0, 0, 0, 0
+        unheld: tuple[float, Array, LoadStep, Equilibrium] | None = None
         while todo:
             target = todo[0]
             newton.solves = newton.iterations = 0
             step = self._step(now, target)
             carried = self._carried(step)
+            ahead = self.course.ahead(self.u, step.prescribed) if self.guess is None else carried
+            share = self.passing.share(self.u, ahead, step.before, step.time)
+            if share < _WHOLE and cuts < _CUTS:
+                cuts += 1
+                todo.insert(0, now + share * (target - now))
+                continue
+            way = (self.body.mesh.nodes, self.u, ahead)
+            self.states = touched_at(self.interfaces, self.states, *way, step)
+            share = first_touch(self.interfaces, self.states, *way, step)
+            if _TOUCHING < share < _WHOLE and cuts < _CUTS:
+                cuts += 1
+                todo.insert(0, now + share * (target - now))
+                continue
             status, found = self._find(step, carried)
+            most = _TOUCHES_ADRIFT if self.course.adrift(step.prescribed) else _TOUCHES
+            if found is not None and touches < most and slid_unheld(self.interfaces, self.states, self.u, found):
+                touches, unheld = touches + 1, (target, carried, step, found)
+                todo.insert(0, 0.5 * (now + target))
+                continue
+            if found is None and unheld is not None:
+                # what nothing holds may find no equilibrium in a shorter step: the longer one's, then
+                target, carried, step, found = unheld
+                todo, touches, status = [time for time in todo if time >= target], most, Status.CONVERGED
+            unheld = None
+            through = "" if found is None else self._through(step, found)
+            if through:
+                status, found = Status.PASSED, None
             solves += newton.solves
             iterations += newton.iterations
             if overlap := self._blocked(step, found):
@@ -136,7 +187,7 @@ class LoadSteps:
             if found is None:
                 halvings += 1
                 if halvings > self._most_halvings(status):
-                    reason = newton.failure if status in _UNHELD else status.value
+                    reason = through or (newton.failure if status in _UNHELD else status.value)
                     message = f"no equilibrium found after time {now:.4g} (tried {target:.4g}): {reason}"
                     return self._end(status, reached, message, step)
                 tell(f"time {target:.3g}: {status.value}; halving the step")
@@ -150,13 +201,26 @@ class LoadSteps:
             halvings = max(0, halvings - 1)
             if target not in self.times:
                 continue
+            for interface, reach in zip(self.interfaces, self._reaches, strict=True):
+                interface.reach = reach  # what overlapped at the start is parted
             reached.append(self._instant(target, found, solves, iterations))
             tell(f"time {target:.3g}: {solves} solves, {iterations} iterations, residual {found.residual:.1e}")
-            solves = iterations = 0
+            solves = iterations = touches = 0
             wish = watch(reached[-1]) if watch else None
             if wish:
                 return self._end(Status.STOPPED, reached, wish, step)
         return self._end(Status.CONVERGED, reached, Status.CONVERGED.value, step)
+
+    def _through(self, step: LoadStep, found: Equilibrium) -> str:
+        """What went through what, or lies in it unseen, in words; nothing where nothing does."""
+        if step.allowed > 0.0:
+            return ""
+        pressed = [t.active for t in found.tractions]
+        if words := self.passing.unseen(found.displacement, step.time, found.points, pressed):
+            return words
+        if self.passing.went_through(self.u, found.displacement, step.before, step.time):
+            return "bodies would pass through each other"
+        return ""
 
     def _most_halvings(self, status: Status) -> int:
         usual = _HALVINGS_UNHELD if status in _UNHELD else _HALVINGS

@@ -1,0 +1,63 @@
+"""Where bodies are going in a load step, before contact has its say."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from warpjld.fem.arrays import Array, Ints
+from warpjld.fem.body import Body
+from warpjld.fem.load.prescribed import Prescribed, components, free_motions
+
+__all__ = ["Course"]
+
+
+class Course:
+    """Prescribed displacements carried on to the nodes that are free, each as the nearest prescribed one of its body.
+
+    Args:
+        body: All bodies, merged.
+    """
+
+    def __init__(self, body: Body) -> None:
+        self._nodes = body.mesh.nodes
+        self._piece = components(body)
+        self._body = body
+        self._adrift: tuple[bytes, bool] | None = None
+        self._nearest: tuple[bytes, list[tuple[Ints, Ints]]] | None = None
+
+    def adrift(self, prescribed: Prescribed) -> bool:
+        """Whether prescribed displacements leave a body free to move as a whole."""
+        key = prescribed.degrees.tobytes()
+        if self._adrift is None or self._adrift[0] != key:
+            self._adrift = (key, bool(free_motions(self._body, prescribed)))
+        return self._adrift[1]
+
+    def ahead(self, u: Array, prescribed: Prescribed) -> Array:
+        """The displacement (3N,) that prescribed ones ask for, from displacement u (3N,): what has none stays."""
+        out = u.reshape(-1, 3).copy()
+        wanted = np.zeros(u.size)
+        wanted[prescribed.degrees] = prescribed.values - u[prescribed.degrees]
+        step = wanted.reshape(-1, 3)
+        for axis, (to, nearest) in enumerate(self._table(prescribed)):
+            out[to, axis] += step[nearest, axis]
+        return out.reshape(-1)
+
+    def _table(self, prescribed: Prescribed) -> list[tuple[Ints, Ints]]:
+        """For each axis nodes, and the prescribed node that each follows."""
+        from scipy.spatial import cKDTree
+
+        key = prescribed.degrees.tobytes()
+        if self._nearest is None or self._nearest[0] != key:
+            table: list[tuple[Ints, Ints]] = []
+            for axis in range(3):
+                given = prescribed.degrees[prescribed.degrees % 3 == axis] // 3
+                to: list[Ints] = []
+                nearest: list[Ints] = []
+                for number in np.unique(self._piece[given]):
+                    mine, known = np.flatnonzero(self._piece == number), given[self._piece[given] == number]
+                    to.append(mine)
+                    nearest.append(known[cKDTree(self._nodes[known]).query(self._nodes[mine])[1]])
+                nothing: list[Ints] = [np.empty(0, np.int64)]
+                table.append((np.concatenate(to or nothing), np.concatenate(nearest or nothing)))
+            self._nearest = (key, table)
+        return self._nearest[1]

@@ -1,0 +1,240 @@
+"""Bodies that would pass through each other: steps too long for contact to follow, and nodes deep in another body.
+
+Contact looks about two edges ahead, and two behind. What goes farther in one step may begin before a surface and end
+behind it, or so deep that nothing is seen, and no force says so. Both are looked at without contact's own points: by
+distances to the whole boundary of the other body.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from warpjld.fem.arrays import Array, Ints, Ints32, Mask
+from warpjld.fem.body import Body
+from warpjld.fem.contact.interface.contact_interface import Interface
+from warpjld.fem.contact.interface.contact_points import ContactPoints
+from warpjld.fem.contact.interface.enclosure import Enclosure
+from warpjld.fem.contact.interface.mortar import Mortar
+from warpjld.fem.contact.obstacles.obstacle import Obstacle
+from warpjld.fem.contact.obstacles.thickness import half_thickness, way_past
+from warpjld.fem.load.prescribed import components
+
+__all__ = ["Passing"]
+
+_FOLLOWED = 0.75
+"""How far behind a surface a step may aim, over what contact looks ahead: farther off it fades."""
+_DEEP = 0.5
+"""Edges that an unpressed node may lie in another body: faces that do not match stand some way inside each other."""
+_LEAST = 1.0 / 64.0
+"""Least share of a step that is asked for."""
+_THINNEST = 2.5e-4
+"""Obstacles are no thinner than twice this [m]."""
+_LOOKS, _MOST_LOOKS = 4, 32
+"""Places at which the way of a step is looked at, for each part that contact could follow, and at most."""
+
+
+@dataclass(frozen=True, eq=False)
+class _Side:
+    """Nodes of one side of a pair, the typical edge there, and the body that the other side belongs to."""
+
+    interface: int
+    nodes: Ints32
+    edge: Array
+    other: Enclosure
+    opposite: Ints32
+    opposite_edge: float
+
+
+class Passing:
+    """Watches every pair that is not bonded: bodies, a body's own parts, and obstacles.
+
+    Args:
+        body: All bodies, merged.
+        interfaces: What may touch.
+    """
+
+    def __init__(self, body: Body, interfaces: Sequence[Interface]) -> None:
+        self._rest = body.mesh.nodes
+        self._interfaces = interfaces
+        self._sides: list[_Side] = []
+        self._own: list[tuple[Interface, Mortar]] = []
+        self._obstacles: list[tuple[int, Interface, Obstacle]] = []
+        between = []
+        for k, interface in enumerate(interfaces):
+            if interface.pair.bond is not None:
+                continue
+            if isinstance(interface.pair.master, Obstacle):
+                self._obstacles.append((k, interface, interface.pair.master))
+            elif interface.mortar is not None:
+                between.append((k, interface, interface.mortar))
+        if between:
+            self._sort(body, between)
+
+    def _sort(self, body: Body, between: list[tuple[int, Interface, Mortar]]) -> None:
+        """Pairs of two bodies from those of one body with itself."""
+        piece = components(body)
+        quads = np.ascontiguousarray(body.mesh.quads(body.mesh.boundary()), dtype=np.int32)
+        around: dict[tuple[int, ...], Enclosure] = {}
+
+        def enclosure(nodes: Ints32) -> Enclosure:
+            pieces = tuple(np.unique(piece[nodes]).tolist())
+            if pieces not in around:
+                around[pieces] = Enclosure(quads[np.isin(piece[quads[:, 0]], pieces)])
+            return around[pieces]
+
+        for k, interface, mortar in between:
+            if np.isin(piece[mortar.slave.nodes], piece[mortar.master.nodes]).any():
+                self._own.append((interface, mortar))
+                continue
+            for one, two in ((mortar.slave, mortar.master), (mortar.master, mortar.slave)):
+                far = enclosure(two.nodes)
+                self._sides.append(_Side(k, one.nodes, one.edge, far, two.nodes, float(np.median(two.edge))))
+
+    def share(self, u: Array, ahead: Array, before: float, time: float) -> float:
+        """Share of the way from displacement u at a time to another (3N,) at a later one that contact can follow."""
+        x, step = self._moved(u), (ahead - u).reshape(-1, 3)
+        least = 1.0
+        for side in self._sides:
+            least = min(least, self._past_body(side, x, step))
+        for interface, mortar in self._own:
+            least = min(least, _past_itself(interface, mortar, x, step))
+        for _, interface, obstacle in self._obstacles:
+            least = min(least, _past_obstacle(interface, obstacle, x, step, before, time))
+        return max(least, _LEAST)
+
+    def _past_body(self, side: _Side, x: Array, step: Array) -> float:
+        """Share of a step (N, 3) from x (N, 3) in which no node of a side goes too far past the other body."""
+        followed = _FOLLOWED * self._interfaces[side.interface].reach
+        mine, theirs = step[side.nodes], step[side.opposite]
+        # a bound on how far any of one side goes past any of the other
+        middle = 0.5 * (theirs.max(axis=0) + theirs.min(axis=0))
+        most = float(np.linalg.norm(mine - middle, axis=1).max() + np.linalg.norm(theirs - middle, axis=1).max())
+        if most <= followed or not _near(x[side.nodes], x[side.other.nodes], most):
+            return 1.0
+        side.other.move(x)
+        gap, face = side.other.ask(x[side.nodes], most)
+        near = np.flatnonzero((face >= 0) & (gap < most))
+        beside = step[side.other.quads[face[near]]].mean(axis=1)
+        return _followed(np.linalg.norm(mine[near] - beside, axis=1), gap[near], followed)
+
+    def depth(self, u: Array, k: int) -> float:
+        """How far nodes of interface k that lie inside the other body are behind its surface there [m], at most."""
+        from scipy.spatial import cKDTree
+
+        deepest, x = 0.0, self._moved(u)
+        for side in self._sides:
+            if side.interface != k:
+                continue
+            side.other.move(x)
+            inside = side.other.ask(x[side.nodes], 0.0)[0] < 0.0
+            if inside.any():
+                away = cKDTree(x[side.opposite]).query(x[side.nodes[inside]])[0]
+                deepest = max(deepest, float(away.max()))
+        return deepest
+
+    def unseen(self, u: Array, time: float, points: Sequence[ContactPoints], pressed: Sequence[Mask]) -> str:
+        """The deepest node that lies in another body with nothing that presses on it, in words; nothing if there is
+        none.
+
+        Args:
+            u: Displacement [m], shape (3N,).
+            time: Of the obstacles.
+            points: Of each interface.
+            pressed: Which of them press.
+        """
+        touched = [p.weights[np.flatnonzero(some)].indices for p, some in zip(points, pressed, strict=True)]
+        depth, k = self._deepest(u, time, touched)
+        if depth == 0.0:
+            return ""
+        title = self._interfaces[k].pair.title
+        return f"{title}: bodies lie {depth:.3g} m deep in one another, and nothing parts them"
+
+    def went_through(self, before: Array, u: Array, start: float, time: float) -> bool:
+        """Whether bodies lie deep in one another on the straight way between displacements (3N,) at two times."""
+        share = self.share(before, u, start, time)
+        count = min(int(np.ceil(_LOOKS / share)), _MOST_LOOKS) if share < 1.0 else 0
+        nothing = [np.empty(0, np.int64)] * len(self._interfaces)
+        for k in range(1, count):
+            there, moment = before + k / count * (u - before), start + k / count * (time - start)
+            if self._deepest(there, moment, nothing)[0] > 0.0:
+                return True
+        return False
+
+    def _deepest(self, u: Array, time: float, touched: Sequence[Ints]) -> tuple[float, int]:
+        """How deep an untouched node lies in another body [m], and of which interface; 0 where none does."""
+        worst, which, x = 0.0, -1, self._moved(u)
+        for side in self._sides:
+            if not _near(x[side.nodes], x[side.other.nodes], 0.0):
+                continue
+            side.other.move(x)
+            depth = -side.other.ask(x[side.nodes], 0.0)[0]
+            slack = _DEEP * np.maximum(side.edge, side.opposite_edge)
+            deepest = self._untouched(side.interface, side.nodes, depth - slack, depth, touched)
+            worst, which = max((worst, which), (deepest, side.interface))
+        for k, interface, obstacle in self._obstacles:
+            nodes = interface.slave.nodes
+            depth = -obstacle.project(x[nodes], time).distance
+            deepest = self._untouched(k, nodes, depth - _DEEP * interface.slave.edge, depth, touched)
+            worst, which = max((worst, which), (deepest, k))
+        return worst, which
+
+    def _untouched(self, k: int, nodes: Ints32, beyond: Array, depth: Array, touched: Sequence[Ints]) -> float:
+        """The greatest depth (n,) of nodes that interface k does not touch, where it is ``beyond`` (n,) what may be."""
+        offset = self._interfaces[k].pair.offset
+        # what is seen may lie inside the mesh
+        inside = 0.0 if offset is None else 2.0 * float(np.maximum(-offset, 0.0).max(initial=0.0))
+        free = np.ones(len(self._rest), dtype=bool)
+        free[touched[k]] = False
+        return float(depth[(beyond > inside) & free[nodes]].max(initial=0.0))
+
+    def _moved(self, u: Array) -> Array:
+        return np.asarray(self._rest + u.reshape(-1, 3))
+
+
+def _followed(way: Array, gap: Array, followed: float) -> float:
+    """Share of ways (n,) past surfaces at gaps (n,) that lead no farther behind them than contact follows [m]."""
+    free = np.maximum(gap, 0.0)
+    meets = (way > free) & (way > followed)
+    return float(((free + followed) / np.maximum(way, 1e-300))[meets].min(initial=1.0))
+
+
+def _near(points: Array, others: Array, most: float) -> bool:
+    """Whether boxes around points are within ``most`` [m]."""
+    apart = np.maximum(points.min(axis=0) - others.max(axis=0), others.min(axis=0) - points.max(axis=0))
+    return bool((apart < most).all()) if most > 0.0 else bool((apart < 0.0).all())
+
+
+def _past_itself(interface: Interface, mortar: Mortar, x: Array, step: Array) -> float:
+    """As ``_past_body``, of a body's parts past others of its own that they may meet, node to node."""
+    from scipy.spatial import cKDTree
+
+    followed = _FOLLOWED * interface.reach
+    if np.linalg.norm(np.ptp(step[mortar.slave.nodes], axis=0)) <= followed:
+        return 1.0
+    least = 1.0
+    for label in np.unique(mortar.labels[0]):
+        mine = np.unique(mortar.slave.quads[mortar.labels[0] == label])
+        others = np.unique(mortar.master.quads[mortar.met_by(int(label))])
+        if not len(others):
+            continue
+        away, near = cKDTree(x[others]).query(x[mine])
+        least = min(least, _followed(np.linalg.norm(step[mine] - step[others[near]], axis=1), away, followed))
+    return least
+
+
+def _past_obstacle(
+    interface: Interface, obstacle: Obstacle, x: Array, step: Array, before: float, time: float
+) -> float:
+    """As ``_past_body``, of a body past an obstacle: no farther than it is thick, either."""
+    nodes = interface.slave.nodes
+    times = [before + (time - before) * k / _LOOKS for k in range(_LOOKS + 1)]
+    way = way_past(obstacle, times, [x[nodes] + k / _LOOKS * step[nodes] for k in range(_LOOKS + 1)])
+    if way.max() <= min(interface.reach, _THINNEST):
+        return 1.0
+    gap = obstacle.project(x[nodes], before).distance
+    if (way <= gap).all():
+        return 1.0
+    return _followed(way, gap, min(interface.reach, half_thickness(obstacle, before)))
