@@ -47,6 +47,7 @@ from warpjld.simulation.solve.solved_frame import SolvedFrame
 from warpjld.simulation.solve.start_frame import StartFrame, find_start
 from warpjld.simulation.solve_frames import Progress, SolveResult, solve_frames
 from warpjld.simulation.specification import ContactSpecification, SolveSpecification
+from warpjld.threads import one_blas_thread
 
 __all__ = ["Simulation", "VisiblePressure", "simulate"]
 
@@ -184,6 +185,7 @@ class Simulation:
         return self.model.spans[name]
 
 
+@one_blas_thread()
 def simulate(
     specification: ContactSpecification,
     animation: Animation,
