@@ -6,7 +6,6 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 
 from warpjld.fem import Body, HexMesh, LinearElastic, Prescribed, box_hexes, merge, prescribe
 from warpjld.fem.contact import Pair
