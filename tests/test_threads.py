@@ -52,3 +52,23 @@ def test_linear_algebra_is_kept_to_one_thread_and_let_go_again() -> None:
         with one_blas_thread(), one_blas_thread():
             assert threads() == {1}
         assert threads() == before
+
+
+def test_contact_is_solved_on_one_thread_of_linear_algebra() -> None:
+    from threadpoolctl import threadpool_info, threadpool_limits
+
+    from warpjld.fem import Body, LinearElastic, box_hexes, prescribe
+    from warpjld.fem.contact import Pair, press
+    from warpjld.fem.contact.obstacles.solids import Plane
+
+    mesh = box_hexes((1.0, 1.0, 1.0), (2, 2, 2))
+    seen: list[int] = []
+
+    def look(text: str) -> None:
+        seen.extend(library["num_threads"] for library in threadpool_info() if library["user_api"] == "blas")
+
+    with threadpool_limits(2, user_api="blas"):
+        down = prescribe(mesh, "z+", x=0.0, y=0.0, z=-0.01)
+        press(Body(mesh, LinearElastic(1.0, 0.3)), down, [Pair("z-", Plane((0, 0, 0), (0, 0, 1)))], progress=look)
+    assert seen
+    assert set(seen) == {1}

@@ -56,11 +56,12 @@ def helpers(threads: int) -> ThreadPoolExecutor:
 
 @contextmanager
 def one_blas_thread() -> Iterator[None]:
-    """Linear algebra on this thread alone meanwhile, in the whole process.
+    """Linear algebra on this thread alone meanwhile, in the whole process; also a decorator.
 
     A sparse factorisation calls BLAS for thousands of small dense blocks. Threads that wait for their share of each
     spin: on two cores the factorisations of a body of 14,000 vertices take 4 s of the processor instead of 1.4, and
-    where other programs want the cores too, 8.
+    where other programs want the cores too, 8. Contact solves have vectors and small blocks only: a Krylov step takes
+    2.4 ms on one thread, and 340 with busy cores on two; and sums come out in the same order everywhere.
     """
     with _blas().limit(limits=1, user_api="blas"):
         yield

@@ -45,7 +45,7 @@ def beside(tip: Fingertip, side: str, sign: float) -> HexMesh:
 def tips_and_block(tip: Fingertip, friction: float) -> PrescribedTrials:
     """A grip is the way [m] by which each tip closes."""
     half = 0.5 * EDGE
-    block = box_hexes((EDGE, EDGE, EDGE), (5, 5, 5), origin=(-half, -half, -half), name="block")
+    block = box_hexes((EDGE, EDGE, EDGE), (4, 4, 4), origin=(-half, -half, -half - 0.002), name="block")
     block = replace(block, faces={f"block.{side}": faces for side, faces in block.faces.items()})
     mesh = merge(block, beside(tip, "left", -1.0), beside(tip, "right", 1.0))
     stuff = LinearElastic(1e6, 0.3, density=WEIGHT / 9.81 / EDGE**3)

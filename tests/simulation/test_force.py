@@ -30,6 +30,41 @@ def test_the_force_is_reached(force: float) -> None:
     assert len(found.trials) < 25
 
 
+@pytest.mark.parametrize("power", [1.0, 1.5, 2.0])
+@pytest.mark.parametrize("force", [2.0, 8.0])
+def test_slopes_find_it_in_four_trials(power: float, force: float) -> None:
+    """From a finger that touches already, and presses with a twentieth or a fifth of it."""
+
+    def press(grip: float) -> PressedForce:
+        pressed = 0.4 * ((grip + 1e-3) / 1e-3) ** power
+        return PressedForce(pressed, slope=power * pressed / (grip + 1e-3))
+
+    found = force_grip(press, 0.0, 0.05, force, start=1e-2)
+    assert found.status is ForceStatus.REACHED
+    assert len(found.trials) <= 4
+
+
+def test_what_was_tried_is_kept_when_interrupted() -> None:
+    pressed = pad()
+
+    def press(grip: float) -> PressedForce:
+        if grip > 1e-3:
+            raise KeyboardInterrupt
+        return pressed(grip)
+
+    found = force_grip(press, 0.0, 0.01, 1.0, start=1e-4)
+    assert found.status is ForceStatus.INTERRUPTED
+    assert len(found.trials) > 2
+    assert "interrupted" in found.text
+
+
+def test_lost_equilibria_are_gone_half_the_way() -> None:
+    """Grips beyond 3 mm cannot be solved; the wished force lies before."""
+    pressed = pad()
+    found = force_grip(lambda grip: None if grip > 3e-3 else pressed(grip), 0.0, 0.01, 14.0, start=1.5e-3)
+    assert found.status is ForceStatus.REACHED
+
+
 def test_muscles_are_too_weak() -> None:
     found = force_grip(pad(limit=2.0), 0.0, 0.01, 3.0, start=1e-4)
     assert found.status is ForceStatus.TOO_WEAK

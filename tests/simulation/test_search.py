@@ -88,6 +88,64 @@ def test_trials_that_cannot_be_solved_say_nothing() -> None:
     assert never.status is GripStatus.NO_SOLUTION
 
 
+@pytest.mark.parametrize("power", [1.0, 1.5, 2.0])
+@pytest.mark.parametrize("share", [0.5, 0.2, 0.05])
+def test_slopes_find_it_in_four_trials_from_a_touch(power: float, share: float) -> None:
+    """Pads that stiffen touch already, by the gentlest grip with a share of what it takes."""
+
+    def hold(grip: float) -> Trial:
+        way = (grip + 0.2e-3) / 0.2e-3
+        capacity, slope = share * way**power, share * power * way ** (power - 1.0) / 0.2e-3
+        return Trial(ended(capacity >= 1.0), 0.0, 2.0, min(capacity, 1.0), capacity=capacity, slope=slope)
+
+    found = gentlest_grip(hold, 0.0, 5e-3, weight=1.0, friction=0.6, start=1e-3, tolerance=0.03)
+    assert found.status is GripStatus.HELD
+    assert 1.0 <= found.trial.capacity <= 1.03
+    assert len(found.trials) <= 4
+
+
+def test_friction_that_balances_moments_takes_more() -> None:
+    """A grip that holds from a capacity of 1.4 on: what slides at less says so, and the search aims there."""
+
+    def hold(grip: float) -> Trial:
+        capacity = 0.3 + 400.0 * grip
+        return Trial(ended(capacity >= 1.4), 0.0, 2.0, min(capacity / 1.4, 1.0), capacity=capacity, slope=400.0)
+
+    found = gentlest_grip(hold, 0.0, 0.02, weight=1.0, friction=0.6, start=1e-4, tolerance=0.03)
+    assert found.status is GripStatus.HELD
+    assert 1.4 <= found.trial.capacity <= 1.03 * 1.4
+    assert len(found.trials) <= 5
+
+
+def test_what_was_tried_is_kept_when_interrupted() -> None:
+    block, tried = squeezed(2.0, 0.5), []
+
+    def hold(grip: float) -> Trial:
+        tried.append(grip)
+        if len(tried) > 3:
+            raise KeyboardInterrupt
+        return block(grip)
+
+    found = gentlest_grip(hold, 0.0, 0.05, weight=2.0, friction=0.5, tolerance=1e-3)
+    assert found.status is GripStatus.INTERRUPTED
+    assert [grip for grip, _ in found.trials] == tried[:3]
+    assert "interrupted" in found.text
+    at_once = gentlest_grip(_interrupted, 0.0, 0.05, weight=2.0, friction=0.5)
+    assert at_once.status is GripStatus.INTERRUPTED
+    assert at_once.trials == ()
+
+
+def _interrupted(grip: float) -> Trial:
+    raise KeyboardInterrupt
+
+
+def test_trials_have_a_budget() -> None:
+    found = gentlest_grip(squeezed(2.0, 0.5), 0.0, 0.05, weight=2.0, friction=0.5, tolerance=1e-6, most=5)
+    assert len(found.trials) == 5
+    assert found.status is GripStatus.HELD
+    assert found.trial.held
+
+
 def test_what_stands_on_something_else_is_not_held() -> None:
     note = "TABLE bears 0.9 N of it"
     found = gentlest_grip(

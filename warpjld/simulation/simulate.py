@@ -17,7 +17,7 @@ Example::
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -25,6 +25,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from warpjld.errors import InputError
+from warpjld.fem.hand.suggestions import DigitSlopes
 from warpjld.simulation.animation import Animation
 from warpjld.simulation.bodies.flesh_body import build_flesh_body
 from warpjld.simulation.bodies.model import ContactModel, assemble_model
@@ -37,6 +38,7 @@ from warpjld.simulation.report.tactile import Tactile, tactile_readings
 from warpjld.simulation.report.verdict import ContactVerdict, verdict_of
 from warpjld.simulation.report.visible_overlap import remaining_overlaps, visible_overlap_notes
 from warpjld.simulation.sensitivity.gradient import Gradient, gradient_at
+from warpjld.simulation.sensitivity.joint_slopes import joint_slopes
 from warpjld.simulation.sensitivity.parameters import Parameter
 from warpjld.simulation.solve.checkpoint import CheckpointFile
 from warpjld.simulation.solve.checks import check_model, check_specification
@@ -45,6 +47,7 @@ from warpjld.simulation.solve.solved_frame import SolvedFrame
 from warpjld.simulation.solve.start_frame import StartFrame, find_start
 from warpjld.simulation.solve_frames import Progress, SolveResult, solve_frames
 from warpjld.simulation.specification import ContactSpecification, SolveSpecification
+from warpjld.threads import one_blas_thread
 
 __all__ = ["Simulation", "VisiblePressure", "simulate"]
 
@@ -182,6 +185,7 @@ class Simulation:
         return self.model.spans[name]
 
 
+@one_blas_thread()
 def simulate(
     specification: ContactSpecification,
     animation: Animation,
@@ -285,7 +289,12 @@ def _report(
         {name: (np.array(frames), places) for name, (frames, places) in before.moved.items()},
         {name: animation.objects[name].thing.vertices for name in before.moved},
     )
-    verdict = verdict_of(solved, table.rows, table.suggestions(model), remaining_overlaps(surfaces))
+
+    def slopes(actor: str, frame: float, forces: Mapping[str, float]) -> Mapping[str, DigitSlopes] | None:
+        known = solved.equilibria.get(frame)
+        return None if known is None else joint_slopes(known.model, known.history, known.solution, actor, forces)
+
+    verdict = verdict_of(solved, table.rows, table.suggestions(model, slopes), remaining_overlaps(surfaces))
     corrections = [one.text for one in worst_digits(solved.corrections)]
     corrections += [text for frame in solved.corrections for text in frame.failed]
     verdict = replace(

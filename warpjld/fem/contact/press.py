@@ -15,10 +15,12 @@ from warpjld.fem.contact.solver.load_steps import Guess, LoadSteps
 from warpjld.fem.load.loads import Loads
 from warpjld.fem.load.prescribed import Prescribed
 from warpjld.fem.solver.krylov import Status
+from warpjld.threads import one_blas_thread
 
 __all__ = ["press"]
 
 
+@one_blas_thread()
 def press(
     body: Body,
     prescribed: Prescribed | Callable[[float], Prescribed],

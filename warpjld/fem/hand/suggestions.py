@@ -1,24 +1,40 @@
 """Words and numbers for the animator: how far to open which joint for which force (R119).
 
-A digit touches things through a spring: its force rises by k for every metre its load would move were nothing in the
-way. A joint that turns by Δθ moves the load by its lever L = torque / force times Δθ. So k = ΔF / Σ L Δθ from the last
-two instants, and opening one joint by (F − F*) / (k L) brings the force down to F*.
+How a digit's force follows each of its joints, the equilibrium's tangent says (``contact.sensitivity``); how it
+stiffens on the way, two instants of one press (``stiffening``).
 """
 
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
-from warpjld.fem.hand.muscles import JOINT_WORDS, DigitEffort, Effort
+from warpjld.fem.hand.muscles import JOINT_WORDS, Effort
+from warpjld.fem.hand.stiffening import ForceSlope, way_to
 from warpjld.skeleton.tree import CHANNELS, Skeleton
 
-__all__ = ["Suggestion", "stiffness", "suggestions"]
+__all__ = ["DigitSlopes", "Suggestion", "suggestions"]
 
 _FLEXION = CHANNELS.index("flexion")
+_LEAST = 1e-3
+"""Slope over the largest of a digit's joints, below which a joint is no use."""
+
+
+@dataclass(frozen=True, eq=False)
+class DigitSlopes:
+    """A digit's force at an instant, and how it follows its joints.
+
+    Attributes:
+        force: [N]
+        slopes: Its derivatives by the flexion of base, knuckle 2 and knuckle 3 [N/rad], shape (3,).
+    """
+
+    force: float
+    slopes: NDArray[np.float64]
 
 
 @dataclass(frozen=True)
@@ -40,31 +56,12 @@ class Suggestion:
     text: str
 
 
-def stiffness(before: DigitEffort, now: DigitEffort, turned: NDArray[np.float64]) -> float | None:
-    """k of a digit's contact [N/m] from two instants, or None where force did not rise with the joints.
-
-    Args:
-        before: The digit at the earlier instant.
-        now: At the later one.
-        turned: What its three joints flexed in between [rad], shape (3,).
-    """
-    moved = (
-        float(0.5 * (before.levers + now.levers) @ turned)
-        if before.force > 0.05 * now.force
-        else (float(now.levers @ turned))
-    )
-    risen = now.force - before.force
-    if abs(moved) < 1e-7 or risen / moved <= 0.0:
-        return None
-    return risen / moved
-
-
 def suggestions(
     skeleton: Skeleton,
     now: Effort,
     angles: NDArray[np.float64],
-    before: Effort | None = None,
-    angles_before: NDArray[np.float64] | None = None,
+    slopes: Mapping[str, DigitSlopes] | None = None,
+    before: Mapping[str, DigitSlopes] | None = None,
     *,
     aim: float = 0.5,
     above: float = 1.0,
@@ -77,8 +74,8 @@ def suggestions(
         skeleton: Names and limits of the joints.
         now: The effort.
         angles: Joint angles [rad], shape (J, 4).
-        before: The effort at an earlier instant, where there is one.
-        angles_before: Its angles.
+        slopes: How the digits' forces follow their joints, where it is known.
+        before: The same at an earlier instant of the press, where there is one.
         aim: Share that is wanted.
         above: Share above which something is suggested.
     """
@@ -88,17 +85,14 @@ def suggestions(
             continue
         wanted = digit.force * aim / digit.share
         joints = [skeleton.index(f"{digit.digit}.{k}") for k in ("base", "knuckle2", "knuckle3")]
-        k = None
-        if before is not None and angles_before is not None:
-            turned = angles[joints, _FLEXION] - angles_before[joints, _FLEXION]
-            k = stiffness(before[digit.digit], digit, turned)
-        room = angles[joints, _FLEXION] - skeleton.limits[joints, _FLEXION, 0]
-        levers = digit.levers
-        if k is None or not (levers > 1e-4).any():
-            text = f"{digit.text}; open it or move the hand back for {wanted:.2g} N (no stiffness is known yet)"
+        known = (slopes or {}).get(digit.digit)
+        if known is None or not (known.slopes > 0.0).any():
+            text = f"{digit.text}; open it or move the hand back for {wanted:.2g} N (no stiffness is known)"
             out.append(Suggestion(digit.digit, "", math.nan, wanted, text))
             continue
-        opening = np.where(levers > 1e-4, (digit.force - wanted) / (k * np.maximum(levers, 1e-4)), np.inf)
+        earlier = (before or {}).get(digit.digit)
+        opening = np.array([_opening(earlier, known, joint, wanted) for joint in range(3)])
+        room = angles[joints, _FLEXION] - skeleton.limits[joints, _FLEXION, 0]
         possible = np.where(opening <= room, opening, np.inf)
         best = int(np.argmin(possible if np.isfinite(possible).any() else opening))
         text = f"{digit.text}; open {JOINT_WORDS[best]} by {math.degrees(opening[best]):.1f}° for {wanted:.2g} N"
@@ -106,3 +100,14 @@ def suggestions(
             text += f" (it can open by {math.degrees(room[best]):.1f}° only: move the hand back)"
         out.append(Suggestion(digit.digit, JOINT_WORDS[best], float(opening[best]), wanted, text))
     return tuple(out)
+
+
+def _opening(before: DigitSlopes | None, now: DigitSlopes, joint: int, wanted: float) -> float:
+    """How far a joint opens for a wanted force [rad]; infinite where that is no use."""
+    slope = float(now.slopes[joint])
+    if not slope > _LEAST * float(now.slopes.max()):
+        return math.inf
+    here, earlier = ForceSlope(now.force, slope), None
+    if before is not None and 0.0 < before.force < now.force and before.slopes[joint] > 0.0:
+        earlier = ForceSlope(before.force, float(before.slopes[joint]))
+    return -way_to(wanted, here, earlier)

@@ -16,12 +16,14 @@ from warpjld.fem.solver.krylov import Status
 from warpjld.fem.solver.newton import Newton
 from warpjld.fem.solver.problem import Problem
 from warpjld.fem.solver.solution import Instant, Solution, SolveError
+from warpjld.threads import one_blas_thread
 
 __all__ = ["solve"]
 
 FREE = ("refuse", "hold")
 
 
+@one_blas_thread()
 def solve(
     body: Body,
     prescribed: Prescribed,

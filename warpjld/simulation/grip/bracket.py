@@ -1,10 +1,10 @@
 """The one search that grips are found by: Newton's method on what rises with the grip, guarded by a bracket.
 
-What digits press with rises ever faster from the first touch on, about as the square of the way (Hertz: to the power
-1.5, thin pulp: 2 and more). Its root y = √value is therefore nearly straight, and Newton's method is used on that: from
-one point along its slope; between two by the cubic that has both their values and slopes (inverse Hermite
-interpolation, F. Stummel, K. Hainer, Praktische Mathematik, 1982). Where no slope is known, the chord does; where
-nothing has been touched, steps grow. No step leaves the bracket, and one that lost an equilibrium is gone half of.
+What digits press with rises ever faster from the first touch on. Slopes at one or two grips tell how it stiffens
+(``warpjld.fem.hand.stiffening``), and so where the target lies; inside a bracket the cubic does that has values and
+slopes of both ends (inverse Hermite interpolation, of the value's root, which is nearly straight). Where no slope is
+known, the chord does; where nothing has been touched, steps grow. No step leaves the bracket, and one that lost an
+equilibrium is gone half of.
 """
 
 from __future__ import annotations
@@ -15,6 +15,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from warpjld.errors import InputError
+from warpjld.fem.hand.stiffening import ForceSlope, way_to
 
 __all__ = ["Bracket", "checked_step"]
 
@@ -22,6 +23,10 @@ _MARGIN = 0.03
 """Part of a bracket, at either end, that is left alone."""
 _FARTHEST = 12.0
 """How many times the last step outwards a Newton step may be."""
+_SHORTEST = 0.01
+"""The same at least."""
+_POWER = 2.0
+"""Of the way since the first touch that a value rises with, before two slopes tell."""
 _SLOW = 0.6
 """Part of its bracket that a step should leave at most, or the next halves it."""
 
@@ -127,11 +132,19 @@ class Bracket:
         if known is None:
             return self.low
         if known.ahead is not None:
-            far = (aim - known.root) * known.ahead
+            far = self._way(known, self._below if above is None else self._above)
             if above is None:
-                return known.grip + min(max(far, 0.1 * self._step), _FARTHEST * self._step)
-            return known.grip + min(far, 0.0)
+                return known.grip + min(max(far, _SHORTEST * self._step), _FARTHEST * self._step)
+            return known.grip + min(far, -_SHORTEST * self._step)
         return self._inward(known) if below is None else self._outward(known)
+
+    def _way(self, known: _Point, side: list[_Point]) -> float:
+        """How far it is to the target from one point, and the next one on its side, if that is known."""
+        others = [one for one in side if one.grip != known.grip and one.ahead is not None]
+        near = min(others, key=lambda one: abs(one.grip - known.grip), default=None)
+        here = ForceSlope(known.value, known.slope or math.nan)
+        there = None if near is None else ForceSlope(near.value, near.slope or math.nan)
+        return way_to(self.target, here, there, _POWER)
 
     @staticmethod
     def _sloped(end: _Point, side: list[_Point]) -> _Point:
@@ -149,7 +162,7 @@ class Bracket:
         sloped = self._sloped(first, self._above)
         if sloped.ahead is None:
             return first.grip - step
-        return first.grip - max((first.root - math.sqrt(self.target)) * sloped.ahead, 0.1 * step)
+        return first.grip - max((first.root - math.sqrt(self.target)) * sloped.ahead, _SHORTEST * step)
 
     def _outward(self, last: _Point) -> float:
         """Farther on by a longer step each time; along the chord where two points rise."""
@@ -158,7 +171,7 @@ class Bracket:
         before = max(others, key=lambda one: one.grip, default=None)
         if before is not None and last.root > before.root:
             line = (last.grip - before.grip) / (last.root - before.root)
-            return last.grip + min(max((math.sqrt(self.target) - last.root) * line, 0.1 * step), _FARTHEST * step)
+            return last.grip + min(max((math.sqrt(self.target) - last.root) * line, _SHORTEST * step), _FARTHEST * step)
         return last.grip + step
 
 

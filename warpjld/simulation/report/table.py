@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 
@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from warpjld.fem.hand.muscles import KNUCKLES, Effort
-from warpjld.fem.hand.suggestions import suggestions
+from warpjld.fem.hand.suggestions import DigitSlopes, suggestions
 from warpjld.simulation.animation import Animation
 from warpjld.simulation.bodies.flesh_body import FleshBody
 from warpjld.simulation.bodies.model import ContactModel
@@ -23,6 +23,10 @@ __all__ = ["ContactRow", "ContactTable", "digit_rows", "write_table"]
 
 _FLEXION = CHANNELS.index("flexion")
 """Column of the angles."""
+
+
+Slopes = Callable[[str, float, Mapping[str, float]], Mapping[str, DigitSlopes] | None]
+"""Actor, frame, and force of some digits there [N] → digit → its force, and how that follows its joints."""
 
 
 @dataclass(frozen=True)
@@ -127,8 +131,13 @@ class ContactTable:
                 )
         return out
 
-    def suggestions(self, model: ContactModel) -> list[str]:
-        """What to open, at the frame that strains an actor most, as the animation is after all."""
+    def suggestions(self, model: ContactModel, slopes: Slopes = lambda actor, frame, forces: None) -> list[str]:
+        """What to open, at the frame that strains an actor most, as the animation is after all.
+
+        Args:
+            model: As it is after all edits.
+            slopes: How forces of an actor's digits follow their joints at a frame; None where that is not known.
+        """
         out = []
         for hand in model.hands:
             efforts = self._efforts.get(hand.name, [])
@@ -136,11 +145,15 @@ class ContactTable:
                 continue
             worst = max(range(len(efforts)), key=lambda k: efforts[k][1].share)
             frame, effort = efforts[worst]
-            angles = hand.bones.animation.angles
-            before, then = efforts[worst - 1] if worst else (frame, None)
-            found = suggestions(
-                hand.bones.skeleton, effort, angles(frame), then, None if then is None else angles(before)
+            if effort.share <= 1.0:
+                continue
+            over = [digit.digit for digit in effort.digits if digit.share > 1.0]
+            now, before = (
+                slopes(hand.name, at, {digit: known[digit].force for digit in over})
+                for at, known in (efforts[worst], efforts[max(worst - 1, 0)])
             )
+            angles = hand.bones.animation.angles(frame)
+            found = suggestions(hand.bones.skeleton, effort, angles, now, before if worst else None)
             out += [f"{hand.name} at frame {frame:g}: {one.text}" for one in found]
         return out
 
