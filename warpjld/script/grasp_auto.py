@@ -58,7 +58,8 @@ def grasp_by_itself(
         )
         _carry(scene, actor, found, (first, middle, last))
     grip = {}
-    changed = np.argwhere((found.start != 0.0) | (found.angles != 0.0))
+    initial = actor.skeleton.initial
+    changed = np.argwhere((found.start != initial) | (found.angles != initial))
     for joint, column in changed.tolist():
         channel = f"{actor.skeleton.names[joint]}.{CHANNELS[column]}"
         start, closed = float(found.start[joint, column]), float(found.angles[joint, column])
