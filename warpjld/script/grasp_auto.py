@@ -56,7 +56,8 @@ def grasp_by_itself(
         found = find_grasp(closer, obstacles=obstacles, side=side, count=tries, posture=posture_name)
         _carry(scene, actor, found, (first, middle, last))
     grip = {}
-    changed = np.argwhere((found.start != 0.0) | (found.angles != 0.0))
+    rest = actor.skeleton.initial
+    changed = np.argwhere((found.start != rest) | (found.angles != rest))
     for joint, column in changed.tolist():
         channel = f"{actor.skeleton.names[joint]}.{CHANNELS[column]}"
         start, closed = float(found.start[joint, column]), float(found.angles[joint, column])
