@@ -95,7 +95,7 @@ def test_flexed_fingertips_come_to_the_palm(rigs, name):
         forward = (at["index.base"] + at["pinky.base"]) / 2 - at["wrist"]
         palmar = np.cross(radial, forward) * (1 if side == "right" else -1)
         palmar /= np.linalg.norm(palmar)
-        angles = np.zeros((1, len(skeleton), 4))
+        angles = skeleton.initial[None].copy()
         for digit in ("index", "middle", "ring", "pinky"):
             for joint in ("base", "knuckle2", "knuckle3"):
                 angles[0, skeleton.names.index(f"{side}.{digit}.{joint}"), 0] = np.radians(60)
@@ -112,7 +112,7 @@ def test_a_flexed_thumb_comes_over_the_palm(rigs, name):
     skeleton = rigs[name].skeleton
     for side in sides(name):
         number = {n: skeleton.names.index(f"{side}.{n}") for n in ("thumb.knuckle2", "thumb.knuckle3", "thumb.tip")}
-        angles = np.zeros((1, len(skeleton), 4))
+        angles = skeleton.initial[None].copy()
         angles[0, [number["thumb.knuckle2"], number["thumb.knuckle3"]], 0] = np.radians(60)
         before, after = skeleton.rest, poses_from_angles(skeleton, angles).positions[0]
         to = skeleton.rest[skeleton.names.index(f"{side}.pinky.base")]

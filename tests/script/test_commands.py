@@ -175,3 +175,9 @@ def test_initial_angles_count_from_the_straight_joint(run, scene) -> None:
     still = scene.add("still", plain.rig)
     run("INITIAL index.knuckle2 FLEXION 30\nWRIST LEFT FLEXION AT 0 0")
     np.testing.assert_allclose(stage(still, np.zeros(1), scene.rate).positions[0], still.skeleton.rest, atol=1e-12)
+
+
+def test_joints_are_shown_with_their_angles_at_rest(run, scene) -> None:
+    run("INITIAL index.knuckle2 FLEXION 30\nSHOW JOINTS")
+    line = next(line for line in scene.said[-1].splitlines() if "left.index.knuckle2" in line)
+    assert line.endswith("flexion 0…100; at rest flexion 30")

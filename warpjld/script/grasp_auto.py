@@ -53,13 +53,11 @@ def grasp_by_itself(
     if f"{side}.shoulder" in actor.skeleton.names:
         found = _by_arm(scene, actor, closer, side, (first, middle, last), obstacles, tries, posture_name)
     else:
-        found = find_grasp(
-            covering, thing, closer=closer, obstacles=obstacles, side=side, count=tries, posture=posture_name
-        )
+        found = find_grasp(closer, obstacles=obstacles, side=side, count=tries, posture=posture_name)
         _carry(scene, actor, found, (first, middle, last))
     grip = {}
-    initial = actor.skeleton.initial
-    changed = np.argwhere((found.start != initial) | (found.angles != initial))
+    rest = actor.skeleton.initial
+    changed = np.argwhere((found.start != rest) | (found.angles != rest))
     for joint, column in changed.tolist():
         channel = f"{actor.skeleton.names[joint]}.{CHANNELS[column]}"
         start, closed = float(found.start[joint, column]), float(found.angles[joint, column])

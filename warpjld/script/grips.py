@@ -68,13 +68,14 @@ def flexions_of_grip(
 ) -> Iterator[tuple[str, float, tuple[float, float]]]:
     """Flexions that close a grip further: channel, value at a frame, and limits [rad].
 
-    Knuckles that GRASP left straight stay so: their digit touches with what comes before them.
+    Knuckles that GRASP left as they were stay so: their digit touches with what comes before them.
     """
     for channel in grip:
         joint, _, kind = channel.rpartition(".")
         if kind != CHANNELS[_FLEXION]:
             continue
         now = actor.value(channel, frame)
-        low, high = actor.skeleton.limits[actor.skeleton.index(joint), _FLEXION]
-        if now > 1e-9 or not joint.endswith(("knuckle2", "knuckle3")):
+        number = actor.skeleton.index(joint)
+        low, high = actor.skeleton.limits[number, _FLEXION]
+        if now > actor.skeleton.initial[number, _FLEXION] + 1e-9 or not joint.endswith(("knuckle2", "knuckle3")):
             yield channel, now, (float(low), float(high))

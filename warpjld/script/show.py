@@ -52,14 +52,17 @@ def actors(scene: Scene) -> str:
 
 
 def joints(actor: Actor) -> str:
-    """An actor's joints with the number JOINT understands, and limits [degrees]; closed channels are left
-    out."""
+    """An actor's joints with the number JOINT understands, and limits [degrees], closed channels left out,
+    and the angles at rest that are not 0."""
     lines = []
     numbers = {joint: str(number) for number, joint in joint_numbers(actor.skeleton).items()}
     for joint, name in enumerate(actor.skeleton.names):
         limits = np.degrees(actor.skeleton.limits[joint])
         open_ = [f"{c} {low:.4g}…{high:.4g}" for c, (low, high) in zip(CHANNELS, limits, strict=True) if low < high]
-        lines.append(f"{numbers.get(joint, ''):>4}  {name:<36} {', '.join(open_) or 'fixed'}")
+        initial = np.degrees(actor.skeleton.initial[joint])
+        rest = ", ".join(f"{c} {angle:.4g}" for c, angle in zip(CHANNELS, initial, strict=True) if angle)
+        at_rest = f"; at rest {rest}" if rest else ""
+        lines.append(f"{numbers.get(joint, ''):>4}  {name:<36} {', '.join(open_) or 'fixed'}{at_rest}")
     return "\n".join(lines)
 
 
