@@ -73,6 +73,9 @@ class Body:
         self._nodes = np.ascontiguousarray(mesh.nodes).reshape(-1)
         self._check_jacobians()
 
+    def __repr__(self) -> str:
+        return f"Body({len(self.mesh.elements)} elements, {self.degrees} degrees of freedom)"
+
     @property
     def large_strain(self) -> bool:
         """Whether any law needs Newton's method."""

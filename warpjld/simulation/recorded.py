@@ -51,6 +51,13 @@ class RecordedActor:
 
     Raises:
         InputError: Neither or both of poses and angles, or another shape.
+
+    Examples:
+        >>> import numpy as np
+        >>> hand = wj.build_hand("left", resolution=1500)
+        >>> actor = wj.RecordedActor("hand", hand, angles=np.zeros((9, len(hand.skeleton), 4)))
+        >>> actor.pose(4.0)
+        Poses(1 frame of 26 joints)
     """
 
     def __init__(
@@ -82,6 +89,11 @@ class RecordedActor:
                 raise InputError(f"root: want finite displacements (3,) or ({len(self._angles)}, 3), got {at.shape}")
             self._root = np.broadcast_to(at, (len(self._angles), 3))
         self._covering = covering
+
+    def __repr__(self) -> str:
+        rows = self._angles if self._poses is None else self._poses
+        frames = 0 if rows is None else len(rows)
+        return f"RecordedActor('{self.name}': {frames} frames from {self._first:g} on, {self.rig})"
 
     @property
     def skeleton(self) -> Skeleton:
@@ -147,6 +159,11 @@ class RecordedObject:
 
     Raises:
         InputError: Other shapes, or a surface that is none.
+
+    Examples:
+        >>> thing = wj.RecordedObject("ball", wj.shapes.ball(0.06), positions=[[0, 0, 0], [0, 0.1, 0]])
+        >>> thing.place(0.5).position.tolist()
+        [[0.0, 0.05, 0.0]]
     """
 
     name: str
@@ -157,6 +174,9 @@ class RecordedObject:
 
     def __post_init__(self) -> None:
         _ = self.thing
+
+    def __repr__(self) -> str:
+        return f"RecordedObject('{self.name}': {len(self._places)} places from frame {self.first:g} on, {self.thing})"
 
     @cached_property
     def _places(self) -> Places:
@@ -198,6 +218,11 @@ class RecordedAnimation:
 
     Raises:
         InputError: Two of one name.
+
+    Examples:
+        >>> stage = wj.RecordedAnimation(objects=[wj.RecordedObject("ball", wj.shapes.ball(0.06))])
+        >>> list(stage.objects)
+        ['ball']
     """
 
     def __init__(self, actors: Iterable[RecordedActor] = (), objects: Iterable[RecordedObject] = ()) -> None:
@@ -206,6 +231,11 @@ class RecordedAnimation:
         self.objects = {one.name: one for one in things}
         if len({*self.actors, *self.objects}) < len(people) + len(things):
             raise InputError("actors, objects: want a name of its own for each")
+
+    def __repr__(self) -> str:
+        return (
+            f"RecordedAnimation(actors {', '.join(self.actors) or 'none'}; objects {', '.join(self.objects) or 'none'})"
+        )
 
     def edited(self, edits: Sequence[AngleEdit]) -> RecordedAnimation:
         """The same with edits laid over its actors."""

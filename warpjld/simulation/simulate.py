@@ -85,6 +85,10 @@ class Simulation:
     verdict: ContactVerdict
     notes: list[str]
 
+    def __repr__(self) -> str:
+        spans = self.model.spans
+        return f"Simulation({self.verdict.status}, {len(self.solved.frames)} frames solved, bodies {', '.join(spans)})"
+
     @property
     def model(self) -> ContactModel:
         """What was solved; ``model.spans[name]`` are the rows of a body's nodes."""
@@ -208,6 +212,19 @@ def simulate(
     Raises:
         InputError: What cannot be: bodies that cannot be meshed or driven, names of nothing; where a script asked for
             it, with the line.
+
+    Examples:
+        >>> import trimesh
+        >>> plate = trimesh.creation.box((0.1, 0.02, 0.1))  # m
+        >>> block = wj.RecordedObject("block", wj.shapes.box(0.02, 0.02, 0.02), positions=(0, 0.0101, 0))
+        >>> floor = wj.RecordedObject("floor", plate, positions=(0, -0.01, 0))
+        >>> press = wj.RecordedObject("press", plate, positions=[[0, 0.0304, 0], [0, 0.03, 0], [0, 0.0296, 0]])
+        >>> contact = wj.ContactSpecification(
+        ...     physical={"block": wj.ObjectMaterial(young=1e5, element=0.01)}, pressing=wj.SolveSpecification(0, 2)
+        ... )
+        >>> found = wj.simulate(contact, wj.RecordedAnimation(objects=[block, floor, press]))
+        >>> found.verdict.status, bool(found.pressure.max() > 1000.0)  # Pa
+        ('CONVERGED', True)
     """
     request = specification.pressing
     if request is None:

@@ -55,6 +55,11 @@ class ObjectMaterial:
         pressure: Inside a hollow one, above that outside [Pa] (R111).
         element: Edge length of its elements [m]; None chooses.
         where: Place in a script, for messages.
+
+    Examples:
+        >>> rubber = wj.ObjectMaterial(young=4e5, wall=0.003, pressure=8000)  # Pa, m, Pa
+        >>> round(rubber.material().young)  # Pa
+        400000
     """
 
     law: Law = "neo-hooke"
@@ -106,6 +111,10 @@ class FleshMaterial:
         stiffening: Exponent of Fung's law; 0 is neo-Hookean.
         itself: Whether the skin may touch itself (R126).
         where: Place in a script, for messages.
+
+    Examples:
+        >>> wj.FleshMaterial(digits=("index",), element=0.003).flesh  # Pa
+        34000.0
     """
 
     digits: tuple[str, ...] = ()
@@ -159,6 +168,12 @@ class GripSpecification:
         force: Wished sum of the forces of the digits [N].
         digits: Those whose forces count, as ``index``; none for all that close.
         where: Place in a script, for messages.
+
+    Examples:
+        >>> closing = ("left.index.base.flexion", "left.thumb.base.flexion")
+        >>> lift = wj.GripSpecification("hand", "ball", 31, 41, closing, most=0.3, lift=True, weight=0.5)
+        >>> lift.middle
+        36
     """
 
     actor: str
@@ -196,6 +211,10 @@ class SolveSpecification:
             it forces double every tenth of a millimetre, and laws of flesh were never measured.
         state: File the state is kept in, so that a stopped run goes on; None keeps none.
         where: Place in a script, for messages.
+
+    Examples:
+        >>> wj.SolveSpecification(0, 8, every=2).method
+        'augmented'
     """
 
     first: int
@@ -225,6 +244,13 @@ class SolveSpecification:
 @dataclass(eq=False)
 class ContactSpecification:
     """Everything that is asked of contact.
+
+    Examples:
+        >>> contact = wj.ContactSpecification(
+        ...     flesh={"hand": wj.FleshMaterial(digits=("index",))}, pressing=wj.SolveSpecification(0, 8)
+        ... )
+        >>> contact.coefficient("hand", "plate")
+        0.6
 
     Attributes:
         physical: Objects that deform, by name.

@@ -61,6 +61,16 @@ class Touch:
         vertices: Rest positions [m], shape (V, 3). What overlaps there already stays as it is, to that depth.
         creases: The joints whose two sides are parted; none without.
         joints: Rest positions of the joints that the patches' bones name [m], shape (J, 3).
+
+    Examples:
+        >>> hand = wj.build_hand("left", resolution=1500)
+        >>> covering, motion = wj.bind(hand), wj.Motion()
+        >>> for joint, angle in (("index.base", 1.4), ("index.knuckle2", 1.7), ("index.knuckle3", 1.2)):  # rad
+        ...     motion.set_key(f"{joint}.flexion", 0, angle)
+        >>> poses = motion.poses(hand.skeleton)
+        >>> parted, told = wj.Touch.of(covering).apply(covering.deform(poses), poses)
+        >>> parted.shape
+        (1, ..., 3)
     """
 
     def __init__(
@@ -91,6 +101,9 @@ class Touch:
         np.maximum.at(at_rest, found.vertex, 1.001 * found.depth + noise)
         self._model = replace(self._model, at_rest=at_rest, never=never | self._nested(found))
         self._benches: list[Bench] = []
+
+    def __repr__(self) -> str:
+        return f"Touch({len(self.patches.names)} parts of {len(self._vertices)} vertices)"
 
     def _nested(self, found: Overlaps) -> NDArray[np.bool_]:
         """Parts of different shells that lie in one another at rest, as pieces of a jointed figure do, shape (P, P)."""

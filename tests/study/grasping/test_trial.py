@@ -219,7 +219,7 @@ def test_the_example_is_a_study_of_a_minute() -> None:
 def test_the_docs_name_every_column_and_key(experiment: GraspExperiment) -> None:
     from warpjld.study.run import table_columns
 
-    text = (_ROOT / "examples" / "study.md").read_text(encoding="utf-8")
+    text = (_ROOT / "docs" / "reference" / "grasp-study.md").read_text(encoding="utf-8")
     for column in table_columns(experiment):
         assert re.search(rf"^\| `{column.name}` \| {column.kind} \| {re.escape(column.unit)}", text, re.M), column.name
         assert column.about in text, column.name

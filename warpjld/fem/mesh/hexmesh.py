@@ -69,6 +69,11 @@ class HexMesh:
         if self.regions.shape != (len(self.elements),):
             raise InputError(f"regions: want shape ({len(self.elements)},), got {self.regions.shape}")
 
+    def __repr__(self) -> str:
+        return (
+            f"HexMesh({len(self.nodes)} nodes, {len(self.elements)} elements, regions {', '.join(self.region_names)})"
+        )
+
     @property
     def size(self) -> float:
         """Diagonal of the bounding box [m]."""

@@ -32,6 +32,10 @@ class Instant:
     iterations: int
     residual: float
 
+    def __repr__(self) -> str:
+        told = f"{self.newton} Newton iterations, residual {self.residual:.1e}"
+        return f"Instant(load {self.factor:.3f}, {len(self.displacement)} nodes, {told})"
+
 
 @dataclass(frozen=True, eq=False)
 class Solution:
@@ -50,6 +54,9 @@ class Solution:
     message: str
     held: Ints
     loads: Loads
+
+    def __repr__(self) -> str:
+        return f"Solution({self.status.name}, {len(self.instants)} instants: {self.message})"
 
     @property
     def converged(self) -> bool:

@@ -1,4 +1,4 @@
-"""Studies from TOML files, whose tables and keys ``examples/fem.md`` lists."""
+"""Studies from TOML files, whose tables and keys ``docs/reference/fem-study.md`` lists."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What visible surfaces show that no force knows of: overlap that stays, and skin pushed aside that has no flesh."""
+"""Overlap of visible surfaces that contact did not solve: what stays, and skin without flesh that was pushed aside."""
 
 from __future__ import annotations
 
