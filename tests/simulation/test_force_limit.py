@@ -57,7 +57,10 @@ def test_muscles_end_it_where_they_are_weaker(run: Callable[[str], Scene], tmp_p
 def test_a_rigid_one_is_refused_before_it_is_solved_where_its_bone_lies_in_the_plate(
     run: Callable[[str], Scene], tmp_path: Path
 ) -> None:
-    scene = run(FINGER.replace("AT 4 7", "AT 4 14") + "PRESS 0 4 EVERY 4 RIGID\nEXPORT 'e.npz'")
+    scene = run(
+        FINGER.replace("AT 4 7", "AT 4 14")
+        + "PRESS 0 4 EVERY 4 RIGID\nEXPORT 'e.npz'\nPICTURE 4 'p.png' PRESSURE\nSIZE 160 120"
+    )
     with pytest.raises(
         InputError, match=r"^contact was not solved: no equilibrium: at frame 4: the bone of LEFT index"
     ):
@@ -66,6 +69,9 @@ def test_a_rigid_one_is_refused_before_it_is_solved_where_its_bone_lies_in_the_p
     assert summary["press"]["status"] == "BLOCKED"
     assert "mm inside PLATE, which cannot give way" in summary["press"]["verdict"]
     assert (tmp_path / "e.npz").is_file()  # what can be made is
+    assert summary["failed"]["p.png"].startswith(
+        "contact was solved at no frame: nothing is known of pressure at frame 4"
+    )
 
 
 def test_what_has_stopped_is_kept_for_a_run_that_goes_on() -> None:

@@ -20,15 +20,14 @@ from numpy.typing import NDArray
 
 from warpjld.errors import WarpjldError
 from warpjld.fem.contact import ContactInstant, ContactSolution
-from warpjld.fem.hand.muscles import KNUCKLES
 from warpjld.simulation.animation import AngleEdit
 from warpjld.simulation.bodies.deformable_body import History
 from warpjld.simulation.bodies.flesh_body import FleshBody
 from warpjld.simulation.bodies.model import ContactModel
 from warpjld.simulation.solve.bone_clearance import BoneClearance, TightBone
 from warpjld.simulation.solve.branch import solve_onward
+from warpjld.simulation.solve.digit_caps import FLEXION, FlexionRamp, closing_joints, held_angles
 from warpjld.simulation.solve.digit_loads import DigitLoad, digit_loads
-from warpjld.skeleton import CHANNELS, DIGITS, Skeleton
 
 __all__ = ["BoneInsideError", "ForceLimits", "Stop"]
 
@@ -36,9 +35,6 @@ __all__ = ["BoneInsideError", "ForceLimits", "Stop"]
 class BoneInsideError(WarpjldError):
     """A bone that would lie in an object, in words with the frame."""
 
-
-_FLEXION = CHANNELS.index("flexion")
-"""Column of the angles."""
 
 _Key = tuple[str, str]
 """An actor and its digit, as the skeleton has it."""
@@ -82,26 +78,6 @@ class Stop:
     why: str
 
 
-@dataclass(frozen=True)
-class _Ramp:
-    """The most that joints of a digit flex by, at two times and straight between them.
-
-    Attributes:
-        begin, end: The times.
-        most: Flexions there [rad], by joint.
-    """
-
-    begin: float
-    end: float
-    most: Mapping[int, tuple[float, float]]
-
-    def at(self, joint: int, time: float) -> float:
-        """At a time, the nearer end's outside."""
-        one, other = self.most[joint]
-        share = (time - self.begin) / (self.end - self.begin) if self.end > self.begin else 1.0
-        return one + min(1.0, max(0.0, share)) * (other - one)
-
-
 @dataclass(eq=False)
 class ForceLimits:
     """Which digits have stopped, and where.
@@ -119,7 +95,7 @@ class ForceLimits:
     weights: Mapping[str, float]
     clearance: BoneClearance
     stops: list[Stop] = field(default_factory=list)
-    _caps: dict[_Key, _Ramp] = field(default_factory=dict)
+    _caps: dict[_Key, FlexionRamp] = field(default_factory=dict)
     _loads: dict[_Key, DigitLoad] = field(default_factory=dict)
     _stuck: set[_Key] = field(default_factory=set)
 
@@ -156,7 +132,7 @@ class ForceLimits:
     def restore(self, content: Mapping[str, Any]) -> None:
         """Go on from what ``content`` gave."""
         self._caps = {
-            (actor, digit): _Ramp(begin, end, {joint: tuple(most) for joint, most in joints})
+            (actor, digit): FlexionRamp(begin, end, {joint: tuple(most) for joint, most in joints})
             for actor, digit, begin, end, joints in content.get("caps", [])
         }
         loads = [DigitLoad(**load) for load in content.get("loads", [])]
@@ -168,7 +144,7 @@ class ForceLimits:
         """Angles at a time of digits that have stopped since another."""
         out = []
         for hand in _bendable(model):
-            wanted, reached = hand.bones.angles(time)[:, _FLEXION], self._angles(hand, time)[:, _FLEXION]
+            wanted, reached = hand.bones.angles(time)[:, FLEXION], self._angles(hand, time)[:, FLEXION]
             for joint in np.flatnonzero(reached < wanted - _SAME).tolist():
                 value = float(reached[joint])
                 out.append(AngleEdit(hand.name, joint, model.start + since, model.start + time, value))
@@ -181,8 +157,10 @@ class ForceLimits:
         return replace(model, hands=tuple(hands))
 
     def _held(self, hand: FleshBody) -> FleshBody:
-        caps = dict(self._caps)  # as they are now
-        return replace(hand, moves=lambda time: hand.bones.moves_of(_angles(hand, time, caps), time))
+        caps = [ramp for (actor, _), ramp in self._caps.items() if actor == hand.name]  # as they are now
+        return replace(
+            hand, moves=lambda time: hand.bones.moves_of(held_angles(hand.bones.angles(time), caps, time), time)
+        )
 
     def _finer(self, model: ContactModel, now: float, times: Sequence[float]) -> list[float]:
         """Times with others between, so that in no step a bone's flesh is squeezed by too much."""
@@ -218,7 +196,7 @@ class ForceLimits:
                 self._stop_what_presses(model, closing, now)
                 continue
             loads = self._found(model, found)
-            over = [key for key in closing if loads[key].share(self.pressure) > 1.0]
+            over = [key for key in closing if key in loads and loads[key].share(self.pressure) > 1.0]
             if not over:
                 self._loads = loads
                 return found
@@ -264,14 +242,16 @@ class ForceLimits:
         return out
 
     def _angles(self, hand: FleshBody, time: float) -> NDArray[np.float64]:
-        return _angles(hand, time, self._caps)
+        """Joint angles [rad], shape (J, 4), of a hand some of whose digits have stopped."""
+        caps = (ramp for (actor, _), ramp in self._caps.items() if actor == hand.name)
+        return held_angles(hand.bones.angles(time), caps, time)
 
     def _closing(self, model: ContactModel, now: float, time: float) -> list[_Key]:
         """Digits of which a joint flexes on in a step."""
         out = []
         for hand in _bendable(model):
-            way = (self._angles(hand, time) - self._angles(hand, now))[:, _FLEXION]
-            digits = _digits(hand.bones.skeleton).items()
+            way = (self._angles(hand, time) - self._angles(hand, now))[:, FLEXION]
+            digits = closing_joints(hand.bones.skeleton).items()
             out += [(hand.name, digit) for digit, joints in digits if (way[joints] > _SAME).any()]
         return out
 
@@ -279,8 +259,8 @@ class ForceLimits:
         """Keep a digit's flexions from a time on."""
         hand = next(one for one in model.hands if one.name == key[0])
         angles = self._angles(hand, time)
-        joints = _digits(hand.bones.skeleton)[key[1]]
-        self._caps[key] = _Ramp(time, time, {joint: (float(angles[joint, _FLEXION]),) * 2 for joint in joints})
+        joints = closing_joints(hand.bones.skeleton)[key[1]]
+        self._caps[key] = FlexionRamp(time, time, {joint: (float(angles[joint, FLEXION]),) * 2 for joint in joints})
         if not any((one.actor, one.digit) == key for one in self.stops):
             self.stops.append(Stop(*key, model.start + time, why))
 
@@ -289,13 +269,13 @@ class ForceLimits:
         there was no equilibrium when they are free."""
         for key, ramp in list(self._caps.items()):
             here = {joint: (ramp.at(joint, now),) * 2 for joint in ramp.most}
-            self._caps[key] = held = _Ramp(now, time, here)
+            self._caps[key] = held = FlexionRamp(now, time, here)
             share = self._share(key)
             if share >= _RELAXED or (key in self._stuck and share > 0.0):
                 continue
             self._stuck.discard(key)
             hand = next(one for one in model.hands if one.name == key[0])
-            wanted = hand.bones.angles(time)[:, _FLEXION]
+            wanted = hand.bones.angles(time)[:, FLEXION]
             if all(most <= ramp.at(joint, now) for joint, most in enumerate(wanted) if joint in ramp.most):
                 del self._caps[key]
                 continue
@@ -304,7 +284,7 @@ class ForceLimits:
                 ends = {
                     joint: (most, most + part * max(0.0, wanted[joint] - most)) for joint, (most, _) in here.items()
                 }
-                self._caps[key] = _Ramp(now, time, ends)
+                self._caps[key] = FlexionRamp(now, time, ends)
                 then = self._left(self.driven(model), time)
                 if all(left.get(place, 1.0) - share <= _SQUEEZED for place, share in then.items()):
                     break
@@ -314,26 +294,6 @@ class ForceLimits:
 
 def _bendable(model: ContactModel) -> list[FleshBody]:
     return [hand for hand in model.hands if hand.bones.bendable]
-
-
-def _angles(hand: FleshBody, time: float, caps: Mapping[_Key, _Ramp]) -> NDArray[np.float64]:
-    """Joint angles [rad], shape (J, 4), of a hand some of whose digits have stopped."""
-    angles = np.array(hand.bones.angles(time))
-    for (actor, _), ramp in caps.items():
-        if actor == hand.name:
-            for joint in ramp.most:
-                angles[joint, _FLEXION] = min(angles[joint, _FLEXION], ramp.at(joint, time))
-    return angles
-
-
-def _digits(skeleton: Skeleton) -> dict[str, list[int]]:
-    """Joints that close each digit of a skeleton: ``left.index``, …, or ``index``."""
-    out: dict[str, list[int]] = {}
-    for joint, name in enumerate(skeleton.names):
-        digit, _, knuckle = name.rpartition(".")
-        if knuckle in KNUCKLES and digit.rpartition(".")[2] in DIGITS:
-            out.setdefault(digit, []).append(joint)
-    return out
 
 
 def _key_of(keys: Sequence[_Key], bone: TightBone) -> _Key | None:

@@ -1,0 +1,56 @@
+"""Digits that flex no farther than they may: ramps of the most that their joints flex by."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from warpjld.fem.hand.muscles import KNUCKLES
+from warpjld.skeleton import CHANNELS, DIGITS, Skeleton
+
+__all__ = ["FLEXION", "FlexionRamp", "closing_joints", "held_angles"]
+
+FLEXION = CHANNELS.index("flexion")
+"""Column of the angles."""
+
+
+@dataclass(frozen=True)
+class FlexionRamp:
+    """The most that joints of a digit flex by, at two times and straight between them.
+
+    Attributes:
+        begin, end: The times.
+        most: Flexions there [rad], by joint.
+    """
+
+    begin: float
+    end: float
+    most: Mapping[int, tuple[float, float]]
+
+    def at(self, joint: int, time: float) -> float:
+        """At a time, the nearer end's outside."""
+        one, other = self.most[joint]
+        share = (time - self.begin) / (self.end - self.begin) if self.end > self.begin else 1.0
+        return one + min(1.0, max(0.0, share)) * (other - one)
+
+
+def held_angles(angles: NDArray[np.float64], ramps: Iterable[FlexionRamp], time: float) -> NDArray[np.float64]:
+    """Joint angles [rad], shape (J, 4), none flexed farther than ramps have it at a time."""
+    out = np.array(angles)
+    for ramp in ramps:
+        for joint in ramp.most:
+            out[joint, FLEXION] = min(out[joint, FLEXION], ramp.at(joint, time))
+    return out
+
+
+def closing_joints(skeleton: Skeleton) -> dict[str, list[int]]:
+    """Joints that close each digit of a skeleton: ``left.index``, …, or ``index``."""
+    out: dict[str, list[int]] = {}
+    for joint, name in enumerate(skeleton.names):
+        digit, _, knuckle = name.rpartition(".")
+        if knuckle in KNUCKLES and digit.rpartition(".")[2] in DIGITS:
+            out.setdefault(digit, []).append(joint)
+    return out
