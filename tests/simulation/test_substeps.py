@@ -10,9 +10,9 @@ import pytest
 
 from warpjld.errors import InputError
 from warpjld.fem.contact.obstacles.solids import Box, Plane, Sphere
+from warpjld.fem.contact.obstacles.thickness import distance_past, half_thickness
 from warpjld.script import Scene
 from warpjld.script.contact import run_contact
-from warpjld.fem.contact.obstacles.thickness import distance_past, half_thickness
 
 PLATE = (
     "OBJECT plate BOX 0.036 0.002 0.036 AT 0.034 -0.0275 -0.165\nSPLINE 1\nFLESH LEFT INDEX ELEMENT 0.004\nRATE 10\n"
