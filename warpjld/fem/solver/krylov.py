@@ -25,6 +25,7 @@ class Status(Enum):
     INDEFINITE = "the stiffness is not positive definite: a body is free, unstable, or an element is turned inside out"
     NOT_FINITE = "a number became infinite or undefined"
     MAX_ITERATIONS = "the iterations allowed were not enough"
+    LIMIT_LOAD = "a limit load: beyond it no stable equilibrium was found"
     INVERTED = "elements were turned inside out, however small the step"
     SLIDING = "slides: friction is not enough to hold it"
     UNHELD = "nothing holds it"

@@ -23,6 +23,11 @@ _ROUNDING, _PLACES = 1e-13, 0.03
 _DIRECT = 40_000
 """Degrees of freedom up to which a step with an indefinite stiffness is solved directly."""
 
+_BRACKET = 2e-3
+"""How narrowly a limit load is found, over itself."""
+_SEED, _TESTED = 7, 1e-4
+"""Of the load that asks whether an equilibrium is stable, and how exactly it is answered."""
+
 Progress = Callable[[str], None]
 
 
@@ -40,22 +45,29 @@ class Newton:
         self._tolerance = tolerance
         self._guess = guess
         self._tangent: Tangent | None = None
+        self._indefinite = False
 
     def run(self, steps: list[float], held: Ints, progress: Progress | None) -> Solution:
         """Instant after instant; one that fails is tried again at half the step."""
         u = self._problem.start.copy()
         reached: list[Instant] = []
-        factor, halvings = 0.0, 0
+        factor, halvings, beyond = 0.0, 0, np.inf
         todo = list(steps)
         while todo:
             target = todo[0]
+            self._indefinite = False
             status, found = self._from_guess(target)
             if status is not Status.CONVERGED:
                 status, found = self._equilibrium(u, target, cautious=False)
-            if status is not Status.CONVERGED:
+            if status is not Status.CONVERGED and beyond == np.inf:
                 status, found = self._equilibrium(u, target, cautious=True)
+            if found is not None and status is Status.CONVERGED and not self._stable(found, target):
+                status, found = Status.LIMIT_LOAD, None
+            if found is None and (self._indefinite or status is Status.LIMIT_LOAD):
+                beyond = min(beyond, target)
             if found is not None and status is Status.CONVERGED:
                 u, factor = found.displacement.reshape(-1), target
+                beyond = beyond if factor < beyond else np.inf
                 reached.append(found)
                 todo.pop(0)
                 halvings = max(0, halvings - 1)
@@ -66,14 +78,31 @@ class Newton:
                     )
                 continue
             halvings += 1
-            if halvings > _HALVINGS:
+            if halvings > _HALVINGS or beyond - factor < _BRACKET * factor:
                 message = f"no equilibrium found above load {factor:.4g} (tried {target:.4g}): {status.value}"
+                if beyond < np.inf:
+                    status, message = Status.LIMIT_LOAD, _limit(factor, beyond)
                 some = tuple(reached) or (self._problem.beginning(),)
                 return Solution(status, some, message, held, self._problem.loads)
             if progress:
                 progress(f"load {target:.3g}: {status.value}; halving the step")
             todo.insert(0, 0.5 * (factor + target))
         return Solution(Status.CONVERGED, tuple(reached), Status.CONVERGED.value, held, self._problem.loads)
+
+    def _stable(self, found: Instant, target: float) -> bool:
+        """Whether the tangent of an equilibrium is positive definite: a shell beyond its limit pressure balances as
+        well, as a pencil does on its tip. A load without any symmetry asks for every mode there is."""
+        problem, u = self._problem, found.displacement.reshape(-1)
+        tangent = self._tangent = problem.body.at(u, reuse=self._tangent)
+        stiffness = tangent.stiffness
+        assert stiffness is not None
+        problem.subtract_pressure(stiffness, target, u)
+        load = np.random.default_rng(_SEED).standard_normal(u.size)
+        try:
+            done = problem.solver(stiffness).solve(np.where(problem.free, load, 0.0), tolerance=_TESTED)
+        except IndefiniteError:
+            return False
+        return done.status is not Status.INDEFINITE
 
     def _from_guess(self, target: float) -> tuple[Status, Instant | None]:
         """The full load's equilibrium from a first guess of it, where there is one."""
@@ -173,6 +202,14 @@ class Newton:
             done = self._problem.solver(stiffness).solve(right, tolerance=tolerance)
         except IndefiniteError:
             done = Iteration(np.zeros_like(right), Status.INDEFINITE, 0, 1.0, np.empty(0))
+        self._indefinite |= done.status is Status.INDEFINITE
         if done.status is Status.INDEFINITE and int(self._problem.free.sum()) <= _DIRECT:
             return self._problem.direct_solver(stiffness).solve(right)
         return done
+
+
+def _limit(factor: float, target: float) -> str:
+    return (
+        f"limit load: above {factor:.4g} of the load (tried {target:.4g}) no stable equilibrium was found: the body "
+        "buckles, snaps through or collapses there"
+    )

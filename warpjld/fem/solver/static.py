@@ -12,6 +12,7 @@ from warpjld.fem.assembly.block_matrix import IndefiniteError
 from warpjld.fem.body import Body
 from warpjld.fem.load.loads import Loads
 from warpjld.fem.load.prescribed import Prescribed, held_in_place, refuse_free
+from warpjld.fem.solver.arc_length import follow
 from warpjld.fem.solver.krylov import Status
 from warpjld.fem.solver.newton import Newton
 from warpjld.fem.solver.problem import Problem
@@ -20,6 +21,8 @@ from warpjld.threads import one_blas_thread
 
 __all__ = ["solve"]
 
+_ARC = 0.1
+"""Load factor that the first step along a path is as long as, where nothing else is said."""
 FREE = ("refuse", "hold")
 
 
@@ -36,6 +39,7 @@ def solve(
     method: str = "auto",
     precision: str = "float64",
     tolerance: float = 1e-8,
+    arc_length: bool = False,
     check: bool = True,
     progress: Callable[[str], None] | None = None,
 ) -> Solution:
@@ -56,6 +60,9 @@ def solve(
         method: Linear solver (see ``LinearSolver``).
         precision: ``float64``, or ``float32`` refined to float64 residuals.
         tolerance: Relative residual of each equilibrium.
+        arc_length: Follow the equilibrium path beyond limit loads, where a body buckles or snaps through and loads
+            fall on the way to the full load; equilibria on it need not be stable. The first of ``instants`` says how
+            long its steps are.
         check: Raise when the full load is not reached; otherwise return the status.
         progress: Called with a line of text after each instant.
 
@@ -73,7 +80,11 @@ def solve(
     prescribed, held = _held(body, prescribed, after, free)
     problem = Problem(body, prescribed, loads or Loads(), after, method=method, precision=precision)
     if body.large_strain:
-        solution = Newton(problem, tolerance, guess).run(steps, held, progress)
+        solution = (
+            follow(problem, steps[0] if len(steps) > 1 else _ARC, tolerance, held, progress)
+            if arc_length
+            else Newton(problem, tolerance, guess).run(steps, held, progress)
+        )
     else:
         solution = _linear(problem, steps, tolerance, held, progress)
     if check and not solution.converged:

@@ -23,8 +23,9 @@ __all__ = ["first_touch", "slid_unheld", "touched_at"]
 
 _SLID = 0.02
 """Edges that something may slide in the step in which it comes to touch, if it is not known when it does."""
-_HALF = 0.5
-"""Share of a step taken for one that is not known, of points beside others that pressed before it."""
+_HALF, _FAR = 0.5, 0.25
+"""Share of a step taken for one that is not known; used where a site is dragged by more edges than this, or else what
+touches beside others takes hold at the end of the step: flesh that is pressed slips a little everywhere."""
 _PAST = 1e-3
 """Share of a step by which it is cut behind the first touch: what touches then presses."""
 _LAST = 1.0 - 1e-9
@@ -55,12 +56,18 @@ def touched_at(
     out = []
     for interface, state in zip(interfaces, states, strict=True):
         if interface.pair.friction > 0.0:
-            share = np.full(len(state.touched_at), _HALF if (state.pressure > 0.0).any() else 1.0)
             points = interface.points(x, step.before, step.time)
-            towards = np.einsum("mi,mi->m", points.normal, points.relative(way) - points.carried)
-            known = towards > _APPROACH * interface.edge[points.sites]
-            behind = np.minimum(points.gap[known], 0.0) / towards[known]
-            share[points.sites[known]] = np.clip(1.0 + behind, 0.0, _LAST)
+            past = points.relative(way) - points.carried
+            towards = np.einsum("mi,mi->m", points.normal, past)
+            edge, began = interface.edge[points.sites], bool((state.pressure > 0.0).any())
+            known = towards > _APPROACH * edge
+            behind = np.minimum(points.gap, 0.0) / np.where(known, towards, 1.0)
+            found = np.where(known, np.clip(1.0 + behind, 0.0, _LAST), _HALF if began else 1.0)
+            if began:
+                drag = np.linalg.norm(tangential(past, points.normal), axis=1)
+                found = np.where((1.0 - found) * drag > _FAR * edge, found, 1.0)
+            share = np.ones(len(state.touched_at))
+            share[points.sites] = found
             state = replace(state, touched_at=share)
         out.append(state)
     return out

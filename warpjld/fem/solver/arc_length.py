@@ -1,0 +1,142 @@
+"""The equilibrium path beyond limit loads: arc length as the parameter, load and displacement as the unknowns.
+
+From an equilibrium (u, λ) a step of length |Δu| = s goes along the tangent u' = K⁻¹ ∂R/∂λ, in the direction in which
+the step before went, and is corrected at right angles to the way gone so far: δu = δu_R + δλ u', Δu · δu = 0, with
+K δu_R = R(u, λ) (Riks 1979, Int. J. Solids Struct. 15, 529; Ramm 1981). The load then falls beyond a limit load as it
+must.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+
+from warpjld.errors import InputError
+from warpjld.fem.arrays import Array, Ints, dot, norm
+from warpjld.fem.body import Tangent
+from warpjld.fem.solver.krylov import Status
+from warpjld.fem.solver.problem import Problem
+from warpjld.fem.solver.solution import Instant, Solution
+
+__all__ = ["DIRECT", "follow"]
+
+DIRECT = 40_000
+"""Degrees of freedom up to which steps are solved directly, as the path's indefinite stiffness asks for."""
+_STEPS = 300
+_ITERATIONS, _FEW = 12, 4
+_SHORTER, _LONGER, _LONGEST = 0.5, 1.5, 4.0
+_SHORTEST = 1e-4
+"""Length of a step under which the path is given up, over the first; ``_LONGEST`` likewise."""
+
+
+def follow(
+    problem: Problem, first: float, tolerance: float, held: Ints, progress: Callable[[str], None] | None
+) -> Solution:
+    """Equilibria along the path, until it reaches the full load; loads rise and fall on the way.
+
+    Args:
+        problem: What is to be in equilibrium.
+        first: Load factor that the first step is as long as.
+        tolerance: Relative residual of each equilibrium.
+        held: Degrees of freedom that were held because a body was free.
+        progress: Called with a line of text after each instant.
+
+    Raises:
+        InputError: Too many degrees of freedom.
+    """
+    if int(problem.free.sum()) > DIRECT:
+        raise InputError(f"arc_length: want {DIRECT} free degrees of freedom at most, got {int(problem.free.sum())}")
+    path = _Path(problem, tolerance)
+    u, factor, reached, limit = problem.start.copy(), 0.0, [problem.beginning()], 0.0
+    way = np.zeros_like(u)
+    length = longest = 0.0
+    for _ in range(_STEPS):
+        slope = path.slope(u, factor)
+        if slope is None:
+            break
+        if length == 0.0:
+            length = first * norm(slope)
+            longest = _LONGEST * length
+        sign = -1.0 if dot(way, slope) < 0.0 else 1.0
+        ahead = sign * length / norm(slope)
+        full = factor + ahead >= 1.0
+        ahead = 1.0 - factor if full else ahead
+        found = path.corrected(u, factor, ahead * slope, ahead, fixed=full)
+        if found is None:
+            length *= _SHORTER
+            if length < _SHORTEST * longest / _LONGEST:
+                break
+            continue
+        there, now, instant = found
+        way, u, factor = there - u, there, now
+        limit = max(limit, factor)
+        reached.append(instant)
+        length = min(longest, length * (_LONGER if instant.newton <= _FEW else 1.0))
+        if progress:
+            progress(f"load {factor:.4g}: {instant.newton} Newton steps, residual {instant.residual:.1e}")
+        if full:
+            text = "" if len(reached) < 2 else _turned([i.factor for i in reached])
+            return Solution(Status.CONVERGED, tuple(reached[1:]), text or "converged", held, problem.loads)
+    message = f"the path could not be followed to the full load: it got to {factor:.4g}, at most to {limit:.4g} of it"
+    return Solution(Status.MAX_ITERATIONS, tuple(reached[1:] or reached), message, held, problem.loads)
+
+
+def _turned(factors: list[float]) -> str:
+    """Where the load had to fall on the way, in words."""
+    peaks = [b for a, b, c in zip(factors, factors[1:], factors[2:], strict=False) if a < b > c]
+    return f"converged, beyond a limit load of {max(peaks):.4g} of the load" if peaks else ""
+
+
+class _Path:
+    """Steps along the path."""
+
+    def __init__(self, problem: Problem, tolerance: float) -> None:
+        self._problem, self._tolerance = problem, tolerance
+        self._tangent: Tangent | None = None
+        self._full = np.zeros_like(problem.start)
+        self._full[problem.prescribed.degrees] = problem.known(1.0) - problem.known(0.0)
+
+    def slope(self, u: Array, factor: float) -> Array | None:
+        """∂u/∂λ at fixed residual, shape (3N,)."""
+        return self._solve(u, factor, np.zeros_like(u))[1]
+
+    def _solve(self, u: Array, factor: float, residual: Array) -> tuple[Array | None, Array | None]:
+        """K⁻¹ R, and ∂u/∂λ."""
+        problem = self._problem
+        self._tangent = problem.body.at(u, reuse=self._tangent)
+        stiffness = self._tangent.stiffness
+        assert stiffness is not None
+        problem.subtract_pressure(stiffness, factor, u)
+        solver = problem.direct_solver(stiffness)
+        more = problem.external(1.0, u) - problem.external(0.0, u)
+        right = np.where(problem.free, more - stiffness.product(self._full, threads=problem.body.threads), 0.0)
+        one, two = (solver.solve(part) if part.any() else None for part in (residual, right))
+        if any(part is not None and not np.isfinite(part.x).all() for part in (one, two)):
+            return None, None
+        return (np.zeros_like(u) if one is None else one.x), self._full + (0.0 if two is None else two.x)
+
+    def corrected(
+        self, start: Array, factor: float, way: Array, ahead: float, *, fixed: bool
+    ) -> tuple[Array, float, Instant] | None:
+        """The equilibrium near a way (3N,) and a load ahead; at that load where it is fixed. None where none is."""
+        problem, load = self._problem, factor + ahead
+        for step in range(_ITERATIONS):
+            u = start + way
+            state = problem.body.at(u, stiffness=False)
+            if not (state.lowest > 0.0).all() or not np.isfinite(state.forces).all():
+                return None
+            external = problem.external(load, u)
+            residual = np.where(problem.free, external - state.forces, 0.0)
+            scale = max(norm(external), norm(np.where(problem.free, 0.0, state.forces - external)), 1e-300)
+            left = norm(residual) / scale
+            if left <= self._tolerance:
+                reactions = problem.reactions(state.forces - external)
+                return u, load, Instant(load, u.reshape(-1, 3), reactions, step, 0, left)
+            move, slope = self._solve(u, load, residual)
+            if move is None or slope is None:
+                return None
+            across = dot(way, slope)
+            change = 0.0 if fixed or across == 0.0 else -dot(way, move) / across
+            way, load = way + move + change * slope, load + change
+        return None
