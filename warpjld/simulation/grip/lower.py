@@ -40,6 +40,8 @@ _LESS = 0.02
 _TOO_FAR = 0.1
 """Share of the weight that the hand may bear beyond all of it before a step is taken again, and shorter: friction
 remembers, and does not let an object rise to where it would have stayed."""
+_CLEARLY = 0.9
+"""Share of the weight that pressures under it must be able to bear for the descent to go on, if they do not grow."""
 _PROBE = 0.05
 """Step once all slides, over ``far``: long enough to see whether more will be borne."""
 _ALL = 1.0 - 1e-9
@@ -201,7 +203,7 @@ def _outcome(weight: SharedWeight, places: list[_Place], far: float) -> TrialOut
         return TrialOutcome.APART
     if len(places) > 1 and here.slides and places[-2].slides:
         return TrialOutcome.SLIDES if max(_slope(places), 0.0) * (far - here.sunk) < here.left else None
-    if len(places) > 1 and here.most < 1.0 and _presses(places) * (far - here.sunk) < 1.0 - here.most:
+    if len(places) > 1 and here.most < _CLEARLY and _presses(places) * (far - here.sunk) < 1.0 - here.most:
         return TrialOutcome.WEAK
     if here.borne < max(one.borne for one in places) - _LESS:
         return TrialOutcome.GIVES
