@@ -137,6 +137,15 @@ _PAIR = """
     };
     const int* sc = slave.data + 4 * pairs.data[2 * pair];
     const int* mc = master.data + 4 * pairs.data[2 * pair + 1];
+    for (int k = 0; k < 3; ++k) {  // boxes farther apart than that: nothing in them is nearer
+        double low[2] = {1e300, 1e300}, high[2] = {-1e300, -1e300};
+        for (int i = 0; i < 8; ++i) {
+            const double at = x.data[3 * (i < 4 ? sc[i] : mc[i - 4]) + k];
+            low[i / 4] = at < low[i / 4] ? at : low[i / 4];
+            high[i / 4] = at > high[i / 4] ? at : high[i / 4];
+        }
+        if (low[0] - high[1] > reach || low[1] - high[0] > reach) return;
+    }
     Real out[33], xs[4][3], xm[4][3], c[3];
     for (int i = 0; i < 33; ++i) out[i] = Real(0.0);
     for (int k = 0; k < 3; ++k) c[k] = Real(0.0);

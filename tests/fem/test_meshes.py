@@ -23,7 +23,7 @@ from warpjld.fem import (
     prescribe,
     solve,
 )
-from warpjld.fem.mesh.core import make_manifold
+from warpjld.fem.mesh.core import core_of, make_manifold
 from warpjld.fem.mesh.embedding import embed
 from warpjld.fem.mesh.envelope import Envelope
 from warpjld.fem.mesh.fit import fit_mesh
@@ -216,3 +216,19 @@ def test_inverted_corner_has_a_negative_scaled_jacobian() -> None:
     nodes = mesh.nodes.copy()
     nodes[7] = [-0.5, -0.5, -0.5]
     assert replace(mesh, nodes=nodes).scaled_jacobian()[0] < 0
+
+
+def test_far_nodes_answer_for_those_around() -> None:
+    """Cells of a grid are those that every node's and every half's own distance gives."""
+    surface = trimesh.creation.capsule(height=1.3, radius=0.31, count=[24, 24])
+    surface.apply_transform(trimesh.transformations.rotation_matrix(0.7, [1.0, 2.0, 0.5]))
+    envelope = Envelope(surface.vertices, surface.faces)
+    assert envelope.closed
+    cells, low = core_of(envelope, 0.07, [])
+    envelope.closed = False
+    plain, same = core_of(envelope, 0.07, [])
+    assert low.tobytes() == same.tobytes()
+    np.testing.assert_array_equal(cells, plain)
+    opened = Envelope(surface.vertices, np.concatenate([surface.faces[5:40], surface.faces[44:]]))
+    assert not Envelope(surface.vertices, np.concatenate([surface.faces, surface.faces[:1]])).closed
+    assert opened.open_edges > 0

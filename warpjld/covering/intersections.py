@@ -7,6 +7,7 @@ opposite to it are asked, of two with a common edge nothing is: they meet there 
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -69,16 +70,23 @@ class Crossings:
         return np.asarray(label[:, 0] != label[:, 1])
 
 
-def crossing_faces(vertices: ArrayLike, faces: NDArray[np.int32]) -> Crossings:
+def crossing_faces(
+    vertices: ArrayLike,
+    faces: NDArray[np.int32],
+    wanted: Callable[[NDArray[np.int32]], NDArray[np.bool_]] | None = None,
+) -> Crossings:
     """All crossing pairs of faces of a surface.
 
     Args:
         vertices: Positions [m], shape (V, 3).
         faces: Triangles, shape (T, 3).
+        wanted: Which pairs (N, 2) to look at, shape (N,); all if left out.
     """
     points = np.asarray(vertices, dtype=np.float64)
     points = points - points.mean(axis=0)
     pairs = _overlapping(points, faces)
+    if wanted is not None:
+        pairs = pairs[wanted(pairs)]
     kept = [part[_cross(points, faces, part)] for part in np.array_split(pairs, max(len(pairs) // _CHUNK, 1))]
     return Crossings(np.concatenate(kept).astype(np.int32))
 

@@ -266,6 +266,7 @@ def _model(
         build_object_body(animation.objects[name], specification, start, before.place(name))
         for name in specification.physical
     ]
+    notes += [f"{one.name}: {note}" for one in objects for note in one.notes]
     rigid = [name for name in animation.objects if name not in specification.physical]
     obstacles = {name: animation.objects[name].obstacle(start) for name in rigid}
     model = assemble_model(hands, objects, obstacles, specification, start=start, animation=animation)

@@ -39,6 +39,7 @@ class ObjectBody(DeformableBody):
         start: Frame of time 0.
         support: What it stands on until a hand takes its weight.
         other: What is prescribed instead of all this, at a time.
+        notes: What is to be told of its mesh.
     """
 
     local: NDArray[np.float64]
@@ -47,6 +48,7 @@ class ObjectBody(DeformableBody):
     start: float
     support: ObjectSupport | None = None
     other: Callable[[float], Prescribed] | None = None
+    notes: tuple[str, ...] = ()
 
     def deformed(
         self, displacement: NDArray[np.float64], covered: NDArray[np.floating] | None = None
@@ -186,6 +188,7 @@ def object_body(
         states=states,
         start=start,
         support=support,
+        notes=volume.notes,
     )
 
 

@@ -14,6 +14,7 @@ from warpjld.fem.mesh.envelope import Envelope
 from warpjld.fem.mesh.fit import fit_mesh
 from warpjld.fem.output.stress import cauchy
 from warpjld.grasp.objects import GraspObject, Places
+from warpjld.kept_values import hash_of, kept_value
 from warpjld.rotations import unit
 from warpjld.simulation.specification import ObjectMaterial
 
@@ -50,6 +51,7 @@ class ObjectMesh:
         surface: Its surface at time 0 [m], shape (V, 3).
         faces: Triangles of its surface, shape (T, 3).
         stress: Stress that holds the pressure inside in its shape at time 0 [Pa], shape (E, 6) (R98).
+        notes: Of files that could not be used.
     """
 
     name: str
@@ -60,6 +62,7 @@ class ObjectMesh:
     surface: NDArray[np.float64]
     faces: NDArray[np.int32]
     stress: NDArray[np.float64]
+    notes: tuple[str, ...] = ()
 
     @property
     def inside(self) -> str:
@@ -82,6 +85,34 @@ def mesh_object(name: str, thing: GraspObject, physical: ObjectMaterial, place: 
     Raises:
         InputError: Elements too large for it, a wall too thick, or a pressure its wall cannot hold.
     """
+    key = hash_of(name, thing.origin, thing.size, thing.vertices, thing.faces, replace(physical, where=None))
+    local, notes = kept_value("object", key, (_Local, HexMesh, Embedding), lambda: _meshed(name, thing, physical))
+    turn = place.apply(np.eye(3))[0] - place.apply(np.zeros((1, 3)))[0]
+    moved = replace(local.mesh, nodes=place.apply(local.mesh.nodes)[0])
+    return ObjectMesh(
+        name,
+        moved,
+        local.mesh.nodes,
+        physical,
+        local.visible,
+        place.apply(thing.vertices)[0],
+        thing.faces,
+        _turned(local.stress, turn.T),
+        notes,
+    )
+
+
+@dataclass(frozen=True, eq=False)
+class _Local:
+    """Of an object in its own frame: what ``ObjectMesh`` has of it elsewhere."""
+
+    mesh: HexMesh
+    visible: Embedding
+    stress: NDArray[np.float64]
+
+
+def _meshed(name: str, thing: GraspObject, physical: ObjectMaterial) -> _Local:
+    """An object's mesh in its own frame, as ``mesh_object`` has it."""
     size = physical.element or float(thing.size.min()) / _ACROSS
     _refuse_many(thing, physical.wall, size)
     if thing.origin == "ball":
@@ -107,18 +138,7 @@ def mesh_object(name: str, thing: GraspObject, physical: ObjectMaterial, place: 
         visible = embed(mesh, thing.vertices, reach=_REACH / thin)
     except InputError as error:
         raise InputError(f"elements of {size:g} m are too large, thin parts are left out ({error.message})") from error
-    turn = place.apply(np.eye(3))[0] - place.apply(np.zeros((1, 3)))[0]
-    moved = replace(mesh, nodes=place.apply(mesh.nodes)[0])
-    return ObjectMesh(
-        name,
-        moved,
-        mesh.nodes,
-        physical,
-        visible,
-        place.apply(thing.vertices)[0],
-        thing.faces,
-        _turned(stress, turn.T),
-    )
+    return _Local(mesh, visible, stress)
 
 
 def _refuse_many(thing: GraspObject, wall: float, size: float) -> None:

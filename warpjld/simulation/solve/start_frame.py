@@ -194,11 +194,19 @@ def _meets_itself(actor: ActorAnimation, material: FleshMaterial, skin: NDArray[
         return False
     covering = actor.covering
     parts = surface_parts(covering)
-    pairs = crossing_faces(skin, covering.surface.faces).contact(parts).pairs
     middle = covering.surface.vertices[covering.surface.faces].mean(axis=1)
-    far = np.linalg.norm(middle[pairs[:, 0]] - middle[pairs[:, 1]], axis=1) > _PARTED
     mine = np.array([not material.digits or name.rpartition(".")[2] in material.digits for name in parts.names])
-    return bool((far & mine[parts.of_face[pairs]].all(axis=1)).any())
+    if mine.sum() < 2:
+        return False
+
+    def apart(pairs: NDArray[np.int32]) -> NDArray[np.bool_]:
+        part = parts.of_face[pairs]
+        some = (part[:, 0] != part[:, 1]) & mine[part].all(axis=1)
+        far = np.linalg.norm(middle[pairs[some, 0]] - middle[pairs[some, 1]], axis=1) > _PARTED
+        some[some] = far
+        return np.asarray(some)
+
+    return bool(len(crossing_faces(skin, covering.surface.faces, apart).pairs))
 
 
 def _inside(solid: Obstacle, points: NDArray[np.float64]) -> bool:

@@ -159,17 +159,14 @@ class Mortar:
         return self._last[2], self._last[3]
 
     def _neighbours(self, x: Array, reach: float) -> Ints32:
-        """Slave and master facets whose boxes are within ``reach``, shape (P, 2), in order; none is left out.
+        """Slave and master facets, shape (P, 2), in order: all whose boxes are within ``reach``, and some more.
 
-        Pairs a little farther apart are kept, and looked through, until a node has moved so far that others may come.
+        They are looked for again only when a node has moved so far that others may have come.
         """
         near = self._near
         if near is None or near.reach != reach or not near.serves(x, self.slave, self.master):
             near = self._near = _Near(x.copy(), reach, self._within(x, reach + 2.0 * _AHEAD * reach))
-        (low, high), (other_low, other_high) = (_boxes(x, surface) for surface in (self.slave, self.master))
-        mine, other = near.pairs.T
-        met = (low[mine] - reach <= other_high[other]) & (high[mine] + reach >= other_low[other])
-        return near.pairs[met.all(axis=1)]
+        return near.pairs
 
     def _within(self, x: Array, reach: float) -> Ints32:
         """Slave and master facets whose boxes are within ``reach``, shape (P, 2), by slave and by master."""

@@ -13,18 +13,18 @@ own.
     (6)  |R| ≤ tolerance · scale,  −g ≤ penetration · edge,  Σ A |Δλ| ≤ 0.002 Σ A |λ|           when it has converged
 
 K is the bodies' tangent, H_t = ε (I − n nᵀ) where a point sticks and what resists its path's turning where it slides.
-K + H is symmetric and, ε being moderate (200 E*/edge), well conditioned: multigrid-preconditioned conjugate gradients
-keep working, and (5) takes away what overlap and slip a penalty leaves. E is what is not symmetric: derivatives of
-mortar weights and normals (Puso & Laursen 2004), and of friction by pressure; with it GMRES takes over, preconditioned
-by K + H.
+K + H is symmetric and, ε being moderate (200 E*/edge), well conditioned, and (5) takes away what overlap and slip a
+penalty leaves. It is factorised (``solver.factor``: multifrontal Cholesky); where that costs too much, or K + H is not
+positive definite, multigrid preconditions instead. E is what is not symmetric: derivatives of mortar weights and
+normals (Puso & Laursen 2004), and of friction by pressure; with it GMRES takes over, preconditioned by K + H.
 
 A load step (``load_steps``, ``contact_newton``), from u and λ of the step before, at the guess that leaves the least
 force over (u carried along by what moves the bodies, alone or with last step's correction), or, where that is in vain,
 from u itself, prescribed values yet to go to their place:
 
 1. ``newton_state.assemble``: R of (1); end where (6) holds and points found afresh agree (``balanced``, ``confirmed``).
-2. ``newton_state.linearise``, ``tangent``: E; ``lagged_solver``: Δu of (4), with the preconditioner of earlier steps
-   while it serves; where K + H is not positive definite ``damping`` lends it stiffness at rest (Levenberg, Marquardt).
+2. ``newton_state.linearise``, ``tangent``: E; ``lagged_solver``: Δu of (4); where K + H is not positive definite
+   ``damping`` lends it stiffness at rest (Levenberg, Marquardt).
    A search that never comes near (|R| above .3 of the forces for ten iterations) is ended.
 3. How far along Δu (``contact_newton``): as far as points look ahead; elements keep a fifth of their Jacobians
    (``line_search.length_upright``); see 5 for the rest.

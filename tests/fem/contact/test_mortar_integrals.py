@@ -1,0 +1,61 @@
+"""Mortar integrals' derivatives against differences; pairs of facets do not depend on what was asked before."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from warpjld.fem import HexMesh, box_hexes, merge
+from warpjld.fem.contact import Pair
+from warpjld.fem.contact.interface.mortar import Mortar
+from warpjld.fem.contact.interface.surface import surface_of
+
+
+def _blocks(counts: int) -> tuple[HexMesh, Mortar]:
+    """Two blocks with uneven faces, one a little inside the other."""
+    rng = np.random.default_rng(7)
+    one = box_hexes((1.0, 0.3, 1.0), (counts, 1, counts))
+    two = box_hexes((1.0, 0.3, 1.0), (counts + 1, 1, counts + 2), origin=(0.03, 0.27, -0.04))
+    uneven = [replace(m, nodes=m.nodes + 0.02 * rng.normal(size=m.nodes.shape)) for m in (one, two)]
+    sides = [replace(m, faces={name: m.faces[face]}) for m, name, face in zip(uneven, "ab", ("y+", "y-"), strict=True)]
+    mesh = merge(*sides)
+    slave, master = (surface_of(mesh, name, name) for name in "ab")
+    return mesh, Mortar(slave, master, Pair("a", "b"), len(mesh.nodes), 1)
+
+
+def test_derivatives_are_those_of_the_integrals() -> None:
+    mesh, mortar = _blocks(3)
+    x, reach, step = mesh.nodes, 0.6, 1e-6
+    pairs = mortar.points(x, reach, mortar.slave.normals(x)).facets
+    assert pairs is not None
+    assert len(pairs) > 20
+    found = mortar.derivatives(pairs, x, reach)
+    quads = np.concatenate([mortar.slave.quads[pairs[:, 0]], mortar.master.quads[pairs[:, 1]]], axis=1)
+    for pair, corners in enumerate(quads):
+        for k in range(24):
+            ends = []
+            for sign in (1.0, -1.0):
+                moved = x.copy()
+                moved[corners[k // 3], k % 3] += sign * step
+                sides = (pairs[pair : pair + 1], mortar.slave.quads, mortar.master.quads)
+                ends.append(mortar.integrals(*sides, moved, reach)[0])
+            difference = (ends[0] - ends[1]) / (2.0 * step)
+            np.testing.assert_allclose(found[pair, k], difference, atol=2e-8)
+
+
+def test_points_do_not_depend_on_what_was_asked_before() -> None:
+    mesh, mortar = _blocks(6)
+    rng, reach = np.random.default_rng(3), 0.3
+    way = np.zeros_like(mesh.nodes)
+    for _ in range(12):  # some steps further than candidates are kept for, some back where it was
+        way += rng.uniform(0.0, 0.05) * np.array([1.0, -0.3, 0.4]) * (np.arange(len(way)) > len(way) // 2)[:, None]
+        for x in (mesh.nodes + way, mesh.nodes):
+            normals = mortar.slave.normals(x)
+            found = mortar.points(x, reach, normals)
+            fresh = Mortar(mortar.slave, mortar.master, Pair("a", "b"), len(x), 1).points(x, reach, normals)
+            assert found.facets is not None
+            assert fresh.facets is not None
+            assert found.facets.tobytes() == fresh.facets.tobytes()
+            assert found.gap.tobytes() == fresh.gap.tobytes()
+            assert (found.weights != fresh.weights).nnz == 0
