@@ -53,7 +53,9 @@ def grasp_by_itself(
     if f"{side}.shoulder" in actor.skeleton.names:
         found = _by_arm(scene, actor, closer, side, (first, middle, last), obstacles, tries, posture_name)
     else:
-        found = find_grasp(closer, obstacles=obstacles, side=side, count=tries, posture=posture_name)
+        found = find_grasp(
+            covering, thing, closer=closer, obstacles=obstacles, side=side, count=tries, posture=posture_name
+        )
         _carry(scene, actor, found, (first, middle, last))
     grip = {}
     rest = actor.skeleton.initial
