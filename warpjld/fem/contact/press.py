@@ -14,7 +14,7 @@ from warpjld.fem.contact.results.contact_solution import ContactError, ContactIn
 from warpjld.fem.contact.solver.load_steps import Guess, LoadSteps
 from warpjld.fem.load.loads import Loads
 from warpjld.fem.load.prescribed import Prescribed
-from warpjld.fem.material.rotation import warn_of_rotation
+from warpjld.fem.rotation import warn_of_rotation
 from warpjld.fem.solver.krylov import Status
 
 __all__ = ["press"]
