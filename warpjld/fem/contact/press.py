@@ -14,6 +14,7 @@ from warpjld.fem.contact.results.contact_solution import ContactError, ContactIn
 from warpjld.fem.contact.solver.load_steps import Guess, LoadSteps
 from warpjld.fem.load.loads import Loads
 from warpjld.fem.load.prescribed import Prescribed
+from warpjld.fem.rotation import warn_of_rotation
 from warpjld.fem.solver.krylov import Status
 from warpjld.threads import one_blas_thread
 
@@ -41,7 +42,9 @@ def press(
 ) -> ContactSolution:
     """Equilibria of bodies in contact at rising times.
 
-    Surfaces that overlap at the start are parted gradually up to the first time (R112). Steps that fail are halved.
+    Surfaces that overlap at the start are parted gradually up to the first time (R112). Steps that fail are halved;
+    those longer than contact can follow, and those in which friction first takes hold, are cut. Bodies that would pass
+    through each other, or lie deep in one another with nothing to part them, end the run with ``Status.PASSED``.
 
     Args:
         body: All bodies, merged into one mesh.
@@ -78,6 +81,7 @@ def press(
     else:
         way = LoadSteps(body, prescribed, list(pairs), loads, wanted, after, tolerance, penetration, guess, halvings)
         solution = way.run(watch, progress)
+    warn_of_rotation(body, solution.last.displacement)
     if check and not solution.converged and solution.status is not Status.STOPPED:
         raise ContactError(solution)
     return solution

@@ -12,6 +12,7 @@ from warpjld.fem.assembly.block_matrix import IndefiniteError
 from warpjld.fem.body import Body
 from warpjld.fem.load.loads import Loads
 from warpjld.fem.load.prescribed import Prescribed, held_in_place, refuse_free
+from warpjld.fem.rotation import warn_of_rotation
 from warpjld.fem.solver.arc_length import follow
 from warpjld.fem.solver.krylov import Status
 from warpjld.fem.solver.newton import Newton
@@ -87,6 +88,7 @@ def solve(
         )
     else:
         solution = _linear(problem, steps, tolerance, held, progress)
+    warn_of_rotation(body, solution.displacement)
     if check and not solution.converged:
         raise SolveError(solution)
     return solution

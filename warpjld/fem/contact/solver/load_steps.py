@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
 
@@ -22,9 +23,10 @@ from warpjld.fem.contact.solver.course import Course
 from warpjld.fem.contact.solver.first_touch import first_touch, slid_unheld, touched_at
 from warpjld.fem.contact.solver.newton_state import Equilibrium
 from warpjld.fem.contact.solver.passing import Passing
+from warpjld.fem.contact.solver.statics import could_balance
 from warpjld.fem.contact.solver.unconstrained import blocked
-from warpjld.fem.load.loads import Loads
-from warpjld.fem.load.prescribed import Prescribed
+from warpjld.fem.load.loads import Loads, external_forces
+from warpjld.fem.load.prescribed import Prescribed, free_motions
 from warpjld.fem.solver.krylov import Status
 
 __all__ = ["Guess", "LoadSteps"]
@@ -45,6 +47,8 @@ _WHOLE = 0.95
 """Share of a step from which on it is left whole."""
 _FAR = 2.2
 """How far contact looks, over the overlap at a start that it is to part: what is farther off than half of it fades."""
+_ROUGHER = (8.0, 2.0, 1.2, 1.0)
+"""Friction over what it is, of equilibria that lead to one that is hard to find."""
 _PART = 0.85
 """How far along the course of the step before a first guess goes: contact stiffens what it meets."""
 
@@ -150,6 +154,7 @@ class LoadSteps:
         while todo:
             target = todo[0]
             newton.solves = newton.iterations = 0
+            newton.failure = ""
             step = self._step(now, target)
             carried = self._carried(step)
             ahead = self.course.ahead(self.u, step.prescribed) if self.guess is None else carried
@@ -181,13 +186,16 @@ class LoadSteps:
                 status, found = Status.PASSED, None
             solves += newton.solves
             iterations += newton.iterations
+            if found is None and status is Status.SLIDING and self._could_hold(step):
+                status = Status.MAX_ITERATIONS
+                newton.failure = "friction could hold it, but how was not found"
             if overlap := self._blocked(step, found):
                 message = f"no equilibrium at time {target:.4g}: {overlap}; no force can part them"
                 return self._end(Status.BLOCKED, reached, message, step)
             if found is None:
                 halvings += 1
                 if halvings > self._most_halvings(status):
-                    reason = through or (newton.failure if status in _UNHELD else status.value)
+                    reason = through or newton.failure or status.value
                     message = f"no equilibrium found after time {now:.4g} (tried {target:.4g}): {reason}"
                     return self._end(status, reached, message, step)
                 tell(f"time {target:.3g}: {status.value}; halving the step")
@@ -242,6 +250,8 @@ class LoadSteps:
         """Equilibrium of a step; again after every bond that did not hold."""
         guesses = self._guesses(step, carried)
         status, found = self.newton.find(self.u, self.states, step, *guesses)
+        if found is None and self._adrift_on_friction(step) and self._could_hold(step):
+            status, found = self._from_rough(step, status)
         for _ in range(_BREAKS):
             if found is None:
                 return status, None
@@ -252,6 +262,41 @@ class LoadSteps:
             states = [without_bonds(s, mask) for s, mask in zip(found.states, broken, strict=True)]
             status, found = self.newton.find(self.u, states, step, found.displacement)
         return Status.MAX_ITERATIONS, None
+
+    def _adrift_on_friction(self, step: LoadStep) -> bool:
+        """Whether a body is held by friction alone."""
+        return self.course.adrift(step.prescribed) and any(i.pair.friction > 0.0 for i in self.interfaces)
+
+    def _from_rough(self, step: LoadStep, status: Status) -> tuple[Status, Equilibrium | None]:
+        """An equilibrium looked for from that of rougher surfaces, where all sticks that can: halving a step of a body
+        on an incline only makes the same problem smaller."""
+        pairs = [interface.pair for interface in self.interfaces]
+        states: list[ContactState] = self.states
+        guess: tuple[Array, ...] = ()
+        found: Equilibrium | None = None
+        try:
+            for rougher in _ROUGHER:
+                for interface, pair in zip(self.interfaces, pairs, strict=True):
+                    interface.pair = replace(pair, friction=rougher * pair.friction)
+                failure = self.newton.failure
+                found = self.newton.find(self.u, states, step, *guess)[1]
+                if found is None:
+                    self.newton.failure = failure
+                    return status, None
+                states, guess = found.states, (found.displacement,)
+        finally:
+            for interface, pair in zip(self.interfaces, pairs, strict=True):
+                interface.pair = pair
+        return Status.CONVERGED, found
+
+    def _could_hold(self, step: LoadStep) -> bool:
+        """Whether forces at contacts could balance every body that nothing else holds; whether they may is unknown."""
+        x = self.body.mesh.nodes + self.u.reshape(-1, 3)
+        points = [interface.points(x, step.before, step.time) for interface in self.interfaces]
+        force = external_forces(self.body, step.loads, self.u if self.body.large_strain else None).reshape(-1, 3)
+        loose = [nodes for nodes, _ in free_motions(self.body, step.prescribed)]
+        known = (x, force, step.prescribed.degrees, self.interfaces, points)
+        return all(could_balance(nodes, *known) for nodes in loose)
 
     def _carried(self, step: LoadStep) -> Array:
         """The displacement that a step begins from, carried on as the caller knows how, shape (3N,)."""
