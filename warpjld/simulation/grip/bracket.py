@@ -79,6 +79,11 @@ class Bracket:
             self._above = [one for one in self._above if one.grip > grip]
             self._below.append(point)
 
+    def distrust(self) -> None:
+        """What was measured until now was something else: grips stay as bounds, without values and slopes."""
+        self._below = [_Point(one.grip, math.nan, None) for one in self._below]
+        self._above = [_Point(one.grip, math.nan, None) for one in self._above]
+
     def lose(self, grip: float) -> None:
         """A grip at which no equilibrium was found."""
         self._lost.append(grip)

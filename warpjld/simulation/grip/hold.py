@@ -151,7 +151,8 @@ class WeightTrials(ABC):
         capacity = self.weight.most(instant) if known else float("nan")
         rate = self._rate(grip) if capacity > 0.0 else None
         slope = None if rate is None else capacity * rate
-        return Trial(outcome, sliding, force, borne, share, who, note, capacity, slope)
+        loaded = grip in self.lowered
+        return Trial(outcome, sliding, force, borne, share, who, note, capacity, slope, loaded)
 
     def _rate(self, grip: float) -> float | None:
         """How fast the forces between hand and object grow with the grip, as a share of them, before the weight is on;

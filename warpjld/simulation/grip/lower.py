@@ -29,6 +29,8 @@ _PART, _BOUNDS = 0.5, (_FIRST, 0.06)
 """Part of the way that is predicted to take in one step, and bounds of this step, over the object's height."""
 _ALMOST = 0.9
 """Part of the way that the tangent foresees to take in the first step."""
+_AGAIN = 0.6
+"""Part of a step that found no equilibrium that later ones may be long: what fails costs most."""
 _SHORTER, _TRIES = 1.0 / 3.0, 3
 """What becomes of a step that finds no equilibrium, and how many are tried."""
 _LEFT, _LITTLE = 0.01, 0.001
@@ -157,6 +159,7 @@ class _Way:
         self._weight, self._moved = weight, moved
         self._begin, self.far = weight.height(bare.last), _FAR * weight.tall
         self.places = [self._place(bare)]
+        self._longest = np.inf
 
     def _place(self, solution: ContactSolution) -> _Place:
         there = solution.last
@@ -167,11 +170,12 @@ class _Way:
 
     def onward(self, here: _Place, step: float) -> _Place | None:
         """Deeper by a step [m], or by less where that finds no equilibrium or goes too far."""
-        ahead = None
+        ahead, step = None, min(step, self._longest)
         for _ in range(_TRIES):
             height = self._weight.lower(self._weight.height(here.solution.last), step)
             solution = self._moved(here.solution, height)
             if not solution.converged:
+                self._longest = _AGAIN * step
                 step *= _SHORTER
                 continue
             ahead = self._place(solution)

@@ -77,6 +77,7 @@ class Trial:
         capacity: Share of the weight that friction could bear with its pressures, were all of it to point up; NaN where
             it is not known: ``borne`` counts then.
         slope: Derivative of the capacity by the grip, where it is known.
+        loaded: Whether pressures were those under the weight, not those before.
     """
 
     outcome: TrialOutcome
@@ -88,6 +89,7 @@ class Trial:
     note: str = ""
     capacity: float = float("nan")
     slope: float | None = None
+    loaded: bool = True
 
     @property
     def able(self) -> float:
@@ -211,6 +213,8 @@ class _Search:
         return self._ended(GripStatus.INTERRUPTED, *self.trials[-1])
 
     def _note(self, grip: float, trial: Trial) -> None:
+        if trial.loaded and not any(one.loaded for _, one in self.trials[:-1]):
+            self._bracket.distrust()  # pressures before the weight came on
         if not trial.held and 0.0 < trial.borne < 1.0 < trial.able:  # it takes more than friction's sum
             self._bracket.target = self._aim * trial.able / trial.borne
         self._bracket.note(grip, trial.able, trial.slope, enough=trial.held)
