@@ -51,6 +51,52 @@ class Blocks:
 
 @wp.func_native(
     """
+    int* at = number.data + size_t(part) * k.place.shape[0];
+    for (int n = fronts.parts.data[part]; n < fronts.parts.data[part + 1]; ++n) {
+        const int f = fronts.todo.data[n];
+        const int* row = fronts.rows.data + fronts.starts.data[f];
+        const int own = fronts.first.data[f + 1] - fronts.first.data[f];
+        const int all = fronts.starts.data[f + 1] - fronts.starts.data[f];
+        for (int i = 0; i < all; ++i) at[row[i]] = i;
+        for (int j = 0; j < own; ++j) {
+            const int node = k.order.data[row[j]];
+            for (int e = k.rows.data[node]; e < k.rows.data[node + 1]; ++e) {
+                const int there = k.place.data[k.columns.data[e]];
+                if (there >= row[j] && at[there] < 0) {
+                    failed.data[part] = -1;
+                    return;
+                }
+            }
+        }
+        for (int i = 0; i < all; ++i) at[row[i]] = -1;
+    }
+"""
+)
+def look_for_room(
+    part: int,
+    fronts: Fronts,
+    k: Blocks,
+    number: wp.array(dtype=wp.int32),
+    failed: wp.array(dtype=wp.int32),
+): ...
+
+
+@wp.kernel
+def has_room(
+    first: int,
+    fronts: Fronts,
+    matrix: Blocks,
+    # scratch
+    number: wp.array(dtype=wp.int32),
+    # out
+    failed: wp.array(dtype=wp.int32),
+):
+    """``failed`` is -1 where the matrix has what no front of a range has room for."""
+    look_for_room(first + wp.tid(), fronts, matrix, number, failed)
+
+
+@wp.func_native(
+    """
     typedef double Eight __attribute__((ext_vector_type(8)));
     typedef double Loose __attribute__((ext_vector_type(8), aligned(8)));
     // C −= A Bᵀ, by columns: c (m × n), a (m × depth), b (n × depth), m a multiple of 8, n of 3; of column j of c what
@@ -107,10 +153,6 @@ class Blocks:
                 const int other = k.columns.data[e], there = k.place.data[other];
                 if (there < here) continue;
                 const int i = at[there];
-                if (i < 0) {
-                    failed.data[part] = -1;
-                    return;
-                }
                 const double* v = k.values.data + 9 * size_t(e);
                 const double* its = k.free.data + 3 * other;
                 for (int p = 0; p < 3; ++p)
@@ -192,8 +234,7 @@ def factorise(
     factor: wp.array(dtype=wp.float64),
     failed: wp.array(dtype=wp.int32),
 ):
-    """The panels of a range of fronts; ``failed`` is -1 where the matrix has what no front has room for, the number of
-    a node and one where its pivot is not positive."""
+    """The panels of a range of fronts; ``failed`` is the number of a node and one where its pivot is not positive."""
     factorise_part(first + wp.tid(), fronts, matrix, number, work, factor, failed)
 
 

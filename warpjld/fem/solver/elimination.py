@@ -111,7 +111,9 @@ def _tables(order: Ints32, place: Ints32, first: Ints, lists: list[Ints32]) -> E
     own = np.diff(first)
     every = np.array([len(rows) for rows in lists])
     owner = np.repeat(np.arange(count), own)
-    parent = np.array([owner[rows[k]] if len(rows) > k else -1 for rows, k in zip(lists, own, strict=True)])
+    flat, starts = np.concatenate(lists).astype(np.int32), np.concatenate([[0], np.cumsum(every)])
+    parent = np.full(count, -1)  # the front that eliminates the first row below
+    parent[every > own] = owner[flat[(starts[:-1] + own)[every > own]]]
     children = np.flatnonzero(parent >= 0)
     children = children[np.argsort(parent[children], kind="stable")]
     child = np.zeros(count + 1, np.int32)
@@ -131,8 +133,8 @@ def _tables(order: Ints32, place: Ints32, first: Ints, lists: list[Ints32]) -> E
         room = _stacked(part, parent, sizes, left, room)
     tables = {
         "first": first.astype(np.int32),
-        "starts": np.concatenate([[0], np.cumsum(every)]).astype(np.int32),
-        "rows": np.concatenate(lists).astype(np.int32),
+        "starts": starts.astype(np.int32),
+        "rows": flat,
         "child": child,
         "children": children.astype(np.int32),
         "panel": panel[:-1].astype(np.int64),

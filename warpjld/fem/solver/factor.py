@@ -43,7 +43,8 @@ class Factor:
             pattern = _both(pattern, reuse._pattern)
         found = eliminate(*pattern, np.asarray(free.reshape(-1, 3).any(axis=1)))
         self._take(found, pattern, (np.empty(found.size + 8), np.empty(found.room + 8)))
-        self._factorised(matrix, threads)
+        whole = self._factorised(matrix, threads)
+        assert whole, "fronts made for a pattern have room for it"
         self._prepare()
 
     def _take(self, elimination: Elimination, pattern: tuple[Ints32, Ints32], memory: tuple[Array, Array]) -> None:
@@ -90,18 +91,18 @@ class Factor:
             place=elimination.place,
             free=self._free.astype(np.float64),
         )
-        for part in (elimination.early, elimination.late):
-            count = len(part[1]) - 1
-            number = np.full((count, len(elimination.place)), -1, np.int32)
-            failed = np.zeros(count, np.int32)
-            memory = [shared(a) for a in (number.reshape(-1), self._work, self._panels, failed)]
-            inputs = [self._fronts(elimination, part), blocks, *memory]
-            on_rows(fem_factor.factorise, count, inputs, threads=threads, least=2)
-            if (failed < 0).any():
-                return False
-            if (failed > 0).any():
-                node = int(failed[failed > 0][0]) - 1
-                raise IndefiniteError(f"the stiffness is not positive definite (found at node {node})")
+        for kernel, memory in ((fem_factor.has_room, ()), (fem_factor.factorise, (self._work, self._panels))):
+            for part in (elimination.early, elimination.late):
+                count = len(part[1]) - 1
+                number = np.full((count, len(elimination.place)), -1, np.int32)
+                failed = np.zeros(count, np.int32)
+                places = [shared(a) for a in (number.reshape(-1), *memory, failed)]
+                on_rows(kernel, count, [self._fronts(elimination, part), blocks, *places], threads=threads, least=2)
+                if (failed < 0).any():
+                    return False
+                if (failed > 0).any():
+                    node = int(failed[failed > 0][0]) - 1
+                    raise IndefiniteError(f"the stiffness is not positive definite (found at node {node})")
         return True
 
 
