@@ -16,6 +16,35 @@ from warpjld_kernels.lanes import VECTORISED
 wp.set_module_options(VECTORISED)
 
 
+# eight numbers that are added and multiplied at once: a vector type of the CPU's compiler, a struct for CUDA's
+_EIGHT = """
+    #ifdef __CUDACC__
+    struct Eight {
+        double n[8];
+        CUDA_CALLABLE Eight(double all = 0.0) { for (double& one : n) one = all; }
+        CUDA_CALLABLE double operator[](int k) const { return n[k]; }
+        CUDA_CALLABLE Eight operator*(const Eight& other) const {
+            Eight out;
+            for (int k = 0; k < 8; ++k) out.n[k] = n[k] * other.n[k];
+            return out;
+        }
+        CUDA_CALLABLE Eight& operator+=(const Eight& other) {
+            for (int k = 0; k < 8; ++k) n[k] += other.n[k];
+            return *this;
+        }
+        CUDA_CALLABLE Eight& operator-=(const Eight& other) {
+            for (int k = 0; k < 8; ++k) n[k] -= other.n[k];
+            return *this;
+        }
+    };
+    typedef Eight Loose;
+    #else
+    typedef double Eight __attribute__((ext_vector_type(8)));
+    typedef double Loose __attribute__((ext_vector_type(8), aligned(8)));
+    #endif
+"""
+
+
 @wp.struct
 class Fronts:
     """F fronts in postorder.
@@ -96,9 +125,8 @@ def has_room(
 
 
 @wp.func_native(
-    """
-    typedef double Eight __attribute__((ext_vector_type(8)));
-    typedef double Loose __attribute__((ext_vector_type(8), aligned(8)));
+    _EIGHT
+    + """
     // C −= A Bᵀ, by columns: c (m × n), a (m × depth), b (n × depth), m a multiple of 8, n of 3; of column j of c what
     // is not above row top + j
     auto tile = [](auto high, auto wide, double* c, size_t sc, const double* a, const double* b, size_t s, int depth) {
@@ -239,7 +267,8 @@ def factorise(
 
 
 @wp.func_native(
-    """
+    _EIGHT
+    + """
     const int count = fronts.first.shape[0] - 1;
     double* y = scratch.data;
     for (int f = 0; f < count; ++f) {
@@ -264,8 +293,6 @@ def factorise(
         for (int i = 0; i < all; ++i)
             for (int p = 0; p < 3; ++p) x.data[3 * row[i] + p] = y[3 * i + p];
     }
-    typedef double Eight __attribute__((ext_vector_type(8)));
-    typedef double Loose __attribute__((ext_vector_type(8), aligned(8)));
     for (int f = count - 1; f >= 0; --f) {
         const int* row = fronts.rows.data + fronts.starts.data[f];
         const int own = fronts.first.data[f + 1] - fronts.first.data[f];
