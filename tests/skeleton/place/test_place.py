@@ -57,10 +57,10 @@ def test_a_hand_gets_its_25_points_and_its_side(hands, side):
 @pytest.mark.parametrize(
     "name",
     [
-        "hand_webxr_generic/left.glb",
-        "hand_webxr_generic/right.glb",
+        pytest.param("hand_webxr_generic/left.glb", marks=pytest.mark.slow),
+        pytest.param("hand_webxr_generic/right.glb", marks=pytest.mark.slow),
         "hand_anny/left.glb",
-        "hand_godot_low/Hand_low_R.gltf",
+        pytest.param("hand_godot_low/Hand_low_R.gltf", marks=pytest.mark.slow),
     ],
 )
 def test_hands_of_others(data, name):
