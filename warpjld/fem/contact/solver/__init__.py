@@ -38,7 +38,10 @@ from u itself, prescribed values yet to go to their place:
 6. Bonds whose traction is too much are broken, and the step is found again; a step that fails is taken in halves.
 
 ``contact_system`` has (2)–(5) for all interfaces, ``contact.law`` for one; ``elastic`` has f_int, f_ext and K;
-``unconstrained`` steadies bodies that only contact holds, and says why none was found: falls, slides, or is blocked.
+``unconstrained`` steadies bodies that only contact holds, and says why none was found: falls, slides, or is blocked;
+``statics`` proves that friction cannot hold a body before that is said. ``passing`` cuts steps longer than contact can
+follow (``course`` says where bodies are going) and finds nodes deep in another body, ``first_touch`` when in a step
+friction takes hold of what was apart.
 
 - P. Alart, A. Curnier 1991, A mixed formulation for frictional contact problems prone to Newton like solution methods,
   Comput. Methods Appl. Mech. Eng. 92, 353–375.
