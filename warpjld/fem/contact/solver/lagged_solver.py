@@ -5,9 +5,12 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import Any
 
+import numpy as np
+
 from warpjld.fem.arrays import Array, Mask
 from warpjld.fem.assembly.block_matrix import BlockMatrix, IndefiniteError
 from warpjld.fem.body import Body
+from warpjld.fem.solver.elimination import work_by_profile
 from warpjld.fem.solver.krylov import Iteration, Status
 from warpjld.fem.solver.linear import LinearSolver
 
@@ -18,8 +21,10 @@ _MOST = 150
 """Iterations of a solve that is not symmetric."""
 _PATIENCE = 25
 """Iterations after which a preconditioner made for an earlier matrix has served its time."""
-_NODES, _WORK = 40_000, 2e10
-"""Free nodes, and multiplications, up to which a factor costs less than multigrid's iterations."""
+_WORK, _PROFILE = 2e5, 6e5
+"""Multiplications a degree of freedom up to which a factor costs less than multigrid's iterations: a ball's costs more
+from a few thousand nodes on, that of fingers and shells does not; and of the quick estimate, above which it is not even
+tried."""
 
 
 class LaggedSolver:
@@ -81,7 +86,10 @@ class LaggedSolver:
 
     def _factor(self, matrix: BlockMatrix, free: Mask) -> LinearSolver | None:
         """A direct solver; None where it costs too much, or K is not positive definite."""
-        if self._large or int(free.reshape(-1, 3).any(axis=1).sum()) > _NODES:
+        active, degrees = np.asarray(free.reshape(-1, 3).any(axis=1)), int(free.sum())
+        if self._direct is None and not self._large:
+            self._large = work_by_profile(matrix.rows, matrix.columns, active) > _PROFILE * degrees
+        if self._large:
             return None
         options = {**self._options, "reuse": self._direct}
         try:
@@ -89,7 +97,7 @@ class LaggedSolver:
         except IndefiniteError:
             return None
         factor = self._direct.factor
-        self._large = factor is not None and factor.elimination.work > _WORK
+        self._large = factor is not None and factor.elimination.work > _WORK * degrees
         return self._direct
 
     def _nonsymmetric(self, matrix: BlockMatrix, free: Mask, right: Array, nonsymmetric: Any) -> Iteration:
