@@ -22,7 +22,7 @@ from warpjld.fem.contact.solver.contact_system import LoadStep
 from warpjld.fem.contact.solver.course import Course
 from warpjld.fem.contact.solver.first_touch import first_touch, slid_unheld, touched_at
 from warpjld.fem.contact.solver.newton_state import Equilibrium
-from warpjld.fem.contact.solver.passing import Passing
+from warpjld.fem.contact.solver.passing import LEAST_SHARE, Passing
 from warpjld.fem.contact.solver.statics import could_balance
 from warpjld.fem.contact.solver.unconstrained import blocked
 from warpjld.fem.load.loads import Loads, external_forces
@@ -54,6 +54,12 @@ _PART = 0.85
 
 Guess = Callable[[float, float, Array], Array]
 """Time before, time, displacement before (N, 3) → where to begin to look for the displacement at the time (N, 3)."""
+
+
+def _jumps(share: float, cut: float) -> bool:
+    """Whether a guess jumps however short the step is: the share that contact could follow hardly grew when the step was
+    cut to another share, which was 1 if it was not cut."""
+    return LEAST_SHARE < cut < 1.0 and share < 1.5 * cut
 
 
 class LoadSteps:
@@ -149,7 +155,7 @@ class LoadSteps:
         reached: list[ContactInstant] = []
         todo = list(self.times)
         newton = self.newton
-        solves, iterations, cuts, touches = 0, 0, 0, 0
+        solves, iterations, cuts, touches, cut = 0, 0, 0, 0, 1.0
         unheld: tuple[float, Array, LoadStep, Equilibrium] | None = None
         while todo:
             target = todo[0]
@@ -159,8 +165,10 @@ class LoadSteps:
             carried = self._carried(step)
             ahead = self.course.ahead(self.u, step.prescribed) if self.guess is None else carried
             share = self.passing.share(self.u, ahead, step.before, step.time)
+            if _jumps(share, cut):
+                share = 1.0
             if share < _WHOLE and cuts < _CUTS:
-                cuts += 1
+                cuts, cut = cuts + 1, share
                 todo.insert(0, now + share * (target - now))
                 continue
             way = (self.body.mesh.nodes, self.u, ahead)
@@ -204,7 +212,7 @@ class LoadSteps:
             self.steps.append(newton.solves)
             self.correction_rate = (found.displacement - carried).reshape(-1, 3) / (target - now)
             self.last_step = self._last_step(now, found)
-            self.u, self.states, now = found.displacement, found.states, target
+            self.u, self.states, now, cut = found.displacement, found.states, target, 1.0
             todo.pop(0)
             halvings = max(0, halvings - 1)
             if target not in self.times:

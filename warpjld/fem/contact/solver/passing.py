@@ -22,13 +22,13 @@ from warpjld.fem.contact.obstacles.obstacle import Obstacle
 from warpjld.fem.contact.obstacles.thickness import half_thickness, way_past
 from warpjld.fem.load.prescribed import components
 
-__all__ = ["Passing"]
+__all__ = ["LEAST_SHARE", "Passing"]
 
 _FOLLOWED = 0.75
 """How far behind a surface a step may aim, over what contact looks ahead: farther off it fades."""
 _DEEP = 0.5
 """Edges that an unpressed node may lie in another body: faces that do not match stand some way inside each other."""
-_LEAST = 1.0 / 64.0
+LEAST_SHARE = 1.0 / 64.0
 """Least share of a step that is asked for."""
 _THINNEST = 2.5e-4
 """Obstacles are no thinner than twice this [m]."""
@@ -103,7 +103,7 @@ class Passing:
             least = min(least, _past_itself(interface, mortar, x, step))
         for _, interface, obstacle in self._obstacles:
             least = min(least, _past_obstacle(interface, obstacle, x, step, before, time))
-        return max(least, _LEAST)
+        return max(least, LEAST_SHARE)
 
     def _past_body(self, side: _Side, x: Array, step: Array) -> float:
         """Share of a step (N, 3) from x (N, 3) in which no node of a side goes too far past the other body."""
