@@ -15,17 +15,16 @@ from warpjld.simulation.specification import FleshMaterial
 def meshed(monkeypatch: pytest.MonkeyPatch, good: float) -> float:
     """Edge of the elements where only those up to ``good`` make a mesh."""
 
-    def build(rig: object, spacing: float, *, name: str) -> str:
-        if spacing > good:
+    def mesh(rig: object, element: float, name: str, poses: object, skin: object) -> str:
+        if element > good:
             raise InputError(
-                f"mesh: least scaled Jacobian 0.01 below 0.1: a smaller spacing than {spacing:g} m is needed"
+                f"mesh: least scaled Jacobian 0.01 below 0.1: a smaller spacing than {element:g} m is needed"
             )
-        return "hand"
+        return "flesh"
 
-    monkeypatch.setattr(flesh_body, "build_flesh_hand", build)
-    monkeypatch.setattr(flesh_body, "rest_in_pose", lambda built, poses, skin: (built, 0.0))
+    monkeypatch.setattr(flesh_body, "resting_flesh", mesh)
     actor = SimpleNamespace(name="LEFT", rig=None)
-    return flesh_body._meshed(actor, FleshMaterial(element=0.004), None, np.zeros((0, 3)))[3]  # type: ignore[arg-type]
+    return flesh_body._meshed(actor, FleshMaterial(element=0.004), None, np.zeros((0, 3)))[1]  # type: ignore[arg-type]
 
 
 def test_another_size_is_tried(monkeypatch: pytest.MonkeyPatch) -> None:

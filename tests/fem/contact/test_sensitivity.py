@@ -148,7 +148,7 @@ BALL, PLATE, BLOCKS = Dented(False), Dented(True), Stacked()
     [
         (BALL, Case(), 0, 0, (aside, down, stiffer)),
         (BALL, Case(friction=2.0), 5, 0, (aside, down, turned)),
-        (PLATE, Case(friction=0.15), 11, 12, (aside, down, stiffer, rougher)),
+        (PLATE, Case(friction=0.15), 5, 18, (aside, down, stiffer, rougher)),
         (BLOCKS, Case(), 0, 0, (down,)),
         (BLOCKS, Case(friction=2.0), 16, 0, (aside, stiffer)),
         (BLOCKS, Case(friction=0.15), 12, 4, (aside, down, stiffer, rougher)),

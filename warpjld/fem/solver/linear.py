@@ -98,7 +98,7 @@ class LinearSolver:
         elif method == "jacobi":
             inverse = block_inverse(stiffness, free)
             self._precondition = lambda r: np.einsum("nij,nj->ni", inverse, r.reshape(-1, 3)).ravel().astype(r.dtype)
-        elif definite:
+        elif definite and free.any():
             before = None if reuse is None else reuse.factor
             self._factor: Factor | _General = Factor(stiffness, free, threads=self.threads, reuse=before)
         else:

@@ -15,24 +15,25 @@ __all__ = ["distance_past", "half_thickness", "way_past"]
 _POINTS = 200
 _THIN = 5.0
 """Percentage of an obstacle's surface where it may be thinner than it is said to be."""
-_FINEST, _WIDEST, _GROWS = 2.5e-4, 0.02, 1.6
-"""Depths at which an obstacle's thickness is looked for [m]: the first, the last, and from one to the next."""
+_FINEST, _GROWS = 2.5e-4, 1.6
+"""Depths at which an obstacle's thickness is looked for, up to its size: the first [m], and from one to the next."""
 _KNOWN: WeakKeyDictionary[Obstacle, float] = WeakKeyDictionary()
 
 
 def half_thickness(obstacle: Obstacle, time: float = 0.0) -> float:
-    """How deep a point may lie in an obstacle and be nearest to the side it came from [m], at most ``_WIDEST``."""
+    """How deep a point may lie in an obstacle and be nearest to the side it came from [m], at most its size."""
     if obstacle in _KNOWN:
         return _KNOWN[obstacle]
     vertices, faces = obstacle.mesh(time)
     corners = np.asarray(vertices, dtype=np.float64)[faces]
     normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-    size = np.linalg.norm(normal, axis=1)
-    share = np.cumsum(size) / max(float(size.sum()), 1e-300)
-    some = np.minimum(np.searchsorted(share, (np.arange(_POINTS) + 0.5) / _POINTS), len(size) - 1)  # evenly by area
-    points, normal = corners[some].mean(axis=1), normal[some] / np.maximum(size[some], 1e-300)[:, None]
+    area = np.linalg.norm(normal, axis=1)
+    share = np.cumsum(area) / max(float(area.sum()), 1e-300)
+    some = np.minimum(np.searchsorted(share, (np.arange(_POINTS) + 0.5) / _POINTS), len(area) - 1)  # evenly by area
+    points, normal = corners[some].mean(axis=1), normal[some] / np.maximum(area[some], 1e-300)[:, None]
     depth, deepest = _FINEST, np.full(len(points), _FINEST)
-    while depth <= _WIDEST:
+    size = float(np.linalg.norm(np.ptp(corners.reshape(-1, 3), axis=0)))
+    while depth <= size:
         deepest = np.maximum(deepest, -obstacle.project(points - depth * normal, time).distance)
         depth *= _GROWS
     _KNOWN[obstacle] = float(np.percentile(deepest, _THIN))

@@ -57,8 +57,8 @@ Guess = Callable[[float, float, Array], Array]
 
 
 def _jumps(share: float, cut: float) -> bool:
-    """Whether a guess jumps however short the step is: the share that contact could follow hardly grew when the step was
-    cut to another share, which was 1 if it was not cut."""
+    """Whether a guess jumps however short the step is: the share that contact could follow hardly grew when the step
+    was cut to another share, which was 1 if it was not cut."""
     return LEAST_SHARE < cut < 1.0 and share < 1.5 * cut
 
 
@@ -155,7 +155,7 @@ class LoadSteps:
         reached: list[ContactInstant] = []
         todo = list(self.times)
         newton = self.newton
-        solves, iterations, cuts, touches, cut = 0, 0, 0, 0, 1.0
+        solves, iterations, cuts, touches, cut, unstable = 0, 0, 0, 0, 1.0, False
         unheld: tuple[float, Array, LoadStep, Equilibrium] | None = None
         while todo:
             target = todo[0]
@@ -202,7 +202,10 @@ class LoadSteps:
                 return self._end(Status.BLOCKED, reached, message, step)
             if found is None:
                 halvings += 1
+                unstable = unstable or status is Status.INDEFINITE
                 if halvings > self._most_halvings(status):
+                    if unstable and status is Status.MAX_ITERATIONS:  # the longer steps say why
+                        status, newton.failure = Status.INDEFINITE, ""
                     reason = through or newton.failure or status.value
                     message = f"no equilibrium found after time {now:.4g} (tried {target:.4g}): {reason}"
                     return self._end(status, reached, message, step)
@@ -212,7 +215,7 @@ class LoadSteps:
             self.steps.append(newton.solves)
             self.correction_rate = (found.displacement - carried).reshape(-1, 3) / (target - now)
             self.last_step = self._last_step(now, found)
-            self.u, self.states, now, cut = found.displacement, found.states, target, 1.0
+            self.u, self.states, now, cut, unstable = found.displacement, found.states, target, 1.0, False
             todo.pop(0)
             halvings = max(0, halvings - 1)
             if target not in self.times:
