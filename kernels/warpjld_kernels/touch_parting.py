@@ -2,7 +2,8 @@
 
 import warp as wp
 
-from warpjld_kernels.touch_samples import FAR, Parts, Samples
+from warpjld_kernels.touch_parts import FAR, Parts
+from warpjld_kernels.touch_samples import Samples
 
 wp.set_module_options({"enable_backward": False})
 

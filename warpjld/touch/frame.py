@@ -8,7 +8,6 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.sparse import csr_array
-from scipy.spatial import cKDTree
 
 from warpjld.covering.binding import smoothstep
 from warpjld.touch.patches import Patches
@@ -110,14 +109,14 @@ class Bench:
         self._deepest = wp.zeros((names, names), dtype=float, device="cpu")
         self._normals, self._moved, self._start = (wp.zeros(count, dtype=wp.vec3, device="cpu") for _ in range(3))
         self._lost, self._room = (wp.zeros(names, dtype=float, device="cpu") for _ in range(2))
-        first, beside = _apart(model.patches, vertices, _PROBES)
-        apart, _ = _apart(model.patches, vertices, _APART)
+        first, beside = model.patches.spaced(vertices, _PROBES)
+        apart, _ = model.patches.spaced(vertices, _APART)
         asked = [np.flatnonzero(some) for some in (first, apart & ~first, ~apart & ~first)]
         self._record(star, smooth, asked, beside)
 
     def _parts(self, model: Model, vertices: NDArray[np.floating]) -> Any:
         import warp as wp
-        from warpjld_kernels.touch_samples import Parts
+        from warpjld_kernels.touch_parts import Parts
 
         patches, names = model.patches, len(model.patches.names)
         meshes = [patches.mesh(k) for k in range(names)]
@@ -160,7 +159,7 @@ class Bench:
         self, star: list[Any], smooth: list[Any], asked: list[NDArray[np.int64]], beside: NDArray[np.int64]
     ) -> None:
         import warp as wp
-        from warpjld_kernels import touch_bulge, touch_parting, touch_samples
+        from warpjld_kernels import touch_bulge, touch_parting, touch_parts, touch_samples
 
         def recorded(kernel: Any, dim: int | tuple[int, int], inputs: list[Any], outputs: list[Any]) -> Any:
             return wp.launch(kernel, dim, inputs=inputs, outputs=outputs, device="cpu", record_cmd=True)
@@ -176,16 +175,16 @@ class Bench:
         ring, plains = (wp.zeros(count, dtype=float, device="cpu") for _ in range(2))
         units = wp.zeros(count, dtype=wp.vec3, device="cpu")
         self._find_pairs = [
-            recorded(touch_samples.find_boxes, names, [points, parts], [low, high]),
+            recorded(touch_parts.find_boxes, names, [points, parts], [low, high]),
             recorded(
-                touch_samples.find_pairs,
+                touch_parts.find_pairs,
                 names,
                 [parts, low, high, self._shown],
                 [pairs, others, self._wanted, self._active],
             ),
         ]
         self._find_normals = recorded(
-            touch_samples.find_normals,
+            touch_parts.find_normals,
             count,
             [points, parts.part, self._active, *star, parts.area],
             [normals, units, plains],
@@ -326,31 +325,6 @@ def _no_samples(room: int) -> Any:
     for name, kind in Samples.vars.items():
         setattr(samples, name, wp.zeros(1 if name == "count" else room, dtype=kind.type.dtype, device="cpu"))
     return samples
-
-
-def _apart(
-    patches: Patches, vertices: NDArray[np.floating], distance: float
-) -> tuple[NDArray[np.bool_], NDArray[np.int64]]:
-    """Vertices that are apart from one another in their part, in parts of its median thickness, and of every vertex the
-    nearest of them; both of shape (V,)."""
-    chosen, nearest = np.zeros(len(vertices), dtype=bool), np.arange(len(vertices))
-    for k in range(len(patches.names)):
-        rows = np.flatnonzero(patches.part == k)
-        if not len(rows):
-            continue
-        points = np.asarray(vertices, dtype=np.float64)[rows]
-        reach, tree, free = (
-            distance * float(np.median(patches.thickness[rows])),
-            cKDTree(points),
-            np.ones(len(rows), bool),
-        )
-        for i, point in enumerate(points):
-            if free[i]:
-                free[tree.query_ball_point(point, reach)] = False
-                chosen[rows[i]] = True
-        some = rows[chosen[rows]]
-        nearest[rows] = some[cKDTree(vertices[some]).query(points)[1]]
-    return chosen, nearest
 
 
 def _vectors(values: NDArray[np.floating]) -> Any:

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse import csr_array
 from scipy.sparse.csgraph import connected_components
+from scipy.spatial import cKDTree
 
 from warpjld.normals import vertex_normals
 
@@ -73,6 +74,31 @@ class Patches:
         ratio = edge / np.maximum(self.thickness, 1e-300)
         usual = [np.median(ratio[self.part == k]) if (self.part == k).any() else 0.0 for k in range(len(self.names))]
         return np.array(usual) > _COARSEST
+
+    def spaced(self, vertices: NDArray[np.floating], distance: float) -> tuple[NDArray[np.bool_], NDArray[np.int64]]:
+        """Vertices that are some way apart from one another in their part, and of every vertex the nearest of them.
+
+        Args:
+            vertices: Of the surface [m], shape (V, 3).
+            distance: How far apart, in parts of a part's median thickness.
+
+        Returns:
+            Which they are, and their numbers, both of shape (V,).
+        """
+        chosen, nearest = np.zeros(len(vertices), dtype=bool), np.arange(len(vertices))
+        for k in range(len(self.names)):
+            rows = np.flatnonzero(self.part == k)
+            if not len(rows):
+                continue
+            points, free = np.asarray(vertices, dtype=np.float64)[rows], np.ones(len(rows), dtype=bool)
+            reach, tree = distance * float(np.median(self.thickness[rows])), cKDTree(points)
+            for i, point in enumerate(points):
+                if free[i]:
+                    free[tree.query_ball_point(point, reach)] = False
+                    chosen[rows[i]] = True
+            some = rows[chosen[rows]]
+            nearest[rows] = some[cKDTree(vertices[some]).query(points)[1]]
+        return chosen, nearest
 
     def mesh(self, part: int) -> tuple[NDArray[np.int32], NDArray[np.float32]]:
         """Faces of a part and of one ring around it, shape (N, 3), so that what lies at the part's own border is not at
