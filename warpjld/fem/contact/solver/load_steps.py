@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import replace
 
 import numpy as np
 
@@ -23,6 +22,7 @@ from warpjld.fem.contact.solver.course import Course
 from warpjld.fem.contact.solver.first_touch import first_touch, slid_unheld, touched_at
 from warpjld.fem.contact.solver.newton_state import Equilibrium
 from warpjld.fem.contact.solver.passing import LEAST_SHARE, Passing
+from warpjld.fem.contact.solver.rougher import from_rougher
 from warpjld.fem.contact.solver.statics import could_balance
 from warpjld.fem.contact.solver.unconstrained import blocked
 from warpjld.fem.load.loads import Loads, external_forces
@@ -47,8 +47,6 @@ _WHOLE = 0.95
 """Share of a step from which on it is left whole."""
 _FAR = 2.2
 """How far contact looks, over the overlap at a start that it is to part: what is farther off than half of it fades."""
-_ROUGHER = (8.0, 2.0, 1.2, 1.0)
-"""Friction over what it is, of equilibria that lead to one that is hard to find."""
 _PART = 0.85
 """How far along the course of the step before a first guess goes: contact stiffens what it meets."""
 
@@ -262,7 +260,7 @@ class LoadSteps:
         guesses = self._guesses(step, carried)
         status, found = self.newton.find(self.u, self.states, step, *guesses)
         if found is None and self._adrift_on_friction(step) and self._could_hold(step):
-            status, found = self._from_rough(step, status)
+            status, found = from_rougher(self.newton, self.interfaces, self.u, self.states, step, status)
         for _ in range(_BREAKS):
             if found is None:
                 return status, None
@@ -277,28 +275,6 @@ class LoadSteps:
     def _adrift_on_friction(self, step: LoadStep) -> bool:
         """Whether a body is held by friction alone."""
         return self.course.adrift(step.prescribed) and any(i.pair.friction > 0.0 for i in self.interfaces)
-
-    def _from_rough(self, step: LoadStep, status: Status) -> tuple[Status, Equilibrium | None]:
-        """An equilibrium looked for from that of rougher surfaces, where all sticks that can: halving a step of a body
-        on an incline only makes the same problem smaller."""
-        pairs = [interface.pair for interface in self.interfaces]
-        states: list[ContactState] = self.states
-        guess: tuple[Array, ...] = ()
-        found: Equilibrium | None = None
-        try:
-            for rougher in _ROUGHER:
-                for interface, pair in zip(self.interfaces, pairs, strict=True):
-                    interface.pair = replace(pair, friction=rougher * pair.friction)
-                failure = self.newton.failure
-                found = self.newton.find(self.u, states, step, *guess)[1]
-                if found is None:
-                    self.newton.failure = failure
-                    return status, None
-                states, guess = found.states, (found.displacement,)
-        finally:
-            for interface, pair in zip(self.interfaces, pairs, strict=True):
-                interface.pair = pair
-        return Status.CONVERGED, found
 
     def _could_hold(self, step: LoadStep) -> bool:
         """Whether forces at contacts could balance every body that nothing else holds; whether they may is unknown."""
