@@ -6,7 +6,7 @@ integrated over the common polygon, triangle by triangle: what passes through no
 
 import warp as wp
 
-from warpjld_kernels.lanes import VECTORISED
+from warpjld_kernels.lanes import EIGHT, VECTORISED
 
 wp.set_module_options(VECTORISED)
 
@@ -48,9 +48,10 @@ _DOUBLE = """
 """
 """Plain numbers."""
 
-_DUAL = """
+_DUAL = (
+    EIGHT
+    + """
     // a number and its derivatives by the 24 coordinates of the corners
-    typedef double Eight __attribute__((ext_vector_type(8)));
     struct Real {
         double v;
         Eight d[3];
@@ -84,6 +85,7 @@ _DUAL = """
         return r;
     };
 """
+)
 """Numbers with derivatives."""
 
 _PAIR = """

@@ -11,38 +11,9 @@ the lower triangle means anything.
 
 import warp as wp
 
-from warpjld_kernels.lanes import VECTORISED
+from warpjld_kernels.lanes import EIGHT, VECTORISED
 
 wp.set_module_options(VECTORISED)
-
-
-# eight numbers that are added and multiplied at once: a vector type of the CPU's compiler, a struct for CUDA's
-_EIGHT = """
-    #ifdef __CUDACC__
-    struct Eight {
-        double n[8];
-        CUDA_CALLABLE Eight(double all = 0.0) { for (double& one : n) one = all; }
-        CUDA_CALLABLE double operator[](int k) const { return n[k]; }
-        CUDA_CALLABLE Eight operator*(const Eight& other) const {
-            Eight out;
-            for (int k = 0; k < 8; ++k) out.n[k] = n[k] * other.n[k];
-            return out;
-        }
-        CUDA_CALLABLE Eight& operator+=(const Eight& other) {
-            for (int k = 0; k < 8; ++k) n[k] += other.n[k];
-            return *this;
-        }
-        CUDA_CALLABLE Eight& operator-=(const Eight& other) {
-            for (int k = 0; k < 8; ++k) n[k] -= other.n[k];
-            return *this;
-        }
-    };
-    typedef Eight Loose;
-    #else
-    typedef double Eight __attribute__((ext_vector_type(8)));
-    typedef double Loose __attribute__((ext_vector_type(8), aligned(8)));
-    #endif
-"""
 
 
 @wp.struct
@@ -125,7 +96,7 @@ def has_room(
 
 
 @wp.func_native(
-    _EIGHT
+    EIGHT
     + """
     // C −= A Bᵀ, by columns: c (m × n), a (m × depth), b (n × depth), m a multiple of 8, n of 3; of column j of c what
     // is not above row top + j
@@ -267,7 +238,7 @@ def factorise(
 
 
 @wp.func_native(
-    _EIGHT
+    EIGHT
     + """
     const int count = fronts.first.shape[0] - 1;
     double* y = scratch.data;

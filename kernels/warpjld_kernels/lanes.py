@@ -21,6 +21,32 @@ VECTORISED = {
 """Options of a module whose loops are to fill the CPU's vector registers."""
 
 
+EIGHT = """
+#ifdef __CUDACC__
+    struct Eight {
+        double n[8];
+        CUDA_CALLABLE Eight(double all = 0.0) { for (double& one : n) one = all; }
+        CUDA_CALLABLE double& operator[](int k) { return n[k]; }
+        CUDA_CALLABLE double operator[](int k) const { return n[k]; }
+        CUDA_CALLABLE Eight& operator+=(const Eight& o) { for (int k = 0; k < 8; ++k) n[k] += o.n[k]; return *this; }
+        CUDA_CALLABLE Eight& operator-=(const Eight& o) { for (int k = 0; k < 8; ++k) n[k] -= o.n[k]; return *this; }
+        CUDA_CALLABLE Eight& operator*=(const Eight& o) { for (int k = 0; k < 8; ++k) n[k] *= o.n[k]; return *this; }
+        CUDA_CALLABLE Eight& operator/=(const Eight& o) { for (int k = 0; k < 8; ++k) n[k] /= o.n[k]; return *this; }
+        CUDA_CALLABLE Eight operator+(const Eight& o) const { Eight out = *this; return out += o; }
+        CUDA_CALLABLE Eight operator-(const Eight& o) const { Eight out = *this; return out -= o; }
+        CUDA_CALLABLE Eight operator*(const Eight& o) const { Eight out = *this; return out *= o; }
+        CUDA_CALLABLE Eight operator/(const Eight& o) const { Eight out = *this; return out /= o; }
+    };
+    typedef Eight Loose;
+#else
+    typedef double Eight __attribute__((ext_vector_type(8)));
+    typedef double Loose __attribute__((ext_vector_type(8), aligned(8)));
+#endif
+"""
+"""Eight doubles of one thread, ``Eight``, and the same as a pointer's target that need not be aligned, ``Loose``: a
+vector on the CPU, a struct on a GPU."""
+
+
 def prelude(lanes: int) -> str:
     """What a native function's body begins with."""
     return f"""
