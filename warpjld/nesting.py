@@ -6,7 +6,7 @@ import numpy as np
 
 __all__ = ["nesting"]
 
-_QUOTE = 2
+_QUOTE = 2  # mark of a quotation mark, beside +1 and -1 for brackets
 
 
 def nesting(raw: bytes, opening: bytes = b"[{", closing: bytes = b"]}") -> int:

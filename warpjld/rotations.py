@@ -20,7 +20,7 @@ __all__ = [
     "upright",
 ]
 
-_PARALLEL = 1e-12
+_PARALLEL = 1e-12  # length of the sum of two opposite unit vectors that is nothing but rounding
 
 
 def unit(vectors: ArrayLike) -> NDArray[np.float64]:

@@ -21,7 +21,7 @@ else:
 __all__ = ["spread"]
 
 _STEPS = 2_000  # of the iteration; what it has not levelled out by then differs by little
-_SETTLED = 1e-9
+_SETTLED = 1e-9  # of the largest value: change of a sweep that is rounding
 
 
 def spread(

@@ -12,9 +12,9 @@ wp.set_module_options({"max_unroll": 1, "enable_backward": False})
 
 # steps towards the object, as parts of the chain's reach; long ones would blur the closest approach
 _SHORTEST = wp.constant(64)
-_LONGEST = wp.constant(8)
-_MOST = wp.constant(160)
-_GOLDEN = wp.constant(0.381966)
+_LONGEST = wp.constant(8)  # a march takes at least eight steps over its reach, however far the surface is
+_MOST = wp.constant(160)  # evaluations of one search; halving to 1e-7 needs 24, the rest is marching
+_GOLDEN = wp.constant(0.381966)  # 2 - golden ratio: the share that golden section cuts off
 
 _FIRST = wp.constant(0)
 _MARCH = wp.constant(1)

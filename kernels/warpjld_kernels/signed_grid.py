@@ -11,7 +11,7 @@ from warpjld_kernels.surface_distance import Hit, Solids, nearest
 
 wp.set_module_options({**VECTORISED, "max_unroll": 1})
 
-UNKNOWN = wp.constant(1.0e30)
+UNKNOWN = wp.constant(1.0e30)  # distance [m] at nodes whose cell is not sampled
 
 
 @wp.struct

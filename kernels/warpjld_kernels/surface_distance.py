@@ -7,10 +7,10 @@ from warpjld_kernels.triangle_tree import SLIVER, Tree, nearest_triangle
 
 wp.set_module_options({**VECTORISED, "max_unroll": 1})
 
-FAR = wp.constant(1.0e10)
+FAR = wp.constant(1.0e10)  # distance [m] where no surface is within the limit
 # half-width of the band round 1/2 in which a winding number by far-field expansion is not trusted
 _DOUBT = wp.constant(0.15)
-_ACCURACY = wp.constant(2.0)
+_ACCURACY = wp.constant(2.0)  # of Warp's far-field expansion: its own default, farther clusters are summed as one
 
 
 @wp.struct

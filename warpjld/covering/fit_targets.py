@@ -27,7 +27,7 @@ _HIGHEST = 3.0  # amplitude: somebody modelled these shapes
 _PULL = 1e-6  # to the start, of what the average amplitude moves: keeps what the shapes do not determine
 _ROUNDS = 4  # of fields and amplitudes in turn
 _GAIN = 0.02  # of the root of the mean square, for which fields are worth changing
-_BOUNDS = {"proximity": (0.05, 0.5), "peak": (0.1, 0.9), "exponents": (0.2, 3.0), "palm": (0.0, 0.5)}
+_BOUNDS = {"proximity": (0.05, 0.5), "peak": (0.1, 0.9), "exponents": (0.2, 3.0), "palm": (0.0, 0.5)}  # of the search
 
 
 @dataclass(frozen=True, eq=False)

@@ -30,8 +30,8 @@ _THREAD = 100_000  # unknowns times right-hand sides that a thread must have to 
 _BITS = 16  # of each coordinate in a place on the curve
 _TOLERANCE = 1e-7  # residual of the iterative solvers, and
 _ACCEPTED = 1e-5  # of a solution that is taken, both relative to the right-hand side
-_MULTIGRID_STEPS = 200
-_PLAIN_STEPS = 5_000
+_MULTIGRID_STEPS = 200  # iterations at most
+_PLAIN_STEPS = 5_000  # iterations at most, where multigrid cannot be used
 
 
 def cotangent_laplacian(

@@ -22,7 +22,7 @@ __all__ = ["Parameters", "default_parameters", "load_parameters", "save_paramete
 _SHAPES = ("proximity", "peak", "exponents")  # what shapes fields on the surface; the others are amplitudes of them
 
 _INFLATION = 0.1  # of a 90° joint: knuckles are rounded, and half of the volume that a tube loses there is put back
-_PALM = 3.0
+_PALM = 3.0  # times as much flesh lies on a joint of the palm as on one of a finger (assumed)
 _WIDEST = np.radians(135.0)  # wider limits say what a joint never does alone
 
 

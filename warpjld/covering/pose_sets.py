@@ -21,9 +21,9 @@ _FLEXION, _ABDUCTION = CHANNELS.index("flexion"), CHANNELS.index("abduction")
 _WIDEST = np.radians(120.0)  # shoulders, knees and elbows in full are contact of the limbs
 _UNKNOWN = np.radians(30.0)  # where limits are as wide one way as the other: nothing is known of the joint
 _TOE = re.compile(r"^toe\d")
-_CURLS = (0.3, 0.6, 0.9)
-_BETWEEN = (0.4, 0.5, 0.7, 0.8)
-_ONE_BY_ONE = (0.45, 0.9)
+_CURLS = (0.3, 0.6, 0.9)  # of `CURL`
+_BETWEEN = (0.4, 0.5, 0.7, 0.8)  # of `CURL`, taken after those
+_ONE_BY_ONE = (0.45, 0.9)  # of every digit's own range, the other digits at rest
 
 
 def curled(skeleton: Skeleton, amounts: NDArray[np.float64] | list[float] | tuple[float, ...]) -> Poses:

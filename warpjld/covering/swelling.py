@@ -42,7 +42,7 @@ __all__ = ["volume_keeping"]
 _PARTS = (0.33, 0.67, 1.0)
 _WIDEST = np.radians(110.0)  # of what is measured: beyond, limbs lie on one another
 _MOST = 0.8  # amplitude at which it ends
-_STEPS = 4
+_STEPS = 4  # Gauss-Newton steps for one amplitude
 _FLEXION, _ABDUCTION = CHANNELS.index("flexion"), CHANNELS.index("abduction")
 
 

@@ -24,7 +24,7 @@ __all__ = ["build_hand", "hand_rig"]
 
 Array = NDArray[np.float64]
 
-_MILLIMETRE = 1e-3
+_MILLIMETRE = 1e-3  # in metres; the design is in millimetres
 _ACROSS = np.array([1.0, 0.0, 0.0])
 
 

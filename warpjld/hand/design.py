@@ -15,7 +15,7 @@ __all__ = [
 
 Point = tuple[float, float, float]
 
-LENGTH, BREADTH = 190.0, 85.0
+LENGTH, BREADTH = 190.0, 85.0  # mm, of the design hand
 
 FOREARM, WRIST = (0.27, 0.28, -44.0), (-0.1, -0.16, 0.0)  # at their sections' centroids
 CARPOMETACARPAL = {
@@ -70,12 +70,12 @@ FINGER_PROFILE = (
     (2, 1.0, 0.67, 0.44, 0.61),
 )
 
-THUMB_BASE = (22.0, -8.0, 22.0)
-THUMB_LENGTHS = (43.0, 32.0, 27.5)
+THUMB_BASE = (22.0, -8.0, 22.0)  # mm, of its carpometacarpal joint
+THUMB_LENGTHS = (43.0, 32.0, 27.5)  # mm, of the thumb's bones
 THUMB_HALF_WIDTH = 10.4  # at knuckle 3
 THUMB_ABDUCTION = (42.0, 43.0, 49.0)  # of the three segments, from the hand's axis, in the dorsal view
 THUMB_DEPTH = (25.0, 18.0, 12.0)  # towards the palm
-THUMB_ROLL = 65.0
+THUMB_ROLL = 65.0  # degrees about its own axis
 THUMB_PROFILE = (
     (-1, 0.0, 0.85, 0.75, 0.80),
     (0, 0.0, 1.20, 1.05, 1.25),

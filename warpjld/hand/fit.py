@@ -15,7 +15,7 @@ __all__ = ["fit_plan", "measure"]
 
 Array = NDArray[np.float64]
 
-_ROUNDS = 3
+_ROUNDS = 3  # of measuring and scaling
 _HEADS = 0.42  # distal place of the breadth, across the heads of the metacarpals, in hand lengths
 
 

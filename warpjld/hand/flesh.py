@@ -16,8 +16,8 @@ Array = NDArray[np.float64]
 
 _BLOCK = 16_384
 _BETWEEN_FINGERS = 1.6  # blending radii [mm of the design hand]
-_FINGER_ROOT = 9.0
-_THUMB_ROOT = 16.0
+_FINGER_ROOT = 9.0  # blending radius at the roots of fingers [mm of the design hand]
+_THUMB_ROOT = 16.0  # likewise
 
 
 @dataclass(frozen=True, eq=False)

@@ -17,7 +17,7 @@ __all__ = ["Digit", "Plan", "plan_hand"]
 Array = NDArray[np.float64]
 
 _ROOT = 30.0  # how far a digit's flesh reaches back beyond its base joint
-_FINGER_SQUARENESS, _THUMB_SQUARENESS = 0.12, 0.10
+_FINGER_SQUARENESS, _THUMB_SQUARENESS = 0.12, 0.10  # of sections, 0 for ellipses
 _CAP = 0.62  # fraction of the last phalanx where the tip's rounding begins
 _TIP = 0.62  # depth of the extremity's centre under the skin, in half-widths
 _NAIL = (0.61, 0.26, 0.58)  # middle and half-length in last phalanges, half-width in half-widths

@@ -15,7 +15,7 @@ from warpjld.hand.mesh import Array, Edges, Faces, dots, face_normals, mean_over
 
 __all__ = ["remesh", "settle"]
 
-_LONG, _SHORT = 4.0 / 3.0, 4.0 / 5.0
+_LONG, _SHORT = 4.0 / 3.0, 4.0 / 5.0  # of the edge length wanted: Botsch and Kobbelt 2004
 _COLLAPSES = 8  # passes a round: one takes few edges, since edges near one another exclude each other
 
 

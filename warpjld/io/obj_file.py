@@ -25,7 +25,7 @@ __all__ = ["ObjFile", "read_obj"]
 _GO_ON = ("v", "vt", "f", "fo")
 """Lines that a backslash continues; in comments and names it is part of a Windows path."""
 
-_MOST = 2**31
+_MOST = 2**31  # indices: more than any file that can be read holds
 
 
 @dataclass(frozen=True, eq=False)

@@ -24,7 +24,7 @@ _MOVES = 5.0
 _SHIFTS = 0.01
 """Of the size of the figure, by which a joint moves from its parent, for the same."""
 
-_SHOWN = 4
+_SHOWN = 4  # joints named in one line
 
 
 def jumps(names: Sequence[str], turns: NDArray[np.float64]) -> list[str]:

@@ -13,7 +13,7 @@ from warpjld.skeleton.recognise.tree import SourceTree
 
 __all__ = ["fbx_animation_names", "read_fbx_animation"]
 
-_FLAT = 1e-12
+_FLAT = 1e-12  # determinant over largest entry cubed
 _TINY = 1e-7
 """What stands for zero scale."""
 

@@ -9,8 +9,8 @@ from warpjld.limits import check_limit
 
 __all__ = ["frame_rate", "frame_times", "merged_times"]
 
-_DEFAULT_RATE = 30.0
-_NTSC = 1000.0 / 1001.0
+_DEFAULT_RATE = 30.0  # frames a second where times say nothing
+_NTSC = 1000.0 / 1001.0  # rates of broadcast: 29.97 is 30 of these
 _COMMON = (30.0, 24.0, 25.0, 60.0, 30.0 * _NTSC, 24.0 * _NTSC, 60.0 * _NTSC, 50.0, 48.0, 120.0, 100.0, 90.0, 240.0)
 """Rates at which keys that were thinned out may lie, the likeliest first."""
 

@@ -27,7 +27,7 @@ else:
 
 __all__ = ["gltf_animation_names", "read_gltf_animation"]
 
-_PATHS = {"translation": 3, "rotation": 4, "scale": 3}
+_PATHS = {"translation": 3, "rotation": 4, "scale": 3}  # numbers a key
 _OTHER_PATHS = {"weights": "morph targets", "pointer": "properties that are no joint's"}
 _SINGLE = float(np.finfo(np.float32).eps)
 

@@ -9,7 +9,7 @@ from typing import Any
 __all__ = ["hands_by_side"]
 
 _KEY = re.compile(r"(left|right)(hand)?(world)?(landmarks)?")
-_COUNT = 21
+_COUNT = 21  # landmarks of one hand: the wrist, and four a digit
 
 
 def hands_by_side(frame: Any) -> list[dict[str, Any]] | None:

@@ -16,7 +16,7 @@ __all__ = ["poses_of_hands"]
 _SIDES = ("left", "right")
 _MOST_JOINTS = 3
 """A quarter of the fingers' twelve joints: one or two bent back for long are someone's supple last knuckles."""
-_MOST_FRAMES = 0.25
+_MOST_FRAMES = 0.25  # share of frames in which a joint may be beyond its limits
 _FAR = np.radians(30.0)
 """No joint gives by so much more than trackers err."""
 

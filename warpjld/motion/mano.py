@@ -24,7 +24,7 @@ _PLACE = ("transl", "trans", "translation")
 _HANDS = {side: (f"{side}_hand_pose", f"{side}_hand", f"{side[0]}hand_pose") for side in ("left", "right")}
 _FRAMES = ("frames", "data", "results")
 _SIDE = ("side", "handedness", "hand", "is_right", "is_rhand", "right")
-_WIDTHS = (45, 48, 51)
+_WIDTHS = (45, 48, 51)  # axis-angle numbers: fifteen joints; with the wrist; with its place
 _BODIES = {156: (66, "SMPL-H"), 165: (75, "SMPL-X")}
 """Width of a body's pose → where its left hand begins, the right one following, and the model's name."""
 _MOST_TURN = 4.0 * np.pi

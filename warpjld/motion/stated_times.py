@@ -13,7 +13,7 @@ from warpjld.errors import InputError
 
 __all__ = ["DEFAULT_RATE", "stated_times"]
 
-DEFAULT_RATE = 30.0
+DEFAULT_RATE = 30.0  # frames a second, said in a note where it is taken
 
 _RATES = ("fps", "rate", "frame_rate", "framerate", "frameRate", "mocap_framerate", "mocap_frame_rate")
 _UNITS = {"_ms": 1e-3, "Ms": 1e-3, "_us": 1e-6, "_ns": 1e-9, "_s": 1.0, "_sec": 1.0}

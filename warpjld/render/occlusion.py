@@ -10,10 +10,10 @@ from numpy.typing import NDArray
 
 __all__ = ["occlusion", "shade"]
 
-_SAMPLES = 20
+_SAMPLES = 20  # directions in which a pixel looks
 _TILE = 4  # pixels in a square of this side look in turned directions; a blur of that size joins them
 _BIAS = 0.12  # cosine below which a neighbour counts as the same flat surface
-_STRENGTH = 4.2
+_STRENGTH = 4.2  # chosen by eye
 
 
 def shade(picture: NDArray[np.uint8], shadow: NDArray[np.floating]) -> NDArray[np.uint8]:

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 __all__ = ["bone_faces", "bone_vertices", "joint_faces", "joint_vertices"]
 
-_SIDES = 8
+_SIDES = 8  # of a bone's prism
 _COLLAR = 0.16  # share of its length after which a bone is thickest
 
 

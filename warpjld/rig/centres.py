@@ -23,7 +23,7 @@ __all__ = ["OFF_CENTRE", "OffCentre", "joint_centres", "with_centred_joints"]
 OFF_CENTRE = 0.2
 """Share of the flesh's thickness from which a joint counts as off its middle: a body's elbows and knees lie up to a
 sixth of it off."""
-_RAYS = 72
+_RAYS = 72  # every 5 degrees round the bone
 _ALL_ROUND = 0.97  # share of directions in which there must be a surface: at an open end nothing is known
 _STUBBY = 0.6  # radius per shorter segment from which a section is more than a finger's or limb's own flesh
 

@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 __all__ = ["Arguments"]
 
 _MOST_KEYS = 10_000
-_LARGEST = 1e12
+_LARGEST = 1e12  # of any number in a script, unless its argument says otherwise
 
 
 class Arguments:

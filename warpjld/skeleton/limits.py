@@ -33,6 +33,7 @@ _ROLES: dict[str, tuple[tuple[float, float], ...]] = {
     "knee": ((0, 135), _CLOSED, _CLOSED, _CLOSED),
     "ankle": ((-20, 50), _CLOSED, (-35, 35), _CLOSED),
 }
+# degrees, of joints that no table names: wide, since nothing is known of them
 _OTHER = ((-120.0, 120.0), (-90.0, 90.0), (-120.0, 120.0), (-90.0, 90.0))
 
 

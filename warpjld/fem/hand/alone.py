@@ -35,14 +35,14 @@ __all__ = ["FleshAlone", "Untouched"]
 
 _STEPS = 12
 """Newton steps; where more are needed the pose between is a better start."""
-_SHORTEST = 0.05
+_SHORTEST = 0.05  # share of the step below which the line search gives up
 _HALVINGS = 6
 """Times a way to another pose may be cut in two."""
 _TOLERANCE = 1e-4
 """Residual over the forces that hold the bones, or over the contact forces that are missing where those are less."""
 _ROUNDING = 1e-7
 """Residual over the latter that is not worth a step."""
-_KEPT = 16
+_KEPT = 16  # poses whose equilibrium is remembered
 
 
 @dataclass(frozen=True, eq=False)

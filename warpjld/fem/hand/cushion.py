@@ -17,7 +17,7 @@ from warpjld.skeleton.hand import DIGITS
 
 __all__ = ["Cushion", "coarse_note", "cushions"]
 
-_ENOUGH = 2
+_ENOUGH = 2  # elements through the flesh over a bone: one alone cannot bend
 _MISSING = 0.1
 """Share of the flesh's depth that flat faces may cut off round skin, at their middles."""
 _PALMAR = 0.8

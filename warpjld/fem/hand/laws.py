@@ -10,7 +10,7 @@ from warpjld.fem.material.materials import Fung, Material, NeoHooke
 
 __all__ = ["hand_laws"]
 
-_POISSON = (0.3, 0.49)
+_POISSON = (0.3, 0.49)  # of flesh, which keeps its volume; from .5 there is no bulk modulus
 _CREASE = 1.0
 """Fung's exponent between the bones of a joint."""
 

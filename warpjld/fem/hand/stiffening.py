@@ -12,7 +12,7 @@ from dataclasses import dataclass
 
 __all__ = ["ForceSlope", "way_to"]
 
-_POWERS = (1.0, 30.0)
+_POWERS = (1.0, 30.0)  # exponents allowed, from linear to a wall
 _STIFFEST = 0.3
 """Least L, over the present one, that two places may foretell."""
 

@@ -14,7 +14,7 @@ from warpjld.fem.mesh.hexmesh import HexMesh
 
 __all__ = ["Fung", "LinearElastic", "Material", "MaterialWarning", "MooneyRivlin", "NeoHooke", "laws_of"]
 
-_USUAL_POISSON = 0.49
+_USUAL_POISSON = 0.49  # above it a warning
 LINEAR, LINEAR_FULL, NEO_HOOKE, MOONEY_RIVLIN, FUNG, NEO_HOOKE_FULL = range(6)
 
 

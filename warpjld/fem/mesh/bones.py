@@ -22,14 +22,14 @@ __all__ = ["Bone", "claimed", "fitted"]
 
 _PULLS = (10.0, 30.0)
 """Weights of distances from the bones' surfaces, in spacings squared, one after the other."""
-_ROUNDS = 40
+_ROUNDS = 40  # of fitting nodes to surfaces, at most
 _LEAST = 0.2
 """Least scaled Jacobian: nodes stay off the bones where they ask for worse, or for worse than it was where it was."""
 _ALONG = 100
 """Points of a bone's axis from which the nearest elements are asked for."""
 _SHORTER = 0.5
 """Share of their way that nodes of elements which become too bad go instead."""
-_SLIDE = 0.02
+_SLIDE = 0.02  # weight along the surface against 1 across it: nodes slide on a bone
 _END = 0.7
 """Least cosine between a face's normal and the bone's direction at an end of the bone."""
 

@@ -99,10 +99,10 @@ _PATH = 0.15
 """Depth of the middle of a cell that a path may go through, in spacings."""
 _BARE = 1.8
 """Distance from the nearest cell taken, in spacings, from which on a path is laid."""
-_ROUNDS = 6
+_ROUNDS = 6  # of taking away what no path reaches, at most
 _BLOCK = 6
 """Nodes along each edge of the blocks of a grid that one node may answer for."""
-_LARGEST = 60_000_000
+_LARGEST = 60_000_000  # nodes of a grid; bounds memory
 
 
 def core_of(envelope: Envelope, spacing: float, notes: list[str]) -> tuple[Mask, Array]:

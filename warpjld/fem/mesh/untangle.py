@@ -117,8 +117,8 @@ def as_far(mesh: HexMesh, start: Array, goal: Array, least: float | Array, short
     return moved
 
 
-_MEMORY = 10
-_SHORTEST = 1e-10
+_MEMORY = 10  # pairs of L-BFGS
+_SHORTEST = 1e-10  # step length at which the line search gives up
 
 
 def minimise(cost: Callable[[Array], tuple[float, Array]], start: Array, *, rounds: int, first_step: float) -> Array:

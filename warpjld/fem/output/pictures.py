@@ -19,8 +19,8 @@ from warpjld.whole_file import whole_file
 __all__ = ["QUANTITIES", "draw"]
 
 QUANTITIES = ("displacement", "stress")
-_PANEL = 1000
-_BAR = 260
+_PANEL = 1000  # pixels, one view
+_BAR = 260  # pixels, width of the scale
 
 
 def draw(path: Path, body: Body, instant: Instant, quantity: str, title: str = "") -> None:

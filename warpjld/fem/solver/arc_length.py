@@ -23,9 +23,9 @@ __all__ = ["DIRECT", "follow"]
 
 DIRECT = 40_000
 """Degrees of freedom up to which steps are solved directly, as the path's indefinite stiffness asks for."""
-_STEPS = 300
-_ITERATIONS, _FEW = 12, 4
-_SHORTER, _LONGER, _LONGEST = 0.5, 1.5, 4.0
+_STEPS = 300  # of one curve at most
+_ITERATIONS, _FEW = 12, 4  # of one step at most; after fewer than `_FEW` the next step is longer
+_SHORTER, _LONGER, _LONGEST = 0.5, 1.5, 4.0  # factors of the step's length, and the longest in units of the first
 _SHORTEST = 1e-4
 """Length of a step under which the path is given up, over the first; ``_LONGEST`` likewise."""
 

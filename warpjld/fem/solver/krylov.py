@@ -144,7 +144,7 @@ def _cg(
 
 
 _Vector = Array
-_RESTART = 80
+_RESTART = 80  # vectors kept by GMRES before it begins again
 
 
 def minimal_residuals(

@@ -15,9 +15,9 @@ from warpjld.fem.solver.solution import Instant, Solution
 
 __all__ = ["Newton"]
 
-_HALVINGS = 8
-_ITERATIONS, _CAUTIOUS = 16, 25
-_LINE_SEARCH = 8
+_HALVINGS = 8  # of a load step at most
+_ITERATIONS, _CAUTIOUS = 16, 25  # of one step; more are allowed where steps are damped from the start
+_LINE_SEARCH = 8  # halvings of a Newton step: 1/256
 _ROUNDING, _PLACES = 1e-13, 0.03
 """As in ``contact.solver.newton_state``."""
 _DIRECT = 40_000

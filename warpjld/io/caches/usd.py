@@ -14,7 +14,7 @@ from warpjld.surface import Surface
 
 __all__ = ["UsdCache", "build_stage", "extent_of", "write_texture_coordinates"]
 
-_FLUSH_BYTES = 32 << 20
+_FLUSH_BYTES = 32 << 20  # of time samples before they are written out and freed
 
 
 class UsdCache(Cache):

@@ -18,7 +18,7 @@ from warpjld.errors import InputError, MissingExtraError
 
 __all__ = ["FbxMesh", "FbxScene", "FbxSkin", "FbxStack", "read_scene"]
 
-_FURTHEST = 1e12
+_FURTHEST = 1e12  # of a file's own units: farther is damage
 _LONGEST = 600.0
 """Seconds that reading may take."""
 _NO_LIBRARY = 4

@@ -21,8 +21,8 @@ __all__ = ["FbxSkeleton", "find_skeleton"]
 
 _SAME = 1e-4
 """Transforms that differ by less, relative to the skeleton's size, are the same."""
-_SINGULAR = 1e-12
-_SCALED = 1e-3
+_SINGULAR = 1e-12  # determinant over size cubed
+_SCALED = 1e-3  # by which a scale may be off 1 and is none
 
 
 @dataclass(frozen=True, eq=False)

@@ -13,7 +13,7 @@ from warpjld.text_file import parse_json
 __all__ = ["read_container"]
 
 _BOM = b"\xef\xbb\xbf"
-_JSON, _BINARY = 0x4E4F534A, 0x004E4942
+_JSON, _BINARY = 0x4E4F534A, 0x004E4942  # chunk types of GLB: "JSON", "BIN\0"
 
 
 def read_container(path: Path) -> tuple[str, dict[str, Any], bytes | None]:

@@ -31,7 +31,7 @@ else:
 
 __all__ = ["Document", "open_document"]
 
-_FURTHEST = 1e12
+_FURTHEST = 1e12  # of a file's own units: farther is damage
 _KIND = "a glTF 2.0 file"
 _UNPACK = "export it without compression"
 

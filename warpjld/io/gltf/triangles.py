@@ -14,7 +14,7 @@ from warpjld.limits import check_limit
 
 __all__ = ["is_surface", "primitive_points", "primitive_triangles"]
 
-_TRIANGLES, _STRIP, _FAN = 4, 5, 6
+_TRIANGLES, _STRIP, _FAN = 4, 5, 6  # primitive modes of glTF
 
 
 def is_surface(primitive: Any) -> bool:

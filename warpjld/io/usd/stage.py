@@ -20,7 +20,7 @@ from warpjld.nesting import nesting
 
 __all__ = ["UsdFile", "matrices", "open_usd"]
 
-_MOST_WARNINGS = 5
+_MOST_WARNINGS = 5  # of OpenUSD's that are passed on
 _PLACE = re.compile(r"^Error in '[^']*' at line \d+ in file \S+ : '(.*?)'?$")
 
 

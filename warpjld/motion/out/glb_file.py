@@ -18,8 +18,8 @@ from warpjld.errors import InputError
 
 __all__ = ["ARRAY_BUFFER", "ELEMENT_ARRAY_BUFFER", "GlbFile", "read_gltf_json"]
 
-ARRAY_BUFFER, ELEMENT_ARRAY_BUFFER = 34962, 34963
-_COMPONENTS = {"f4": 5126, "u4": 5125, "u2": 5123}
+ARRAY_BUFFER, ELEMENT_ARRAY_BUFFER = 34962, 34963  # targets of buffer views in glTF
+_COMPONENTS = {"f4": 5126, "u4": 5125, "u2": 5123}  # component types of glTF
 _LARGEST = 2**32 - 1  # lengths are 32 bit
 
 

@@ -34,7 +34,7 @@ from warpjld.skeleton import Poses
 __all__ = ["write_usd"]
 
 _SHEARED = 1e-3  # of a joint's scale
-_SAME = 1e-9
+_SAME = 1e-9  # of the file's unit
 
 
 def write_usd(path: Path, rig: Rig, poses: Poses, timing: Timing, baked: BakedSkin | None = None) -> WrittenMotion:

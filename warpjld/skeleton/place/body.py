@@ -27,9 +27,9 @@ Points = dict[str, Array]
 _GRID = 170  # voxels in a body's height
 _HAND_GRID = 110  # voxels in a hand's length
 _CROTCH = (0.40, 0.55)  # heights between which legs part
-_USUAL_CROTCH = 0.47
+_USUAL_CROTCH = 0.47  # of the height, where none is found
 _HIP = 0.055  # of the height: the hip joint above where the legs part
-_ANKLE = 0.043
+_ANKLE = 0.043  # of the height
 _KNEE = 0.5  # from ankle to hip
 _SPINE = (0.14, 0.28, 0.45, 0.72)  # vertebrae from pelvis to the lowest of the neck
 _SPINE_DEPTH, _SKULL_DEPTH = 0.42, 0.3  # of the flesh from the back; the mouth lies before the skull's base
@@ -39,7 +39,7 @@ _SHOULDER = 0.1  # head of the humerus from the midline
 _WIDER = 1.35  # an arm ends where it is that much wider than it is on average
 _REACH = 1.4  # of the way from fingertip to wrist: how much of an arm is looked at as a hand
 _BALL = 0.72  # of the foot's length from the heel
-_HEEL = 0.13
+_HEEL = 0.13  # of the foot's length from its back
 
 
 def place_body(vertices: Array, faces: NDArray[np.integer], label: str = "the body") -> Points:

@@ -26,7 +26,7 @@ _CLEAR_RATIO = 1.45  # by which a ratio must differ from that to count as one vo
 # spread of the chains' first joints per spread of their second ones: metacarpals meet at the wrist
 _METACARPAL_SPREAD, _CLEAR_SPREAD = 0.75, 1.3
 _BARE = 0.1  # flesh of a last joint per that of the one before: below, it is an end
-_FLESHY = 0.25
+_FLESHY = 0.25  # likewise: above, it is surely a joint
 
 
 @dataclass

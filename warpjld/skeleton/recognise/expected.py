@@ -32,7 +32,7 @@ _PHALANGES = {
 _TO_BASE = {"index": 98.0, "middle": 95.0, "ring": 89.0, "pinky": 84.0}
 _ALONG = 0.045  # of the palm's length: by which joints of four fingers differ in share from one another
 _THUMB = (0.51, 0.65)  # of the way between its neighbours, second and third joint, as rigs of others have them
-_THUMB_ALONG = 0.08
+_THUMB_ALONG = 0.08  # of both bones' length: as `_ALONG`, for thumbs
 _LIMBS = (("hip", "knee", "ankle"), ("shoulder", "elbow", "wrist"))
 _HALVES = 1.32  # longer per shorter half of a limb: 1.02 to 1.13 are usual, knees a tenth of the leg off give 1.4
 _ASIDE = 0.012  # of the height: off the midline, or off where the other side's joint is
@@ -42,7 +42,7 @@ _CLEARLY = 1.25  # by which one side is the odder one
 _USUAL = {"hip": (0.055, 0.53), "shoulder": (0.1, 0.8)}
 """From the midline and from the floor, shares of the height (Drillis, Contini 1966)."""
 _BETWEEN = (0.27, 0.70)  # of the way between its neighbours: where a joint of the spine lies
-_MIDDLE = 0.48
+_MIDDLE = 0.48  # of the way from the joint below to the one above, where one is proposed
 
 
 @dataclass(frozen=True, eq=False)

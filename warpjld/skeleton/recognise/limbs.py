@@ -14,7 +14,7 @@ __all__ = ["FOREARM_RATIO", "SHIN_RATIO", "ankle_of", "divide_limb", "limb_misfi
 
 FOREARM_RATIO = 0.9  # forearm per upper arm, elbow to wrist
 SHIN_RATIO = 1.0  # shin per thigh
-_ANKLE_TURN = np.radians(35.0)
+_ANKLE_TURN = np.radians(35.0)  # a leg turns by more than that from shin to foot
 
 
 def path_below(tree: SourceTree, above: int, joint: int) -> list[int]:

@@ -21,13 +21,13 @@ __all__ = ["Finding", "check_placing", "in_trunk", "outside_surface"]
 _OFF_CENTRE = 0.5  # |a − b| / (a + b) of the flesh on both sides: at 0.5 one side is three times the other
 _NARROW = 1.6  # a section wider than this times its depth is judged by its depth alone (palms)
 _PAD = (0.4, 2.5)  # flesh beyond an extremity per half thickness there: 1 in the centre of a round end
-_SAMPLES = 5
+_SAMPLES = 5  # points of a segment that are looked at
 # trunk joints follow the spine, which lies at the back: off-centre is where they belong
 _DIGIT = (0.06, 0.66)
 """Share of the flesh, from the back, at which joints of digits lie: their bones run under the back's skin, the pad lies
 below. Toes of others lie at .08, knuckles at .2 to .5."""
 _CROWN = 0.02  # of the height: about half a head's radius
-_SPINE_AT = 0.3
+_SPINE_AT = 0.3  # of the trunk's depth from its back: where a joint of the spine is proposed
 _SPINE = (0.07, 0.56)
 """Likewise joints of the spine in the trunk: of others .15 to .46."""
 
