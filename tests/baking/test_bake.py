@@ -15,7 +15,7 @@ from scipy.spatial.transform import Rotation
 
 from warpjld.baking import Baked, accuracy, bake, training_poses, unseen_poses, write_baked
 from warpjld.baking.weights import fit_weights
-from warpjld.cli.bake import command
+from warpjld.cli.bake import bake_command
 from warpjld.covering import Covering
 from warpjld.errors import InputError
 from warpjld.skeleton.kinematics import Poses, rest_poses
@@ -161,5 +161,5 @@ def test_what_is_rigid_follows_its_joint(baked: Baked, covering: Covering) -> No
 def test_bad_input(arguments: list[str], message: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
     with pytest.raises(InputError, match=message):
-        CliRunner().invoke(command, arguments, catch_exceptions=False)
+        CliRunner().invoke(bake_command, arguments, catch_exceptions=False)
     assert not list(tmp_path.iterdir())

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from click.testing import CliRunner
 
-from warpjld.cli.calibrate import command
+from warpjld.cli.calibrate import calibrate_command
 from warpjld.covering import bind_rig
 from warpjld.covering.parameters import load_parameters, save_parameters
 from warpjld.errors import InputError
@@ -26,7 +26,7 @@ def hand(data: Path) -> Path:
 def test_parameters_are_written_and_loaded(hand: Path, tmp_path: Path) -> None:
     out = tmp_path / "hand.json"
     arguments = [str(hand), "-o", str(out), "--poses", "6", "--iterations", "4", "--json"]
-    result = CliRunner().invoke(command, arguments, catch_exceptions=False)
+    result = CliRunner().invoke(calibrate_command, arguments, catch_exceptions=False)
     assert result.exit_code == 0
     summary = json.loads(result.stdout)
     assert summary["poses"] == 6
@@ -41,9 +41,11 @@ def test_parameters_are_written_and_loaded(hand: Path, tmp_path: Path) -> None:
 def test_a_table_for_people(hand: Path, tmp_path: Path) -> None:
     start = tmp_path / "start.json"
     few = ["--poses", "4", "--iterations", "2"]
-    assert CliRunner().invoke(command, [str(hand), "-o", str(start), "-q", *few]).output == ""
+    assert CliRunner().invoke(calibrate_command, [str(hand), "-o", str(start), "-q", *few]).output == ""
     out = tmp_path / "again.json"
-    result = CliRunner().invoke(command, [str(hand), "-o", str(out), "--start", str(start), "--domains", "skin", *few])
+    result = CliRunner().invoke(
+        calibrate_command, [str(hand), "-o", str(out), "--start", str(start), "--domains", "skin", *few]
+    )
     assert "before" in result.stdout
     for row in ("volume error, worst", "roughness, typical", "faces folded"):
         assert row in result.stdout
@@ -76,7 +78,7 @@ def test_targets(hand: Path, shapes: Path, tmp_path: Path, own_poses: bool) -> N
     name = "shapes.npz" if own_poses else "bare.npz"
     arguments = [str(hand), "-o", str(out), "--targets", str(shapes / name)]
     arguments += [] if own_poses else ["--motion", str(shapes / "poses.csv")]
-    result = CliRunner().invoke(command, [*arguments, "--json"], catch_exceptions=False)
+    result = CliRunner().invoke(calibrate_command, [*arguments, "--json"], catch_exceptions=False)
     summary = json.loads(result.stdout)
     assert summary["poses"] == 3
     assert summary["before"]["rms_mm"] > 0.05
@@ -90,7 +92,7 @@ def test_targets(hand: Path, shapes: Path, tmp_path: Path, own_poses: bool) -> N
 def test_targets_for_people(hand: Path, shapes: Path, tmp_path: Path) -> None:
     out = tmp_path / "found.json"
     arguments = [str(hand), "-o", str(out), "--targets", str(shapes / "shapes.npz")]
-    result = CliRunner().invoke(command, arguments, catch_exceptions=False)
+    result = CliRunner().invoke(calibrate_command, arguments, catch_exceptions=False)
     assert "3 target shapes" in result.stdout
     assert "distance, typical [mm]" in result.stdout
 
@@ -109,11 +111,11 @@ def test_targets_for_people(hand: Path, shapes: Path, tmp_path: Path) -> None:
 def test_bad_input(arguments: list[str], message: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
     with pytest.raises(InputError, match=message):
-        CliRunner().invoke(command, arguments, catch_exceptions=False)
+        CliRunner().invoke(calibrate_command, arguments, catch_exceptions=False)
     assert not list(tmp_path.iterdir())
 
 
 def test_targets_are_not_overwritten(hand: Path, shapes: Path) -> None:
     targets = str(shapes / "shapes.npz")
     with pytest.raises(InputError):
-        CliRunner().invoke(command, [str(hand), "-o", targets, "--targets", targets], catch_exceptions=False)
+        CliRunner().invoke(calibrate_command, [str(hand), "-o", targets, "--targets", targets], catch_exceptions=False)

@@ -9,11 +9,11 @@ import numpy as np
 import pytest
 from click.testing import CliRunner
 
-from warpjld.cli.inspect import command
+from warpjld.cli.inspect import inspect_command
 
 
 def run(*arguments: object):
-    result = CliRunner().invoke(command, [str(a) for a in arguments])
+    result = CliRunner().invoke(inspect_command, [str(a) for a in arguments])
     if result.exception and not isinstance(result.exception, SystemExit):
         raise result.exception
     return result

@@ -74,7 +74,7 @@ def test_too_little_memory_is_one_line(monkeypatch: pytest.MonkeyPatch, capsys: 
     def greedy() -> None:
         np.empty(10**17)
 
-    monkeypatch.setattr("warpjld.cli.study.command", greedy)
+    monkeypatch.setattr("warpjld.cli.study.study_command", greedy)
     assert run("study") == 1
     assert capsys.readouterr().err.startswith("error: not enough memory: Unable to allocate")
 
@@ -84,7 +84,7 @@ def test_a_full_disk_is_one_line(monkeypatch: pytest.MonkeyPatch, capsys: pytest
     def full() -> None:
         raise OSError(errno.ENOSPC, "No space left on device", "out/a.npz")
 
-    monkeypatch.setattr("warpjld.cli.study.command", full)
+    monkeypatch.setattr("warpjld.cli.study.study_command", full)
     assert run("study") == 1
     assert capsys.readouterr().err == "error: out/a.npz: No space left on device\n"
 

@@ -17,7 +17,7 @@ from warpjld.errors import WarpjldError
 from warpjld.limits import LIMITS, set_limit
 from warpjld.suggest import one_of
 
-__all__ = ["group", "main"]
+__all__ = ["command_group", "main"]
 
 _FAULT = 70  # EX_SOFTWARE of sysexits.h
 _TRACEBACK = "WARPJLD_TRACEBACK"
@@ -41,7 +41,7 @@ what scripts understand."""
 
 
 class _Lazy(click.Group):
-    """Loads ``warpjld.cli.NAME.command`` only for the command that is called: start-up stays short."""
+    """Loads ``NAME_command`` of ``warpjld.cli.NAME`` only for the command that is called: start-up stays short."""
 
     def list_commands(self, ctx: click.Context) -> list[str]:
         return list(_COMMANDS)
@@ -49,7 +49,7 @@ class _Lazy(click.Group):
     def get_command(self, ctx: click.Context, name: str) -> click.Command | None:
         if name not in _COMMANDS:
             return None
-        command: click.Command = importlib.import_module(f"warpjld.cli.{name}").command
+        command: click.Command = getattr(importlib.import_module(f"warpjld.cli.{name}"), f"{name}_command")
         return command
 
     def resolve_command(
@@ -77,7 +77,7 @@ def _limits() -> str:
     metavar="NAME=NUMBER",
     help=f"Raise or lower a limit on what is read or computed, before the command; repeatable. {_limits()}.",
 )
-def group(limits: tuple[str, ...]) -> None:
+def command_group(limits: tuple[str, ...]) -> None:
     """Hands and bodies deformed by Joint-dependent Local Deformations, without painted weights."""
     for one in limits:
         name, _, value = one.partition("=")
@@ -94,7 +94,7 @@ def main(arguments: list[str] | None = None) -> None:
     if isinstance(sys.stdout, io.TextIOWrapper):
         sys.stdout.reconfigure(errors="backslashreplace")  # names of files may be no text
     try:
-        code = group.main(arguments, prog_name="warpjld", standalone_mode=False)
+        code = command_group.main(arguments, prog_name="warpjld", standalone_mode=False)
     except click.exceptions.Abort:
         click.echo("interrupted", err=True)
         sys.exit(130)

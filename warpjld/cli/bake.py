@@ -14,7 +14,7 @@ from warpjld.cli.answer import answer
 if TYPE_CHECKING:
     from warpjld.baking import Accuracy
 
-__all__ = ["command"]
+__all__ = ["bake_command"]
 
 
 @click.command("bake")
@@ -53,7 +53,7 @@ __all__ = ["command"]
 @options.domains
 @options.json
 @options.quiet
-def command(
+def bake_command(
     rig: str,
     out: Path,
     motions: tuple[Path, ...],
@@ -81,11 +81,11 @@ def command(
     from warpjld.cli.warn import warn
     from warpjld.covering import load_parameters
     from warpjld.covering.kept import bind_kept
-    from warpjld.folders import make_folder
+    from warpjld.files.folders import make_folder
+    from warpjld.files.overwriting import check_outputs
     from warpjld.io.identity import files_of
     from warpjld.motion import load_motion
-    from warpjld.overwriting import check_outputs
-    from warpjld.quiet import silence_warp
+    from warpjld.runtime.quiet import silence_warp
 
     silence_warp()
     check_baked(out)
@@ -93,16 +93,14 @@ def command(
     if table is not None:
         check_report(table)
         outputs.append(table)
-    read = [path for path in (*motions, clip) if path is not None]
-    inputs = [file for path in dict.fromkeys(read) for file in (path, *files_of(path))]
+    read = dict.fromkeys(path for path in (*motions, clip) if path is not None)
+    inputs = [file for path in read for file in (path, *files_of(path))]
     check_outputs(outputs, [*rig_files(rig, how | {"parameters": parameters}), *inputs])
     opened = open_rig(rig, **how)
     chosen = None if parameters is None else load_parameters(parameters, opened.skeleton)
-    warnings: list[str] = []
     loaded = [load_motion(path, opened) for path in motions]
     shown = None if clip is None else load_motion(clip, opened)
-    for motion in (*loaded, *([shown] if shown else [])):
-        warnings.extend(motion.warnings)
+    warnings = [line for motion in (*loaded, *([shown] if shown else [])) for line in motion.warnings]
     if opened.skin is None:
         warnings.append("the rig has no painted weights: the report has nothing to set the fitted ones beside")
     with progress(quiet) as report:
@@ -110,31 +108,32 @@ def command(
         fitted, unseen = with_motions(opened.skeleton, [motion.poses for motion in loaded])
         baked = bake(opened, covering, fitted, influences=int(influences), correctives=correctives, progress=report)
         rows = accuracy(baked, covering, unseen)
-        written = write_baked(
-            out, baked, None if shown is None else shown.poses, rate=30.0 if shown is None else shown.rate
-        )
+        written = write_baked(out, baked, shown.poses if shown else None, rate=shown.rate if shown else 30.0)
     if table is not None:
         make_folder(table.parent)
         write_report(table, rows)
     warn(dict.fromkeys([*warnings, *written.warnings]))
+    told = {
+        "rig": rig,
+        "files": [str(path) for path in outputs],
+        "influences": int(influences),
+        "correctives": len(baked.correctives),
+        "poses": len(fitted),
+        "unseen": [asdict(row) for row in rows],
+        "warnings": [*opened.suspicious, *warnings, *written.warnings],
+        "notes": list(written.notes),
+    }
     if as_json:
-        answer(
-            {
-                "rig": rig,
-                "files": [str(path) for path in outputs],
-                "influences": int(influences),
-                "correctives": len(baked.correctives),
-                "poses": len(fitted),
-                "unseen": [asdict(row) for row in rows],
-                "warnings": [*opened.suspicious, *warnings, *written.warnings],
-                "notes": list(written.notes),
-            }
-        )
+        answer(told)
     elif not quiet:
-        _table(rows, len(fitted))
-        click.echo(f"{', '.join(str(path) for path in outputs)} written")
-        for note in written.notes:
-            click.echo(f"note: {note}")
+        _print(told, rows)
+
+
+def _print(told: dict[str, Any], rows: list[Accuracy]) -> None:
+    _table(rows, told["poses"])
+    click.echo(f"{', '.join(told['files'])} written")
+    for note in told["notes"]:
+        click.echo(f"note: {note}")
 
 
 def _table(rows: list[Accuracy], fitted: int) -> None:

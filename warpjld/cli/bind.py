@@ -11,7 +11,7 @@ import click
 from warpjld.cli import options
 from warpjld.cli.answer import answer
 
-__all__ = ["command"]
+__all__ = ["bind_command"]
 
 
 @click.command("bind")
@@ -22,7 +22,7 @@ __all__ = ["command"]
 @options.domains
 @options.json
 @options.quiet
-def command(
+def bind_command(
     rig: str,
     out: Path,
     parameters: Path | None,
@@ -38,8 +38,8 @@ def command(
     from warpjld.covering import bind_rig, load_parameters
     from warpjld.covering.kept import save_binding
     from warpjld.errors import InputError
-    from warpjld.overwriting import check_outputs
-    from warpjld.quiet import silence_warp
+    from warpjld.files.overwriting import check_outputs
+    from warpjld.runtime.quiet import silence_warp
 
     began = time.perf_counter()
     silence_warp()

@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from warpjld.covering.fit_targets import TargetFit
     from warpjld.rig import Rig
 
-__all__ = ["command"]
+__all__ = ["calibrate_command"]
 
 _ROWS = {
     "loss": ("loss", ".2f"),
@@ -62,7 +62,7 @@ _ROWS = {
 )
 @options.json
 @options.quiet
-def command(
+def calibrate_command(
     rig: str,
     out: Path,
     start: Path | None,
@@ -87,9 +87,9 @@ def command(
     from warpjld.covering.kept import bind_kept
     from warpjld.covering.parameters import load_parameters, save_parameters
     from warpjld.errors import InputError
+    from warpjld.files.overwriting import check_outputs
     from warpjld.io.identity import files_of
-    from warpjld.overwriting import check_outputs
-    from warpjld.quiet import silence_warp
+    from warpjld.runtime.quiet import silence_warp
 
     silence_warp()
     if not out.absolute().parent.is_dir():

@@ -16,7 +16,7 @@ from warpjld import __version__
 from warpjld.cli import options
 from warpjld.errors import WarpjldError
 
-__all__ = ["command"]
+__all__ = ["doctor_command"]
 
 _REQUIREMENT = re.compile(r"^(?P<name>[\w.-]+)\s*(?P<version>[^;]*?)\s*(?:;.*extra == ['\"](?P<extra>\w+)['\"].*)?$")
 _GATHERED = ("all", "dev", "docs")
@@ -26,13 +26,13 @@ _GATHERED = ("all", "dev", "docs")
 @click.command("doctor")
 @click.option("--no-picture", is_flag=True, help="Do not try to draw.")
 @options.json
-def command(no_picture: bool, as_json: bool) -> None:
+def doctor_command(no_picture: bool, as_json: bool) -> None:
     """Say what is installed and what works here: versions, devices, drawing, extras, caches; and what is missing.
 
     The exit code is 1 where something does not work that every installation has.
     """
     from warpjld.cli.answer import answer
-    from warpjld.quiet import silence_warp
+    from warpjld.runtime.quiet import silence_warp
 
     silence_warp()
     required, extras = _requirements()
@@ -100,7 +100,7 @@ def _caches() -> dict[str, dict[str, Any]]:
     """Folders where things are kept from one run to the next, and how much is in them."""
     import warp as wp
 
-    from warpjld.kept_files import kept_folder
+    from warpjld.files.kept_files import kept_folder
 
     kept = kept_folder()
     folders = {

@@ -14,7 +14,7 @@ from warpjld.cli import options
 from warpjld.errors import InputError, WarpjldError
 from warpjld.suggest import did_you_mean
 
-__all__ = ["command", "example_files", "examples_folder"]
+__all__ = ["example_command", "example_files", "examples_folder"]
 
 _SUFFIXES = (".jld", ".toml", ".py")
 _WITH = {"user_command.jld": ("user_command.py",), "grasp_objects.py": ("grasp_objects.toml",)}
@@ -54,7 +54,7 @@ def example_files() -> dict[str, Path]:
 @options.json
 @options.quiet
 @click.pass_context
-def command(
+def example_command(
     ctx: click.Context,
     name: str | None,
     arguments: tuple[str, ...],
@@ -104,7 +104,7 @@ def _list(files: dict[str, Path], as_json: bool) -> None:
 
 
 def _copy(file: Path, out: Path, quiet: bool) -> None:
-    from warpjld.folders import make_folder
+    from warpjld.files.folders import make_folder
 
     make_folder(out)
     for name in (file.name, *_WITH.get(file.name, ())):
@@ -118,7 +118,7 @@ def _copy(file: Path, out: Path, quiet: bool) -> None:
 
 def _run_program(file: Path, arguments: tuple[str, ...], out: Path) -> None:
     """A program of its own process, in the output folder; arguments that name files are found from there."""
-    from warpjld.folders import make_folder
+    from warpjld.files.folders import make_folder
 
     make_folder(out)
     given = [os.path.abspath(one) if os.path.exists(one) else one for one in arguments]
@@ -134,11 +134,11 @@ def _run_file(ctx: click.Context, file: Path, out: Path, as_json: bool, quiet: b
     shared = {"out": out, "as_json": as_json, "quiet": quiet}
     if file.suffix == ".jld":
         more = tuple(file.with_name(name) for name in _WITH.get(file.name, ()))
-        ctx.invoke(run.command, script=file, commands=more, **shared)
+        ctx.invoke(run.run_command, script=file, commands=more, **shared)
     elif "[[hands]]" in file.read_text(encoding="utf-8"):
-        ctx.invoke(study.command, plan=file, table=_table_format(), **shared)
+        ctx.invoke(study.study_command, plan=file, table=_table_format(), **shared)
     else:
-        ctx.invoke(fem.command, study=file, **shared)
+        ctx.invoke(fem.fem_command, study=file, **shared)
 
 
 def _table_format() -> str:

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
     from warpjld.fem.study.study_results import Reaction
 
-__all__ = ["command"]
+__all__ = ["fem_command"]
 
 _ROUNDING = 1e-9  # of the largest reaction: smaller ones are shown as none
 
@@ -29,7 +29,7 @@ _ROUNDING = 1e-9  # of the largest reaction: smaller ones are shown as none
 @click.option("--no-pictures", is_flag=True, help="Write no pictures.")
 @options.json
 @options.quiet
-def command(study: Path, out: Path | None, no_pictures: bool, as_json: bool, quiet: bool) -> None:
+def fem_command(study: Path, out: Path | None, no_pictures: bool, as_json: bool, quiet: bool) -> None:
     """Solve the load steps of STUDY (a .toml file, see docs/reference/fem-study.md and examples/inflate_ball.toml).
 
     Written: NAME.pvd with one .vtu an instant (for ParaView), reactions.csv, and pictures of displacement and stress
@@ -41,7 +41,7 @@ def command(study: Path, out: Path | None, no_pictures: bool, as_json: bool, qui
     from warpjld.cli.answer import answer
     from warpjld.fem.study.study_file import load_study
     from warpjld.fem.study.study_results import StudyResults
-    from warpjld.quiet import silence_warp
+    from warpjld.runtime.quiet import silence_warp
     from warpjld.script.folder import OutputFolder
 
     silence_warp()

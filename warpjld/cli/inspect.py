@@ -15,7 +15,7 @@ from warpjld.cli.answer import answer
 from warpjld.rig import Rig
 from warpjld.skeleton.tree import CHANNELS
 
-__all__ = ["command"]
+__all__ = ["inspect_command"]
 
 
 @click.command("inspect")
@@ -27,7 +27,7 @@ __all__ = ["command"]
 @click.option("--write-map", type=click.Path(path_type=Path), help="Joint map to write, for editing (see --map).")
 @options.json
 @click.option("-q", "--quiet", is_flag=True, help="Say only what looks suspicious.")
-def command(
+def inspect_command(
     rig: str,
     out: Path | None,
     no_picture: bool,
@@ -44,8 +44,8 @@ def command(
     --no-picture.
     """
     from warpjld.cli.rig_argument import open_rig, rig_files
-    from warpjld.overwriting import check_outputs
-    from warpjld.quiet import silence_warp
+    from warpjld.files.overwriting import check_outputs
+    from warpjld.runtime.quiet import silence_warp
 
     silence_warp()
     listed = how["points"] == options.LISTED

@@ -10,7 +10,7 @@ import numpy as np
 from warpjld.cli import options
 from warpjld.cli.answer import answer
 
-__all__ = ["command"]
+__all__ = ["place_command"]
 
 
 @click.command("place")
@@ -20,16 +20,16 @@ __all__ = ["command"]
 @click.option("--picture", type=click.Path(path_type=Path), help="Picture (PNG) of the points in the surface.")
 @options.json
 @options.quiet
-def command(surface: Path, out: Path, side: str | None, picture: Path | None, as_json: bool, quiet: bool) -> None:
+def place_command(surface: Path, out: Path, side: str | None, picture: Path | None, as_json: bool, quiet: bool) -> None:
     """Propose the 87 named points of a digitised body, or the 25 of a hand, from SURFACE alone.
 
     A body stands upright along an axis, its legs, arms and fingers apart. The file is in SURFACE's own unit and axes;
     correct it by hand, look at it with `inspect SURFACE --points FILE`, use it with MODEL … POINTS.
     """
+    from warpjld.files.overwriting import check_outputs
     from warpjld.io.mesh_file import read_mesh
     from warpjld.io.points_file import write_points_file
-    from warpjld.overwriting import check_outputs
-    from warpjld.quiet import silence_warp
+    from warpjld.runtime.quiet import silence_warp
     from warpjld.skeleton.place.place import propose_points
 
     silence_warp()

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from contextlib import contextmanager
+from typing import TYPE_CHECKING
 
-__all__ = ["Report", "progress"]
+if TYPE_CHECKING:
+    from warpjld.script.runner import Report
 
-Report = Callable[[str, int, int], None]
-"""What long work calls: what is being done, how much of it is done, and how much there is."""
+__all__ = ["progress"]
 
 
 @contextmanager

@@ -9,7 +9,7 @@ import click
 from warpjld.cli import options
 from warpjld.cli.answer import answer
 
-__all__ = ["command"]
+__all__ = ["run_command"]
 
 
 @click.command("run")
@@ -21,7 +21,7 @@ __all__ = ["command"]
 @click.option("--check", is_flag=True, help="Read the script and say what it would make; compute nothing.")
 @options.json
 @options.quiet
-def command(
+def run_command(
     script: Path,
     out: Path,
     device: str,
@@ -34,7 +34,7 @@ def command(
     """Run SCRIPT and make the pictures, films and exports it asks for; if it asks for none, an animated surface (NPZ),
     a film and a contact sheet. A summary goes to summary.json in the output folder."""
     from warpjld.cli.progress import progress
-    from warpjld.quiet import silence_warp
+    from warpjld.runtime.quiet import silence_warp
     from warpjld.script.run_script import run_script
     from warpjld.script.summary import table
 

@@ -13,7 +13,7 @@ from warpjld.cli import options
 from warpjld.cli.warn import one_line
 from warpjld.errors import WarpjldError
 
-__all__ = ["command"]
+__all__ = ["shell_command"]
 
 _PROMPT, _MORE = "jld> ", "...> "
 _HISTORY = Path("~/.warpjld_history")
@@ -26,10 +26,10 @@ _WELCOME = "HELP lists the commands, RUN makes the files, SAVE keeps what was ty
 @options.device
 @options.threads
 @options.commands
-def command(script: Path | None, out: Path, device: str, threads: int | None, commands: tuple[Path, ...]) -> None:
+def shell_command(script: Path | None, out: Path, device: str, threads: int | None, commands: tuple[Path, ...]) -> None:
     """Type commands of the language, after running SCRIPT if one is given. Commands may also be piped in; then the
     first error ends the shell."""
-    from warpjld.quiet import silence_warp
+    from warpjld.runtime.quiet import silence_warp
     from warpjld.script.plugin import load_commands
     from warpjld.script.session import Session
 

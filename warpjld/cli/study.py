@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from warpjld.study import Rerun, StudyResult
     from warpjld.study.grasping import GraspPlan
 
-__all__ = ["command"]
+__all__ = ["study_command"]
 
 
 @click.command("study")
@@ -34,7 +34,7 @@ __all__ = ["command"]
 @click.option("--check", is_flag=True, help="Read the plan and load its hands and objects; run nothing.")
 @options.json
 @options.quiet
-def command(
+def study_command(
     plan: Path,
     out: Path,
     processes: int | None,
@@ -51,7 +51,7 @@ def command(
     whatever the number of processes and however often the study was stopped."""
     from warpjld.cli.progress import progress
     from warpjld.errors import InputError
-    from warpjld.quiet import silence_warp
+    from warpjld.runtime.quiet import silence_warp
     from warpjld.study.grasping import Study
 
     silence_warp()

@@ -8,9 +8,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from warpjld.covering.binding import STATIONS, Anchors
-from warpjld.rotations import unit
+from warpjld.geometry.rotations import unit
+from warpjld.skeleton.channels import FLEXION
 from warpjld.skeleton.kinematics import Poses, vertical_flexion
-from warpjld.skeleton.tree import CHANNELS, Skeleton
+from warpjld.skeleton.tree import Skeleton
 
 __all__ = [
     "Drivers",
@@ -64,7 +65,7 @@ def flexion_ratio(skeleton: Skeleton, flexion: NDArray[np.float64]) -> NDArray[n
 
     Zero at roots: an angle lies between two segments (R1), and a root turns all there is.
     """
-    largest = skeleton.limits[:, CHANNELS.index("flexion"), 1]
+    largest = skeleton.limits[:, FLEXION, 1]
     moves = (largest > 1e-6) & (skeleton.parents >= 0)
     return np.where(moves, np.clip(flexion / np.where(moves, largest, 1.0), 0.0, 1.0), 0.0)
 

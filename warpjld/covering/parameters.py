@@ -11,11 +11,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from warpjld.errors import InputError
-from warpjld.reading import reading
+from warpjld.files.reading import reading
+from warpjld.files.text_file import read_json
+from warpjld.files.whole_file import whole_file
+from warpjld.skeleton.channels import FLEXION
 from warpjld.skeleton.tree import CHANNELS, Skeleton
 from warpjld.suggest import one_of
-from warpjld.text_file import read_json
-from warpjld.whole_file import whole_file
 
 __all__ = ["Parameters", "default_parameters", "load_parameters", "save_parameters"]
 
@@ -98,7 +99,7 @@ def default_parameters(skeleton: Skeleton) -> Parameters:
     Where a finger meets the palm inflation is three times as large: the palm loses volume at that joint too.
     """
     count = len(skeleton)
-    largest = np.minimum(skeleton.limits[:, CHANNELS.index("flexion"), 1], _WIDEST)
+    largest = np.minimum(skeleton.limits[:, FLEXION, 1], _WIDEST)
     bends = (largest > 1e-6) & (skeleton.parents >= 0) & np.array([bool(c) for c in skeleton.children])
     loss = np.where(bends, _volume_loss(largest) / _volume_loss(np.array(np.pi / 2.0)), 0.0)
     loss[[s.distal for s in skeleton.segments if s.palm]] *= _PALM

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from warpjld.errors import InputError
+from warpjld.skeleton.channels import FLEXION
 from warpjld.skeleton.hand import DIGITS
 from warpjld.skeleton.kinematics import Poses, poses_beside_rest
 from warpjld.skeleton.tree import CHANNELS, Skeleton
@@ -17,7 +18,7 @@ __all__ = ["CURL", "calibration_poses", "curled", "guard_poses"]
 CURL = {"base": 80.0, "knuckle2": 97.0, "knuckle3": 63.0}
 """Flexion [degrees] of a finger's joints in a full curl; the thumb takes no part."""
 
-_FLEXION, _ABDUCTION = CHANNELS.index("flexion"), CHANNELS.index("abduction")
+_ABDUCTION = CHANNELS.index("abduction")
 _WIDEST = np.radians(120.0)  # shoulders, knees and elbows in full are contact of the limbs
 _UNKNOWN = np.radians(30.0)  # where limits are as wide one way as the other: nothing is known of the joint
 _TOE = re.compile(r"^toe\d")
@@ -83,7 +84,7 @@ def guard_poses(skeleton: Skeleton, *, seed: int = 0) -> Poses:
 
 def _range(skeleton: Skeleton) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
     """Joints that flex, and the largest flexion [rad] of all joints."""
-    low, high = np.moveaxis(skeleton.limits[:, _FLEXION], -1, 0)
+    low, high = np.moveaxis(skeleton.limits[:, FLEXION], -1, 0)
     largest = np.minimum(high, np.where(low <= -high, _UNKNOWN, _WIDEST))
     inner = (skeleton.parents >= 0) & np.array([bool(c) for c in skeleton.children])
     bends = np.flatnonzero(inner & (largest > 1e-6))
@@ -102,7 +103,7 @@ def _curls(skeleton: Skeleton, amounts: NDArray[np.float64] | list[float] | tupl
         return np.zeros((0, len(skeleton), len(CHANNELS)))
     angles = np.zeros((len(amounts), len(skeleton), len(CHANNELS)))
     for j, full in joints:
-        angles[:, j, _FLEXION] = np.asarray(amounts) * np.radians(full)
+        angles[:, j, FLEXION] = np.asarray(amounts) * np.radians(full)
     return angles
 
 
@@ -110,7 +111,7 @@ def _digits(skeleton: Skeleton, bends: NDArray[np.int64], largest: NDArray[np.fl
     """Digits one by one, half and nearly curled, on all hands at once."""
     full = _curls(skeleton, [1.0])[0] if _curls(skeleton, [1.0]).size else np.zeros((len(skeleton), len(CHANNELS)))
     thumbs = [j for j in bends if _digit(skeleton.names[j]) == DIGITS[-1] and not skeleton.names[j].endswith(".base")]
-    full[thumbs, _FLEXION] = largest[thumbs]
+    full[thumbs, FLEXION] = largest[thumbs]
     digit = np.array([_digit(name) for name in skeleton.names])
     alone = [np.where((digit == d)[:, None], full, 0.0) for d in DIGITS]
     angles = [part * one for one in alone if one.any() for part in _ONE_BY_ONE]
@@ -123,7 +124,7 @@ def _fists(skeleton: Skeleton, bends: NDArray[np.int64], largest: NDArray[np.flo
     roots = [j for j in bends if skeleton.names[j].endswith("thumb.base")]
     angles = np.zeros((2, len(skeleton), len(CHANNELS)))
     for frame, amount in enumerate((0.5, 0.8)):
-        angles[frame, digits, _FLEXION] = amount * largest[digits]
+        angles[frame, digits, FLEXION] = amount * largest[digits]
         angles[frame, roots, _ABDUCTION] = 0.5 * amount * skeleton.limits[roots, _ABDUCTION, 0]
     return angles[[bool(digits)] * 2]
 
@@ -134,7 +135,7 @@ def _thumbs(skeleton: Skeleton, bends: NDArray[np.int64], largest: NDArray[np.fl
     angles = np.zeros((2, len(skeleton), len(CHANNELS)))
     for frame, end in ((0, 0), (1, 1)):
         angles[frame, roots, _ABDUCTION] = 0.5 * skeleton.limits[roots, _ABDUCTION, end]
-    angles[0, roots, _FLEXION] = largest[roots]
+    angles[0, roots, FLEXION] = largest[roots]
     return angles[[bool(roots)] * 2]
 
 
@@ -146,7 +147,7 @@ def _random(
     known, kind = _without_side(skeleton, bends)
     angles = np.zeros((frames, len(skeleton), len(CHANNELS)))
     part = generator.uniform(0.0, 1.0, (frames, 2, len(known)))[:, :, kind]
-    angles[:, bends, _FLEXION] = part[:, 0] * largest[bends]
+    angles[:, bends, FLEXION] = part[:, 0] * largest[bends]
     low, high = (np.clip(skeleton.limits[bends, _ABDUCTION, k], -_WIDEST / 4, _WIDEST / 4) for k in (0, 1))
     angles[:, bends, _ABDUCTION] = 0.5 * (low + part[:, 1] * (high - low))
     return angles
@@ -158,7 +159,7 @@ def _alone(
     """One joint a frame, on both sides of a body at once."""
     known, kind = _without_side(skeleton, bends)
     angles = np.zeros((len(known), len(skeleton), len(CHANNELS)))
-    angles[kind, bends, _FLEXION] = part * largest[bends]
+    angles[kind, bends, FLEXION] = part * largest[bends]
     return angles
 
 

@@ -23,8 +23,9 @@ from warpjld.covering.drivers import drive, initial_ratio
 from warpjld.covering.parameters import default_parameters
 from warpjld.covering.quality import closing_fans
 from warpjld.covering.rows import Rows, rows_of, scalar_inputs
-from warpjld.lazily import lazy_module
-from warpjld.rotations import rotate, unit
+from warpjld.geometry.rotations import rotate, unit
+from warpjld.runtime.lazily import lazy_module
+from warpjld.skeleton.channels import FLEXION
 from warpjld.skeleton.kinematics import poses_from_angles
 from warpjld.skeleton.tree import CHANNELS
 
@@ -43,7 +44,7 @@ _PARTS = (0.33, 0.67, 1.0)
 _WIDEST = np.radians(110.0)  # of what is measured: beyond, limbs lie on one another
 _MOST = 0.8  # amplitude at which it ends
 _STEPS = 4  # Gauss-Newton steps for one amplitude
-_FLEXION, _ABDUCTION = CHANNELS.index("flexion"), CHANNELS.index("abduction")
+_ABDUCTION = CHANNELS.index("abduction")
 
 
 def volume_keeping(covering: Covering) -> NDArray[np.float64]:
@@ -53,7 +54,7 @@ def volume_keeping(covering: Covering) -> NDArray[np.float64]:
     does not grow without end.
     """
     skeleton = covering.skeleton
-    largest = np.minimum(skeleton.limits[:, _FLEXION, 1], _WIDEST)
+    largest = np.minimum(skeleton.limits[:, FLEXION, 1], _WIDEST)
     bends = (skeleton.parents >= 0) & np.array([bool(c) for c in skeleton.children]) & (largest > 1e-6)
     amplitudes = np.zeros(len(skeleton))
     joints = np.flatnonzero(bends)
@@ -81,7 +82,7 @@ def _measured(skeleton: Skeleton, joint: int, largest: float) -> NDArray[np.floa
     """Angles of the poses that one joint is measured in, shape (F, J, channels): flexed; and where it goes further to
     its sides than it flexes, as a thumb does, with both at once."""
     angles = np.repeat(skeleton.initial[None], len(_PARTS), axis=0)
-    angles[:, joint, _FLEXION] = largest * np.array(_PARTS)
+    angles[:, joint, FLEXION] = largest * np.array(_PARTS)
     sideways = skeleton.limits[joint, _ABDUCTION]
     if sideways[1] <= largest:
         return angles

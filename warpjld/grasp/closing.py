@@ -11,16 +11,16 @@ from scipy.spatial.transform import Rotation
 
 from warpjld.covering import Covering
 from warpjld.covering.device import array_on
-from warpjld.grasp.found import Status
+from warpjld.grasp.found import SearchStatus
 from warpjld.grasp.moved import skin_beyond, skin_that_moves
 from warpjld.grasp.near_object import NearObject
 from warpjld.grasp.objects import Places
 from warpjld.grasp.packing import Chains, drives_on, posture_on, skin_on
-from warpjld.skeleton import CHANNELS, Poses, poses_from_angles
+from warpjld.skeleton import Poses, poses_from_angles
+from warpjld.skeleton.channels import FLEXION
 
 __all__ = ["ClosingHands", "MovedSkin"]
 
-_FLEXION = CHANNELS.index("flexion")
 _MOST_JOINTS = 4
 _WIDEST = 0.35  # how far a base joint may open again for the sake of swelling skin [rad]
 _CUTS, _PIECES = 3, 8  # the opening is found to a 512th of that
@@ -160,14 +160,14 @@ class ClosingHands:
             for a, kind in ((status, wp.int32), (closing, float))
         ]
         wp.launch(first_touch, status.size, inputs=[packed, *inputs], outputs=outs, device="cpu")
-        touched = status != int(Status.NO_CONTACT)
+        touched = status != int(SearchStatus.NO_CONTACT)
         by = closing.astype(np.float64)
         for d, chain in enumerate(joints):
             for joint, rate in zip(chain[moving], rates[moving], strict=True):
-                low, high = self._skeleton.limits[joint, _FLEXION]
-                now = self.angles[hands, joint, _FLEXION]
+                low, high = self._skeleton.limits[joint, FLEXION]
+                now = self.angles[hands, joint, FLEXION]
                 far = np.where(touched[:, d], now + rate * by[:, d], high)
-                self.angles[hands, joint, _FLEXION] = np.maximum(now, np.clip(far, low, high))
+                self.angles[hands, joint, FLEXION] = np.maximum(now, np.clip(far, low, high))
         return status
 
     def settle(self, hands: NDArray[np.int64], bases: list[int]) -> NDArray[np.bool_]:
@@ -221,8 +221,8 @@ class ClosingHands:
         ]
         outs = [wp.array(by, dtype=float, device="cpu", copy=False)]
         wp.launch(least_opening, len(some), inputs=[packed, *inputs], outputs=outs, device="cpu")
-        now, start = self.angles[hands[some], base, _FLEXION], self._open[hands[some], base, _FLEXION]
-        self.angles[hands[some], base, _FLEXION] = np.maximum(now - by, np.minimum(start, now))
+        now, start = self.angles[hands[some], base, FLEXION], self._open[hands[some], base, FLEXION]
+        self.angles[hands[some], base, FLEXION] = np.maximum(now - by, np.minimum(start, now))
 
     def _opened_distances(
         self, hands: NDArray[np.int64], bases: list[int], rows: NDArray[np.int64], vertices: NDArray[np.int32]
@@ -248,7 +248,7 @@ class ClosingHands:
         """Hands of which base joints open, row d · n + i joint d of hand i, no farther than it began."""
         count = len(hands)
         frames, joints = np.tile(np.arange(count), len(bases)), np.repeat(bases, count)
-        own = hands[frames], joints, _FLEXION
+        own = hands[frames], joints, FLEXION
         stops = np.minimum(self._open[own], self.angles[own])
         return self._on_object(hands, frames, joints[:, None], np.array([-1.0]), stops[:, None])
 
@@ -265,9 +265,9 @@ class ClosingHands:
         from warpjld_kernels.first_touch import Hands
 
         angles, skeleton = self.angles[hands], self._skeleton
-        starts = angles[frames[:, None], joints, _FLEXION]
+        starts = angles[frames[:, None], joints, FLEXION]
         if stops is None:  # a joint that begins beyond its limit stays where it is
-            stops = np.maximum(skeleton.limits[joints, _FLEXION, 1], starts)
+            stops = np.maximum(skeleton.limits[joints, FLEXION, 1], starts)
         fill = ((0, 0), (0, _MOST_JOINTS - joints.shape[1]))
         chains = Chains(
             frames.astype(np.int32),

@@ -10,11 +10,11 @@ from numpy.typing import NDArray
 
 from warpjld.covering import Covering
 from warpjld.grasp.digits import digit_chains, pad_vertex
-from warpjld.skeleton import CHANNELS, poses_from_angles
+from warpjld.skeleton import poses_from_angles
+from warpjld.skeleton.channels import FLEXION
 
 __all__ = ["Opening", "closing_in_air"]
 
-_FLEXION = CHANNELS.index("flexion")
 _STEPS = 15
 _CURL = {"finger": (50.0, 45.0, 30.0), "thumb": (20.0, 40.0, 45.0)}  # of the joints at the end [degrees]
 
@@ -64,8 +64,8 @@ def closing_in_air(covering: Covering, side: str, starts: NDArray[np.float64], d
     for digit in digits:
         (chain,) = digit_chains(skeleton, [f"{side}.{digit}"]).values()
         for joint, curl in zip(chain, _CURL["thumb" if digit == "thumb" else "finger"], strict=True):
-            bent = starts[:, None, joint, _FLEXION] + share * np.radians(curl)
-            angles[:, :, joint, _FLEXION] = np.clip(bent, *skeleton.limits[joint, _FLEXION])
+            bent = starts[:, None, joint, FLEXION] + share * np.radians(curl)
+            angles[:, :, joint, FLEXION] = np.clip(bent, *skeleton.limits[joint, FLEXION])
     opposed = [digit for digit in ("index", "middle", "ring") if digit in digits]
     pads = np.array([pad_vertex(covering, f"{side}.{digit}") for digit in ("thumb", *opposed)], dtype=np.int32)
     poses = poses_from_angles(skeleton, angles.reshape(-1, *angles.shape[2:]))

@@ -16,12 +16,11 @@ from warpjld.covering.device import array_on
 from warpjld.covering.drivers import flexion_ratio, virtual_lengths
 from warpjld.covering.rows import Padded
 from warpjld.errors import InputError
-from warpjld.rotations import conjugate, multiply
+from warpjld.geometry.rotations import conjugate, multiply
 from warpjld.skeleton import CHANNELS, Poses, Skeleton
+from warpjld.skeleton.channels import FLEXION
 
 __all__ = ["Chains", "drives_on", "posture_on", "skin_on"]
-
-_FLEXION = CHANNELS.index("flexion")
 
 
 @dataclass(frozen=True, eq=False)
@@ -129,7 +128,7 @@ def drives_on(device: Any, skeleton: Skeleton, poses: Poses, angles: NDArray[np.
         before = multiply(conjugate(skeleton.initial_turns[j]), before)
     bend = _turn(_about(direction, mirror * channels[..., CHANNELS.index("pivot")]), axis)
     after = _about(direction, -mirror * channels[..., CHANNELS.index("twisting")])
-    local = Rotation.from_quat(_flat(before)) * Rotation.from_quat(_flat(_about(bend, channels[..., _FLEXION])))
+    local = Rotation.from_quat(_flat(before)) * Rotation.from_quat(_flat(_about(bend, channels[..., FLEXION])))
     local = local * Rotation.from_quat(_flat(after))
     carried = Rotation.from_quat(_flat(poses.rotations[frame[:, None], j])) * local.inv()
     world = (carried * Rotation.from_quat(_flat(before))).apply(bend.reshape(-1, 3)).reshape(bend.shape)
@@ -137,7 +136,7 @@ def drives_on(device: Any, skeleton: Skeleton, poses: Poses, angles: NDArray[np.
     upright = straight - level * (straight * level).sum(axis=-1, keepdims=True)
     length = np.linalg.norm(upright, axis=-1, keepdims=True)
     upright = np.where(length > 1e-6, upright / np.maximum(length, 1e-12), 0.0)
-    largest = skeleton.limits[j, _FLEXION, 1]
+    largest = skeleton.limits[j, FLEXION, 1]
     moves = (largest > 1e-6) & (skeleton.parents[j] >= 0)
     out = Drives()
     for name, values, kind in (

@@ -11,14 +11,14 @@ from numpy.typing import ArrayLike, NDArray
 from warpjld.errors import InputError
 from warpjld.grasp.objects import GraspObject
 from warpjld.grasp.packing import Chains
-from warpjld.skeleton import CHANNELS, Skeleton
+from warpjld.skeleton import Skeleton
+from warpjld.skeleton.channels import FLEXION
 
-__all__ = ["NEAREST", "Rows", "Searches", "search_rows"]
+__all__ = ["NEAREST", "SearchRows", "Searches", "search_rows"]
 
 NEAREST = -1
 """In place of a facet's number: whatever facet is nearest."""
 
-_FLEXION = CHANNELS.index("flexion")
 _MOST_JOINTS = 4
 
 
@@ -53,7 +53,7 @@ class Searches:
 
 
 @dataclass(frozen=True, eq=False)
-class Rows:
+class SearchRows:
     """N searches, one a row: the fields of ``Searches`` with shape (N,), checked.
 
     ``drive`` is the row of ``chains``, joints that close together in some frame, which a search moves.
@@ -82,7 +82,7 @@ def search_rows(
     vertices: int,
     coverings: int,
     places: int,
-) -> Rows:
+) -> SearchRows:
     """Lay out searches one a row.
 
     Args:
@@ -130,7 +130,7 @@ def search_rows(
     joints, rates, stops = (np.broadcast_to(a, (count, _MOST_JOINTS)) for a in (joints, rates, stops))
     first, drive = _distinct([columns["frame"], *joints.T, *rates.T, *np.nan_to_num(stops, nan=1e9).T])
     chains = _chains(skeleton, angles, columns["frame"][first], joints[first], rates[first], stops[first])
-    return Rows(**columns, distance=distance, drive=drive, chains=chains)
+    return SearchRows(**columns, distance=distance, drive=drive, chains=chains)
 
 
 def _chain_columns(searches: Searches, joint_count: int) -> tuple[NDArray, NDArray, NDArray]:
@@ -167,8 +167,8 @@ def _chains(
 ) -> Chains:
     """Chains with the angles they start from, and their limits where no stop is given."""
     used = np.where(joints >= 0, joints, 0)
-    starts = angles[frame[:, None], used, _FLEXION]
-    low, high = np.moveaxis(skeleton.limits[used, _FLEXION], -1, 0)
+    starts = angles[frame[:, None], used, FLEXION]
+    low, high = np.moveaxis(skeleton.limits[used, FLEXION], -1, 0)
     stops = np.where(np.isnan(stops), np.where(rates > 0.0, high, low), stops)
     # a joint that begins beyond its limit stays where it is
     stops = np.where(rates > 0.0, np.maximum(stops, starts), np.minimum(stops, starts))

@@ -9,13 +9,12 @@ from warpjld.script.arguments import Arguments
 from warpjld.script.keys import SIDES
 from warpjld.script.scene import Scene
 from warpjld.skeleton import CHANNELS
+from warpjld.skeleton.channels import FLEXION
 
 if TYPE_CHECKING:
     from warpjld.script.scene import Actor
 
 __all__ = ["flexions_of_grip", "gripping_actor", "read_actor", "read_frames", "read_side"]
-
-_FLEXION = CHANNELS.index("flexion")
 
 
 def read_frames(arguments: Arguments, begin: str, end: str) -> tuple[float, float]:
@@ -72,10 +71,10 @@ def flexions_of_grip(
     """
     for channel in grip:
         joint, _, kind = channel.rpartition(".")
-        if kind != CHANNELS[_FLEXION]:
+        if kind != CHANNELS[FLEXION]:
             continue
         now = actor.value(channel, frame)
         number = actor.skeleton.index(joint)
-        low, high = actor.skeleton.limits[number, _FLEXION]
-        if now > actor.skeleton.initial[number, _FLEXION] + 1e-9 or not joint.endswith(("knuckle2", "knuckle3")):
+        low, high = actor.skeleton.limits[number, FLEXION]
+        if now > actor.skeleton.initial[number, FLEXION] + 1e-9 or not joint.endswith(("knuckle2", "knuckle3")):
             yield channel, now, (float(low), float(high))

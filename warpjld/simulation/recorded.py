@@ -22,10 +22,9 @@ from warpjld.simulation.animation import AngleEdit
 from warpjld.simulation.bodies.obstacle import rigid_obstacle
 from warpjld.skeleton import CHANNELS, Poses, Skeleton, poses_from_angles
 from warpjld.skeleton.between import poses_between
+from warpjld.skeleton.channels import FLEXION
 
 __all__ = ["RecordedActor", "RecordedAnimation", "RecordedObject"]
-
-_FLEXION = CHANNELS.index("flexion")
 
 
 def _between(rows: NDArray[np.float64], at: float) -> NDArray[np.float64]:
@@ -135,7 +134,7 @@ class RecordedActor:
         assert self._angles is not None
         angles, frames = self._angles.copy(), self._first + np.arange(len(self._angles))
         for edit in edits:
-            column = angles[:, edit.joint, _FLEXION]
+            column = angles[:, edit.joint, FLEXION]
             if edit.frame is None:
                 was = _between(column, edit.kept - self._first)
                 column[(frames > edit.kept) & (column == was)] = edit.value

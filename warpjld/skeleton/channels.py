@@ -5,13 +5,16 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from warpjld.rotations import about, multiply, rotate
+from warpjld.geometry.rotations import about, multiply, rotate
 
-__all__ = ["CHANNELS", "channel_rotations"]
+__all__ = ["CHANNELS", "FLEXION", "channel_rotations"]
 
 CHANNELS = ("flexion", "pivot", "twisting", "abduction")
 """Angles of a joint, in the order of their last array axis. Abduction is this project's addition: the paper's
 pivot turns the flexion axis about the segment (R27) and so moves nothing while the joint is straight."""
+
+FLEXION = CHANNELS.index("flexion")
+"""Where on that axis the angle is that closes hands."""
 
 
 def channel_rotations(

@@ -14,8 +14,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from warpjld.errors import InputError
-from warpjld.rotations import unit
-from warpjld.skeleton.channels import CHANNELS
+from warpjld.geometry.rotations import unit
+from warpjld.skeleton.channels import CHANNELS, FLEXION
 from warpjld.skeleton.tree import Skeleton
 
 __all__ = ["bent_as_before", "bent_limbs", "check_initial", "with_initial"]
@@ -23,7 +23,6 @@ __all__ = ["bent_as_before", "bent_limbs", "check_initial", "with_initial"]
 _HINGES = {"elbow": ("shoulder", "wrist"), "knee": ("hip", "ankle")}
 _PLAIN = np.radians(1.0)
 """Bends below are how exactly joints are placed."""
-_FLEXION = CHANNELS.index("flexion")
 _SLACK = 1e-6  # rad: limits in files are in degrees
 
 
@@ -45,8 +44,8 @@ def with_initial(skeleton: Skeleton, given: Mapping[int, Mapping[str, float]]) -
     found = {joint: angle for joint, angle in bent_limbs(skeleton).items() if joint not in given}
     limits = skeleton.limits.copy()
     for joint, angle in found.items():
-        initial[joint, _FLEXION] = angle
-        limits[joint, _FLEXION, 1] = max(limits[joint, _FLEXION, 1], angle)
+        initial[joint, FLEXION] = angle
+        limits[joint, FLEXION, 1] = max(limits[joint, FLEXION, 1], angle)
     if not initial.any():
         return skeleton, ()
     bent = replace(skeleton, initial=initial, limits=limits)
@@ -80,9 +79,9 @@ def bent_as_before(before: Skeleton, after: Skeleton) -> Skeleton:
     old, new = bent_limbs(before), bent_limbs(after)
     initial, limits = after.initial.copy(), after.limits.copy()
     for joint, angle in old.items():
-        if before.initial[joint, _FLEXION] == angle:
-            initial[joint, _FLEXION] = new.get(joint, 0.0)
-            limits[joint, _FLEXION, 1] = max(limits[joint, _FLEXION, 1], new.get(joint, 0.0))
+        if before.initial[joint, FLEXION] == angle:
+            initial[joint, FLEXION] = new.get(joint, 0.0)
+            limits[joint, FLEXION, 1] = max(limits[joint, FLEXION, 1], new.get(joint, 0.0))
     return replace(after, initial=initial, limits=limits)
 
 

@@ -6,10 +6,11 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 from scipy.sparse import csr_array
 
 from warpjld.covering.binding import smoothstep
+from warpjld.touch.host_arrays import floats, numbers, recorded, starts, vectors
 from warpjld.touch.patches import Patches
 
 __all__ = ["FULL", "NONE", "SHARE", "Bench", "Model", "Overlaps", "fade"]
@@ -93,15 +94,15 @@ class Bench:
         wp.init()
         self._meshes: list[Any] = []
         count, names = len(vertices), len(model.patches.names)
-        self.points = _vectors(vertices)
-        self.joints = _vectors(np.zeros((max(model.joints, 1), 3)))
+        self.points = vectors(vertices)
+        self.joints = vectors(np.zeros((max(model.joints, 1), 3)))
         self.parts = self._parts(model, vertices)
         self.samples = _no_samples(2 * count)
         faces = model.patches.faces
         order = np.argsort(faces.ravel(), kind="stable")
         around = faces[:, [[1, 2], [2, 0], [0, 1]]].reshape(-1, 2)[order]
-        star = [_starts(np.bincount(faces.ravel(), minlength=count)), wp.array(around, dtype=wp.vec2i, device="cpu")]
-        smooth = [_numbers(model.smooth.indptr), _numbers(model.smooth.indices), _floats(model.smooth.data)]
+        star = [starts(np.bincount(faces.ravel(), minlength=count)), wp.array(around, dtype=wp.vec2i, device="cpu")]
+        smooth = [numbers(model.smooth.indptr), numbers(model.smooth.indices), floats(model.smooth.data)]
         self._count = self.samples.count.numpy()
         self._wanted = wp.zeros(names, dtype=wp.int32, device="cpu")
         self._active = wp.zeros(names, dtype=wp.int32, device="cpu")
@@ -120,7 +121,7 @@ class Bench:
 
         patches, names = model.patches, len(model.patches.names)
         meshes = [patches.mesh(k) for k in range(names)]
-        self._meshes = [wp.Mesh(self.points, _numbers(f.ravel())) if len(f) else None for f, _ in meshes]
+        self._meshes = [wp.Mesh(self.points, numbers(f.ravel())) if len(f) else None for f, _ in meshes]
         corners = [np.unique(f) for f, _ in meshes]
         joined = patches.joined
         empty = np.array([not len(f) for f, _ in meshes], dtype=bool)
@@ -129,50 +130,46 @@ class Bench:
             some = np.flatnonzero(row)
             beside[k, : len(some)] = some
         parts = Parts()
-        parts.part = _numbers(patches.part)
+        parts.part = numbers(patches.part)
         parts.mesh = wp.array([m.id if m else 0 for m in self._meshes], dtype=wp.uint64, device="cpu")
-        parts.first_corner = _starts([len(c) for c in corners])
-        parts.corner = _numbers(np.concatenate(corners))
-        parts.first_face = _starts([len(f) for f, _ in meshes])
-        parts.border = _floats(np.concatenate([b.ravel() for _, b in meshes]))
-        parts.apart = _numbers(np.where(joined, 2, np.where(empty[:, None] | empty | model.never, 0, 1)))
-        parts.beside = _numbers(beside)
-        parts.thickness = _floats(patches.thickness)
-        parts.give = _floats(patches.give)
+        parts.first_corner = starts([len(c) for c in corners])
+        parts.corner = numbers(np.concatenate(corners))
+        parts.first_face = starts([len(f) for f, _ in meshes])
+        parts.border = floats(np.concatenate([b.ravel() for _, b in meshes]))
+        parts.apart = numbers(np.where(joined, 2, np.where(empty[:, None] | empty | model.never, 0, 1)))
+        parts.beside = numbers(beside)
+        parts.thickness = floats(patches.thickness)
+        parts.give = floats(patches.give)
         members = np.bincount(patches.part, minlength=names)
-        parts.give_of = _floats(np.bincount(patches.part, patches.give, names) / np.maximum(members, 1))
-        parts.at_rest = _floats(np.zeros(len(vertices)) if model.at_rest is None else model.at_rest)
+        parts.give_of = floats(np.bincount(patches.part, patches.give, names) / np.maximum(members, 1))
+        parts.at_rest = floats(np.zeros(len(vertices)) if model.at_rest is None else model.at_rest)
         a, b, c = (np.asarray(vertices, dtype=np.float64)[patches.faces[:, k]] for k in range(3))
         turns = np.cross(b - a, c - a).T
         areas = [np.bincount(patches.faces.ravel(), np.repeat(n, 3), len(vertices)) for n in turns]
-        parts.area = _floats(np.linalg.norm(areas, axis=0) / 6.0)
+        parts.area = floats(np.linalg.norm(areas, axis=0) / 6.0)
         parts.facing = 1.0 if model.at_rest is None else 0.0
-        parts.edge = _floats(model.edge)
+        parts.edge = floats(model.edge)
         bones = patches.bones if model.joints else ((),) * names
-        parts.first_bone = _starts([len(some) for some in bones])
+        parts.first_bone = starts([len(some) for some in bones])
         flat = np.array([pair for some in bones for pair in some], dtype=np.int32).reshape(-1, 2)
         parts.bone = wp.array(flat, dtype=wp.vec2i, device="cpu")
-        parts.around = _floats(_SWELLS * model.around)
+        parts.around = floats(_SWELLS * model.around)
         return parts
 
     def _record(
         self, star: list[Any], smooth: list[Any], asked: list[NDArray[np.int64]], beside: NDArray[np.int64]
     ) -> None:
         import warp as wp
-        from warpjld_kernels import touch_bulge, touch_parting, touch_parts, touch_samples
-
-        def recorded(kernel: Any, dim: int | tuple[int, int], inputs: list[Any], outputs: list[Any]) -> Any:
-            return wp.launch(kernel, dim, inputs=inputs, outputs=outputs, device="cpu", record_cmd=True)
+        from warpjld_kernels import touch_parts
 
         count, names = len(self.points), len(self._meshes)
-        parts, points, normals, samples = self.parts, self.points, self._normals, self.samples
+        parts, points = self.parts, self.points
         low, high, reach_low, reach_high = (wp.zeros(names, dtype=wp.vec3, device="cpu") for _ in range(4))
         boxes = [reach_low, reach_high]
         self._everywhere = reach_low.numpy(), reach_high.numpy()
-        pairs, heeded = (wp.zeros(names, dtype=wp.int32, device="cpu") for _ in range(2))
+        pairs = wp.zeros(names, dtype=wp.int32, device="cpu")
         others = wp.zeros((names, names), dtype=wp.int32, device="cpu")
-        heed = wp.zeros((names, count), dtype=wp.int32, device="cpu")
-        ring, plains = (wp.zeros(count, dtype=float, device="cpu") for _ in range(2))
+        plains = wp.zeros(count, dtype=float, device="cpu")
         units = wp.zeros(count, dtype=wp.vec3, device="cpu")
         self._find_pairs = [
             recorded(touch_parts.find_boxes, names, [points, parts], [low, high]),
@@ -187,31 +184,47 @@ class Bench:
             touch_parts.find_normals,
             count,
             [points, parts.part, self._active, *star, parts.area],
-            [normals, units, plains],
+            [self._normals, units, plains],
         )
+        self._record_samples([points, units, plains, low, high, pairs, others, self.joints, *boxes], asked, beside)
+        self._record_parting(boxes, smooth)
+
+    def _record_samples(self, frame: list[Any], asked: list[NDArray[np.int64]], beside: NDArray[np.int64]) -> None:
+        import warp as wp
+        from warpjld_kernels import touch_parting, touch_samples
+
+        count, names, parts = len(self.points), len(self._meshes), self.parts
         probed, apart, every = (wp.ones((names, names), dtype=float, device="cpu") for _ in range(3))
         self._heard = apart.numpy(), every.numpy()
         deep = wp.zeros((names, names), dtype=float, device="cpu")
         ratio = wp.zeros(count + 1, dtype=float, device="cpu")
-        none, probe = _numbers(np.full(count, count)), _numbers(beside)
-        frame = [points, units, plains, low, high, pairs, others, self.joints, *boxes]
+        none, probe = numbers(np.full(count, count)), numbers(beside)
         self._probe, *self._find_samples = (
             recorded(
                 touch_samples.find_samples,
                 len(some),
-                [_numbers(some), heard, beside, deep, *frame, parts, SHARE, _SOFT, NONE],
-                [ratio, self._deepest, samples],
+                [numbers(some), heard, where, deep, *frame, parts, SHARE, _SOFT, NONE],
+                [ratio, self._deepest, self.samples],
             )
-            for some, heard, beside in zip(asked, (probed, apart, every), (none, probe, none), strict=True)
+            for some, heard, where in zip(asked, (probed, apart, every), (none, probe, none), strict=True)
         )
         self._choose = recorded(
             touch_parting.choose_heard, (names, names), [self._deepest, _FEW, NONE], [apart, every, deep]
         )
-        self._heed_nothing = recorded(touch_parting.heed_nothing, names, [], [heeded, *boxes])
         # as deep as the pose is, in every sweep: what is parted in part would be parted ever more
         self._fade = recorded(
             touch_parting.fade_pairs, (names, names), [parts, self._deepest, FULL, NONE, _JUST], [self._shown]
         )
+
+    def _record_parting(self, boxes: list[Any], smooth: list[Any]) -> None:
+        import warp as wp
+        from warpjld_kernels import touch_bulge, touch_parting
+
+        count, names = len(self.points), len(self._meshes)
+        parts, points, normals, samples = self.parts, self.points, self._normals, self.samples
+        heeded = wp.zeros(names, dtype=wp.int32, device="cpu")
+        heed = wp.zeros((names, count), dtype=wp.int32, device="cpu")
+        self._heed_nothing = recorded(touch_parting.heed_nothing, names, [], [heeded, *boxes])
         self._heed = recorded(touch_parting.heed_samples, 1, [samples, self._shown, parts], [heeded, heed, *boxes])
         self._part = [
             recorded(
@@ -222,7 +235,7 @@ class Bench:
             ),
             recorded(touch_parting.move, count, [self._moved], [points]),
         ]
-        displaced = [ring, self._lost, self._room]
+        displaced = [wp.zeros(count, dtype=float, device="cpu"), self._lost, self._room]
         self._bulge = [
             recorded(
                 touch_bulge.measure_displaced,
@@ -325,25 +338,3 @@ def _no_samples(room: int) -> Any:
     for name, kind in Samples.vars.items():
         setattr(samples, name, wp.zeros(1 if name == "count" else room, dtype=kind.type.dtype, device="cpu"))
     return samples
-
-
-def _vectors(values: NDArray[np.floating]) -> Any:
-    import warp as wp
-
-    return wp.array(np.array(values, dtype=np.float32), dtype=wp.vec3, device="cpu")
-
-
-def _numbers(values: NDArray) -> Any:
-    import warp as wp
-
-    return wp.array(np.ascontiguousarray(values, dtype=np.int32), dtype=wp.int32, device="cpu")
-
-
-def _floats(values: NDArray) -> Any:
-    import warp as wp
-
-    return wp.array(np.ascontiguousarray(values, dtype=np.float32), dtype=float, device="cpu")
-
-
-def _starts(lengths: ArrayLike) -> Any:
-    return _numbers(np.concatenate([[0], np.cumsum(np.asarray(lengths, dtype=np.int64))]))

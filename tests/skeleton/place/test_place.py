@@ -9,10 +9,10 @@ import pytest
 import trimesh
 from click.testing import CliRunner
 
-from warpjld.cli.place import command
+from warpjld.cli.place import place_command
 from warpjld.errors import InputError
+from warpjld.geometry.rotations import unit
 from warpjld.io import load_rig
-from warpjld.rotations import unit
 from warpjld.skeleton.actor import actor_skeleton
 from warpjld.skeleton.actor_points import ACTOR_POINTS
 from warpjld.skeleton.hand import hand_joint_names
@@ -93,7 +93,7 @@ def test_what_is_placed_is_written_and_loads_as_it_is(hands, tmp_path):
     surface, file = tmp_path / "hand.obj", tmp_path / "points.json"
     hand = hands["right"].surface
     trimesh.Trimesh(hand.vertices, hand.faces, process=False).export(surface)
-    result = CliRunner().invoke(command, [str(surface), "-o", str(file)])
+    result = CliRunner().invoke(place_command, [str(surface), "-o", str(file)])
     assert result.exit_code == 0, result.output
     rig = load_rig(surface, points=file)
     wanted = json.loads(file.read_text())["points"]

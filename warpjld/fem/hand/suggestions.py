@@ -15,11 +15,11 @@ from numpy.typing import NDArray
 
 from warpjld.fem.hand.muscles import JOINT_WORDS, Effort
 from warpjld.fem.hand.stiffening import ForceSlope, way_to
-from warpjld.skeleton.tree import CHANNELS, Skeleton
+from warpjld.skeleton.channels import FLEXION
+from warpjld.skeleton.tree import Skeleton
 
 __all__ = ["DigitSlopes", "Suggestion", "suggestions"]
 
-_FLEXION = CHANNELS.index("flexion")
 _LEAST = 1e-3
 """Slope over the largest of a digit's joints, below which a joint is no use."""
 
@@ -92,7 +92,7 @@ def suggestions(
             continue
         earlier = (before or {}).get(digit.digit)
         opening = np.array([_opening(earlier, known, joint, wanted) for joint in range(3)])
-        room = angles[joints, _FLEXION] - skeleton.limits[joints, _FLEXION, 0]
+        room = angles[joints, FLEXION] - skeleton.limits[joints, FLEXION, 0]
         possible = np.where(opening <= room, opening, np.inf)
         best = int(np.argmin(possible if np.isfinite(possible).any() else opening))
         text = f"{digit.text}; open {JOINT_WORDS[best]} by {math.degrees(opening[best]):.1f}° for {wanted:.2g} N"

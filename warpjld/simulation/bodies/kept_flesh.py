@@ -15,8 +15,9 @@ from warpjld.fem.mesh.bones import Bone
 from warpjld.fem.mesh.embedding import Embedding
 from warpjld.fem.mesh.fit import Fit
 from warpjld.fem.mesh.hexmesh import HexMesh
-from warpjld.kept_values import hash_of, kept_value
+from warpjld.files.kept_values import hash_of, kept_value
 from warpjld.rig import Rig
+from warpjld.simulation.bodies.kept_sources import MESHING
 from warpjld.simulation.bodies.rest_shape import rest_in_pose
 from warpjld.skeleton import Poses
 
@@ -90,7 +91,7 @@ def resting_flesh(rig: Rig, element: float, name: str, poses: Poses, skin: NDArr
         return _Meshed(flesh=hand.flesh, cushions=cushions(hand), **parts)
 
     key = hash_of(rig.surface.vertices, rig.surface.faces, rig.skeleton, element, name)
-    meshed, notes = kept_value("flesh", key, _CLASSES, mesh)
+    meshed, notes = kept_value("flesh", key, _CLASSES, mesh, modules=MESHING)
     parts = {part: getattr(meshed, part) for part in _SHARED}
     built = FleshHand(name=name, flesh=meshed.flesh, skeleton=rig.skeleton, surface=rig.surface, **parts)
 
@@ -99,7 +100,7 @@ def resting_flesh(rig: Rig, element: float, name: str, poses: Poses, skin: NDArr
         return _Posed(hand.mesh.nodes, hand.mesh.node_sets, gap)
 
     key = hash_of(key, poses, skin)
-    posed, more = kept_value("rest", key, (_Posed,), pose)
+    posed, more = kept_value("rest", key, (_Posed,), pose, modules=MESHING)
     moved = replace(built.mesh, nodes=posed.nodes, node_sets=posed.node_sets)
     hand = replace(built, flesh=replace(built.flesh, mesh=moved))
     return RestingFlesh(built, hand, posed.gap, meshed.cushions, (*notes, *more))

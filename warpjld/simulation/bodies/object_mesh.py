@@ -13,9 +13,10 @@ from warpjld.fem.mesh.embedding import Embedding, embed
 from warpjld.fem.mesh.envelope import Envelope
 from warpjld.fem.mesh.fit import fit_mesh
 from warpjld.fem.output.stress import cauchy
+from warpjld.files.kept_values import hash_of, kept_value
+from warpjld.geometry.rotations import unit
 from warpjld.grasp.objects import GraspObject, Places
-from warpjld.kept_values import hash_of, kept_value
-from warpjld.rotations import unit
+from warpjld.simulation.bodies.kept_sources import MESHING
 from warpjld.simulation.specification import ObjectMaterial
 
 __all__ = ["ObjectMesh", "mesh_object"]
@@ -86,7 +87,9 @@ def mesh_object(name: str, thing: GraspObject, physical: ObjectMaterial, place: 
         InputError: Elements too large for it, a wall too thick, or a pressure its wall cannot hold.
     """
     key = hash_of(name, thing.origin, thing.size, thing.vertices, thing.faces, replace(physical, where=None))
-    local, notes = kept_value("object", key, (_Local, HexMesh, Embedding), lambda: _meshed(name, thing, physical))
+    local, notes = kept_value(
+        "object", key, (_Local, HexMesh, Embedding), lambda: _meshed(name, thing, physical), modules=MESHING
+    )
     turn = place.apply(np.eye(3))[0] - place.apply(np.zeros((1, 3)))[0]
     moved = replace(local.mesh, nodes=place.apply(local.mesh.nodes)[0])
     return ObjectMesh(

@@ -10,16 +10,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from warpjld.errors import InputError
-from warpjld.fem.hand.muscles import Effort
+from warpjld.fem.hand.muscles import KNUCKLES, Effort
 from warpjld.simulation.grip.bracket import Bracket
+from warpjld.skeleton.channels import FLEXION
 from warpjld.skeleton.tree import CHANNELS, Skeleton
 
-__all__ = ["FLEXION", "KNUCKLES", "CorrectedPose", "Correction", "Slopes", "correct_angles"]
+__all__ = ["CorrectedPose", "Correction", "Slopes", "correct_angles"]
 
-FLEXION = CHANNELS.index("flexion")
-"""Column of the angles."""
-KNUCKLES = ("base", "knuckle2", "knuckle3")
-"""Joints of a digit that open."""
 _FIRST = 0.04
 """Share of the way back that is tried first, where no slope is known."""
 _NARROW = 1e-3

@@ -12,18 +12,19 @@ from numpy.typing import NDArray
 
 from warpjld.fem.contact import ContactSolution
 from warpjld.fem.contact.sensitivity.equilibrium_tangent import EquilibriumTangent, SensitivityError
-from warpjld.fem.hand.muscles import JOINT_WORDS, Effort
+from warpjld.fem.hand.muscles import JOINT_WORDS, KNUCKLES, Effort
 from warpjld.simulation.animation import AngleEdit
 from warpjld.simulation.bodies.deformable_body import History
 from warpjld.simulation.bodies.flesh_body import FleshBody
 from warpjld.simulation.bodies.model import ContactModel
-from warpjld.simulation.grip.correct import FLEXION, KNUCKLES, CorrectedPose, Correction, correct_angles
+from warpjld.simulation.grip.correct import CorrectedPose, Correction, correct_angles
 from warpjld.simulation.grip.squeeze import TRAVEL
 from warpjld.simulation.report.efforts import effort_at
 from warpjld.simulation.sensitivity.effort_slope import EffortTangent
 from warpjld.simulation.sensitivity.parameters import angles_perturbed
 from warpjld.simulation.solve.branch import solve_branch
 from warpjld.skeleton import Poses
+from warpjld.skeleton.channels import FLEXION
 
 __all__ = ["CorrectedDigit", "CorrectedFrame", "correct_frame", "worst_digits"]
 

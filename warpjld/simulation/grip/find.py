@@ -18,12 +18,12 @@ from warpjld.simulation.bodies.deformable_body import History
 from warpjld.simulation.bodies.flesh_body import FleshBody
 from warpjld.simulation.bodies.model import ContactModel
 from warpjld.simulation.bodies.object_body import ObjectBody
-from warpjld.simulation.grip.correct import FLEXION
 from warpjld.simulation.grip.force import ForceStatus, PressedForce, force_grip
 from warpjld.simulation.grip.hold import HandTrials
 from warpjld.simulation.grip.search import GripStatus, Trial, gentlest_grip
 from warpjld.simulation.grip.squeeze import Squeeze
 from warpjld.simulation.specification import GripSpecification
+from warpjld.skeleton.channels import FLEXION
 
 __all__ = ["FoundGrip", "SupportRelease", "find_grip", "write_grips"]
 

@@ -15,11 +15,11 @@ from warpjld.fem.hand.muscles import Effort
 from warpjld.simulation.bodies.deformable_body import History
 from warpjld.simulation.bodies.flesh_body import FleshBody
 from warpjld.simulation.bodies.model import ContactModel
-from warpjld.simulation.grip.correct import FLEXION
 from warpjld.simulation.report.efforts import effort_at
 from warpjld.simulation.sensitivity.effort_slope import DigitSlope, EffortTangent
 from warpjld.simulation.sensitivity.parameters import angles_perturbed
 from warpjld.simulation.solve.branch import solve_branch
+from warpjld.skeleton.channels import FLEXION
 
 __all__ = ["TRAVEL", "Squeeze"]
 

@@ -17,12 +17,9 @@ from warpjld.simulation.bodies.model import ContactModel
 from warpjld.simulation.bodies.skin_parts import digit_of_label
 from warpjld.simulation.report.efforts import effort_at
 from warpjld.simulation.solve.solved_frame import SolvedFrame
-from warpjld.skeleton import CHANNELS
+from warpjld.skeleton.channels import FLEXION
 
 __all__ = ["ContactRow", "ContactTable", "digit_rows", "write_table"]
-
-_FLEXION = CHANNELS.index("flexion")
-"""Column of the angles."""
 
 
 Slopes = Callable[[str, float, Mapping[str, float]], Mapping[str, DigitSlopes] | None]
@@ -110,8 +107,8 @@ class ContactTable:
         """How far digits stay short of what was asked [degrees]."""
         if self._asked is None or not hand.bones.bendable:
             return {}
-        asked = self._asked.actors[hand.name].angles(frame)[:, _FLEXION]
-        missing = np.degrees(asked - hand.bones.animation.angles(frame)[:, _FLEXION])
+        asked = self._asked.actors[hand.name].angles(frame)[:, FLEXION]
+        missing = np.degrees(asked - hand.bones.animation.angles(frame)[:, FLEXION])
         out: dict[str, float] = {}
         for joint, name in enumerate(hand.bones.skeleton.names):
             digit, knuckle = name.split(".")[-2:] if name.count(".") else ("", name)

@@ -9,12 +9,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from warpjld.fem.hand.muscles import KNUCKLES
-from warpjld.skeleton import CHANNELS, DIGITS, Skeleton
+from warpjld.skeleton import DIGITS, Skeleton
+from warpjld.skeleton.channels import FLEXION
 
-__all__ = ["FLEXION", "FlexionRamp", "closing_joints", "held_angles"]
-
-FLEXION = CHANNELS.index("flexion")
-"""Column of the angles."""
+__all__ = ["FlexionRamp", "closing_joints", "held_angles"]
 
 
 @dataclass(frozen=True)

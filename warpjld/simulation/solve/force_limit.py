@@ -26,8 +26,9 @@ from warpjld.simulation.bodies.flesh_body import FleshBody
 from warpjld.simulation.bodies.model import ContactModel
 from warpjld.simulation.solve.bone_clearance import BoneClearance, TightBone
 from warpjld.simulation.solve.branch import solve_onward
-from warpjld.simulation.solve.digit_caps import FLEXION, FlexionRamp, closing_joints, held_angles
+from warpjld.simulation.solve.digit_caps import FlexionRamp, closing_joints, held_angles
 from warpjld.simulation.solve.digit_loads import DigitLoad, digit_loads
+from warpjld.skeleton.channels import FLEXION
 
 __all__ = ["BoneInsideError", "ForceLimits", "Stop"]
 

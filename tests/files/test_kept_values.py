@@ -11,8 +11,10 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from warpjld.kept_files import CACHE_VARIABLE
-from warpjld.kept_values import hash_of, kept_sources, kept_value
+from warpjld.files.kept_files import CACHE_VARIABLE
+from warpjld.files.kept_values import hash_of, kept_value
+from warpjld.files.sources import source_files
+from warpjld.simulation.bodies.kept_sources import MESHING
 
 
 @dataclass(frozen=True, eq=False)
@@ -45,8 +47,8 @@ def _never() -> _Outer:
 
 
 def test_what_comes_back_is_what_was_made(folder: Path) -> None:
-    first, notes = kept_value("thing", "key", (_Inner, _Outer), _made)
-    second, again = kept_value("thing", "key", (_Inner, _Outer), _never)
+    first, notes = kept_value("thing", "key", (_Inner, _Outer), _made, modules=("files/*.py",))
+    second, again = kept_value("thing", "key", (_Inner, _Outer), _never, modules=("files/*.py",))
     assert notes == again == ()
     assert second.size == first.size
     assert second.none is None
@@ -60,17 +62,17 @@ def test_what_comes_back_is_what_was_made(folder: Path) -> None:
 
 @pytest.mark.parametrize("damage", ["short", "text", "bits"])
 def test_a_damaged_file_is_named_and_made_anew(folder: Path, damage: str) -> None:
-    kept_value("thing", "key", (_Inner, _Outer), _made)
+    kept_value("thing", "key", (_Inner, _Outer), _made, modules=("files/*.py",))
     (file,) = folder.glob("thing-*.npz")
     whole = file.read_bytes()
     bits = bytearray(whole)
     bits[len(bits) // 2] ^= 0xFF
     file.write_bytes({"short": whole[: len(whole) // 2], "text": b"no archive", "bits": bytes(bits)}[damage])
-    made, notes = kept_value("thing", "key", (_Inner, _Outer), _made)
+    made, notes = kept_value("thing", "key", (_Inner, _Outer), _made, modules=("files/*.py",))
     assert made.size == 0.1 + 0.2
     (note,) = notes
     assert str(file) in note
-    assert kept_value("thing", "key", (_Inner, _Outer), _never)[1] == ()
+    assert kept_value("thing", "key", (_Inner, _Outer), _never, modules=("files/*.py",))[1] == ()
 
 
 def test_every_number_counts() -> None:
@@ -85,7 +87,7 @@ def test_every_number_counts() -> None:
 
 
 def test_every_module_that_meshing_runs_through_counts() -> None:
-    counted = {file.resolve() for file in kept_sources()}
+    counted = {file.resolve() for _, file in source_files(MESHING)}
     todo, reached = ["warpjld.simulation.bodies.kept_flesh"], set()
     while todo:
         module = todo.pop()

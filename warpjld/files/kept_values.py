@@ -5,9 +5,8 @@ from __future__ import annotations
 import hashlib
 import json
 import zipfile
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import fields, is_dataclass
-from functools import cache
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -15,19 +14,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from warpjld import __version__
-from warpjld.kept_files import keep, kept_folder, used
+from warpjld.files.kept_files import keep, kept_folder, used
+from warpjld.files.sources import hash_of_sources
 
-__all__ = ["hash_of", "kept_sources", "kept_value"]
+__all__ = ["hash_of", "kept_value"]
 
 _FORMAT = "warpjld values 1"
 _Value = TypeVar("_Value")
 
-# whatever computes what is kept: more than each value needs, so that none is ever out of date
-_MODULES = ("*.py", "fem/**/*.py", "grasp/objects.py", "rig/*.py", "simulation/**/*.py", "skeleton/**/*.py")
-
 
 def kept_value(
-    what: str, key: str, classes: Sequence[type], make: Callable[[], _Value]
+    what: str, key: str, classes: Sequence[type], make: Callable[[], _Value], *, modules: tuple[str, ...]
 ) -> tuple[_Value, tuple[str, ...]]:
     """What ``make`` returns, out of a file of the cache where it was made before; and what is to be told of that.
 
@@ -36,11 +33,12 @@ def kept_value(
         key: Hash of what is given to ``make`` (see ``hash_of``); that of the programs is added.
         classes: Dataclasses it consists of, beside arrays, tuples, dictionaries, numbers and strings.
         make: Makes it.
+        modules: Patterns of the package's files that ``make`` runs through; all kernels count as well.
     """
     folder = kept_folder()
     if folder is None:
         return make(), ()
-    key = hash_of(__version__, _hash_of_sources(), what, key)
+    key = hash_of(__version__, hash_of_sources(modules), what, key)
     file = folder / f"{what}-{key}.npz"
     notes: tuple[str, ...] = ()
     if file.exists():
@@ -63,27 +61,6 @@ def hash_of(*values: Any) -> str:
     for array in arrays:
         digest.update(f"{array.dtype.str}{array.shape}".encode())
         digest.update(np.ascontiguousarray(array).data)
-    return digest.hexdigest()
-
-
-def kept_sources() -> Iterator[Path]:
-    """Files whose content a kept value depends on, always in the same order."""
-    import warpjld_kernels
-
-    import warpjld
-
-    package, kernels = Path(warpjld.__path__[0]), Path(warpjld_kernels.__path__[0])
-    yield from sorted({file for pattern in _MODULES for file in package.glob(pattern)})
-    yield from sorted(kernels.glob("*.py"))
-
-
-@cache
-def _hash_of_sources() -> str:
-    """Of their content: a version under way changes without its number."""
-    digest = hashlib.sha256()
-    for file in kept_sources():
-        digest.update(file.name.encode())
-        digest.update(file.read_bytes())
     return digest.hexdigest()
 
 

@@ -1,0 +1,71 @@
+"""How the house is kept: no two public names alike, no long files, no long functions."""
+
+from __future__ import annotations
+
+import ast
+from collections import defaultdict
+from collections.abc import Iterator
+from pathlib import Path
+
+ROOT = Path(__file__).resolve().parents[1]
+LONGEST_FILE = 350
+LONGEST_FUNCTION = 60
+"""Lines of code, docstring and signature aside."""
+
+
+def modules() -> Iterator[tuple[Path, ast.Module]]:
+    for room in ("warpjld", "kernels"):
+        for path in sorted((ROOT / room).rglob("*.py")):
+            yield path, ast.parse(path.read_text(encoding="utf-8"))
+
+
+def defined(tree: ast.Module) -> set[str]:
+    """Names that a module makes itself, not those that it imports."""
+    names = set()
+    for node in tree.body:
+        if isinstance(node, ast.FunctionDef | ast.ClassDef):
+            names.add(node.name)
+        targets = (
+            node.targets if isinstance(node, ast.Assign) else [node.target] if isinstance(node, ast.AnnAssign) else []
+        )
+        names.update(target.id for target in targets if isinstance(target, ast.Name))
+    return names
+
+
+def public(tree: ast.Module) -> set[str]:
+    """What ``__all__`` lists; nothing where it is computed."""
+    for node in tree.body:
+        if isinstance(node, ast.Assign) and any(isinstance(t, ast.Name) and t.id == "__all__" for t in node.targets):
+            return set(ast.literal_eval(node.value)) if isinstance(node.value, ast.List) else set()
+    return set()
+
+
+def test_no_two_public_names_are_alike() -> None:
+    where = defaultdict(list)
+    for path, tree in modules():
+        for name in public(tree) & defined(tree):
+            where[name].append(str(path.relative_to(ROOT)))
+    assert len(where) > 1000
+    assert {name: paths for name, paths in where.items() if len(paths) > 1} == {}
+
+
+def test_no_file_is_long() -> None:
+    lengths = {str(path.relative_to(ROOT)): path.read_text(encoding="utf-8").count("\n") for path, _ in modules()}
+    assert {path: lines for path, lines in lengths.items() if lines > LONGEST_FILE} == {}
+
+
+def body_lines(function: ast.FunctionDef) -> int:
+    body = function.body
+    if isinstance(body[0], ast.Expr) and isinstance(body[0].value, ast.Constant):
+        body = body[1:]
+    return (function.end_lineno or 0) - body[0].lineno + 1 if body else 0
+
+
+def test_no_function_is_long() -> None:
+    long = {}
+    for path, tree in modules():
+        if path.is_relative_to(ROOT / "warpjld"):
+            for node in ast.walk(tree):
+                if isinstance(node, ast.FunctionDef) and body_lines(node) > LONGEST_FUNCTION:
+                    long[f"{path.relative_to(ROOT)}:{node.lineno} {node.name}"] = body_lines(node)
+    assert long == {}
