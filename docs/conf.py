@@ -31,7 +31,8 @@ add_module_names = False
 
 html_theme = "furo"
 html_title = f"warpjld {release}"
-html_static_path: list[str] = []
+html_static_path = ["styles"]
+html_css_files = ["tables.css"]
 html_copy_source = False
 html_show_sphinx = False
 smartquotes = False

@@ -24,7 +24,7 @@ _TITLES = {
 }
 _RESULTS = {
     "motion.load": ["LoadedMotion"],
-    "surface": ["Surface"],
+    "geometry.surface": ["Surface"],
     "covering.calibrate": ["Calibration"],
     "batch.deform": ["ClipFiles"],
     "baking.baked": ["Baked"],
