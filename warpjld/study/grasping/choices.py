@@ -83,6 +83,7 @@ class ObjectChoice:
         unit: Unit of the file's numbers.
         up: The file's axis that points up.
         mass: Mass at scale 1 [kg], or None to have it from density and volume.
+        centre: Whether a file's bounding box is put at the origin; otherwise its own frame stays.
     """
 
     name: str
@@ -92,9 +93,10 @@ class ObjectChoice:
     unit: str = "m"
     up: str = "y"
     mass: float | None = None
+    centre: bool = True
 
     def load(self, scale: float) -> GraspObject:
-        """Build or read the object, its bounding box centred on the origin, Y up."""
+        """Build or read the object, Y up, its bounding box centred on the origin unless ``centre`` is off."""
         if self.shape is not None:
             from warpjld.grasp.shapes import SHAPES
 
@@ -102,7 +104,7 @@ class ObjectChoice:
         from warpjld.grasp import load_object
 
         assert self.file is not None
-        found = load_object(self.file, name=self.name, unit=self.unit, up=self.up, scale=scale, centre=True)  # type: ignore[arg-type]
+        found = load_object(self.file, name=self.name, unit=self.unit, up=self.up, scale=scale, centre=self.centre)  # type: ignore[arg-type]
         check_size(found.vertices, f"object {self.name} at scale {scale:g}", path=self.file)
         return found
 

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from warpjld.tables.columns import Column
 
-__all__ = ["GRASP_COLUMNS"]
+__all__ = ["GRASP_COLUMNS", "SCORE_COLUMNS"]
 
 _PLANNED = (
     Column("hand", "text", "", "Name of the hand in the study file."),
@@ -21,6 +21,8 @@ _PLACED = (
     Column("approach_z", "number", "", "The same, z."),
     Column("gap", "number", "m", "Distance between palm and object along the approach, before closing."),
     Column("tilt", "number", "rad", "Angle between the palm's normal and the approach."),
+)
+_WRIST = (
     Column("wrist_x", "number", "m", "Position of the wrist joint, object frame, x."),
     Column("wrist_y", "number", "m", "The same, y."),
     Column("wrist_z", "number", "m", "The same, z."),
@@ -50,5 +52,10 @@ _MEASURED = (
     Column("success", "truth", "", "Force closure, penetration and displacement within the study's limits."),
 )  # fmt: skip
 
-GRASP_COLUMNS = (*_PLANNED, *_PLACED, *_TOUCH, *_MEASURED)
+GRASP_COLUMNS = (*_PLANNED, *_PLACED, *_WRIST, *_TOUCH, *_MEASURED)
 """Columns after the ones every study has."""
+
+SCORE_COLUMNS = (
+    Column("grasp", "text", "", "What the file of grasps calls it."), *_PLANNED, *_WRIST, *_TOUCH, *_MEASURED
+)  # fmt: skip
+"""Likewise for grasps of others: how the hand came there is not known."""
