@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
 from warpjld.study.grasping.plan import GraspPlan, load_plan
 from warpjld.study.grasping.trial import GraspExperiment
 from warpjld.study.rerun import Rerun, rerun_trial
-from warpjld.study.run import StudyResult, TableFormat, run_study
+from warpjld.study.run import StudyResult, TableFormat, opened, run_study
 
 __all__ = ["Study"]
 
@@ -94,3 +94,20 @@ class Study:
     ) -> Rerun:
         """Run one trial again, compare it with what is there, and draw it; errors as of ``rerun_trial``."""
         return rerun_trial(self.experiment, out, trial, report=report)
+
+    def export(self, out: str | Path, kinds: Sequence[str], *, trials: Sequence[int] | None = None) -> list[Path]:
+        """Write the closed hands of a study for other programs, into ``out/export``.
+
+        Args:
+            out: The study's folder.
+            kinds: Some of ``isaac`` (isaac_grasp YAML 1.0), ``dexgraspbench`` (``.npy``) and ``mesh`` (OBJ and GLB of hand
+                and object, and maps of contact).
+            trials: Numbers of trials; all that closed if left out.
+
+        Raises:
+            InputError: An unknown kind, another study in ``out``, a trial that did not close, or none that did.
+        """
+        from warpjld.study.grasping.export import export_grasps
+
+        folder = Path(out)
+        return export_grasps(self.plan, opened(self.experiment, folder), folder / "export", kinds, trials)

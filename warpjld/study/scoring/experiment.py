@@ -68,12 +68,12 @@ class ScoreExperiment:
     def identity(self) -> dict[str, Any]:
         """Hashes of all files, and settings."""
         hands = {one.hand.name: one.hand for one in self.scored}
-        things = {one.thing.name: one.thing for one in self.scored}
+        things = dict.fromkeys(one.thing for one in self.scored)
         return {
             "grasps": dict(self.files),
             "given": [[one.hand.name, one.thing.name, one.grasp.scale, one.friction] for one in self.scored],
             "hands": [hand.identity() for hand in hands.values()],
-            "objects": [thing.identity() for thing in things.values()],
+            "objects": [thing.identity() for thing in things],
             "measuring": vars(self.measuring),
             "versions": {name: versions([name])[name] for name in COMPUTING},
         }
