@@ -32,7 +32,13 @@ def tell_checked(path: Path, plan: GraspPlan, notes: list[str], as_json: bool, q
 
 
 def tell(
-    result: StudyResult, notes: list[str], as_json: bool, quiet: bool, *, exported: Sequence[Path] = (), what: str = "trials"
+    result: StudyResult,
+    notes: list[str],
+    as_json: bool,
+    quiet: bool,
+    *,
+    exported: Sequence[Path] = (),
+    what: str = "trials",
 ) -> None:
     """The result of a study; ``what`` its trials are called."""
     from dataclasses import asdict

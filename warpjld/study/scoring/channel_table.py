@@ -39,7 +39,9 @@ def read_channel_table(path: Path, how: GraspReading) -> list[GivenGrasp]:
     if missing := [name for name in _NEEDED if name not in header]:
         raise InputError(f"has no column {', '.join(missing)}", path=path, line=1)
     if len(set(header)) != len(header):
-        raise InputError(f"two columns are called '{next(n for n in header if header.count(n) > 1)}'", path=path, line=1)
+        raise InputError(
+            f"two columns are called '{next(n for n in header if header.count(n) > 1)}'", path=path, line=1
+        )
     grasps = []
     for line, row in enumerate(rows[1:], 2):
         if len(row) != len(header):

@@ -72,7 +72,11 @@ def _rows(
         array = np.asarray(content.get(key, default), dtype=np.float64)
     except (TypeError, ValueError):
         array = np.zeros(0)
-    if array.ndim not in (1, 2) or not array.size or not (array.shape[-1] == width or (more and array.shape[-1] > width)):
+    if (
+        array.ndim not in (1, 2)
+        or not array.size
+        or not (array.shape[-1] == width or (more and array.shape[-1] > width))
+    ):
         wanted = f"{width} {'or more ' if more else ''}numbers, or rows of them"
         raise InputError(f"{key}: want {wanted}, got shape {array.shape}")
     if not np.isfinite(array).all():

@@ -8,19 +8,17 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from warpjld.errors import InputError
 from warpjld.manifest import versions
 from warpjld.study.experiment import Outcome
 from warpjld.study.grasping.choices import HandChoice, ObjectChoice
 from warpjld.study.grasping.columns import SCORE_COLUMNS
 from warpjld.study.grasping.load import closer_of, hand_of, thing_of
 from warpjld.study.grasping.measure import measure_grasp
-from warpjld.study.grasping.pictures import draw_grasp
 from warpjld.study.grasping.plan import COMPUTING, Measuring
 from warpjld.study.scoring.given import GivenGrasp
 from warpjld.tables.columns import Column
 
-__all__ = ["Scored", "ScoreExperiment"]
+__all__ = ["ScoreExperiment", "Scored"]
 
 
 @dataclass(frozen=True, eq=False)

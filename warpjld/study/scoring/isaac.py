@@ -39,7 +39,10 @@ def read_isaac(path: Path, how: GraspReading) -> list[GivenGrasp]:
     frame = content.get("object_frame_link", content.get("object_frame", ""))
     thing = str(own.get("object", str(frame).rstrip("/").rpartition("/")[2]))
     frictions = own.get("friction") if isinstance(own.get("friction"), Mapping) else {}
-    same: dict[str, Any] = {"hand": str(own.get("hand", "")), "scale": number(own.get("scale", 1.0), "scale", above=0.0)}
+    same: dict[str, Any] = {
+        "hand": str(own.get("hand", "")),
+        "scale": number(own.get("scale", 1.0), "scale", above=0.0),
+    }
     if "mass" in own:
         same["mass"] = number(own["mass"], "mass", above=0.0)
     grasps = content.get("grasps")

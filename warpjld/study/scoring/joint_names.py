@@ -72,7 +72,7 @@ class JointNames:
         called = list(names) or list(self.order)
         if not called:
             raise InputError(
-                f"has {len(values)} joints without names: state their order in a joint map (\"order\"), with the angle "
+                f'has {len(values)} joints without names: state their order in a joint map ("order"), with the angle '
                 "of the hand that each of them is"
             )
         if len(called) != len(values):

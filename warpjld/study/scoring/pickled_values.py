@@ -220,7 +220,7 @@ def _set_state(made: Any, state: tuple[Any, ...]) -> None:
 
 def _array(raw: bytes, kind: _Type, shape: Any, fortran: bool) -> NDArray[Any]:
     flat = np.frombuffer(raw, dtype=kind.numpy())
-    return flat.reshape(shape, order="F" if fortran else "C")
+    return flat.reshape(shape, order="F" if fortran else "C").copy()
 
 
 def _checked_kind(text: Any) -> str:

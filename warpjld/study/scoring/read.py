@@ -45,7 +45,9 @@ def grasp_files(path: Path) -> list[Path]:
         return [table, table.parent / "poses.npz"]
     if not path.is_dir():
         if path.exists() and path.suffix.lower() not in _READ:
-            raise InputError(f"'{path.suffix}' is no kind of file of grasps that is read: {', '.join(_READ)}", path=path)
+            raise InputError(
+                f"'{path.suffix}' is no kind of file of grasps that is read: {', '.join(_READ)}", path=path
+            )
         return [path]
     listed = sorted(path.rglob(LISTED))
     if listed:

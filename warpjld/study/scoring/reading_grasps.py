@@ -76,5 +76,7 @@ def number(value: Any, what: str, *, above: float | None = None) -> float:
     except (TypeError, ValueError):
         found = float("nan")
     if not np.isfinite(found) or (above is not None and not found > above):
-        raise InputError(f"{what}: want a number{'' if above is None else f' above {above:g}'}, got {str(value)[:60]!r}")
+        raise InputError(
+            f"{what}: want a number{'' if above is None else f' above {above:g}'}, got {str(value)[:60]!r}"
+        )
     return found

@@ -71,7 +71,9 @@ def given_scores(
         for one in found
     )
     files = [*grasp_files(path), *([Path(joint_map)] if joint_map else [])]
-    hashes = tuple((str(file.relative_to(path) if file.is_relative_to(path) else file.name), file_hash(file)) for file in files)
+    hashes = tuple(
+        (str(file.relative_to(path) if file.is_relative_to(path) else file.name), file_hash(file)) for file in files
+    )
     return ScoreExperiment(scored, measuring or (planned.measuring if planned else Measuring()), hashes)
 
 

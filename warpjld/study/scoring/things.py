@@ -14,6 +14,9 @@ _SURFACES = (".obj", ".ply", ".stl", ".off", ".glb", ".gltf")
 _CHOSEN = ("simplified", "mesh", "model", "textured", "decomposed")
 """File names that collections give the one surface of an object's folder, in the order they are taken."""
 
+_DEEP = 2
+"""Parts of its path in there: ``mesh/simplified.obj``."""
+
 
 class ObjectFolder:
     """A folder of objects: files, ``ball.obj``, or folders of them, ``ball/mesh/simplified.obj``.
@@ -48,19 +51,23 @@ class ObjectFolder:
             if ".." in tail or tail[0] == "/":
                 continue
             below = self._folder.joinpath(*tail)
-            found = [below] if below in self._files else [f for f in self._files if below in f.parents]
+            if below in self._files:
+                return below
+            found = [file for file in self._files if below in file.parents]
             if found:
-                return self._only(found, wanted)
+                return self._only(found, wanted, below)
         for part in reversed(parts):
             found = self._by_name.get(PurePosixPath(part).stem if part.lower().endswith(_SURFACES) else part, [])
             if found:
-                return self._only(found, wanted)
+                return self._only(found, wanted, None)
         known = sorted(self._by_name)
         raise InputError(f"no object '{wanted}' in {self._folder}{did_you_mean(wanted, known)}")
 
-    def _only(self, found: list[Path], wanted: str) -> Path:
+    def _only(self, found: list[Path], wanted: str, below: Path | None) -> Path:
+        """The one of several that an object's folder is known by; deeper down lie other objects' folders."""
+        near = [file for file in found if below is None or len(file.relative_to(below).parts) <= _DEEP]
         for name in (PurePosixPath(wanted).stem, *_CHOSEN):
-            chosen = [file for file in found if file.stem == name]
+            chosen = [file for file in near if file.stem == name]
             if len(chosen) == 1:
                 return chosen[0]
         if len(found) > 1:

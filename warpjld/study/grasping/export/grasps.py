@@ -105,7 +105,9 @@ def write_objects(trials: Sequence[ClosedTrial], density: float, folder: Path) -
     for thing in dict.fromkeys(trial.thing for trial in trials):
         body = thing_of(thing, 1.0, density).body
         path = folder / f"{thing.name}.obj"
-        write_obj(path, body.vertices, body.faces, "metres; the study's frame: Y up, the middle of its bounding box at 0")
+        write_obj(
+            path, body.vertices, body.faces, "metres; the study's frame: Y up, the middle of its bounding box at 0"
+        )
         files.append(path)
     return files
 

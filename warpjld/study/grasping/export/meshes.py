@@ -69,7 +69,9 @@ def _write(trial: ClosedTrial, measuring: Measuring, folder: Path) -> list[Path]
     both = closer_of(trial.hand, trial.thing, trial.scale, measuring.density).both
     found = contact_map(both, skin, vertex_segments(hand.covering), tolerance=measuring.contact)
     files = [folder / name for name in ("hand.obj", "object.obj", "contact.npz", "grasp.glb")]
-    write_obj(files[0], skin, hand.rig.surface.faces, f"trial {trial.trial}: {trial.hand.name}; metres, the object's frame")
+    write_obj(
+        files[0], skin, hand.rig.surface.faces, f"trial {trial.trial}: {trial.hand.name}; metres, the object's frame"
+    )
     write_obj(files[1], body.vertices, body.faces, f"trial {trial.trial}: {trial.thing.name}; metres, its own frame")
     with whole_file(files[2]) as part, part.open("wb") as file:
         np.savez_compressed(file, **vars(found))
