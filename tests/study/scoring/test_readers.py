@@ -202,7 +202,7 @@ def test_objects_are_found_as_collections_keep_them(tmp_path: Path) -> None:
     assert folder.find("objects/ball.obj") == tmp_path / "ball.obj"
     assert folder.find("assets/DGN/core_bottle") == tmp_path / "DGN/core_bottle/mesh/simplified.obj"
     assert folder.find("cup") == tmp_path / "DGN/cup/cup.ply"
-    with pytest.raises(InputError, match="no object 'bal' in .*; did you mean ball?"):
+    with pytest.raises(InputError, match=r"no object 'bal' in .*; did you mean ball\?"):
         folder.find("bal")
     with pytest.raises(InputError, match="object 'DGN' may be any of"):
         folder.find("DGN")
@@ -210,9 +210,9 @@ def test_objects_are_found_as_collections_keep_them(tmp_path: Path) -> None:
 
 def test_hands_are_named_as_on_the_command_line(tmp_path: Path) -> None:
     assert hand_choice("builtin:left").side == "left"
-    with pytest.raises(InputError, match="want builtin:left or builtin:right"):
+    with pytest.raises(InputError, match=r"want builtin:left or builtin:right"):
         hand_choice("builtin:body")
-    with pytest.raises(InputError, match="none.glb: no such file"):
+    with pytest.raises(InputError, match=r"none\.glb: no such file"):
         hand_choice(str(tmp_path / "none.glb"))
     with pytest.raises(InputError, match="want a hand and a folder of objects, or a study's plan"):
         given_scores(tmp_path, hand=hand_choice("builtin:left"))

@@ -100,8 +100,8 @@ class Study:
 
         Args:
             out: The study's folder.
-            kinds: Some of ``isaac`` (isaac_grasp YAML 1.0), ``dexgraspbench`` (``.npy``) and ``mesh`` (OBJ and GLB of hand
-                and object, and maps of contact).
+            kinds: Some of ``isaac`` (isaac_grasp YAML 1.0), ``dexgraspbench`` (``.npy``) and ``mesh`` (OBJ and GLB of
+                hand and object, and maps of contact).
             trials: Numbers of trials; all that closed if left out.
 
         Raises:

@@ -1,8 +1,8 @@
 """Grasps as rows of a CSV file, angles in degrees.
 
-``object`` and the hand's pose in the object's frame, ``x``, ``y``, ``z`` [m] and ``qw``, ``qx``, ``qy``, ``qz``; then a column
-a joint, ``index.base.flexion`` or what a joint map says. ``name``, ``hand``, ``scale``, ``friction`` and ``mass`` [kg] may be
-there. An empty cell is an angle as at rest.
+``object`` and the hand's pose in the object's frame, ``x``, ``y``, ``z`` [m] and ``qw``, ``qx``, ``qy``, ``qz``; then
+a column a joint, ``index.base.flexion`` or what a joint map says. ``name``, ``hand``, ``scale``, ``friction`` and
+``mass`` [kg] may be there. An empty cell is an angle as at rest.
 """
 
 from __future__ import annotations

@@ -1,9 +1,9 @@
 """Grasps as DexGraspBench (Chen, Ke & Wang 2025) has them: a dictionary in an ``.npy`` file.
 
-``grasp_qpos`` holds position [m], quaternion w, x, y, z and joint angles [rad] of the hand in the world, one grasp or one a
-row; ``obj_pose`` the object's position and quaternion there, ``obj_scale`` its scale, ``obj_path`` its file or folder. Names
-of joints stand in ``joint_names`` where we wrote the file, else in a joint map's ``order``. ``pregrasp_qpos`` and
-``squeeze_qpos`` are not looked at: the grasp is judged.
+``grasp_qpos`` holds position [m], quaternion w, x, y, z and joint angles [rad] of the hand in the world, one grasp or
+one a row; ``obj_pose`` the object's position and quaternion there, ``obj_scale`` its scale, ``obj_path`` its file or
+folder. Names of joints stand in ``joint_names`` where we wrote the file, else in a joint map's ``order``.
+``pregrasp_qpos`` and ``squeeze_qpos`` are not looked at: the grasp is judged.
 """
 
 from __future__ import annotations

@@ -101,10 +101,7 @@ class ScoreExperiment:
             skin = hand.covering.deform(poses, threads=1)[0]
             wrist = one.grasp.place.to_local(poses.positions[0, [hand.rig.skeleton.index("wrist")]])[0, 0]
             values |= dict(zip(("wrist_x", "wrist_y", "wrist_z"), wrist, strict=True))
-        if _stands_still(one.grasp):
-            local = skin
-        else:
-            local = one.grasp.place.to_local(skin)[0].astype(np.float32)
+        local = skin if _stands_still(one.grasp) else one.grasp.place.to_local(skin)[0].astype(np.float32)
         both = closer_of(one.hand, one.thing, one.grasp.scale, self.measuring.density).both
         measured, patches = measure_grasp(hand, thing, both, local, one.friction, self.measuring)
         arrays = {f"{one.hand.name}/skin": local}

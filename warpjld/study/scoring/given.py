@@ -18,7 +18,7 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True, eq=False)
 class GivenGrasp:
-    """One grasp to be judged, in any frame that hand and object share. One of ``angles``, ``turns`` and ``skin`` is there.
+    """One grasp to be judged, in any frame that hand and object share, with ``angles``, ``turns`` or ``skin``.
 
     Attributes:
         name: What its file calls it.

@@ -1,8 +1,8 @@
 """Grasps of NVIDIA Isaac Sim and Isaac ROS: ``isaac_grasp`` YAML, version 1.0.
 
-A file holds grasps of one gripper and one object: the gripper's pose in the object's frame [m], and named joints [rad].
-What is ours, hand, object, scale, mass and friction, stands below ``warpjld`` where we wrote the file; without, the object
-is named by ``object_frame_link`` (Isaac ROS: ``object_frame``), the last part of its path.
+A file holds grasps of one gripper and one object: the gripper's pose in the object's frame [m], and named joints
+[rad]. What is ours, hand, object, scale, mass and friction, stands below ``warpjld`` where we wrote the file;
+without, the object is named by ``object_frame_link`` (Isaac ROS: ``object_frame``), the last part of its path.
 """
 
 from __future__ import annotations

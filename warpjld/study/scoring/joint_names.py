@@ -12,9 +12,9 @@
       "hand_frame": {"position": [0, 0, 0.01], "rotation": [1, 0, 0, 0]}
     }
 
-The hand's angle is factor × joint + offset [°]; null leaves a joint out. ``order`` names the joints of files that only
-number them. ``hand_frame`` is the pose of the rig's root joint at rest, in the axes of the rig's file, in the frame that
-the grasps call the hand's: metres, and a quaternion w, x, y, z.
+The hand's angle is factor × joint + offset [°]; null leaves a joint out. ``order`` names the joints of files that
+only number them. ``hand_frame`` is the pose of the rig's root joint at rest, in the axes of the rig's file, in the
+frame that the grasps call the hand's: metres, and a quaternion w, x, y, z.
 """
 
 from __future__ import annotations

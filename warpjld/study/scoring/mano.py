@@ -1,9 +1,9 @@
 """Recordings of MANO hands beside objects, as GraspXL (Zhang et al. 2024) has them: a dictionary in an ``.npy`` file.
 
 A hand, ``right_hand`` or ``left_hand``, has ``trans`` [m], ``rot`` and ``pose`` (axis-angle, fifteen joints in MANO's
-order) a frame; every other entry with ``trans`` and ``rot`` is the object, by its name. ``trans`` is taken for where the
-wrist is: MANO's own translation is that less the wrist's place in its rest hand, a part of the licensed model, which a
-field ``wrist`` [m] of the hand gives where it must be added.
+order) a frame; every other entry with ``trans`` and ``rot`` is the object, by its name. ``trans`` is taken for where
+the wrist is: MANO's own translation is that less the wrist's place in its rest hand, a part of the licensed model,
+which a field ``wrist`` [m] of the hand gives where it must be added.
 """
 
 from __future__ import annotations

@@ -64,7 +64,8 @@ def _grasp(
     position: NDArray[np.float64],
     rotation: NDArray[np.float64],
 ) -> GivenGrasp:
-    more = {key: number(row[key], key, above=0.0) for key in ("scale", "friction", "mass") if row.get(key)}
+    given = [key for key in ("scale", "friction", "mass") if row.get(key)]
+    more: dict[str, Any] = {key: number(row[key], key, above=0.0) for key in given}
     return GivenGrasp(f"trial {trial}", str(row["object"]), position, rotation, angles=angles, hand=hand, **more)
 
 

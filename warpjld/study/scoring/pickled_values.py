@@ -1,10 +1,11 @@
 """Arrays, numbers, texts, lists and dictionaries out of a pickle that is never executed.
 
-NumPy keeps a dictionary in an ``.npy`` file as a pickle, and unpickling runs whatever the file asks for. Here no pickle
-machinery runs at all: the standard library's `pickletools` splits the bytes into opcodes, and this file has a meaning for
-those that make plain values. What a pickle wants to call is compared with a short list of names of NumPy's, and what
-NumPy would make of it is made here from the bytes; nothing is ever imported or called by a name in the file. A restricted
-unpickler, which would be shorter, still calls NumPy's constructors with arguments of the file's choice.
+NumPy keeps a dictionary in an ``.npy`` file as a pickle, and unpickling runs whatever the file asks for. Here no
+pickle machinery runs at all: the standard library's `pickletools` splits the bytes into opcodes, and this file has a
+meaning for those that make plain values. What a pickle wants to call is compared with a short list of names of
+NumPy's, and what NumPy would make of it is made here from the bytes; nothing is ever imported or called by a name in
+the file. A restricted unpickler, which would be shorter, still calls NumPy's constructors with arguments of the
+file's choice.
 """
 
 from __future__ import annotations

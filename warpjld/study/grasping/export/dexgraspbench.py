@@ -1,4 +1,4 @@
-"""A study's grasps as DexGraspBench has them: a dictionary in an ``.npy`` file each, and ``header.json`` beside them."""
+"""A study's grasps as DexGraspBench has them: a dictionary in an ``.npy`` file each, ``header.json`` beside them."""
 
 from __future__ import annotations
 
