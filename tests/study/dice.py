@@ -8,6 +8,7 @@ import os
 import signal
 import sys
 import time
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -60,6 +61,12 @@ class Dice:
         # sums whose last bits depend on the order of summation
         pose = rng.normal(size=(40, 40)) @ rng.normal(size=(40, 40))
         return Outcome("thrown", values, {f"pose {'ab'[trial % 2]}": pose[: 2 + trial % 2]})
+
+    def inputs(self) -> tuple[Path, ...]:
+        return ()
+
+    def moved(self, places: Mapping[Path, Path]) -> Dice:
+        return self
 
     def pictures(self, trial: int, outcome: Outcome, folder: Path) -> list[Path]:
         (folder / "die.txt").write_text(str(outcome.values["thrown"]))

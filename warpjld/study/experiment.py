@@ -75,6 +75,12 @@ class Experiment(Protocol):
     def run(self, trial: int, rng: np.random.Generator) -> Outcome:
         """Trial number ``trial``. Exceptions become rows with status "error"."""
 
+    def inputs(self) -> tuple[Path, ...]:
+        """Files that its trials read: what another machine must be given."""
+
+    def moved(self, places: Mapping[Path, Path]) -> Experiment:
+        """The same experiment where each of its inputs lies elsewhere."""
+
     def pictures(self, trial: int, outcome: Outcome, folder: Path) -> list[Path]:
         """Draw a trial; may draw nothing."""
 

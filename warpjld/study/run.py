@@ -70,6 +70,8 @@ def run_study(
     table: TableFormat = "parquet",
     fresh: bool = False,
     title: str = "study",
+    ray: str | None = None,
+    allow_mixed: bool = False,
     report: Report = lambda what, done, total: None,
 ) -> StudyResult:
     """Run what is missing of a study, then write its table, arrays, manifest and summary.
@@ -84,11 +86,13 @@ def run_study(
         table: "parquet" (wants the extra ``study``), "csv", or "both".
         fresh: Forget what ``out`` holds.
         title: For the summary.
+        ray: Address of a Ray cluster that runs the trials, or ``local``; None for processes of this machine.
+        allow_mixed: Take machines of the cluster whose bits differ.
         report: Called with what is being done, how much is done, and of how much.
 
     Raises:
         InputError: ``out`` holds another study, or cannot be written.
-        MissingExtraError: Parquet is wanted and pyarrow is not installed.
+        MissingExtraError: Parquet is wanted and pyarrow is not installed, or a cluster and Ray is not.
     """
     if table not in ("parquet", "csv", "both"):
         raise InputError(f"table: want 'parquet', 'csv' or 'both', got {table!r}")
@@ -115,7 +119,15 @@ def run_study(
         finished += 1
         report("trials", finished, experiment.trials)
 
-    run_trials(experiment, missing, folder / _TRIALS, processes=workers, done=done)
+    where: dict[str, Any] = {"processes": workers}
+    if ray is None:
+        run_trials(experiment, missing, folder / _TRIALS, processes=workers, done=done)
+    elif missing:
+        from warpjld.study.cluster import run_on_ray
+
+        how: dict[str, Any] = {"address": ray, "processes": processes, "allow_mixed": allow_mixed}
+        kept = folder / _TRIALS
+        where = {"cluster": run_on_ray(experiment, missing, kept, **how, done=done, note=notes.append)}
     files = _write_results(experiment, folder, shards, table)
     rows, seconds = _rows_and_seconds(shards, experiment.trials)
     rates = success_rates(rows, experiment.success, experiment.groups)
@@ -139,7 +151,7 @@ def run_study(
             "last_run": {
                 "started": moment.isoformat(timespec="seconds"),
                 "seconds": round(total, 3),
-                "processes": workers,
+                **where,
                 "trials_run": len(missing),
             },
             "trial_seconds": [round(value, 4) for value in seconds],

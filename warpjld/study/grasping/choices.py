@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -47,6 +48,14 @@ class HandChoice:
     up: str | None = None
     scale: float | None = None
     map: Path | None = None
+
+    def inputs(self) -> tuple[Path, ...]:
+        """Its files."""
+        return tuple(path for path in (self.file, self.skeleton, self.map) if path is not None)
+
+    def moved(self, places: Mapping[Path, Path]) -> HandChoice:
+        """The same hand, its files elsewhere."""
+        return replace(self, **_elsewhere(self, ("file", "skeleton", "map"), places))
 
     def load(self) -> Rig:
         """Build or read the hand."""
@@ -94,6 +103,14 @@ class ObjectChoice:
     up: str = "y"
     mass: float | None = None
     centre: bool = True
+
+    def inputs(self) -> tuple[Path, ...]:
+        """Its file."""
+        return () if self.file is None else (self.file,)
+
+    def moved(self, places: Mapping[Path, Path]) -> ObjectChoice:
+        """The same object, its file elsewhere."""
+        return replace(self, **_elsewhere(self, ("file",), places))
 
     def load(self, scale: float) -> GraspObject:
         """Build or read the object, Y up, its bounding box centred on the origin unless ``centre`` is off."""
@@ -203,6 +220,11 @@ def _path(table: TomlTable, key: str) -> Path:
     if not path.is_file():
         table.fail(key, f"no such file: {path}")
     return path
+
+
+def _elsewhere(choice: Any, names: tuple[str, ...], places: Mapping[Path, Path]) -> dict[str, Any]:
+    paths = {name: getattr(choice, name) for name in names}
+    return {name: places.get(path, path) for name, path in paths.items() if path is not None}
 
 
 def _hashed(settings: dict[str, Any]) -> dict[str, Any]:

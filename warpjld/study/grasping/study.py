@@ -78,11 +78,21 @@ class Study:
         processes: int | None = None,
         table: TableFormat = "parquet",
         fresh: bool = False,
+        ray: str | None = None,
+        allow_mixed: bool = False,
         report: Callable[[str, int, int], None] = lambda what, done, total: None,
     ) -> StudyResult:
         """Run what is missing of the study in a folder; arguments and errors as of ``run_study``."""
         return run_study(
-            self.experiment, out, processes=processes, table=table, fresh=fresh, title=self.plan.title, report=report
+            self.experiment,
+            out,
+            processes=processes,
+            table=table,
+            fresh=fresh,
+            title=self.plan.title,
+            ray=ray,
+            allow_mixed=allow_mixed,
+            report=report,
         )
 
     def rerun(

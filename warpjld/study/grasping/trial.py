@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, ClassVar
 
@@ -71,6 +72,16 @@ class GraspExperiment:
     def identity(self) -> dict[str, Any]:
         """See `GraspPlan.identity`."""
         return self.settings.identity()
+
+    def inputs(self) -> tuple[Path, ...]:
+        """Files of hands and objects."""
+        return tuple(path for one in (*self.settings.hands, *self.settings.objects) for path in one.inputs())
+
+    def moved(self, places: Mapping[Path, Path]) -> GraspExperiment:
+        """The same study, these files elsewhere."""
+        hands = tuple(hand.moved(places) for hand in self.settings.hands)
+        objects = tuple(thing.moved(places) for thing in self.settings.objects)
+        return GraspExperiment(replace(self.settings, hands=hands, objects=objects))
 
     def plan(self, trial: int) -> dict[str, Any]:
         """What is known beforehand."""

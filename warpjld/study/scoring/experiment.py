@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, ClassVar
 
@@ -81,6 +82,15 @@ class ScoreExperiment:
         one = self.scored[trial]
         named = {"hand": one.hand.name, "object": one.thing.name, "scale": one.grasp.scale}
         return {"grasp": one.grasp.name, **named, "friction": one.friction}
+
+    def inputs(self) -> tuple[Path, ...]:
+        """Files of hands and objects; the grasps are read already."""
+        return tuple(dict.fromkeys(path for one in self.scored for path in (*one.hand.inputs(), *one.thing.inputs())))
+
+    def moved(self, places: Mapping[Path, Path]) -> ScoreExperiment:
+        """The same grasps, these files elsewhere."""
+        moved = (replace(one, hand=one.hand.moved(places), thing=one.thing.moved(places)) for one in self.scored)
+        return replace(self, scored=tuple(moved))
 
     def begin(self) -> None:
         """Keep Warp's remarks off the output."""

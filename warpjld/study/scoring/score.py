@@ -90,6 +90,8 @@ def score_grasps(
     processes: int | None = None,
     table: TableFormat = "parquet",
     fresh: bool = False,
+    ray: str | None = None,
+    allow_mixed: bool = False,
     report: Callable[[str, int, int], None] = lambda what, done, total: None,
 ) -> StudyResult:
     """Judge grasps of others by the columns of a grasp study, on skin that deforms.
@@ -103,7 +105,7 @@ def score_grasps(
         joint_map: JSON that says which angle of the hand each joint is, where names differ.
         friction: Coulomb coefficient where a grasp brings none.
         flat_hand_mean: Whether no rotation of a MANO pose means the flat hand; None where the file says it.
-        processes: As of ``Study.run``, likewise ``table``, ``fresh`` and ``report``.
+        processes: As of ``Study.run``, likewise ``table``, ``fresh``, ``ray``, ``allow_mixed`` and ``report``.
 
     Raises:
         InputError: Grasps, hand or objects cannot be used; names the file.
@@ -118,7 +120,17 @@ def score_grasps(
         friction=friction,
         flat_hand_mean=flat_hand_mean,
     )
-    return run_study(experiment, out, processes=processes, table=table, fresh=fresh, title="scores", report=report)
+    return run_study(
+        experiment,
+        out,
+        processes=processes,
+        table=table,
+        fresh=fresh,
+        title="scores",
+        ray=ray,
+        allow_mixed=allow_mixed,
+        report=report,
+    )
 
 
 def hand_choice(text: str) -> HandChoice:
