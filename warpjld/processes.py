@@ -25,12 +25,12 @@ _WATCH = 1.0  # seconds between looks at whether all workers live
 _PATIENCE = 5.0  # seconds that a worker has to put away what it was writing
 
 THREAD_VARIABLES = (
-    "OMP_NUMTHREAD_VARIABLES",
-    "OPENBLAS_NUMTHREAD_VARIABLES",
-    "MKL_NUMTHREAD_VARIABLES",
-    "BLIS_NUMTHREAD_VARIABLES",
-    "VECLIB_MAXIMUMTHREAD_VARIABLES",
-    "NUMEXPR_NUMTHREAD_VARIABLES",
+    "OMP_NUM_THREADS",
+    "OPENBLAS_NUM_THREADS",
+    "MKL_NUM_THREADS",
+    "BLIS_NUM_THREADS",
+    "VECLIB_MAXIMUM_THREADS",
+    "NUMEXPR_NUM_THREADS",
 )
 
 
