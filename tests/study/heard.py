@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from warpjld.study import Column, Outcome
 
@@ -36,6 +37,9 @@ class Heard:
 
     def begin(self) -> None:
         pass
+
+    def overall(self, rows: Sequence[dict[str, Any]], arrays: Mapping[str, NDArray[Any]]) -> dict[str, Any]:
+        return {}
 
     def inputs(self) -> tuple[Path, ...]:
         return (self.file,)

@@ -206,5 +206,5 @@ def test_killed_half_way_on_ray_and_resumed(tmp_path: Path, thousand: Path) -> N
 @pytest.mark.slow
 def test_no_cluster_at_an_address(tmp_path: Path) -> None:
     ray.shutdown()
-    with pytest.raises(InputError, match="no Ray cluster at '127.0.0.1:9'"):
+    with pytest.raises(InputError, match=r"no Ray cluster at '127\.0\.0\.1:9'"):
         run_study(Dice(trials=2), tmp_path, table="csv", ray="127.0.0.1:9")

@@ -50,6 +50,8 @@ __all__ = ["command"]
     help="Format of the results table.",
 )
 @click.option("--fresh", is_flag=True, help="Start again, forgetting the trials in the output folder.")
+@options.ray
+@options.allow_mixed
 @options.json
 @options.quiet
 def command(
@@ -59,6 +61,8 @@ def command(
     processes: int | None,
     table: Literal["parquet", "csv", "both"],
     fresh: bool,
+    ray: str | None,
+    allow_mixed: bool,
     as_json: bool,
     quiet: bool,
     **how: Any,
@@ -80,9 +84,8 @@ def command(
         notes, doubts = experiment.check()
         warn(doubts, "suspicious")
         try:
-            result = run_study(
-                experiment, out, processes=processes, table=table, fresh=fresh, title=grasps.name, report=report
-            )
+            where: dict[str, Any] = {"processes": processes, "ray": ray, "allow_mixed": allow_mixed}
+            result = run_study(experiment, out, **where, table=table, fresh=fresh, title=grasps.name, report=report)
         except KeyboardInterrupt:
             click.echo(f"stopped; the same command goes on from what is in {out}", err=True)
             raise

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Literal
+from typing import Any, Literal
 
 import click
 
@@ -36,6 +36,8 @@ __all__ = ["command"]
 )
 @click.option("--only", metavar="ROWS", help="Trials that --export writes, such as 0-9,17; all that closed by default.")
 @click.option("--check", is_flag=True, help="Read the plan and load its hands and objects; run nothing.")
+@options.ray
+@options.allow_mixed
 @options.json
 @options.quiet
 def command(
@@ -48,6 +50,8 @@ def command(
     exports: tuple[str, ...],
     only: str | None,
     check: bool,
+    ray: str | None,
+    allow_mixed: bool,
     as_json: bool,
     quiet: bool,
 ) -> None:
@@ -80,7 +84,8 @@ def command(
             tell_checked(plan, study.plan, notes, as_json, quiet)
             return
         try:
-            result = study.run(out, processes=processes, table=table, fresh=fresh, report=report)
+            where: dict[str, Any] = {"ray": ray, "allow_mixed": allow_mixed}
+            result = study.run(out, processes=processes, table=table, fresh=fresh, **where, report=report)
             exported = study.export(out, exports, trials=trials) if exports else []
         except KeyboardInterrupt:
             click.echo(f"stopped; the same command goes on from what is in {out}", err=True)

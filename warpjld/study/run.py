@@ -12,6 +12,8 @@ from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any, Literal
 
+from numpy.typing import NDArray
+
 from warpjld.errors import InputError
 from warpjld.folders import make_folder
 from warpjld.manifest import file_hash, fingerprint, versions, write_json
@@ -128,8 +130,9 @@ def run_study(
         how: dict[str, Any] = {"address": ray, "processes": processes, "allow_mixed": allow_mixed}
         kept = folder / _TRIALS
         where = {"cluster": run_on_ray(experiment, missing, kept, **how, done=done, note=notes.append)}
-    files = _write_results(experiment, folder, shards, table)
-    rows, seconds = _rows_and_seconds(shards, experiment.trials)
+    rows, arrays = gathered(shards.all(experiment.trials))
+    files = _write_results(experiment, folder, rows, arrays, table)
+    seconds = [shard.seconds for shard in shards.all(experiment.trials)]
     rates = success_rates(rows, experiment.success, experiment.groups)
     shown = [column for column in experiment.columns if column.name in experiment.shown]
     files += write_summary(folder, title, rates, rows, shown)
@@ -146,6 +149,7 @@ def run_study(
             "versions": versions(),
             "statuses": dict(Counter(str(row["status"]) for row in rows).most_common()),
             "rates": [asdict(rate) for rate in rates],
+            **experiment.overall(rows, arrays),
             "files": {file.name: file_hash(file) for file in files},
             "columns": [asdict(column) for column in table_columns(experiment)],
             "last_run": {
@@ -219,8 +223,13 @@ def _same_study(before: dict[str, Any], now: dict[str, Any], folder: Path) -> No
     )
 
 
-def _write_results(experiment: Experiment, folder: Path, shards: Shards, table: TableFormat) -> list[Path]:
-    rows, arrays = gathered(shards.all(experiment.trials))
+def _write_results(
+    experiment: Experiment,
+    folder: Path,
+    rows: list[dict[str, Any]],
+    arrays: dict[str, NDArray[Any]],
+    table: TableFormat,
+) -> list[Path]:
     columns, files = table_columns(experiment), []
     if table != "csv":
         write_parquet(folder / "table.parquet", rows, columns)
@@ -230,8 +239,3 @@ def _write_results(experiment: Experiment, folder: Path, shards: Shards, table: 
         files += [folder / "table.csv", folder / "columns.json"]
     write_arrays(folder / "poses.npz", arrays)
     return [*files, folder / "poses.npz"]
-
-
-def _rows_and_seconds(shards: Shards, trials: int) -> tuple[list[dict[str, Any]], list[float]]:
-    found = [(shard.row, shard.seconds) for shard in shards.all(trials)]
-    return [row for row, _ in found], [seconds for _, seconds in found]

@@ -40,6 +40,9 @@ _MEASURED = (
     Column("object_inside", "number", "m", "Depth of the object's deepest vertex, or point of a sharp edge, inside the"
            " skin; 0 where none is."),
     Column("overlap", "number", "m³", "Volume common to hand and object, on a grid (see warpjld.grasp.Intersection)."),
+    Column("self_penetration", "number", "m", "Depth of the deepest vertex of a digit or the palm in another part"
+           " of the hand; 0 where none is."),
+    Column("touching", "text", "", "Parts of the hand in contact, of: thumb index middle ring pinky palm."),
     Column("closed", "truth", "", "Force closure with discretised cones (Nguyen 1988)."),
     Column("margin", "number", "", "Evenness of the closing force: smallest share of a cone edge × number of edges."),
     Column("epsilon", "number", "N", "Ferrari–Canny epsilon, 1 N of normal force, torques over torque_scale."),
@@ -49,6 +52,9 @@ _MEASURED = (
     Column("displacement", "number", "m", "Largest displacement of the centre of mass under gravity from ±x, ±y, ±z;"
            " empty where a direction is not held."),
     Column("held", "integer", "", "Directions of the six in which the weight is held."),
+    Column("lift", "number", "", "Times the object's weight that is held against gravity along −y by normal"
+           " forces of squeeze in all; above 1 it is lifted, quasi-statically."),
+    Column("lift_least", "number", "", "The least of the same for gravity along ±x, ±y, ±z."),
     Column("success", "truth", "", "Force closure, penetration and displacement within the study's limits."),
 )  # fmt: skip
 

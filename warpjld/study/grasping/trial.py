@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, ClassVar
@@ -26,6 +26,7 @@ from warpjld.study.grasping.columns import GRASP_COLUMNS
 from warpjld.study.grasping.load import Thing, closer_of, hand_of, opened_hand, thing_of
 from warpjld.study.grasping.measure import measure_grasp
 from warpjld.study.grasping.plan import GraspPlan
+from warpjld.study.grasping.variety import varieties
 from warpjld.study.grasping.wrist import Approach, draw_approach, place_palm, touch_along
 from warpjld.tables.columns import Column
 
@@ -72,6 +73,10 @@ class GraspExperiment:
     def identity(self) -> dict[str, Any]:
         """See `GraspPlan.identity`."""
         return self.settings.identity()
+
+    def overall(self, rows: Sequence[dict[str, Any]], arrays: Mapping[str, NDArray[Any]]) -> dict[str, Any]:
+        """Diversity of every hand's grasps."""
+        return {"diversity": varieties(self.settings.hands, rows, arrays)}
 
     def inputs(self) -> tuple[Path, ...]:
         """Files of hands and objects."""

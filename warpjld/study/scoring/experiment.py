@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, ClassVar
 
 import numpy as np
+from numpy.typing import NDArray
 
 from warpjld.manifest import versions
 from warpjld.study.experiment import Outcome
@@ -16,6 +17,7 @@ from warpjld.study.grasping.columns import SCORE_COLUMNS
 from warpjld.study.grasping.load import closer_of, hand_of, thing_of
 from warpjld.study.grasping.measure import measure_grasp
 from warpjld.study.grasping.plan import COMPUTING, Measuring
+from warpjld.study.grasping.variety import varieties
 from warpjld.study.scoring.given import GivenGrasp
 from warpjld.tables.columns import Column
 
@@ -83,6 +85,10 @@ class ScoreExperiment:
         named = {"hand": one.hand.name, "object": one.thing.name, "scale": one.grasp.scale}
         return {"grasp": one.grasp.name, **named, "friction": one.friction}
 
+    def overall(self, rows: Sequence[dict[str, Any]], arrays: Mapping[str, NDArray[Any]]) -> dict[str, Any]:
+        """Diversity of every hand's grasps."""
+        return {"diversity": varieties(dict.fromkeys(one.hand for one in self.scored), rows, arrays)}
+
     def inputs(self) -> tuple[Path, ...]:
         """Files of hands and objects; the grasps are read already."""
         return tuple(dict.fromkeys(path for one in self.scored for path in (*one.hand.inputs(), *one.thing.inputs())))
@@ -114,7 +120,7 @@ class ScoreExperiment:
         local = skin if _stands_still(one.grasp) else one.grasp.place.to_local(skin)[0].astype(np.float32)
         both = closer_of(one.hand, one.thing, one.grasp.scale, self.measuring.density).both
         measured, patches = measure_grasp(hand, thing, both, local, one.friction, self.measuring)
-        arrays = {f"{one.hand.name}/skin": local}
+        arrays = {} if one.grasp.angles is None else {f"{one.hand.name}/angles": one.grasp.angles}
         touches = len(patches) > 0
         return Outcome("scored" if touches else "no contact", {**values, **measured}, arrays, one.grasp.message)
 
