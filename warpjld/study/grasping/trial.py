@@ -80,7 +80,8 @@ class GraspExperiment:
 
     def inputs(self) -> tuple[Path, ...]:
         """Files of hands and objects."""
-        return tuple(path for one in (*self.settings.hands, *self.settings.objects) for path in one.inputs())
+        hands = (path for hand in self.settings.hands for path in hand.inputs())
+        return (*hands, *(path for thing in self.settings.objects for path in thing.inputs()))
 
     def moved(self, places: Mapping[Path, Path]) -> GraspExperiment:
         """The same study, these files elsewhere."""
