@@ -17,7 +17,7 @@ import pytest
 
 from tests.study.dice import Dice
 from tests.study.heard import Heard
-from warpjld.errors import InputError, WarpjldError
+from warpjld.errors import InputError, MissingExtraError, WarpjldError
 from warpjld.study import run_study
 
 ray = pytest.importorskip("ray", reason="Ray is not installed")
@@ -203,8 +203,14 @@ def test_killed_half_way_on_ray_and_resumed(tmp_path: Path, thousand: Path) -> N
     assert _same(tmp_path, thousand)
 
 
-@pytest.mark.slow
-def test_no_cluster_at_an_address(tmp_path: Path) -> None:
-    ray.shutdown()
-    with pytest.raises(InputError, match=r"no Ray cluster at '127\.0\.0\.1:9'"):
-        run_study(Dice(trials=2), tmp_path, table="csv", ray="127.0.0.1:9")
+def test_no_cluster_at_an_address(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(ray, "is_initialized", lambda: False)
+    for address, said in (("127.0.0.1:9", ".*"), ("ray://head:10001", "want HOST:PORT"), ("head", "want HOST:PORT")):
+        with pytest.raises(InputError, match=rf"no Ray cluster at '{address}': {said}"):
+            run_study(Dice(trials=2), tmp_path, table="csv", ray=address)
+
+
+def test_without_ray_the_extra_is_named(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(sys.modules, "ray", None)
+    with pytest.raises(MissingExtraError, match=r"warpjld\[ray\]"):
+        run_study(Dice(trials=1), tmp_path, table="csv", ray="local")

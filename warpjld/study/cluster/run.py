@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import socket
 import time
 import uuid
 from collections import deque
@@ -28,6 +29,7 @@ _LOOK = 1.0  # seconds of waiting at a time
 _JOINS = 5.0  # seconds between looks for new machines
 _PATIENCE = 60.0  # seconds that a study waits for a machine when none is left
 _CANARIES = 3
+_CONNECTS = 10.0  # seconds that a cluster's head has to answer
 _STORE = 200_000_000  # bytes of Ray's store on this machine: trials are small
 
 
@@ -95,13 +97,25 @@ def _connected(address: str, processes: int | None) -> Iterator[None]:
             own = {"num_cpus": processes or cores(), "object_store_memory": _STORE, "include_dashboard": False}
             ray.init(address="local", **own, **quiet)
         else:
+            _listens(address)
             ray.init(address=address, **quiet)
     except (ConnectionError, ValueError, RuntimeError, OSError) as error:
-        raise InputError(f"no Ray cluster at '{address}': {str(error).strip().splitlines()[0]}") from None
+        said = str(error).strip().splitlines() or [type(error).__name__]
+        raise InputError(f"no Ray cluster at '{address}': {said[0]}") from None
     try:
         yield
     finally:
         ray.shutdown()
+
+
+def _listens(address: str) -> None:
+    """Raise OSError or ValueError where nothing listens; Ray itself waits for minutes."""
+    if address == "auto":
+        return
+    host, colon, port = address.rpartition(":")
+    if "://" in address or not colon or not port.isdecimal():
+        raise ValueError("want HOST:PORT of its head, as ray start says it, or auto, or local")
+    socket.create_connection((host.strip("[]"), int(port)), timeout=_CONNECTS).close()
 
 
 class _Study:
