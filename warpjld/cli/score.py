@@ -50,6 +50,7 @@ __all__ = ["command"]
     help="Format of the results table.",
 )
 @click.option("--fresh", is_flag=True, help="Start again, forgetting the trials in the output folder.")
+@options.device
 @options.ray
 @options.allow_mixed
 @options.json

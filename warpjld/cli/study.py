@@ -36,6 +36,7 @@ __all__ = ["command"]
 )
 @click.option("--only", metavar="ROWS", help="Trials that --export writes, such as 0-9,17; all that closed by default.")
 @click.option("--check", is_flag=True, help="Read the plan and load its hands and objects; run nothing.")
+@options.device
 @options.ray
 @options.allow_mixed
 @options.json
@@ -50,6 +51,7 @@ def command(
     exports: tuple[str, ...],
     only: str | None,
     check: bool,
+    device: str,
     ray: str | None,
     allow_mixed: bool,
     as_json: bool,
@@ -65,7 +67,7 @@ def command(
     from warpjld.study.grasping import Study
 
     silence_warp()
-    study = Study.load(plan)
+    study = Study.load(plan, device=device)
     trials = rows_of(only)
     if trials is not None and not exports:
         raise InputError("--only says which trials --export writes: give that too")

@@ -20,6 +20,7 @@ class Study:
 
     Attributes:
         plan: What is tried.
+        device: Warp device of the covering and of distances to objects; hands close on the CPU.
 
     Examples:
         >>> from tempfile import mkdtemp
@@ -44,24 +45,25 @@ class Study:
     """
 
     plan: GraspPlan
+    device: str = "cpu"
 
     def __repr__(self) -> str:
         counts = ((self.plan.trials, "trial"), (len(self.plan.hands), "hand"), (len(self.plan.objects), "object"))
         return f"Study({self.plan.title}: " + ", ".join(f"{n} {what}{'s' * (n != 1)}" for n, what in counts) + ")"
 
     @classmethod
-    def load(cls, path: str | Path) -> Study:
+    def load(cls, path: str | Path, *, device: str = "cpu") -> Study:
         """Read a plan (TOML).
 
         Raises:
             InputError: It cannot be read, or asks for what cannot be; names the line or key.
         """
-        return cls(load_plan(Path(path)))
+        return cls(load_plan(Path(path)), device)
 
     @property
     def experiment(self) -> GraspExperiment:
         """What is repeated."""
-        return GraspExperiment(self.plan)
+        return GraspExperiment(self.plan, self.device)
 
     def check(self) -> tuple[list[str], list[str]]:
         """Load every hand and object once: notes on them, and what looks suspicious.

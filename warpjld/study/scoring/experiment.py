@@ -14,7 +14,7 @@ from warpjld.manifest import versions
 from warpjld.study.experiment import Outcome
 from warpjld.study.grasping.choices import HandChoice, ObjectChoice
 from warpjld.study.grasping.columns import SCORE_COLUMNS
-from warpjld.study.grasping.load import closer_of, hand_of, thing_of
+from warpjld.study.grasping.load import closer_of, device_identity, hand_of, thing_of
 from warpjld.study.grasping.measure import measure_grasp
 from warpjld.study.grasping.plan import COMPUTING, Measuring
 from warpjld.study.grasping.variety import varieties
@@ -49,11 +49,13 @@ class ScoreExperiment:
         scored: The grasps.
         measuring: How they are measured.
         files: SHA-256 of the files they were read from, by name.
+        device: Warp device of the covering.
     """
 
     scored: tuple[Scored, ...]
     measuring: Measuring
     files: tuple[tuple[str, str], ...]
+    device: str = "cpu"
 
     columns: ClassVar[tuple[Column, ...]] = SCORE_COLUMNS
     success: ClassVar[str] = "success"
@@ -77,6 +79,7 @@ class ScoreExperiment:
             "objects": [thing.identity() for thing in things],
             "measuring": vars(self.measuring),
             "versions": {name: versions([name])[name] for name in COMPUTING},
+            **device_identity(self.device),
         }
 
     def plan(self, trial: int) -> dict[str, Any]:
@@ -114,7 +117,7 @@ class ScoreExperiment:
             assert one.grasp.skin is not None
             skin = one.grasp.skin
         else:
-            skin = hand.covering.deform(poses, threads=1)[0]
+            skin = hand.covering.deform(poses, device=self.device, threads=1)[0]
             wrist = one.grasp.place.to_local(poses.positions[0, [hand.rig.skeleton.index("wrist")]])[0, 0]
             values |= dict(zip(("wrist_x", "wrist_y", "wrist_z"), wrist, strict=True))
         local = skin if _stands_still(one.grasp) else one.grasp.place.to_local(skin)[0].astype(np.float32)

@@ -34,6 +34,7 @@ def given_scores(
     friction: float = 0.6,
     unit: str = "m",
     measuring: Measuring | None = None,
+    device: str = "cpu",
     flat_hand_mean: bool | None = None,
     frames: Literal["last", "all"] = "last",
 ) -> ScoreExperiment:
@@ -48,6 +49,7 @@ def given_scores(
         friction: Coulomb coefficient where a grasp brings none.
         unit: Of the surfaces in ``objects``.
         measuring: How; that of the plan, or the defaults.
+        device: Warp device of the covering.
         flat_hand_mean: Whether no rotation of a MANO pose means the flat hand; None where the file says it.
         frames: Of recordings, whether the last frame is a grasp or all are.
 
@@ -76,7 +78,7 @@ def given_scores(
     hashes = tuple(
         (str(file.relative_to(path) if file.is_relative_to(path) else file.name), file_hash(file)) for file in files
     )
-    return ScoreExperiment(scored, measuring or (planned.measuring if planned else Measuring()), hashes)
+    return ScoreExperiment(scored, measuring or (planned.measuring if planned else Measuring()), hashes, device)
 
 
 def score_grasps(
