@@ -1,6 +1,6 @@
 """What a GPU gives: covering, distances, searches, conjugate gradients, beside this machine's CPU, in one run.
 
-    python tests/benchmarks/gpu.py [--device cuda:0] [--json gpu.json]
+    python -m tests.benchmarks.gpu [--device cuda:0] [--json gpu.json]
 
 Six minutes at most. Each row is measured on the device and on the CPU (all its cores), the least of its repetitions,
 after one that compiles. *Share of copy* is the time of a copy of as many bytes as a launch writes over the time of the
@@ -17,6 +17,7 @@ import json
 import time
 from collections.abc import Callable, Iterator
 from dataclasses import asdict, dataclass
+from functools import cache
 from pathlib import Path
 
 import click
@@ -31,8 +32,9 @@ from warpjld.fem import Body, LinearElastic, box_hexes, prescribe
 from warpjld.grasp import NEAREST, FlexionSearch, ObjectSet, Searches
 from warpjld.grasp.close import Closer
 from warpjld.grasp.shapes import ball
-from warpjld.hand import build_hand
+from warpjld.hand.kept import kept_hand
 from warpjld.quiet import silence_warp
+from warpjld.rig import Rig
 from warpjld.skeleton import Poses, poses_from_angles
 from warpjld.threads import cores
 
@@ -108,10 +110,16 @@ def seconds(run: Callable[[], object], device: wp.Device, repeats: int) -> float
     return min(times[1:])
 
 
+@cache
+def hand(resolution: int) -> tuple[Rig, Covering]:
+    """A hand of so many vertices, bound."""
+    rig = kept_hand("left", resolution=resolution)
+    return rig, bind(rig.skeleton, rig.surface)
+
+
 def covering(device: wp.Device, sizes: Sizes) -> Iterator[Row]:
     """A hand of many frames."""
-    rig = build_hand("left", resolution=sizes.vertices)
-    skin = bind(rig.skeleton, rig.surface)
+    rig, skin = hand(sizes.vertices)
     count = len(rig.surface.vertices) * sizes.frames
     poses = fist(rig.skeleton, sizes.frames)
     cpu = wp.get_device("cpu")
@@ -151,8 +159,7 @@ def distances(device: wp.Device, sizes: Sizes) -> Iterator[Row]:
 
 def searches(device: wp.Device, sizes: Sizes) -> Iterator[Row]:
     """Flexion searches of fingertips against a ball."""
-    rig = build_hand("left", resolution=min(sizes.vertices, 4600))
-    skin, rng = bind(rig.skeleton, rig.surface), np.random.default_rng(0)
+    (rig, skin), rng = hand(min(sizes.vertices, 4600)), np.random.default_rng(0)
     joints = [rig.skeleton.index(f"{d}.base") for d in ("index", "middle", "ring", "pinky")]
     thing = ball(0.09).placed((0.0, -0.075, -0.11))
     poses, angles = open_hands(rig.skeleton, 1)
@@ -168,8 +175,8 @@ def searches(device: wp.Device, sizes: Sizes) -> Iterator[Row]:
 
 def closing(device: wp.Device, sizes: Sizes) -> Iterator[Row]:
     """Hands closed on a ball, one thread of the CPU."""
-    rig = build_hand("left", resolution=1500)
-    closer = Closer(bind(rig.skeleton, rig.surface), ball(0.065))
+    rig, skin = hand(1500)
+    closer = Closer(skin, ball(0.065))
     shift = -np.array([0.004, -0.056, -0.062]) + np.random.default_rng(0).uniform(
         -0.004, 0.004, size=(sizes.grasps, 3)
     ) * [1, 0, 1]

@@ -112,7 +112,6 @@ def run_study(
     if damaged:
         few = ", ".join(map(str, damaged[:5])) + (", …" if len(damaged) > 5 else "")
         notes.append(f"{len(damaged)} trials kept in {folder} are damaged and run again: {few}")
-    workers = min(processes or cores(), max(len(missing), 1))
     finished = experiment.trials - len(missing)
     report("trials", finished, experiment.trials)
 
@@ -121,47 +120,62 @@ def run_study(
         finished += 1
         report("trials", finished, experiment.trials)
 
-    where: dict[str, Any] = {"processes": workers}
-    if ray is None:
-        run_trials(experiment, missing, folder / _TRIALS, processes=workers, done=done)
-    elif missing:
-        from warpjld.study.cluster import run_on_ray
-
-        how: dict[str, Any] = {"address": ray, "processes": processes, "allow_mixed": allow_mixed}
-        kept = folder / _TRIALS
-        where = {"cluster": run_on_ray(experiment, missing, kept, **how, done=done, note=notes.append)}
+    how: dict[str, Any] = {"ray": ray, "allow_mixed": allow_mixed, "processes": processes}
+    where = _run_missing(experiment, missing, folder / _TRIALS, **how, done=done, note=notes.append)
     rows, arrays = gathered(shards.all(experiment.trials))
     files = _write_results(experiment, folder, rows, arrays, table)
-    seconds = [shard.seconds for shard in shards.all(experiment.trials)]
     rates = success_rates(rows, experiment.success, experiment.groups)
     shown = [column for column in experiment.columns if column.name in experiment.shown]
     files += write_summary(folder, title, rates, rows, shown)
     total = time.perf_counter() - began
-    write_json(
-        folder / "manifest.json",
-        {
-            "title": title,
-            "trials": experiment.trials,
-            "seed": experiment.seed,
-            "seeds": "trial k draws from numpy.random.SeedSequence(seed, spawn_key=(k,))",
-            "fingerprint": fingerprint(experiment.identity()),
-            "experiment": experiment.identity(),
-            "versions": versions(),
-            "statuses": dict(Counter(str(row["status"]) for row in rows).most_common()),
-            "rates": [asdict(rate) for rate in rates],
-            **experiment.overall(rows, arrays),
-            "files": {file.name: file_hash(file) for file in files},
-            "columns": [asdict(column) for column in table_columns(experiment)],
-            "last_run": {
-                "started": moment.isoformat(timespec="seconds"),
-                "seconds": round(total, 3),
-                **where,
-                "trials_run": len(missing),
-            },
-            "trial_seconds": [round(value, 4) for value in seconds],
-        },
-    )
+    run = {"started": moment.isoformat(timespec="seconds"), "seconds": round(total, 3), **where}
+    content = {"title": title, **_described(experiment, rows, rates), **experiment.overall(rows, arrays)}
+    content |= {
+        "files": {file.name: file_hash(file) for file in files},
+        "columns": [asdict(column) for column in table_columns(experiment)],
+        "last_run": {**run, "trials_run": len(missing)},
+        "trial_seconds": [round(shard.seconds, 4) for shard in shards.all(experiment.trials)],
+    }
+    write_json(folder / "manifest.json", content)
     return StudyResult((*files, folder / "manifest.json"), tuple(rates), len(missing), total, tuple(notes))
+
+
+def _run_missing(
+    experiment: Experiment,
+    missing: list[int],
+    kept: Path,
+    *,
+    ray: str | None,
+    allow_mixed: bool,
+    processes: int | None,
+    done: Callable[[int, str], None],
+    note: Callable[[str], None],
+) -> dict[str, Any]:
+    """Run trials here or on a cluster; returns where, for the manifest."""
+    if ray is None:
+        workers = min(processes or cores(), max(len(missing), 1))
+        run_trials(experiment, missing, kept, processes=workers, done=done)
+        return {"processes": workers}
+    if not missing:
+        return {}
+    from warpjld.study.cluster import run_on_ray
+
+    how: dict[str, Any] = {"address": ray, "processes": processes, "allow_mixed": allow_mixed}
+    return {"cluster": run_on_ray(experiment, missing, kept, **how, done=done, note=note)}
+
+
+def _described(experiment: Experiment, rows: list[dict[str, Any]], rates: list[Rate]) -> dict[str, Any]:
+    """What was tried, and how it ended."""
+    return {
+        "trials": experiment.trials,
+        "seed": experiment.seed,
+        "seeds": "trial k draws from numpy.random.SeedSequence(seed, spawn_key=(k,))",
+        "fingerprint": fingerprint(experiment.identity()),
+        "experiment": experiment.identity(),
+        "versions": versions(),
+        "statuses": dict(Counter(str(row["status"]) for row in rows).most_common()),
+        "rates": [asdict(rate) for rate in rates],
+    }
 
 
 def opened(experiment: Experiment, folder: Path, *, fresh: bool = False, notes: list[str] | None = None) -> Shards:
