@@ -139,7 +139,7 @@ def gravity_displacement(
         load = weight * np.r_[way, np.zeros(3)]
         reach = resisted_wrench(contacts, load, center, torque_scale=torque_scale, budget=1e6 * weight, edges=edges)
         # the program is homogeneous: half the forces hold half the weight
-        lift[d] = reach * squeeze / (1e6 * weight)
+        lift[d] = max(0.0, reach) * squeeze / (1e6 * weight)
         if reach < 1.0:
             continue
         held[d] = True

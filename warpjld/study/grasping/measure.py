@@ -71,7 +71,7 @@ def measure_grasp(
         "object_inside": inside.thing,
         "overlap": inside.volume,
         "self_penetration": self_penetration(hand.covering, vertices),
-        "touching": " ".join(part for part, area in areas.items() if area > 0.0),
+        "touching": " ".join(part for part in (*reversed(DIGITS), "palm") if areas[part] > 0.0),
         "closed": closure.closed,
         "margin": closure.margin,
         "epsilon": space.epsilon,
