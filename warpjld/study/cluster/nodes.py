@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 from dataclasses import asdict, dataclass, field
 from typing import Any
 
@@ -13,6 +14,7 @@ __all__ = ["LostNodeError", "LostWorkerError", "Node", "Nodes", "differing"]
 
 _ANSWER = 120.0  # seconds that a machine has to start a worker and answer
 _STILL_THERE = 15.0  # likewise, where one has just lost a worker
+_MISSED = 60.0  # seconds within which Ray misses a machine that is gone
 
 
 class LostWorkerError(Exception):
@@ -118,7 +120,7 @@ class Nodes:
         except lost.RayTaskError as error:
             raise WarpjldError(f"a trial cannot be run on {node}: {_first_line(error.cause)}") from error
         except (lost.WorkerCrashedError, lost.OutOfMemoryError) as error:
-            if self._answers(node):
+            if self._lives(node):
                 raise LostWorkerError from error
             raise LostNodeError from error
         except lost.RuntimeEnvSetupError as error:
@@ -127,11 +129,19 @@ class Nodes:
             raise LostNodeError from error
         return content
 
-    def _answers(self, node: Node) -> bool:
-        try:
-            self._answer(self._on(self._ping, node).remote(), node, _STILL_THERE)
-        except WarpjldError:
-            return False
+    def _lives(self, node: Node) -> bool:
+        """Whether a machine that has just lost a worker is there: it answers, or Ray still has not missed it."""
+        import ray
+
+        began = time.monotonic()
+        while time.monotonic() - began < _MISSED:
+            try:
+                self._answer(self._on(self._ping, node).remote(), node, _STILL_THERE)
+            except WarpjldError:
+                if all(one["NodeID"] != node.key or not one["Alive"] for one in ray.nodes()):
+                    return False
+            else:
+                return True
         return True
 
     def _answer(self, reference: Any, node: Node, patience: float) -> dict[str, Any]:
