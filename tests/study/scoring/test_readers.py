@@ -224,3 +224,48 @@ def test_two_hands_are_not_one(rig: Rig) -> None:
     hands = _Hands((hand_choice("builtin:left"),))
     with pytest.raises(InputError, match="grasps of a, b: one hand is not all of them"):
         hands.check([GivenGrasp("1", "ball", hand="a"), GivenGrasp("2", "ball", hand="b")])
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        ({"obj_scale": "large"}, "obj_scale: want a number, got 'large'"),
+        ({"obj_scale": -1.0}, "obj_scale: want a number above 0"),
+        ({"obj_pose": [1.0, 2.0]}, r"obj_pose: want 7 numbers, or rows of them, got shape \(2,\)"),
+        ({"obj_path": 3}, "obj_path: want the object's file"),
+        ({"joint_names": 5}, "joint_names: want a list of names"),
+        ({"joint_names": ["index.base.flexion", "index.base.flexion"]}, "two joints are called 'index.base.flexion'"),
+        ({"joint_names": ["index.base.flexion", "rh_FFJ2"]}, "'rh_FFJ2': no joint of this hand"),
+        ({"grasp_qpos": np.r_[0, 0, 0, 2.0, 0, 0, 0, 0.1, 0.2]}, "unit quaternion w, x, y, z"),
+        ({"grasp_qpos": np.r_[0, 0, np.nan, 1.0, 0, 0, 0, 0.1, 0.2]}, "grasp_qpos: holds numbers that are not finite"),
+        ({"friction": 0.0}, "friction: want a number above 0"),
+    ],
+)
+def test_dictionaries_with_mistakes(rig: Rig, tmp_path: Path, change: dict[str, Any], message: str) -> None:
+    good = {"grasp_qpos": np.r_[0, 0, 0, 1.0, 0, 0, 0, 0.1, 0.2], "obj_path": "ball",
+            "joint_names": ["index.base.flexion", "thumb.base.flexion"]}  # fmt: skip
+    np.save(tmp_path / "g.npy", np.array(good, dtype=object))
+    assert len(read_grasps(tmp_path / "g.npy", how(rig))) == 1
+    np.save(tmp_path / "g.npy", np.array(good | change, dtype=object))
+    with pytest.raises(InputError, match=f"g.npy: .*{message}"):
+        read_grasps(tmp_path / "g.npy", how(rig))
+
+
+_V1 = "format: isaac_grasp\nformat_version: 1.0\n"
+
+
+@pytest.mark.parametrize(
+    "text", ["", "a: [", _V1.replace("1.0", "2.0") + "grasps: {a: 1}", "- 1", _V1 + "grasps: {a: {position: [1, 2]}}"]
+)
+def test_yaml_with_mistakes(rig: Rig, tmp_path: Path, text: str) -> None:
+    pytest.importorskip("yaml")
+    with pytest.raises(InputError, match=r"a\.yaml"):
+        read_grasps(write(tmp_path, "a.yaml", text), how(rig))
+
+
+@pytest.mark.parametrize("table", ["trial,object,scale,friction,mass\nx,ball,1,1,1\n", "trial\n1\n", "\0"])
+def test_tables_with_mistakes(rig: Rig, tmp_path: Path, table: str) -> None:
+    write(tmp_path, "table.csv", table)
+    np.savez(tmp_path / "poses.npz", **{"hand/angles": np.zeros((1, 2, 4))})
+    with pytest.raises(InputError, match=r"table\.csv|poses\.npz"):
+        read_grasps(tmp_path, how(rig))

@@ -15,6 +15,7 @@ from typing import Any
 import numpy as np
 
 from warpjld.errors import InputError
+from warpjld.reading import reading
 from warpjld.study.scoring.given import GivenGrasp, quaternion
 from warpjld.study.scoring.reading_grasps import GraspReading, number
 from warpjld.text_file import read_text
@@ -32,7 +33,9 @@ def read_channel_table(path: Path, how: GraspReading) -> list[GivenGrasp]:
     Raises:
         InputError: Columns that are missing or twice, cells that are no numbers, joints that are none: names the line.
     """
-    rows = [row for row in csv.reader(StringIO(read_text(path))) if row]
+    text = read_text(path)
+    with reading(path, "CSV"):
+        rows = [row for row in csv.reader(StringIO(text)) if row]
     if len(rows) < 2:
         raise InputError("want a line of column names, and a line a grasp", path=path)
     header = [name.strip() for name in rows[0]]

@@ -43,14 +43,16 @@ def dexgraspbench_grasps(content: Mapping[str, Any], name: str, how: GraspReadin
     poses = _rows(content, "grasp_qpos", 8, more=True)
     count = len(poses)
     places = _rows(content, "obj_pose", 7, default=[0, 0, 0, 1, 0, 0, 0])
-    scales = np.asarray(content.get("obj_scale", 1.0), dtype=np.float64).reshape(-1)
+    scales = _scales(content.get("obj_scale", 1.0))
     for what, found in (("obj_pose", places), ("obj_scale", scales)):
         if len(found) not in (1, count):
             raise InputError(f"{what}: want one, or one for each of {count} grasps, got {len(found)}")
     thing = content.get("obj_path")
     if not isinstance(thing, str) or not thing:
         raise InputError("obj_path: want the object's file or folder")
-    names = [str(one) for one in content.get("joint_names", [])]
+    names = content.get("joint_names", [])
+    if not isinstance(names, list | tuple | np.ndarray) or not all(isinstance(name, str) for name in names):
+        raise InputError("joint_names: want a list of names")
     more: dict[str, Any] = {"hand": str(content.get("hand", ""))}
     more |= {key: number(content[key], key, above=0.0) for key in ("friction", "mass") if key in content}
     grasps = []
@@ -60,9 +62,16 @@ def dexgraspbench_grasps(content: Mapping[str, Any], name: str, how: GraspReadin
         scale = number(scales[k if len(scales) > 1 else 0], "obj_scale", above=0.0)
         stands = Places.of(place[:3], quaternion(place[3:], "obj_pose"))
         turn = quaternion(pose[3:7], f"{called}: grasp_qpos")
-        joints = how.names.named(pose[7:].tolist(), names)
+        joints = how.names.named(pose[7:].tolist(), [str(one) for one in names])
         grasps.append(how.posed(called, thing, pose[:3], turn, joints, place=stands, scale=scale, **more))
     return grasps
+
+
+def _scales(value: Any) -> Array:
+    try:
+        return np.asarray(value, dtype=np.float64).reshape(-1)
+    except (TypeError, ValueError):
+        raise InputError(f"obj_scale: want a number, got {str(value)[:60]!r}") from None
 
 
 def _rows(

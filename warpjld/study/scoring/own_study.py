@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from warpjld.errors import InputError
 from warpjld.motion.array_file import read_arrays
+from warpjld.reading import reading
 from warpjld.study.scoring.given import GivenGrasp
 from warpjld.study.scoring.reading_grasps import GraspReading, number
 from warpjld.tables.files import read_table
@@ -35,7 +36,9 @@ def read_own_study(table: Path, how: GraspReading) -> list[GivenGrasp]:
     Raises:
         InputError: Damaged files, poses of another skeleton, or none.
     """
-    rows = {int(row["trial"]): row for row in _rows(table)}
+    listed = _rows(table)
+    with reading(table, "a table of a study"):
+        rows = {int(row["trial"]): row for row in listed}
     path = table.parent / "poses.npz"
     arrays = read_arrays(path)
     grasps: dict[int, GivenGrasp] = {}
@@ -70,7 +73,13 @@ def _grasp(
 
 
 def _rows(table: Path) -> list[dict[str, Any]]:
-    rows = read_table(table) if table.suffix == ".parquet" else list(csv.DictReader(StringIO(read_text(table))))
+    if table.suffix == ".parquet":
+        with reading(table, "Parquet"):
+            rows = read_table(table)
+    else:
+        text = read_text(table)
+        with reading(table, "CSV"):
+            rows = list(csv.DictReader(StringIO(text)))
     if rows and (missing := [key for key in ("trial", "object", "scale", "friction", "mass") if key not in rows[0]]):
         raise InputError(f"is no table of a grasp study: it has no column {', '.join(missing)}", path=table)
     return rows

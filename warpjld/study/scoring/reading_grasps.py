@@ -73,7 +73,7 @@ def number(value: Any, what: str, *, above: float | None = None) -> float:
     """
     try:
         found = float(value) if not isinstance(value, bool) else float("nan")
-    except (TypeError, ValueError):
+    except (TypeError, ValueError, OverflowError):
         found = float("nan")
     if not np.isfinite(found) or (above is not None and not found > above):
         raise InputError(
