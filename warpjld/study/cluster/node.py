@@ -90,8 +90,12 @@ def _placed(one: Sent) -> Path:
     from warpjld.whole_file import whole_file
 
     user = os.getuid() if hasattr(os, "getuid") else "user"
-    folder = Path(tempfile.gettempdir()) / f"warpjld-inputs-{user}" / one.digest
-    folder.mkdir(parents=True, exist_ok=True, mode=0o700)
+    own = Path(tempfile.gettempdir()) / f"warpjld-inputs-{user}"
+    own.mkdir(exist_ok=True, mode=0o700)
+    if hasattr(os, "getuid") and own.stat().st_uid != os.getuid():
+        raise WarpjldError(f"{own} on {platform.node()} belongs to somebody else: remove it")
+    folder = own / one.digest
+    folder.mkdir(exist_ok=True)
     for name, digest, held in one.files:
         path = folder / name
         if path.is_file() and hashlib.sha256(path.read_bytes()).hexdigest() == digest:
