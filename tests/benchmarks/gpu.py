@@ -33,10 +33,10 @@ from warpjld.grasp import NEAREST, FlexionSearch, ObjectSet, Searches
 from warpjld.grasp.close import Closer
 from warpjld.grasp.shapes import ball
 from warpjld.hand.kept import kept_hand
-from warpjld.quiet import silence_warp
 from warpjld.rig import Rig
+from warpjld.runtime.quiet import silence_warp
+from warpjld.runtime.threads import cores
 from warpjld.skeleton import Poses, poses_from_angles
-from warpjld.threads import cores
 
 LIMIT = 330.0
 """Seconds after which no further row begins."""

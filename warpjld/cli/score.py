@@ -73,7 +73,7 @@ def command(
     Read are a study's folder, isaac_grasp YAML 1.0, DexGraspBench and GraspXL .npy (pickles are never executed), CSV of
     joint angles in degrees, and surfaces as study --export mesh writes them."""
     from warpjld.cli.progress import progress
-    from warpjld.quiet import silence_warp
+    from warpjld.runtime.quiet import silence_warp
     from warpjld.study.run import run_study
     from warpjld.study.scoring import given_scores, hand_choice
 

@@ -9,10 +9,10 @@ from scipy.stats import qmc
 from tests.grasp.quality.winding import closed, distance, winding
 from warpjld.covering import Covering
 from warpjld.covering.intersections import surface_parts
+from warpjld.geometry.normals import vertex_normals
 from warpjld.grasp.both_ways import BothWays
 from warpjld.grasp.quality import penetration, self_penetration
 from warpjld.grasp.shapes import ball
-from warpjld.normals import vertex_normals
 from warpjld.rig import Rig
 from warpjld.skeleton import CHANNELS, poses_from_angles
 

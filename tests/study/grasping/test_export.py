@@ -19,7 +19,7 @@ from warpjld.study.pool import perform
 from warpjld.study.run import opened, table_columns
 from warpjld.study.scoring import given_scores
 from warpjld.study.shards import Shard, Shards
-from warpjld.tables.files import write_csv
+from warpjld.tables.files import write_table_csv
 
 _PLAN = """seed = 5
 trials = 4
@@ -63,7 +63,7 @@ def _run_here(study: Study, out: Path) -> None:
         row, outcome = perform(study.experiment, trial)
         shards.write(Shard(trial, row, dict(outcome.arrays), 0.0))
     rows, arrays = gathered(shards.all(study.plan.trials))
-    write_csv(out / "table.csv", rows, table_columns(study.experiment))
+    write_table_csv(out / "table.csv", rows, table_columns(study.experiment))
     write_arrays(out / "poses.npz", arrays)
 
 

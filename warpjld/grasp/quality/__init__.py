@@ -13,7 +13,7 @@ from warpjld.grasp.quality.gravity import SIX_DIRECTIONS, GravityResponse, gravi
 from warpjld.grasp.quality.penetration import Penetration, penetration
 from warpjld.grasp.quality.resistance import resisted_wrench
 from warpjld.grasp.quality.self_penetration import self_penetration
-from warpjld.grasp.quality.touch import Patches, contact_patches, vertex_areas
+from warpjld.grasp.quality.touch import ContactPatches, contact_patches, vertex_areas
 from warpjld.grasp.quality.wrench_space import WrenchSpace, least_resistance, wrench_space
 from warpjld.grasp.quality.wrenches import contact_wrenches, grasp_matrix
 
@@ -21,10 +21,10 @@ __all__ = [
     "SIX_DIRECTIONS",
     "Closure",
     "ContactMap",
+    "ContactPatches",
     "Contacts",
     "Diversity",
     "GravityResponse",
-    "Patches",
     "Penetration",
     "WrenchSpace",
     "contact_map",

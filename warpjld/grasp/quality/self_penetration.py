@@ -6,10 +6,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from warpjld.covering import Covering
+from warpjld.geometry.normals import vertex_normals
 from warpjld.grasp.kept import kept_with
 from warpjld.grasp.objects import Places
 from warpjld.grasp.posed_skins import PosedSkins
-from warpjld.normals import vertex_normals
 
 __all__ = ["self_penetration"]
 

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from warpjld.errors import InputError
-from warpjld.input_file import read_bytes
+from warpjld.files.input_file import read_bytes
 from warpjld.io.identity import files_of
 from warpjld.study.cluster.node import Sent
 

@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import Any
 
 from warpjld.errors import WarpjldError
-from warpjld.manifest import versions
+from warpjld.files.manifest import versions
 from warpjld.study.experiment import Experiment
 from warpjld.study.pool import performed
 
@@ -87,7 +87,7 @@ def _placed(one: Sent) -> Path:
     """Where an input lies on this machine; it is fetched unless it is there already, by its hash."""
     import ray
 
-    from warpjld.whole_file import whole_file
+    from warpjld.files.whole_file import whole_file
 
     user = os.getuid() if hasattr(os, "getuid") else "user"
     own = Path(tempfile.gettempdir()) / f"warpjld-inputs-{user}"

@@ -7,7 +7,7 @@ from dataclasses import asdict, dataclass, field
 from typing import Any
 
 from warpjld.errors import WarpjldError
-from warpjld.processes import THREAD_VARIABLES
+from warpjld.runtime.processes import THREAD_VARIABLES
 from warpjld.study.cluster.node import MATCHING, Sent, ping, trial_bytes
 
 __all__ = ["LostNodeError", "LostWorkerError", "Node", "Nodes", "differing"]

@@ -13,14 +13,14 @@ from pathlib import Path
 from typing import Any
 
 from warpjld.errors import InputError, MissingExtraError, WarpjldError
-from warpjld.processes import LIVES
+from warpjld.runtime.processes import LIVES
+from warpjld.runtime.threads import cores
 from warpjld.study.cluster.inputs import sent_inputs
 from warpjld.study.cluster.node import ping
 from warpjld.study.cluster.nodes import LostNodeError, LostWorkerError, Node, Nodes, differing
 from warpjld.study.experiment import Experiment
 from warpjld.study.pool import TrialWork
 from warpjld.study.shards import Shard, Shards
-from warpjld.threads import cores
 
 __all__ = ["run_on_ray"]
 

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from warpjld.grasp.both_ways import BothWays
 from warpjld.grasp.quality import (
     SIX_DIRECTIONS,
-    Patches,
+    ContactPatches,
     force_closure,
     gravity_displacement,
     penetration,
@@ -29,7 +29,7 @@ _DOWN = int((SIX_DIRECTIONS @ [0.0, -1.0, 0.0]).argmax())
 
 def measure_grasp(
     hand: Hand, thing: Thing, both: BothWays, vertices: NDArray[np.float32], friction: float, how: Measuring
-) -> tuple[dict[str, Any], Patches]:
+) -> tuple[dict[str, Any], ContactPatches]:
     """Columns of the table, and the patches of contact; definitions are in `warpjld.grasp.quality`, one a measure.
 
     Args:

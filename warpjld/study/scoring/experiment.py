@@ -10,7 +10,7 @@ from typing import Any, ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from warpjld.manifest import versions
+from warpjld.files.manifest import versions
 from warpjld.study.experiment import Outcome
 from warpjld.study.grasping.choices import HandChoice, ObjectChoice
 from warpjld.study.grasping.columns import SCORE_COLUMNS
@@ -103,7 +103,7 @@ class ScoreExperiment:
 
     def begin(self) -> None:
         """Keep Warp's remarks off the output."""
-        from warpjld.quiet import silence_warp
+        from warpjld.runtime.quiet import silence_warp
 
         silence_warp()
 

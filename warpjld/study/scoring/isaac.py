@@ -14,10 +14,10 @@ from typing import Any
 import numpy as np
 
 from warpjld.errors import InputError, MissingExtraError
-from warpjld.reading import reading
+from warpjld.files.reading import reading
+from warpjld.files.text_file import read_text
 from warpjld.study.scoring.given import GivenGrasp, quaternion
 from warpjld.study.scoring.reading_grasps import GraspReading, number
-from warpjld.text_file import read_text
 
 __all__ = ["read_isaac"]
 

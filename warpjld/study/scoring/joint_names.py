@@ -28,8 +28,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from warpjld.errors import InputError
-from warpjld.rotations import multiply, rotate
-from warpjld.text_file import read_json
+from warpjld.files.text_file import read_json
+from warpjld.geometry.rotations import multiply, rotate
 
 __all__ = ["JointNames", "read_joint_names"]
 

@@ -18,11 +18,11 @@ from typing import Any
 import numpy as np
 
 from warpjld.errors import InputError
+from warpjld.files.text_file import read_json
 from warpjld.io.obj_file import read_obj
 from warpjld.rig import Rig
 from warpjld.study.scoring.given import GivenGrasp
 from warpjld.study.scoring.reading_grasps import GraspReading, number
-from warpjld.text_file import read_json
 
 __all__ = ["FORMAT", "LISTED", "read_meshes"]
 

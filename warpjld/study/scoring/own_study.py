@@ -11,12 +11,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from warpjld.errors import InputError
+from warpjld.files.reading import reading
+from warpjld.files.text_file import read_text
 from warpjld.motion.array_file import read_arrays
-from warpjld.reading import reading
 from warpjld.study.scoring.given import GivenGrasp
 from warpjld.study.scoring.reading_grasps import GraspReading, number
 from warpjld.tables.files import read_table
-from warpjld.text_file import read_text
 
 __all__ = ["read_own_study", "study_tables"]
 

@@ -21,8 +21,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from warpjld.errors import InputError
-from warpjld.input_file import read_bytes
-from warpjld.reading import reading
+from warpjld.files.input_file import read_bytes
+from warpjld.files.reading import reading
 
 __all__ = ["read_object_array", "values_of_pickle"]
 

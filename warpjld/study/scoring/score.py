@@ -7,8 +7,8 @@ from pathlib import Path, PurePosixPath
 from typing import Literal
 
 from warpjld.errors import InputError
+from warpjld.files.manifest import file_hash
 from warpjld.grasp.judge import check_friction
-from warpjld.manifest import file_hash
 from warpjld.rig import Rig
 from warpjld.study.grasping.choices import HandChoice, ObjectChoice
 from warpjld.study.grasping.load import hand_of

@@ -8,10 +8,10 @@ from typing import Any
 
 import numpy as np
 
-from warpjld.manifest import write_json
+from warpjld.files.manifest import write_json
+from warpjld.files.whole_file import whole_file
 from warpjld.study.grasping.export.grasps import ClosedTrial, posture
 from warpjld.study.grasping.load import hand_of
-from warpjld.whole_file import whole_file
 
 __all__ = ["write_dexgraspbench"]
 

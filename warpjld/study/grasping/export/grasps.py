@@ -11,12 +11,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from warpjld.errors import InputError
+from warpjld.files.whole_file import whole_file
 from warpjld.study.grasping.choices import HandChoice, ObjectChoice
 from warpjld.study.grasping.load import hand_of, thing_of
 from warpjld.study.grasping.plan import GraspPlan
 from warpjld.study.named_angles import channel_names, free_channels
 from warpjld.study.shards import Shards
-from warpjld.whole_file import whole_file
 
 __all__ = ["ClosedTrial", "closed_trials", "posture", "write_obj", "write_objects"]
 

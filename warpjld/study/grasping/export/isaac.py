@@ -9,10 +9,10 @@ import json
 from collections.abc import Sequence
 from pathlib import Path
 
+from warpjld.files.whole_file import whole_file
 from warpjld.skeleton import Skeleton
 from warpjld.study.grasping.export.grasps import ClosedTrial, posture
 from warpjld.study.grasping.load import hand_of
-from warpjld.whole_file import whole_file
 
 __all__ = ["write_isaac"]
 

@@ -13,15 +13,15 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from warpjld.files.manifest import write_json
+from warpjld.files.whole_file import whole_file
 from warpjld.grasp import GraspObject
 from warpjld.grasp.quality.contact_map import ContactMap, contact_map
 from warpjld.grasp.segments import SEGMENTS, vertex_segments
-from warpjld.manifest import write_json
 from warpjld.skeleton import poses_from_angles
 from warpjld.study.grasping.export.grasps import ClosedTrial, write_obj
 from warpjld.study.grasping.load import Hand, closer_of, hand_of, thing_of
 from warpjld.study.grasping.plan import Measuring
-from warpjld.whole_file import whole_file
 
 __all__ = ["write_meshes"]
 
