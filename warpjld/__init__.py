@@ -44,6 +44,7 @@ if TYPE_CHECKING:
     from warpjld.skeleton import Poses, Skeleton, poses_from_angles
     from warpjld.skeleton.place.place import propose_points
     from warpjld.study.grasping import Study
+    from warpjld.study.scoring.score import score_grasps
     from warpjld.touch import Touch
 
 __version__ = "0.1.0"
@@ -98,6 +99,7 @@ _WHERE = {
     "Scene": "script",
     "Arguments": "script",
     "Study": "study.grasping",
+    "score_grasps": "study.scoring.score",
     # errors
     "WarpjldError": "errors",
     "InputError": "errors",
@@ -155,6 +157,7 @@ __all__ = [
     "render",
     "run_script",
     "save_parameters",
+    "score_grasps",
     "shapes",
     "simulate",
     "write_baked",

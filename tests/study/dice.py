@@ -8,11 +8,13 @@ import os
 import signal
 import sys
 import time
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from warpjld.errors import WarpjldError
 from warpjld.study import Column, Outcome, run_study
@@ -60,6 +62,15 @@ class Dice:
         # sums whose last bits depend on the order of summation
         pose = rng.normal(size=(40, 40)) @ rng.normal(size=(40, 40))
         return Outcome("thrown", values, {f"pose {'ab'[trial % 2]}": pose[: 2 + trial % 2]})
+
+    def overall(self, rows: Sequence[dict[str, Any]], arrays: Mapping[str, NDArray[Any]]) -> dict[str, Any]:
+        return {"thrown": sum(row["thrown"] is not None for row in rows)}
+
+    def inputs(self) -> tuple[Path, ...]:
+        return ()
+
+    def moved(self, places: Mapping[Path, Path]) -> Dice:
+        return self
 
     def pictures(self, trial: int, outcome: Outcome, folder: Path) -> list[Path]:
         (folder / "die.txt").write_text(str(outcome.values["thrown"]))

@@ -100,6 +100,7 @@ def test_schema_is_in_the_file_and_wall_clock_is_not(whole: Path) -> None:
     assert schema.field("thrown").metadata == {b"unit": b"m", b"description": b"A number."}
     manifest = json.loads((whole / "manifest.json").read_text())
     assert len(manifest["trial_seconds"]) == 1000
+    assert manifest["thrown"] == sum(row["thrown"] is not None for row in read_table(whole / "table.parquet"))
     header, first = (whole / "table.csv").read_text().splitlines()[:2]
     assert header == "trial,seed,status,message,thrown,wide,table"
     assert float(first.split(",")[5]) == read_table(whole / "table.parquet")[0]["thrown"]

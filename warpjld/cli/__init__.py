@@ -33,6 +33,7 @@ _COMMANDS = {
     "deform": "Deform a rig by a motion file.",
     "bake": "Write a rig for engines: fitted skin weights and corrective shapes.",
     "study": "Run many grasps and bring them into one table.",
+    "score": "Judge grasps of others by the same measures.",
     "fem": "Load a deformable body and solve for its shape, stresses and reactions.",
     "doctor": "Say what is installed, what works here, and what is missing.",
 }

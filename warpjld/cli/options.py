@@ -8,7 +8,20 @@ from typing import Any
 
 import click
 
-__all__ = ["RIG", "commands", "device", "domains", "json", "out_folder", "parameters", "quiet", "rig", "threads"]
+__all__ = [
+    "RIG",
+    "allow_mixed",
+    "commands",
+    "device",
+    "domains",
+    "json",
+    "out_folder",
+    "parameters",
+    "quiet",
+    "ray",
+    "rig",
+    "threads",
+]
 
 Decorator = Callable[[Callable[..., None]], Callable[..., None]]
 
@@ -31,6 +44,14 @@ domains: Decorator = click.option(
 )
 parameters: Decorator = click.option(
     "--parameters", type=click.Path(path_type=Path), help="Covering parameters, as calibrate writes them."
+)
+ray: Decorator = click.option(
+    "--ray",
+    metavar="ADDRESS",
+    help="Run on a Ray cluster: its address, auto, or local for workers on this machine (extra ray).",
+)
+allow_mixed: Decorator = click.option(
+    "--allow-mixed", is_flag=True, help="With --ray: take machines too that give other last bits."
 )
 json: Decorator = click.option("--json", "as_json", is_flag=True, help="Write the result to stdout as JSON.")
 quiet: Decorator = click.option("-q", "--quiet", is_flag=True, help="Say nothing but errors.")

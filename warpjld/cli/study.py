@@ -3,17 +3,13 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Literal
+from typing import Any, Literal
 
 import click
 
 from warpjld.cli import options
-from warpjld.cli.answer import answer
+from warpjld.cli.study_answer import tell, tell_checked, tell_rerun
 from warpjld.cli.warn import warn
-
-if TYPE_CHECKING:
-    from warpjld.study import Rerun, StudyResult
-    from warpjld.study.grasping import GraspPlan
 
 __all__ = ["study_command"]
 
@@ -31,7 +27,18 @@ __all__ = ["study_command"]
 )
 @click.option("--fresh", is_flag=True, help="Start again, forgetting the trials in the output folder.")
 @click.option("--rerun", "row", type=click.IntRange(min=0), metavar="ROW", help="Repeat one trial, with pictures.")
+@click.option(
+    "--export",
+    "exports",
+    multiple=True,
+    type=click.Choice(["isaac", "dexgraspbench", "mesh"]),
+    help="Also write the closed hands for other programs, into OUT/export; repeatable.",
+)
+@click.option("--only", metavar="ROWS", help="Trials that --export writes, such as 0-9,17; all that closed by default.")
 @click.option("--check", is_flag=True, help="Read the plan and load its hands and objects; run nothing.")
+@options.device
+@options.ray
+@options.allow_mixed
 @options.json
 @options.quiet
 def study_command(
@@ -41,7 +48,12 @@ def study_command(
     table: Literal["parquet", "csv", "both"],
     fresh: bool,
     row: int | None,
+    exports: tuple[str, ...],
+    only: str | None,
     check: bool,
+    device: str,
+    ray: str | None,
+    allow_mixed: bool,
     as_json: bool,
     quiet: bool,
 ) -> None:
@@ -55,80 +67,49 @@ def study_command(
     from warpjld.study.grasping import Study
 
     silence_warp()
-    study = Study.load(plan)
+    study = Study.load(plan, device=device)
+    trials = rows_of(only)
+    if trials is not None and not exports:
+        raise InputError("--only says which trials --export writes: give that too")
     if row is not None:
-        if fresh or check:
-            raise InputError("--rerun repeats a trial that is there: --fresh and --check do not go with it")
+        if fresh or check or exports:
+            raise InputError("--rerun repeats a trial that is there: --fresh, --check and --export do not go with it")
         with progress(quiet) as report:
             again = study.rerun(out, row, report=report)
-        _tell_rerun(again, as_json, quiet)
+        tell_rerun(again, as_json, quiet)
         return
     with progress(quiet) as report:
         report("loading hands and objects", 0, 1)
         notes, doubts = study.check()
         warn(doubts, "suspicious")
-        if not check:
-            try:
-                result = study.run(out, processes=processes, table=table, fresh=fresh, report=report)
-            except KeyboardInterrupt:
-                click.echo(f"stopped; the same command goes on from what is in {out}", err=True)
-                raise
-    if check:
-        _tell_checked(plan, study.plan, notes, as_json, quiet)
-        return
+        if check:
+            tell_checked(plan, study.plan, notes, as_json, quiet)
+            return
+        try:
+            where: dict[str, Any] = {"ray": ray, "allow_mixed": allow_mixed}
+            result = study.run(out, processes=processes, table=table, fresh=fresh, **where, report=report)
+            exported = study.export(out, exports, trials=trials) if exports else []
+        except KeyboardInterrupt:
+            click.echo(f"stopped; the same command goes on from what is in {out}", err=True)
+            raise
     warn(result.notes)
-    _tell(result, notes, as_json, quiet)
+    tell(result, notes, as_json, quiet, exported=exported)
 
 
-def _tell_checked(path: Path, plan: GraspPlan, notes: list[str], as_json: bool, quiet: bool) -> None:
-    combinations = len(plan.hands) * len(plan.objects) * len(plan.scales) * len(plan.frictions)
-    tried = min(combinations, plan.trials)
-    if as_json:
-        counts = {"trials": plan.trials, "combinations": combinations, "combinations_tried": tried}
-        answer({"plan": str(path), **counts, "notes": notes})
-    elif not quiet:
-        for note in notes:
-            click.echo(f"note: {note}")
-        of = f"{tried} of {combinations} combinations of hand, object, scale and friction"
-        click.echo(f"{path}: {plan.trials} trials of {of}")
+def rows_of(text: str | None) -> list[int] | None:
+    """Numbers of a list such as ``0-9,17``.
 
+    Raises:
+        InputError: It is no such list.
+    """
+    from warpjld.errors import InputError
 
-def _tell(result: StudyResult, notes: list[str], as_json: bool, quiet: bool) -> None:
-    from dataclasses import asdict
-
-    if as_json:
-        summary = {
-            "files": [str(file) for file in result.files],
-            "rates": [asdict(rate) for rate in result.rates],
-            "trials_run": result.ran,
-            "seconds": round(result.seconds, 3),
-            "notes": notes,
-        }
-        answer(summary)
-        return
-    if quiet:
-        return
-    for note in notes:
-        click.echo(f"note: {note}")
-    for rate in result.rates:
-        name = f"{rate.group} {rate.value}" if rate.group else "all"
-        ended = ", ".join(f"{status} {count}" for status, count in rate.statuses.items())
-        share = f"{100 * rate.rate:5.1f} %  ({100 * rate.low:.0f}–{100 * rate.high:.0f} %)"
-        click.echo(f"{name:32} {rate.successes:5d} of {rate.trials:5d}  {share:20}  {ended}")
-    click.echo(f"{result.ran} trials run in {result.seconds:.1f} s; {', '.join(str(file) for file in result.files)}")
-
-
-def _tell_rerun(again: Rerun, as_json: bool, quiet: bool) -> None:
-    same = not again.differences
-    if as_json:
-        files = [str(file) for file in again.files]
-        content = {"row": again.row, "differences": again.differences, "files": files}
-        answer(content)
-    elif not quiet:
-        for name, value in again.row.items():
-            shown = f"{value:.6g}" if isinstance(value, float) else value
-            click.echo(f"{name:16} {'' if value is None else shown}")
-        click.echo("the same as in the study, bit for bit" if same else f"differs in: {', '.join(again.differences)}")
-        click.echo(", ".join(str(file) for file in again.files))
-    if not same:
-        raise SystemExit(1)
+    if text is None:
+        return None
+    rows: list[int] = []
+    for part in text.split(","):
+        first, dash, last = (one.strip() for one in part.partition("-"))
+        if not first.isdecimal() or (dash and not last.isdecimal()) or len(first + last) > 14:
+            raise InputError(f"--only: want numbers of trials such as 0-9,17, got '{part.strip()[:40]}'")
+        rows += range(int(first), int(last or first) + 1)
+    return list(dict.fromkeys(rows))

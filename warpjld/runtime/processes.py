@@ -17,14 +17,14 @@ from typing import Any, Protocol, TypeVar
 
 from warpjld.errors import WarpjldError
 
-__all__ = ["Work", "Workers", "one_thread", "run_jobs", "worker_pool"]
+__all__ = ["LIVES", "THREAD_VARIABLES", "Work", "Workers", "one_thread", "run_jobs", "worker_pool"]
 
 _AHEAD = 2  # jobs handed out for each process: keeps it busy, and few are suspected when it dies
-_LIVES = 2  # times a job may kill a worker that has nothing else to do
+LIVES = 2  # times a job may kill a worker that has nothing else to do
 _WATCH = 1.0  # seconds between looks at whether all workers live
 _PATIENCE = 5.0  # seconds that a worker has to put away what it was writing
 
-_THREADS = (
+THREAD_VARIABLES = (
     "OMP_NUM_THREADS",
     "OPENBLAS_NUM_THREADS",
     "MKL_NUM_THREADS",
@@ -82,8 +82,8 @@ def one_thread() -> Iterator[None]:
 
     Besides not fighting over cores, this is what makes sums come out in the same order everywhere.
     """
-    before = {name: os.environ.get(name) for name in _THREADS}
-    os.environ.update(dict.fromkeys(_THREADS, "1"))
+    before = {name: os.environ.get(name) for name in THREAD_VARIABLES}
+    os.environ.update(dict.fromkeys(THREAD_VARIABLES, "1"))
     try:
         yield
     finally:
@@ -253,7 +253,7 @@ def _settle(work: Work[Job], jobs: Iterable[Job], done: Callable[[Job, str], Non
 
 
 def _alone(work: Work[Job], suspects: list[Job], done: Callable[[Job, str], None]) -> None:
-    lives = [(job, _LIVES) for job in suspects]
+    lives = [(job, LIVES) for job in suspects]
     while lives:
         try:
             with worker_pool(work, 1) as workers:

@@ -98,7 +98,9 @@ def search_flexion(
     thing = placed_at(scene, prop, key)
     triangle = NEAREST if facet is None else int(facet.triangles[0])
     wanted = Searches(vertex=vertex, joint=joint, facet=triangle, distance=distance)
-    found = FlexionSearch(covering, ObjectSet(thing)).nearest(poses, angles, wanted, tolerance=within)
+    found = FlexionSearch(covering, ObjectSet(thing, device=scene.device)).nearest(
+        poses, angles, wanted, tolerance=within
+    )
     angles[0, joint, 0] = found.angles[0, 0]
     _, root = actor.motion.sample(np.array([key]), actor.skeleton)
     bent = actor.placement.apply(poses_from_angles(actor.skeleton, angles, root_position=root), np.array([key]))

@@ -62,6 +62,6 @@ def run_script(
     for path in commands:
         load_commands(Path(path))
     folder, file = Path(out), Path(script)
-    scene = Scene(folder=folder, say=say, dry=check)
+    scene = Scene(folder=folder, say=say, dry=check, device=device)
     Interpreter(scene).run_file(file)
     return run_scene(scene, folder, script=file, device=device, threads=threads, dry=check, progress=progress)

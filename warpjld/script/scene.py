@@ -128,6 +128,7 @@ class Scene:
         read: Files that were read, which no output may take the place of.
         say: Where PRINT and SHOW write.
         warn: Told what is probably wrong with a rig or a motion, as it is met; ``warnings`` keeps it for the summary.
+        device: Warp device of searches.
 
     Examples:
         >>> from warpjld.script import Interpreter
@@ -159,6 +160,7 @@ class Scene:
     say: Callable[[str], None] = print
     warn: Callable[[str], None] = _to_stderr
     warnings: list[str] = field(default_factory=list)
+    device: str = "cpu"
 
     def __repr__(self) -> str:
         counts = ((len(self.actors), "actor"), (len(self.props), "object"))

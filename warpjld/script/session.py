@@ -144,7 +144,7 @@ class Session:
             raise InputError("this MACRO has no END", path="<shell>", line=self._typed)
 
     def _start(self) -> None:
-        self.scene = Scene(folder=self._folder, say=self._say)
+        self.scene = Scene(folder=self._folder, say=self._say, device=self._device)
         self._interpreter = Interpreter(self.scene)
 
     def _own(self, statement: Statement) -> bool:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Protocol
@@ -74,6 +74,15 @@ class Experiment(Protocol):
 
     def run(self, trial: int, rng: np.random.Generator) -> Outcome:
         """Trial number ``trial``. Exceptions become rows with status "error"."""
+
+    def overall(self, rows: Sequence[dict[str, Any]], arrays: Mapping[str, NDArray[Any]]) -> dict[str, Any]:
+        """What is said of all trials together, as JSON for the manifest."""
+
+    def inputs(self) -> tuple[Path, ...]:
+        """Files that its trials read: what another machine must be given."""
+
+    def moved(self, places: Mapping[Path, Path]) -> Experiment:
+        """The same experiment where each of its inputs lies elsewhere."""
 
     def pictures(self, trial: int, outcome: Outcome, folder: Path) -> list[Path]:
         """Draw a trial; may draw nothing."""

@@ -15,7 +15,7 @@ from warpjld.study.experiment import Experiment, Outcome, generator
 from warpjld.study.shards import Shard, Shards
 from warpjld.tables.columns import checked_values
 
-__all__ = ["TrialWork", "perform", "run_trials"]
+__all__ = ["TrialWork", "perform", "performed", "run_trials"]
 
 
 def run_trials(
@@ -55,14 +55,12 @@ class TrialWork:
         Raises:
             WarpjldError: It cannot be written, the disk being full for example.
         """
-        began = time.perf_counter()
-        row, outcome = perform(self.experiment, trial)
-        shard = Shard(trial, row, dict(outcome.arrays), time.perf_counter() - began)
+        shard = performed(self.experiment, trial)
         try:
             Shards(self.folder).write(shard)
         except OSError as error:
             raise WarpjldError(f"trial {trial} cannot be kept in {self.folder}: {error}") from error
-        return outcome.status
+        return str(shard.row["status"])
 
     def kept(self, trial: int) -> str | None:
         """Status of a trial that is kept already."""
@@ -74,6 +72,13 @@ class TrialWork:
         outcome = Outcome("crashed", message="the trial ended its process")
         Shards(self.folder).write(Shard(trial, _row(self.experiment, trial, outcome), {}, 0.0))
         return outcome.status
+
+
+def performed(experiment: Experiment, trial: int) -> Shard:
+    """A trial as it is kept."""
+    began = time.perf_counter()
+    row, outcome = perform(experiment, trial)
+    return Shard(trial, row, dict(outcome.arrays), time.perf_counter() - began)
 
 
 def perform(experiment: Experiment, trial: int) -> tuple[dict[str, object], Outcome]:

@@ -12,6 +12,8 @@ from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any, Literal
 
+from numpy.typing import NDArray
+
 from warpjld.errors import InputError
 from warpjld.files.folders import make_folder
 from warpjld.files.manifest import file_hash, fingerprint, versions, write_json
@@ -70,6 +72,8 @@ def run_study(
     table: TableFormat = "parquet",
     fresh: bool = False,
     title: str = "study",
+    ray: str | None = None,
+    allow_mixed: bool = False,
     report: Report = lambda what, done, total: None,
 ) -> StudyResult:
     """Run what is missing of a study, then write its table, arrays, manifest and summary.
@@ -84,11 +88,13 @@ def run_study(
         table: "parquet" (wants the extra ``study``), "csv", or "both".
         fresh: Forget what ``out`` holds.
         title: For the summary.
+        ray: Address of a Ray cluster that runs the trials, or ``local``; None for processes of this machine.
+        allow_mixed: Take machines of the cluster whose bits differ.
         report: Called with what is being done, how much is done, and of how much.
 
     Raises:
         InputError: ``out`` holds another study, or cannot be written.
-        MissingExtraError: Parquet is wanted and pyarrow is not installed.
+        MissingExtraError: Parquet is wanted and pyarrow is not installed, or a cluster and Ray is not.
     """
     if table not in ("parquet", "csv", "both"):
         raise InputError(f"table: want 'parquet', 'csv' or 'both', got {table!r}")
@@ -106,7 +112,6 @@ def run_study(
     if damaged:
         few = ", ".join(map(str, damaged[:5])) + (", …" if len(damaged) > 5 else "")
         notes.append(f"{len(damaged)} trials kept in {folder} are damaged and run again: {few}")
-    workers = min(processes or cores(), max(len(missing), 1))
     finished = experiment.trials - len(missing)
     report("trials", finished, experiment.trials)
 
@@ -115,37 +120,62 @@ def run_study(
         finished += 1
         report("trials", finished, experiment.trials)
 
-    run_trials(experiment, missing, folder / _TRIALS, processes=workers, done=done)
-    files = _write_results(experiment, folder, shards, table)
-    rows, seconds = _rows_and_seconds(shards, experiment.trials)
+    how: dict[str, Any] = {"ray": ray, "allow_mixed": allow_mixed, "processes": processes}
+    where = _run_missing(experiment, missing, folder / _TRIALS, **how, done=done, note=notes.append)
+    rows, arrays = gathered(shards.all(experiment.trials))
+    files = _write_results(experiment, folder, rows, arrays, table)
     rates = success_rates(rows, experiment.success, experiment.groups)
     shown = [column for column in experiment.columns if column.name in experiment.shown]
     files += write_summary(folder, title, rates, rows, shown)
     total = time.perf_counter() - began
-    write_json(
-        folder / "manifest.json",
-        {
-            "title": title,
-            "trials": experiment.trials,
-            "seed": experiment.seed,
-            "seeds": "trial k draws from numpy.random.SeedSequence(seed, spawn_key=(k,))",
-            "fingerprint": fingerprint(experiment.identity()),
-            "experiment": experiment.identity(),
-            "versions": versions(),
-            "statuses": dict(Counter(str(row["status"]) for row in rows).most_common()),
-            "rates": [asdict(rate) for rate in rates],
-            "files": {file.name: file_hash(file) for file in files},
-            "columns": [asdict(column) for column in table_columns(experiment)],
-            "last_run": {
-                "started": moment.isoformat(timespec="seconds"),
-                "seconds": round(total, 3),
-                "processes": workers,
-                "trials_run": len(missing),
-            },
-            "trial_seconds": [round(value, 4) for value in seconds],
-        },
-    )
+    run = {"started": moment.isoformat(timespec="seconds"), "seconds": round(total, 3), **where}
+    content = {"title": title, **_described(experiment, rows, rates), **experiment.overall(rows, arrays)}
+    content |= {
+        "files": {file.name: file_hash(file) for file in files},
+        "columns": [asdict(column) for column in table_columns(experiment)],
+        "last_run": {**run, "trials_run": len(missing)},
+        "trial_seconds": [round(shard.seconds, 4) for shard in shards.all(experiment.trials)],
+    }
+    write_json(folder / "manifest.json", content)
     return StudyResult((*files, folder / "manifest.json"), tuple(rates), len(missing), total, tuple(notes))
+
+
+def _run_missing(
+    experiment: Experiment,
+    missing: list[int],
+    kept: Path,
+    *,
+    ray: str | None,
+    allow_mixed: bool,
+    processes: int | None,
+    done: Callable[[int, str], None],
+    note: Callable[[str], None],
+) -> dict[str, Any]:
+    """Run trials here or on a cluster; returns where, for the manifest."""
+    if ray is None:
+        workers = min(processes or cores(), max(len(missing), 1))
+        run_trials(experiment, missing, kept, processes=workers, done=done)
+        return {"processes": workers}
+    if not missing:
+        return {}
+    from warpjld.study.cluster import run_on_ray
+
+    how: dict[str, Any] = {"address": ray, "processes": processes, "allow_mixed": allow_mixed}
+    return {"cluster": run_on_ray(experiment, missing, kept, **how, done=done, note=note)}
+
+
+def _described(experiment: Experiment, rows: list[dict[str, Any]], rates: list[Rate]) -> dict[str, Any]:
+    """What was tried, and how it ended."""
+    return {
+        "trials": experiment.trials,
+        "seed": experiment.seed,
+        "seeds": "trial k draws from numpy.random.SeedSequence(seed, spawn_key=(k,))",
+        "fingerprint": fingerprint(experiment.identity()),
+        "experiment": experiment.identity(),
+        "versions": versions(),
+        "statuses": dict(Counter(str(row["status"]) for row in rows).most_common()),
+        "rates": [asdict(rate) for rate in rates],
+    }
 
 
 def opened(experiment: Experiment, folder: Path, *, fresh: bool = False, notes: list[str] | None = None) -> Shards:
@@ -207,8 +237,13 @@ def _same_study(before: dict[str, Any], now: dict[str, Any], folder: Path) -> No
     )
 
 
-def _write_results(experiment: Experiment, folder: Path, shards: Shards, table: TableFormat) -> list[Path]:
-    rows, arrays = gathered(shards.all(experiment.trials))
+def _write_results(
+    experiment: Experiment,
+    folder: Path,
+    rows: list[dict[str, Any]],
+    arrays: dict[str, NDArray[Any]],
+    table: TableFormat,
+) -> list[Path]:
     columns, files = table_columns(experiment), []
     if table != "csv":
         write_parquet(folder / "table.parquet", rows, columns)
@@ -218,8 +253,3 @@ def _write_results(experiment: Experiment, folder: Path, shards: Shards, table: 
         files += [folder / "table.csv", folder / "columns.json"]
     write_arrays(folder / "poses.npz", arrays)
     return [*files, folder / "poses.npz"]
-
-
-def _rows_and_seconds(shards: Shards, trials: int) -> tuple[list[dict[str, Any]], list[float]]:
-    found = [(shard.row, shard.seconds) for shard in shards.all(trials)]
-    return [row for row, _ in found], [seconds for _, seconds in found]

@@ -6,7 +6,7 @@ import base64
 import json
 import os
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -31,6 +31,27 @@ class Shard:
     arrays: dict[str, NDArray[Any]]
     seconds: float
 
+    def packed(self) -> bytes:
+        """As it is kept on disk."""
+        content = {
+            "trial": self.trial,
+            "row": self.row,
+            "arrays": {name: _packed(array) for name, array in self.arrays.items()},
+            "seconds": self.seconds,
+        }
+        return json.dumps(content, allow_nan=True, ensure_ascii=False).encode("utf-8")
+
+    @staticmethod
+    def unpacked(content: bytes) -> Shard:
+        """What `packed` made; raises whatever damaged bytes lead to."""
+        found = json.loads(content.decode("utf-8"))
+        arrays = {name: _unpacked(packed) for name, packed in found["arrays"].items()}
+        return Shard(int(found["trial"]), dict(found["row"]), arrays, float(found["seconds"]))
+
+    def results(self) -> bytes:
+        """Its results alone, which are the same bits wherever it is run: all but the seconds."""
+        return replace(self, seconds=0.0).packed()
+
 
 class Shards:
     """The folder of trials. Numbers are kept exactly: JSON holds doubles by their shortest decimal form, arrays by
@@ -51,25 +72,21 @@ class Shards:
 
     def write(self, shard: Shard) -> None:
         """Keep a trial; whoever reads sees all of it or nothing, whenever the writer is killed."""
-        target = self.path(shard.trial)
+        self.put(shard.trial, shard.packed())
+
+    def put(self, trial: int, content: bytes) -> None:
+        """Keep a trial that another machine has packed."""
+        target = self.path(trial)
         target.parent.mkdir(parents=True, exist_ok=True)
-        content = {
-            "trial": shard.trial,
-            "row": shard.row,
-            "arrays": {name: _packed(array) for name, array in shard.arrays.items()},
-            "seconds": shard.seconds,
-        }
         # two writers of one trial (a worker thought dead) must not share a file
         beside = target.with_name(f"{target.name}.{os.getpid()}.part")
-        beside.write_text(json.dumps(content, allow_nan=True, ensure_ascii=False), encoding="utf-8")
+        beside.write_bytes(content)
         beside.replace(target)
 
     def read(self, trial: int) -> Shard | None:
         """A trial, or None where it has not been run, or its file is damaged."""
         try:
-            content = json.loads(self.path(trial).read_text(encoding="utf-8"))
-            arrays = {name: _unpacked(packed) for name, packed in content["arrays"].items()}
-            shard = Shard(int(content["trial"]), dict(content["row"]), arrays, float(content["seconds"]))
+            shard = Shard.unpacked(self.path(trial).read_bytes())
             if {shard.trial, shard.row.get("trial", trial)} != {trial} or not isinstance(shard.row["status"], str):
                 return None
             if self._columns:

@@ -129,3 +129,25 @@ def test_bad_arguments_are_named() -> None:
         resisted_wrench(box, [0.0] * 6)
     with pytest.raises(InputError, match="budget"):
         resisted_wrench(box, [1.0, 0, 0, 0, 0, 0], budget=0.0)
+
+
+def test_lift_is_what_friction_holds_of_the_squeeze() -> None:
+    """Two fingers on a line: along it one pushes with all there is, across it friction holds μ times that."""
+    answer = gravity_displacement(
+        two_on_sphere(0.03, 0.8), (0, 0, 0), mass=0.2, torque_scale=0.03, squeeze=5.0, **_STIFF
+    )
+    times = 5.0 / _WEIGHT
+    assert answer.lift == pytest.approx([times] * 2 + [0.8 * times] * 4, rel=1e-6)
+
+
+@settings(max_examples=10, deadline=None, derandomize=True)
+@given(st.integers(0, 2**31 - 1), st.floats(0.5, 50.0))
+def test_lift_is_the_resistance_with_that_budget(seed: int, squeeze: float) -> None:
+    rng = np.random.default_rng(seed)
+    points = rng.normal(size=(4, 3))
+    contacts = Contacts(0.03 * points, -points + 0.3 * rng.normal(size=(4, 3)), 0.6)
+    answer = gravity_displacement(contacts, (0, 0, 0), mass=0.2, torque_scale=0.03, squeeze=squeeze, **_STIFF)
+    for way, lift in zip(SIX_DIRECTIONS, answer.lift, strict=True):
+        load = np.r_[way * _WEIGHT, np.zeros(3)]
+        direct = resisted_wrench(contacts, load, torque_scale=0.03, budget=squeeze)
+        assert lift == pytest.approx(direct, rel=1e-5, abs=1e-6)

@@ -61,10 +61,23 @@ def test_a_thousand_trials_killed_half_way_give_the_same_bytes(tmp_path: Path) -
     assert sum(row["status"] == "closed" for row in rows) > 0.9 * _TRIALS
 
 
-def _started(plan: Path, out: Path, processes: int) -> subprocess.Popen[bytes]:
+@pytest.mark.slow
+def test_a_thousand_trials_on_ray_give_the_same_bytes(tmp_path: Path) -> None:
+    pytest.importorskip("pyarrow")
+    pytest.importorskip("ray")
+    plan = tmp_path / "study.toml"
+    plan.write_text(_PLAN)
+    here, there = tmp_path / "here", tmp_path / "there"
+    assert _started(plan, here, processes=1).wait() == 0
+    assert _started(plan, there, 2, "--ray", "local").wait() == 0
+    for name in _RESULTS:
+        assert (here / name).read_bytes() == (there / name).read_bytes(), name
+
+
+def _started(plan: Path, out: Path, processes: int, *more: str) -> subprocess.Popen[bytes]:
     """The command, leading a process group of its own."""
     environment = os.environ | {"PYTHONPATH": os.pathsep.join([str(_ROOT), str(_ROOT / "kernels")])}
-    options = ["-o", str(out), "--processes", str(processes), "--table", "both", "--quiet"]
+    options = ["-o", str(out), "--processes", str(processes), "--table", "both", "--quiet", *more]
     command = [sys.executable, "-m", "warpjld", "study", str(plan), *options]
     return subprocess.Popen(command, cwd=_ROOT, env=environment, start_new_session=True)
 

@@ -40,6 +40,9 @@ mass = 0.2
 """
 
 
+_PARTS = ("thumb", "index", "middle", "ring", "pinky", "palm")
+
+
 def plan(folder: Path, trials: int = 4, side: str = "right", more: str = "") -> Path:
     path = folder / "study.toml"
     path.write_text(PLAN.format(trials=trials, side=side) + more)
@@ -75,6 +78,10 @@ def test_measures_agree_with_one_another(rows: list[dict]) -> None:
         assert row["success"] == (row["closed"] and row["penetration"] <= 1e-3)
         assert row["held"] == 6 or not row["closed"]
         assert (row["displacement"] is None) == (row["held"] < 6)
+        assert row["touching"].split() == [part for part in _PARTS if row[f"area_{part}"] > 0.0]
+        assert 0.0 <= row["lift_least"] <= row["lift"]
+        assert (row["lift_least"] > 0.0) == (row["held"] == 6)
+        assert row["self_penetration"] >= 0.0
     boxes = [row for row in closed if row["object"] == "box"]
     assert all(row["mass"] == 0.2 for row in boxes)
 

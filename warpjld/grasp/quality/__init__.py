@@ -1,14 +1,18 @@
 """How good a grasp is. One measure a file, each with its formula and its source.
 
-All but `penetration` take plain arrays or a `Contacts` set, so that grasps from elsewhere can be judged too.
+All but `penetration`, `self_penetration` and `contact_map` take plain arrays or a `Contacts` set, so that grasps from
+elsewhere can be judged too.
 """
 
 from warpjld.grasp.quality.closure import Closure, force_closure
 from warpjld.grasp.quality.cone import friction_cone
+from warpjld.grasp.quality.contact_map import ContactMap, contact_map
 from warpjld.grasp.quality.contacts import Contacts, patch_spin
+from warpjld.grasp.quality.diversity import Diversity, diversity
 from warpjld.grasp.quality.gravity import SIX_DIRECTIONS, GravityResponse, gravity_displacement
 from warpjld.grasp.quality.penetration import Penetration, penetration
 from warpjld.grasp.quality.resistance import resisted_wrench
+from warpjld.grasp.quality.self_penetration import self_penetration
 from warpjld.grasp.quality.touch import ContactPatches, contact_patches, vertex_areas
 from warpjld.grasp.quality.wrench_space import WrenchSpace, least_resistance, wrench_space
 from warpjld.grasp.quality.wrenches import contact_wrenches, grasp_matrix
@@ -16,13 +20,17 @@ from warpjld.grasp.quality.wrenches import contact_wrenches, grasp_matrix
 __all__ = [
     "SIX_DIRECTIONS",
     "Closure",
+    "ContactMap",
     "ContactPatches",
     "Contacts",
+    "Diversity",
     "GravityResponse",
     "Penetration",
     "WrenchSpace",
+    "contact_map",
     "contact_patches",
     "contact_wrenches",
+    "diversity",
     "force_closure",
     "friction_cone",
     "grasp_matrix",
@@ -31,6 +39,7 @@ __all__ = [
     "patch_spin",
     "penetration",
     "resisted_wrench",
+    "self_penetration",
     "vertex_areas",
     "wrench_space",
 ]

@@ -37,6 +37,7 @@ class GravityResponse:
         forces: Contact forces in the contacts' frames (f_t₁, f_t₂, f_n, τ_n) [N, N m], shape (D, C, 4); NaN where
             not held.
         residual: Unbalanced wrench over the weight, after the solve, shape (D,); infinite where not held.
+        lift: Times the weight that the contacts hold with normal forces of ``squeeze`` in all, shape (D,).
     """
 
     held: NDArray[np.bool_]
@@ -44,6 +45,7 @@ class GravityResponse:
     rotations: Array
     forces: Array
     residual: Array
+    lift: Array
 
     @property
     def distance(self) -> Array:
@@ -87,6 +89,10 @@ def gravity_displacement(
     without closure. Without slip ξ = −(G K Gᵀ)⁻¹(−w) exactly. Where even unbounded forces in the discretised cones
     cannot carry w, the object is not held.
 
+    ``lift`` asks for no stiffness: it is `resisted_wrench` for the weight with a budget of ``squeeze``, the largest
+    factor λ for which forces in the cones, whose normal parts sum to ``squeeze`` at most, balance λ w. Above 1 the hand
+    lifts the object, slowly; above 1 + a/g also with the acceleration a.
+
     Args:
         contacts: C contacts.
         center: Centre of mass [m].
@@ -125,20 +131,22 @@ def gravity_displacement(
     held = np.zeros(count, dtype=bool)
     motion = np.full((count, 6), np.inf)
     forces = np.full((count, len(contacts), 4), np.nan)
-    residual = np.full(count, np.inf)
+    residual, lift = np.full(count, np.inf), np.zeros(count)
     springs = _Springs(contacts, grasp_matrix(contacts, center, torque_scale), stiffness)
     preload = squeeze * force_closure(contacts, center, torque_scale=torque_scale, edges=edges).forces
     weight = mass * gravity
     for d, way in enumerate(ways):
         load = weight * np.r_[way, np.zeros(3)]
         reach = resisted_wrench(contacts, load, center, torque_scale=torque_scale, budget=1e6 * weight, edges=edges)
+        # the program is homogeneous: half the forces hold half the weight
+        lift[d] = max(0.0, reach) * squeeze / (1e6 * weight)
         if reach < 1.0:
             continue
         held[d] = True
         motion[d], forces[d], residual[d] = springs.balance(preload, load)
         if residual[d] > _BALANCED:
             raise WarpjldError(f"gravity: direction {d}: forces are unbalanced by {residual[d]:.1e} of the weight")
-    return GravityResponse(held, motion[:, :3], motion[:, 3:] / torque_scale, forces, residual)
+    return GravityResponse(held, motion[:, :3], motion[:, 3:] / torque_scale, forces, residual, lift)
 
 
 class _Springs:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -48,6 +49,14 @@ class HandChoice:
     scale: float | None = None
     map: Path | None = None
 
+    def inputs(self) -> tuple[Path, ...]:
+        """Its files."""
+        return tuple(path for path in (self.file, self.skeleton, self.map) if path is not None)
+
+    def moved(self, places: Mapping[Path, Path]) -> HandChoice:
+        """The same hand, its files elsewhere."""
+        return replace(self, **_elsewhere(self, ("file", "skeleton", "map"), places))
+
     def load(self) -> Rig:
         """Build or read the hand."""
         if self.file is None:
@@ -83,6 +92,7 @@ class ObjectChoice:
         unit: Unit of the file's numbers.
         up: The file's axis that points up.
         mass: Mass at scale 1 [kg], or None to have it from density and volume.
+        centre: Whether a file's bounding box is put at the origin; otherwise its own frame stays.
     """
 
     name: str
@@ -92,9 +102,18 @@ class ObjectChoice:
     unit: str = "m"
     up: str = "y"
     mass: float | None = None
+    centre: bool = True
+
+    def inputs(self) -> tuple[Path, ...]:
+        """Its file."""
+        return () if self.file is None else (self.file,)
+
+    def moved(self, places: Mapping[Path, Path]) -> ObjectChoice:
+        """The same object, its file elsewhere."""
+        return replace(self, **_elsewhere(self, ("file",), places))
 
     def load(self, scale: float) -> GraspObject:
-        """Build or read the object, its bounding box centred on the origin, Y up."""
+        """Build or read the object, Y up, its bounding box centred on the origin unless ``centre`` is off."""
         if self.shape is not None:
             from warpjld.grasp.shapes import SHAPES
 
@@ -102,7 +121,7 @@ class ObjectChoice:
         from warpjld.grasp import load_object
 
         assert self.file is not None
-        found = load_object(self.file, name=self.name, unit=self.unit, up=self.up, scale=scale, centre=True)  # type: ignore[arg-type]
+        found = load_object(self.file, name=self.name, unit=self.unit, up=self.up, scale=scale, centre=self.centre)  # type: ignore[arg-type]
         check_size(found.vertices, f"object {self.name} at scale {scale:g}", path=self.file)
         return found
 
@@ -201,6 +220,11 @@ def _path(table: TomlTable, key: str) -> Path:
     if not path.is_file():
         table.fail(key, f"no such file: {path}")
     return path
+
+
+def _elsewhere(choice: Any, names: tuple[str, ...], places: Mapping[Path, Path]) -> dict[str, Any]:
+    paths = {name: getattr(choice, name) for name in names}
+    return {name: places.get(path, path) for name, path in paths.items() if path is not None}
 
 
 def _hashed(settings: dict[str, Any]) -> dict[str, Any]:

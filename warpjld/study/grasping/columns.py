@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from warpjld.tables.columns import Column
 
-__all__ = ["GRASP_COLUMNS"]
+__all__ = ["GRASP_COLUMNS", "SCORE_COLUMNS"]
 
 _PLANNED = (
     Column("hand", "text", "", "Name of the hand in the study file."),
@@ -21,6 +21,8 @@ _PLACED = (
     Column("approach_z", "number", "", "The same, z."),
     Column("gap", "number", "m", "Distance between palm and object along the approach, before closing."),
     Column("tilt", "number", "rad", "Angle between the palm's normal and the approach."),
+)
+_WRIST = (
     Column("wrist_x", "number", "m", "Position of the wrist joint, object frame, x."),
     Column("wrist_y", "number", "m", "The same, y."),
     Column("wrist_z", "number", "m", "The same, z."),
@@ -38,6 +40,9 @@ _MEASURED = (
     Column("object_inside", "number", "m", "Depth of the object's deepest vertex, or point of a sharp edge, inside the"
            " skin; 0 where none is."),
     Column("overlap", "number", "m³", "Volume common to hand and object, on a grid (see warpjld.grasp.Intersection)."),
+    Column("self_penetration", "number", "m", "Depth of the deepest vertex of a digit or the palm in another part"
+           " of the hand; 0 where none is."),
+    Column("touching", "text", "", "Parts of the hand in contact, of: thumb index middle ring pinky palm."),
     Column("closed", "truth", "", "Force closure with discretised cones (Nguyen 1988)."),
     Column("margin", "number", "", "Evenness of the closing force: smallest share of a cone edge × number of edges."),
     Column("epsilon", "number", "N", "Ferrari–Canny epsilon, 1 N of normal force, torques over torque_scale."),
@@ -47,8 +52,16 @@ _MEASURED = (
     Column("displacement", "number", "m", "Largest displacement of the centre of mass under gravity from ±x, ±y, ±z;"
            " empty where a direction is not held."),
     Column("held", "integer", "", "Directions of the six in which the weight is held."),
+    Column("lift", "number", "", "Times the object's weight that is held against gravity along −y by normal"
+           " forces of squeeze in all; above 1 it is lifted, quasi-statically."),
+    Column("lift_least", "number", "", "The least of the same for gravity along ±x, ±y, ±z."),
     Column("success", "truth", "", "Force closure, penetration and displacement within the study's limits."),
 )  # fmt: skip
 
-GRASP_COLUMNS = (*_PLANNED, *_PLACED, *_TOUCH, *_MEASURED)
+GRASP_COLUMNS = (*_PLANNED, *_PLACED, *_WRIST, *_TOUCH, *_MEASURED)
 """Columns after the ones every study has."""
+
+SCORE_COLUMNS = (
+    Column("grasp", "text", "", "What the file of grasps calls it."), *_PLANNED, *_WRIST, *_TOUCH, *_MEASURED
+)  # fmt: skip
+"""Likewise for grasps of others: how the hand came there is not known."""

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from warpjld.covering import Covering
+from warpjld.covering.device import checked_device
 from warpjld.covering.kept import bind_kept
 from warpjld.errors import InputError
 from warpjld.grasp import GraspObject, ObjectSet
@@ -23,7 +24,7 @@ from warpjld.skeleton import CHANNELS, Skeleton, poses_from_angles
 from warpjld.study.grasping.choices import HandChoice, ObjectChoice
 from warpjld.study.grasping.plan import Posture
 
-__all__ = ["Hand", "Opened", "Thing", "closer_of", "hand_of", "opened_hand", "thing_of"]
+__all__ = ["Hand", "Opened", "Thing", "closer_of", "device_identity", "hand_of", "opened_hand", "thing_of"]
 
 _SPACING = 1.5e-3  # of the points that stand for skin [m]
 
@@ -82,6 +83,16 @@ class Thing:
         return self.objects.objects[0]
 
 
+def device_identity(device: str) -> dict[str, str]:
+    """What of a device decides last bits: nothing for the CPU, else which it is.
+
+    Raises:
+        InputError: There is no such device.
+    """
+    found = checked_device(device)
+    return {} if found.is_cpu else {"device": str(found.name)}
+
+
 @lru_cache(maxsize=4)
 def hand_of(choice: HandChoice) -> Hand:
     """Build or read a hand and bind it; kept for the process.
@@ -131,8 +142,8 @@ def _angles(skeleton: Skeleton, posture: tuple[tuple[str, str, float], ...], nam
 
 
 @lru_cache(maxsize=32)
-def thing_of(choice: ObjectChoice, scale: float, density: float) -> Thing:
-    """Build or read an object at a scale; kept for the process.
+def thing_of(choice: ObjectChoice, scale: float, density: float, device: str = "cpu") -> Thing:
+    """Build or read an object at a scale, for distances on a Warp device; kept for the process.
 
     Raises:
         InputError: It cannot be used, or has neither volume nor mass.
@@ -143,7 +154,7 @@ def thing_of(choice: ObjectChoice, scale: float, density: float) -> Thing:
     if not mass > 0.0:
         raise InputError(f"object {choice.name}: encloses no volume; give it a mass")
     radius = float(np.linalg.norm(body.vertices - body.centroid, axis=1).max())
-    return Thing(ObjectSet(body), mass, radius)
+    return Thing(ObjectSet(body, device=device), mass, radius)
 
 
 @lru_cache(maxsize=32)

@@ -9,10 +9,12 @@ from numpy.typing import NDArray
 
 from warpjld.grasp.both_ways import BothWays
 from warpjld.grasp.quality import (
+    SIX_DIRECTIONS,
     ContactPatches,
     force_closure,
     gravity_displacement,
     penetration,
+    self_penetration,
     wrench_space,
 )
 from warpjld.grasp.touching import touching_patches
@@ -21,6 +23,8 @@ from warpjld.study.grasping.load import Hand, Thing
 from warpjld.study.grasping.plan import Measuring
 
 __all__ = ["measure_grasp"]
+
+_DOWN = int((SIX_DIRECTIONS @ [0.0, -1.0, 0.0]).argmax())
 
 
 def measure_grasp(
@@ -66,6 +70,8 @@ def measure_grasp(
         "skin_inside": skin_inside,
         "object_inside": inside.thing,
         "overlap": inside.volume,
+        "self_penetration": self_penetration(hand.covering, vertices),
+        "touching": " ".join(part for part in (*reversed(DIGITS), "palm") if areas[part] > 0.0),
         "closed": closure.closed,
         "margin": closure.margin,
         "epsilon": space.epsilon,
@@ -74,6 +80,8 @@ def measure_grasp(
         "mass": thing.mass,
         "displacement": gravity.worst if np.isfinite(gravity.worst) else None,
         "held": int(gravity.held.sum()),
+        "lift": float(gravity.lift[_DOWN]),
+        "lift_least": float(gravity.lift.min()),
         "success": bool(closure.closed and max(skin_inside, inside.thing) <= how.penetration and firm),
     }
     return values, patches

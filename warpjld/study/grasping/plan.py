@@ -12,9 +12,9 @@ from warpjld.skeleton import CHANNELS, DIGITS
 from warpjld.skeleton.hand import HAND_PARENTS
 from warpjld.study.grasping.choices import HandChoice, ObjectChoice, read_hand, read_object
 
-__all__ = ["GraspPlan", "Measuring", "WristRange", "load_plan"]
+__all__ = ["COMPUTING", "GraspPlan", "Measuring", "WristRange", "load_plan"]
 
-_COMPUTING = ("warpjld", "numpy", "scipy", "warp-lang")  # another version may give other last digits
+COMPUTING = ("warpjld", "numpy", "scipy", "warp-lang")  # another version may give other last digits
 
 
 @dataclass(frozen=True)
@@ -107,7 +107,7 @@ class GraspPlan:
         del settings["trials"], settings["title"]
         settings["hands"] = [hand.identity() for hand in self.hands]
         settings["objects"] = [thing.identity() for thing in self.objects]
-        return settings | {"versions": {name: versions([name])[name] for name in _COMPUTING}}
+        return settings | {"versions": {name: versions([name])[name] for name in COMPUTING}}
 
 
 def load_plan(path: str | Path) -> GraspPlan:

@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
 from warpjld.study.grasping.plan import GraspPlan, load_plan
 from warpjld.study.grasping.trial import GraspExperiment
 from warpjld.study.rerun import Rerun, rerun_trial
-from warpjld.study.run import StudyResult, TableFormat, run_study
+from warpjld.study.run import StudyResult, TableFormat, opened, run_study
 
 __all__ = ["Study"]
 
@@ -20,6 +20,7 @@ class Study:
 
     Attributes:
         plan: What is tried.
+        device: Warp device of the covering and of distances to objects; hands close on the CPU.
 
     Examples:
         >>> from tempfile import mkdtemp
@@ -44,24 +45,25 @@ class Study:
     """
 
     plan: GraspPlan
+    device: str = "cpu"
 
     def __repr__(self) -> str:
         counts = ((self.plan.trials, "trial"), (len(self.plan.hands), "hand"), (len(self.plan.objects), "object"))
         return f"Study({self.plan.title}: " + ", ".join(f"{n} {what}{'s' * (n != 1)}" for n, what in counts) + ")"
 
     @classmethod
-    def load(cls, path: str | Path) -> Study:
+    def load(cls, path: str | Path, *, device: str = "cpu") -> Study:
         """Read a plan (TOML).
 
         Raises:
             InputError: It cannot be read, or asks for what cannot be; names the line or key.
         """
-        return cls(load_plan(Path(path)))
+        return cls(load_plan(Path(path)), device)
 
     @property
     def experiment(self) -> GraspExperiment:
         """What is repeated."""
-        return GraspExperiment(self.plan)
+        return GraspExperiment(self.plan, self.device)
 
     def check(self) -> tuple[list[str], list[str]]:
         """Load every hand and object once: notes on them, and what looks suspicious.
@@ -78,11 +80,21 @@ class Study:
         processes: int | None = None,
         table: TableFormat = "parquet",
         fresh: bool = False,
+        ray: str | None = None,
+        allow_mixed: bool = False,
         report: Callable[[str, int, int], None] = lambda what, done, total: None,
     ) -> StudyResult:
         """Run what is missing of the study in a folder; arguments and errors as of ``run_study``."""
         return run_study(
-            self.experiment, out, processes=processes, table=table, fresh=fresh, title=self.plan.title, report=report
+            self.experiment,
+            out,
+            processes=processes,
+            table=table,
+            fresh=fresh,
+            title=self.plan.title,
+            ray=ray,
+            allow_mixed=allow_mixed,
+            report=report,
         )
 
     def rerun(
@@ -94,3 +106,20 @@ class Study:
     ) -> Rerun:
         """Run one trial again, compare it with what is there, and draw it; errors as of ``rerun_trial``."""
         return rerun_trial(self.experiment, out, trial, report=report)
+
+    def export(self, out: str | Path, kinds: Sequence[str], *, trials: Sequence[int] | None = None) -> list[Path]:
+        """Write the closed hands of a study for other programs, into ``out/export``.
+
+        Args:
+            out: The study's folder.
+            kinds: Some of ``isaac`` (isaac_grasp YAML 1.0), ``dexgraspbench`` (``.npy``) and ``mesh`` (OBJ and GLB of
+                hand and object, and maps of contact).
+            trials: Numbers of trials; all that closed if left out.
+
+        Raises:
+            InputError: An unknown kind, another study in ``out``, a trial that did not close, or none that did.
+        """
+        from warpjld.study.grasping.export import export_grasps
+
+        folder = Path(out)
+        return export_grasps(self.plan, opened(self.experiment, folder), folder / "export", kinds, trials)

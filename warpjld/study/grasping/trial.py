@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, ClassVar
 
@@ -22,9 +23,10 @@ from warpjld.skeleton import poses_from_angles
 from warpjld.study.experiment import Outcome
 from warpjld.study.grasping.choices import HandChoice, ObjectChoice
 from warpjld.study.grasping.columns import GRASP_COLUMNS
-from warpjld.study.grasping.load import Thing, closer_of, hand_of, opened_hand, thing_of
+from warpjld.study.grasping.load import Thing, closer_of, device_identity, hand_of, opened_hand, thing_of
 from warpjld.study.grasping.measure import measure_grasp
 from warpjld.study.grasping.plan import GraspPlan
+from warpjld.study.grasping.variety import varieties
 from warpjld.study.grasping.wrist import Approach, draw_approach, place_palm, touch_along
 from warpjld.tables.columns import Column
 
@@ -49,9 +51,15 @@ class _Tried:
 
 @dataclass(frozen=True)
 class GraspExperiment:
-    """The experiment of a plan, for `warpjld.study.run_study`."""
+    """The experiment of a plan, for `warpjld.study.run_study`.
+
+    Attributes:
+        settings: The plan.
+        device: Warp device of the covering and of distances to objects; hands close on the CPU.
+    """
 
     settings: GraspPlan
+    device: str = "cpu"
 
     columns: ClassVar[tuple[Column, ...]] = GRASP_COLUMNS
     success: ClassVar[str] = "success"
@@ -69,8 +77,23 @@ class GraspExperiment:
         return self.settings.seed
 
     def identity(self) -> dict[str, Any]:
-        """See `GraspPlan.identity`."""
-        return self.settings.identity()
+        """See `GraspPlan.identity`; another device gives other last bits."""
+        return self.settings.identity() | device_identity(self.device)
+
+    def overall(self, rows: Sequence[dict[str, Any]], arrays: Mapping[str, NDArray[Any]]) -> dict[str, Any]:
+        """Diversity of every hand's grasps."""
+        return {"diversity": varieties(self.settings.hands, rows, arrays)}
+
+    def inputs(self) -> tuple[Path, ...]:
+        """Files of hands and objects."""
+        hands = (path for hand in self.settings.hands for path in hand.inputs())
+        return (*hands, *(path for thing in self.settings.objects for path in thing.inputs()))
+
+    def moved(self, places: Mapping[Path, Path]) -> GraspExperiment:
+        """The same study, these files elsewhere."""
+        hands = tuple(hand.moved(places) for hand in self.settings.hands)
+        objects = tuple(thing.moved(places) for thing in self.settings.objects)
+        return replace(self, settings=replace(self.settings, hands=hands, objects=objects))
 
     def plan(self, trial: int) -> dict[str, Any]:
         """What is known beforehand."""
@@ -132,7 +155,7 @@ class GraspExperiment:
         poses = poses_from_angles(hand.rig.skeleton, tried.angles[None], **one_frame)
         wrist = poses.positions[0, hand.rig.skeleton.index("wrist")]
         placed = dict(zip(("wrist_x", "wrist_y", "wrist_z"), wrist, strict=True))
-        vertices = hand.covering.deform(poses, threads=1)[0]
+        vertices = hand.covering.deform(poses, device=self.device, threads=1)[0]
         both = self._closer(choice, wanted, scale).both
         measured, patches = measure_grasp(hand, thing, both, vertices, friction, self.settings.measuring)
         kept = {"angles": tried.angles, **root, **_by_segment(patches)}
@@ -204,7 +227,7 @@ class GraspExperiment:
         return draw_grasp(hand_of(choice), self._thing(wanted, scale).body, trial, outcome, folder)
 
     def _thing(self, choice: ObjectChoice, scale: float) -> Thing:
-        return thing_of(choice, scale, self.settings.measuring.density)
+        return thing_of(choice, scale, self.settings.measuring.density, self.device)
 
     def _closer(self, hand: HandChoice, choice: ObjectChoice, scale: float) -> Closer:
         return closer_of(hand, choice, scale, self.settings.measuring.density)

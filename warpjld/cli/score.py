@@ -1,0 +1,94 @@
+"""``warpjld score``: grasps of others, judged by the columns of a grasp study."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any, Literal
+
+import click
+
+from warpjld.cli import options
+from warpjld.cli.study_answer import tell
+from warpjld.cli.warn import warn
+
+__all__ = ["score_command"]
+
+
+@click.command("score")
+@click.argument("grasps", type=click.Path(path_type=Path))
+@options.out_folder
+@click.option("--hand", metavar="RIG", help="Whose grasps they are: a rig file, builtin:left or builtin:right.")
+@click.option("--objects", type=click.Path(path_type=Path), help="Folder of surfaces, in the frame of the grasps.")
+@click.option("--object-unit", "unit", default="m", show_default=True, help="Unit of these: m, dm, cm, mm, in.")
+@click.option(
+    "--plan",
+    type=click.Path(path_type=Path),
+    help="A study file that has hands, objects and [measuring], instead of --hand and --objects.",
+)
+@click.option(
+    "--map", "joint_map", type=click.Path(path_type=Path), help="JSON: which angle of the hand each joint is."
+)
+@click.option("--friction", type=float, default=0.6, show_default=True, help="Where a grasp brings none.")
+@click.option(
+    "--flat-hand-mean/--no-flat-hand-mean",
+    default=None,
+    help="Whether no rotation of a MANO pose is the flat hand; where the file does not say.",
+)
+@click.option(
+    "--frames",
+    type=click.Choice(["last", "all"]),
+    default="last",
+    show_default=True,
+    help="Of a recording, its last frame is the grasp, or each.",
+)
+@click.option("--processes", type=click.IntRange(min=1), help="Worker processes; one a core by default.")
+@click.option(
+    "--table",
+    type=click.Choice(["parquet", "csv", "both"]),
+    default="parquet",
+    show_default=True,
+    help="Format of the results table.",
+)
+@click.option("--fresh", is_flag=True, help="Start again, forgetting the trials in the output folder.")
+@options.device
+@options.ray
+@options.allow_mixed
+@options.json
+@options.quiet
+def score_command(
+    grasps: Path,
+    out: Path,
+    hand: str | None,
+    processes: int | None,
+    table: Literal["parquet", "csv", "both"],
+    fresh: bool,
+    ray: str | None,
+    allow_mixed: bool,
+    as_json: bool,
+    quiet: bool,
+    **how: Any,
+) -> None:
+    """Judge GRASPS, a file or folder, on skin that deforms: the table of a grasp study, a row for each.
+
+    Read are a study's folder, isaac_grasp YAML 1.0, DexGraspBench and GraspXL .npy (pickles are never executed), CSV of
+    joint angles in degrees, and surfaces as study --export mesh writes them."""
+    from warpjld.cli.progress import progress
+    from warpjld.runtime.quiet import silence_warp
+    from warpjld.study.run import run_study
+    from warpjld.study.scoring import given_scores, hand_choice
+
+    silence_warp()
+    with progress(quiet) as report:
+        report("reading grasps, hand and objects", 0, 1)
+        chosen = None if hand is None else hand_choice(hand)
+        experiment = given_scores(grasps, hand=chosen, **how)
+        notes, doubts = experiment.check()
+        warn(doubts, "suspicious")
+        try:
+            where: dict[str, Any] = {"processes": processes, "ray": ray, "allow_mixed": allow_mixed}
+            result = run_study(experiment, out, **where, table=table, fresh=fresh, title=grasps.name, report=report)
+        except KeyboardInterrupt:
+            click.echo(f"stopped; the same command goes on from what is in {out}", err=True)
+            raise
+    warn(result.notes)
+    tell(result, notes, as_json, quiet, what="grasps")

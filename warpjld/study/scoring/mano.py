@@ -1,0 +1,89 @@
+"""Recordings of MANO hands beside objects, as GraspXL (Zhang et al. 2024) has them: a dictionary in an ``.npy`` file.
+
+A hand, ``right_hand`` or ``left_hand``, has ``trans`` [m], ``rot`` and ``pose`` (axis-angle, fifteen joints in MANO's
+order) a frame; every other entry with ``trans`` and ``rot`` is the object, by its name. ``trans`` is taken for where
+the wrist is: MANO's own translation is that less the wrist's place in its rest hand, a part of the licensed model,
+which a field ``wrist`` [m] of the hand gives where it must be added.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial.transform import Rotation
+
+from warpjld.errors import InputError
+from warpjld.grasp.objects import Places
+from warpjld.motion.mano import mano_hands
+from warpjld.study.scoring.given import GivenGrasp
+from warpjld.study.scoring.reading_grasps import GraspReading
+
+__all__ = ["is_mano_grasp", "mano_grasps"]
+
+Array = NDArray[np.float64]
+
+_HANDS = {"right_hand": "right", "left_hand": "left"}
+_RATE = 30.0  # of the frames, which are looked at one by one
+
+
+def is_mano_grasp(content: Any) -> bool:
+    """Whether a file's content is of this kind."""
+    return isinstance(content, Mapping) and any(isinstance(content.get(key), Mapping) for key in _HANDS)
+
+
+def mano_grasps(content: Mapping[str, Any], name: str, how: GraspReading) -> list[GivenGrasp]:
+    """The last frame of a recording, or each of them.
+
+    Raises:
+        InputError: No hand of the rig's side, no object, frames that differ in number, or what ``mano_hands`` refuses.
+    """
+    rig = how.hand("")
+    side = next(one for one in ("left", "right") if f"{one}.wrist" in rig.skeleton.names)
+    hand = content.get(f"{side}_hand")
+    if not isinstance(hand, Mapping):
+        raise InputError(f"has no {side}_hand, which the rig is")
+    things = [key for key, value in content.items() if key not in _HANDS and isinstance(value, Mapping)]
+    if len(things) != 1:
+        raise InputError(f"want one object beside the hand, got {', '.join(things) or 'none'}")
+    thing = content[things[0]]
+    trans, turn = _vectors(hand, "trans"), _vectors(hand, "rot")
+    count = len(trans)
+    if "wrist" in hand:
+        trans = trans + _vectors(hand, "wrist")
+    where, facing = _vectors(thing, "trans"), _vectors(thing, "rot")
+    if {count} != {len(turn), len(where), len(facing)}:
+        raise InputError(f"{things[0]}: want as many frames as the hand has, {count}")
+    fields = {"pose": hand.get("pose"), "global_orient": turn, "transl": trans, "side": side, "frame": "rig"}
+    fields |= {key: hand[key] for key in ("flat_hand_mean", "hands_mean", "joint_order") if key in hand}
+    (track,) = mano_hands(fields, _RATE, how.flat_hand_mean, where="the recording").hands
+    turns = track.turns(rig.skeleton)
+    if len(turns.local) != count:
+        raise InputError(f"pose: want {count} frames, got {len(turns.local)}")
+    quaternions = Rotation.from_rotvec(facing).as_quat()
+    wanted = range(count) if how.frames == "all" else [count - 1]
+    said = f"frame {count - 1} of {count}, the last" if count > 1 and how.frames != "all" else ""
+    return [
+        GivenGrasp(
+            f"{name}#{k}" if count > 1 else name,
+            things[0],
+            turns.displacement[k],
+            turns.root[k],
+            turns=turns.local[k],
+            place=Places.of(where[k], quaternions[k]),
+            message=said,
+        )
+        for k in wanted
+    ]
+
+
+def _vectors(fields: Mapping[str, Any], key: str) -> Array:
+    try:
+        array = np.atleast_2d(np.asarray(fields.get(key), dtype=np.float64))
+    except (TypeError, ValueError):
+        array = np.zeros((0, 0))
+    if array.ndim != 2 or array.shape[1] != 3 or not len(array) or not np.isfinite(array).all():
+        raise InputError(f"'{key}': want three finite numbers a frame")
+    return array

@@ -1,0 +1,66 @@
+"""Grasps as surfaces: the deformed skin of each, as ``study --export mesh`` writes it or others may.
+
+``grasps.json`` lists them::
+
+    {"format": "warpjld_grasp_meshes", "format_version": 1,
+     "grasps": [{"name": "trial 0", "hand": "right", "object": "ball", "scale": 1, "friction": 0.6, "mass": 0.04,
+                 "skin": "0/hand.obj"}, …]}
+
+A skin is an OBJ file in metres and the object's frame whose vertices are the rig's, in their order.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from warpjld.errors import InputError
+from warpjld.files.text_file import read_json
+from warpjld.io.obj_file import read_obj
+from warpjld.rig import Rig
+from warpjld.study.scoring.given import GivenGrasp
+from warpjld.study.scoring.reading_grasps import GraspReading, number
+
+__all__ = ["FORMAT", "LISTED", "read_meshes"]
+
+FORMAT = "warpjld_grasp_meshes"
+LISTED = "grasps.json"
+
+
+def read_meshes(path: Path, how: GraspReading) -> list[GivenGrasp]:
+    """Grasps of a list of surfaces.
+
+    Raises:
+        InputError: It is no such list, or a surface is not the rig's.
+    """
+    content = read_json(path)
+    if not isinstance(content, Mapping) or content.get("format") != FORMAT or content.get("format_version") != 1:
+        raise InputError(f"want a list of surfaces: format {FORMAT}, format_version 1", path=path)
+    listed = content.get("grasps")
+    if not isinstance(listed, list) or not listed:
+        raise InputError("has no grasps", path=path)
+    try:
+        return [_grasp(one, path.parent, how) for one in listed]
+    except InputError as error:
+        raise InputError(error.message, path=error.path or path, line=error.line) from None
+
+
+def _grasp(one: Any, folder: Path, how: GraspReading) -> GivenGrasp:
+    if not isinstance(one, Mapping) or not all(isinstance(one.get(key), str) for key in ("name", "object", "skin")):
+        raise InputError("want name, object and skin of every grasp")
+    more: dict[str, Any] = {"hand": str(one.get("hand", ""))}
+    more |= {key: number(one[key], key, above=0.0) for key in ("scale", "friction", "mass") if key in one}
+    file = folder / one["skin"]
+    if not file.resolve().is_relative_to(folder.resolve()):
+        raise InputError(f"{one['name']}: '{one['skin']}' lies outside of the folder")
+    return GivenGrasp(one["name"], one["object"], skin=_skin(file, how.hand(more["hand"])), **more)
+
+
+def _skin(file: Path, rig: Rig) -> Any:
+    mesh, wanted = read_obj(file), len(rig.surface.vertices)
+    if len(mesh.vertices) != wanted or not np.array_equal(mesh.faces, rig.surface.faces):
+        raise InputError(f"is not this hand's skin: want its {wanted} vertices and its triangles", path=file)
+    return mesh.vertices.astype(np.float32)
