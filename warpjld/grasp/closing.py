@@ -153,7 +153,7 @@ class ClosingHands:
             self._tolerance,
             self._tolerance,
             wp.array(earliest, dtype=float, device="cpu", copy=False),
-            wp.array(np.empty_like(earliest, dtype=np.int32), dtype=wp.int32, device="cpu", copy=False),
+            wp.array(np.empty_like(earliest), dtype=float, device="cpu", copy=False),
         ]
         outs = [
             wp.array(a.reshape(-1), dtype=kind, device="cpu", copy=False)
