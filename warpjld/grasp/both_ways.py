@@ -12,6 +12,7 @@ from warpjld.grasp.moved import share_moved
 from warpjld.grasp.near_object import NearObject
 from warpjld.grasp.objects import GraspObject, Places
 from warpjld.grasp.outline import outline
+from warpjld.grasp.point_groups import grouped_points
 from warpjld.grasp.posed_skins import PosedSkins
 
 __all__ = ["BothWays"]
@@ -38,13 +39,8 @@ class BothWays:
     """
 
     def __init__(self, covering: Covering, thing: GraspObject) -> None:
-        import warp as wp
-
         self.covering, self.thing, self.near = covering, thing, NearObject(thing)
-        self._skins, self._points = (
-            kept_with(covering, PosedSkins),
-            wp.array(outline(thing), dtype=wp.vec3d, device="cpu"),
-        )
+        self._skins, self._points = kept_with(covering, PosedSkins), grouped_points(outline(thing))
         self.parts = self._skins.parts.names
         owned = kept_with(covering, _Owners)
         self.part_of_vertex, self._owners, self._movers = owned.owners[1], owned.owners, owned.movers

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterable
 from dataclasses import dataclass
 
 import numpy as np
@@ -119,12 +119,12 @@ class Judge:
 
     def _patches(
         self, finer: FinerSkin, vertices: NDArray[np.floating], tolerance: float
-    ) -> Iterator[tuple[Patches, float]]:
+    ) -> Iterable[tuple[Patches, float]]:
         """Patches of contact in the object's frame, and depth of the skin's points, of every hand."""
         place, parts = self.both.thing.place, self._segments[finer.parents]
         local = place.to_local(vertices.reshape(-1, 3))[0].reshape(vertices.shape)
-        for skin in local:
-            yield touching_patches(finer, parts, self.both.near, skin, tolerance)
+        patches, depths = touching_patches(finer, parts, self.both.near, local, tolerance)
+        return zip(patches, depths.tolist(), strict=True)
 
     def _pressing(self, patches: Patches, rotations: NDArray[np.float64]) -> tuple[Contacts, tuple[str, ...], bool]:
         rows = [SEGMENTS.index(name) for name in patches.names]

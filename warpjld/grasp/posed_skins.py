@@ -89,7 +89,7 @@ class PosedSkins:
 
         Args:
             skins: From ``fitted``.
-            points: ``wp.array`` of vec3d in the frames of the skins.
+            points: ``warpjld_kernels.posed_skin.PointGroups`` in the frames of the skins, see ``grouped_points``.
             part_of_face: Part that each triangle of the surface counts as, shape (T,).
             gaps: What is known already, contiguous.
             near: Points farther from a skin's bounding box do not count [m].
@@ -101,6 +101,7 @@ class PosedSkins:
 
         owner = np.full(len(self._faces), -1, dtype=np.int32)
         owner[: len(part_of_face)] = part_of_face
+        reach = np.empty((len(gaps), _WIDTH * len(self._tree.child)), dtype=np.float32)
         wp.launch(
             points_in_skins,
             len(gaps),
@@ -111,6 +112,7 @@ class PosedSkins:
                 limit,
                 outside,
                 wp.array(owner, dtype=wp.int32, device="cpu", copy=False),
+                wp.array(reach, dtype=float, device="cpu", copy=False),
                 wp.array(gaps, dtype=wp.float64, device="cpu", copy=False),
             ],
             device="cpu",

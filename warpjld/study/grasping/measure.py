@@ -37,7 +37,7 @@ def measure_grasp(
         how: Settings.
     """
     body, scale = thing.body, how.torque_scale or thing.radius
-    patches, deepest = touching_patches(hand.finer, hand.parts, both.near, vertices, how.contact)
+    (patches,), (deepest,) = touching_patches(hand.finer, hand.parts, both.near, vertices[None], how.contact)
     contacts, center = patches.contacts(friction), body.centroid
     closure = force_closure(contacts, center, torque_scale=scale, edges=how.edges)
     space = wrench_space(contacts, center, torque_scale=scale, norm=how.norm, edges=how.edges)
@@ -52,7 +52,7 @@ def measure_grasp(
         edges=how.edges,
     )
     inside = penetration(both, vertices)
-    skin_inside = max(inside.skin, deepest)
+    skin_inside = max(inside.skin, float(deepest))
     areas = dict.fromkeys((*DIGITS, "palm"), 0.0)
     for digit, area in zip(patches.digits, patches.areas, strict=True):
         areas[digit if digit in DIGITS else "palm"] += float(area)
