@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from warpjld.grasp.edges import unique_edges
 from warpjld.rotations import unit
 
 __all__ = ["pairs_round_edge", "separate_pieces", "turned_patches"]
@@ -88,13 +89,13 @@ def turned_patches(
         if before == behind:
             doubtful.append(k)
     ends = np.stack([faces, np.roll(faces, -1, axis=1)], axis=-1).reshape(-1, 2)
-    _, edge = np.unique(np.sort(ends, axis=1), axis=0, return_inverse=True)
+    _, edge, _ = unique_edges(ends)
     along = np.where(ends[:, 0] < ends[:, 1], 1, -1)
     owner = np.repeat(patch, 3)
     for k in doubtful:
         own = owner == k
-        run = np.bincount(edge.ravel(), along * np.where(turned[owner], -1, 1))
-        its = np.bincount(edge.ravel()[own], along[own], minlength=len(run))
+        run = np.bincount(edge, along * np.where(turned[owner], -1, 1))
+        its = np.bincount(edge[own], along[own], minlength=len(run))
         turned[k] = np.abs(run - 2.0 * its).sum() < np.abs(run).sum()
     return turned
 

@@ -5,6 +5,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from warpjld.grasp.edges import unique_edges
+
 __all__ = ["FinerSkin"]
 
 _MOST = 3  # rounds: every one makes four triangles of one
@@ -29,8 +31,7 @@ class FinerSkin:
         self.faces, self.parents = faces.astype(np.int32), np.arange(len(vertices))
         self._middles: list[NDArray[np.integer]] = []
         for _ in range(rounds):
-            corners = self.faces[:, [[0, 1], [1, 2], [2, 0]]]
-            edges, place = np.unique(np.sort(corners.reshape(-1, 2), axis=1), axis=0, return_inverse=True)
+            edges, place, _ = unique_edges(self.faces[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2))
             a, b, c = self.faces.T
             ab, bc, ca = (place.reshape(-1, 3) + len(self.parents)).T
             cut = [(a, ab, ca), (ab, b, bc), (ca, bc, c), (ab, bc, ca)]
