@@ -193,7 +193,11 @@ def _come(covering: Covering, hands: Candidates, near: NearObject, reach: NDArra
     skins = covering.deform(hands.poses(covering.skeleton), threads=1)
     place, moved = near.thing.place, np.zeros(len(hands))
     scratch = np.empty((2, *skins.shape[:2]), dtype=np.float32)
-    arrays = [(skins, wp.vec3), (np.ascontiguousarray(hands.approach), wp.vec3d), (reach.astype(np.float64), wp.float64)]
+    arrays = [
+        (skins, wp.vec3),
+        (np.ascontiguousarray(hands.approach), wp.vec3d),
+        (reach.astype(np.float64), wp.float64),
+    ]
     settings = [_CLEARANCE, _NEXT, _STEPS]
     rest = [(scratch[0], float), (scratch[1], float), (moved, wp.float64)]
     held, out = ([wp.array(a, dtype=kind, device="cpu", copy=False) for a, kind in some] for some in (arrays, rest))

@@ -108,7 +108,9 @@ def find_two_handed(
     widths = sample_widths(near, _LINES, rng, widest=float(np.linalg.norm(thing.size)))
     widths = widths[np.flatnonzero(widths.slant >= np.cos(np.arctan(friction)))]
     if not len(widths):
-        raise InputError(f"object {thing.name}: nowhere has it two sides that friction {friction:g} holds between palms")
+        raise InputError(
+            f"object {thing.name}: nowhere has it two sides that friction {friction:g} holds between palms"
+        )
     best: dict[str, AutoGrasp] = {}
     tried = 0
     while tried < count and not (best and 2 * tried >= count):
