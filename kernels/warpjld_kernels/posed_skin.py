@@ -241,7 +241,8 @@ def set_reach(
             for (int base = 0; base < W; base += N) {{
                 Floats squared = Floats(0.0f);
                 for (int i = 0; i < 3; ++i) {{
-                    const Floats a = *(const Stored*)(leaf + W * i + base), b = *(const Stored*)(leaf + W * (3 + i) + base);
+                    const Floats a = *(const Stored*)(leaf + W * i + base);
+                    const Floats b = *(const Stored*)(leaf + W * (3 + i) + base);
                     const Floats c = *(const Stored*)(leaf + W * (6 + i) + base);
                     const Floats gap = HIGHEST(
                         HIGHEST(LOWEST(LOWEST(a, b), c) - at[i], at[i] - HIGHEST(HIGHEST(a, b), c)), Floats(0.0f));
@@ -273,8 +274,10 @@ def set_reach(
     return false;
 """
 )
-def may_matter(skins: PosedSkins, reach: wp.array2d(dtype=float), pose: int, point: wp.vec3d, radius: wp.float64) -> bool:
-    """Whether a point within a ball may be near enough to a posed skin; if not, all of the ball is on one side of it."""
+def may_matter(
+    skins: PosedSkins, reach: wp.array2d(dtype=float), pose: int, point: wp.vec3d, radius: wp.float64
+) -> bool:
+    """Whether a point within a ball may be near enough to a posed skin; if not, the ball is on one side of it."""
 
 
 @wp.func

@@ -6,7 +6,7 @@ from scipy.spatial import cKDTree
 
 from warpjld.covering import bind
 from warpjld.errors import InputError
-from warpjld.grasp.both_ways import BothWays
+from warpjld.grasp.hand_object_gaps import HandObjectGaps
 from warpjld.grasp.quality import Contacts, least_resistance
 from warpjld.grasp.shapes import ball, box
 from warpjld.grasp.two_hands import find_two_handed
@@ -23,10 +23,12 @@ def test_palms_are_opposed_across_a_crate(both) -> None:
     left, right = found["left"], found["right"]
     assert left.approach @ right.approach == pytest.approx(-1.0)
     assert left.verdict is right.verdict
-    assert left.verdict.closed and left.touching and right.touching
+    assert left.verdict.closed
+    assert left.touching
+    assert right.touching
     skins = {side: both[side].deform(one.poses(both[side].skeleton))[0] for side, one in found.items()}
     for side, skin in skins.items():
-        assert BothWays(both[side], thing).depths(skin[None]).max() < 6e-4
+        assert HandObjectGaps(both[side], thing).depths(skin[None]).max() < 6e-4
     assert cKDTree(skins["left"]).query(skins["right"])[0].min() > 0.2  # the crate is between them
 
 

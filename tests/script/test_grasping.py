@@ -8,9 +8,9 @@ import pytest
 
 from warpjld.errors import InputError
 from warpjld.grasp import ObjectSet, Status
-from warpjld.grasp.both_ways import BothWays
 from warpjld.grasp.digits import pad_vertex
 from warpjld.grasp.draws import WAY
+from warpjld.grasp.hand_object_gaps import HandObjectGaps
 from warpjld.normals import vertex_normals
 from warpjld.script.binding import cover
 from warpjld.script.grasping import placed_at, posture
@@ -222,7 +222,7 @@ def test_two_hands_take_a_crate(run, scene, hands) -> None:
         assert np.array_equal(where[1], where[2])
         prop = scene.props["CRATE"]
         skin = cover(actor).deform(stage(actor, frames[2:], scene.rate))
-        assert BothWays(cover(actor), placed_at(scene, prop, 15.0)).gaps(skin).min() < 1e-4, side
+        assert HandObjectGaps(cover(actor), placed_at(scene, prop, 15.0)).gaps(skin).min() < 1e-4, side
 
 
 def test_grasp_auto_keeps_out_of_other_objects(run) -> None:

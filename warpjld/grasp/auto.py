@@ -199,9 +199,10 @@ def _refuse_what_is_too_wide(draws: Draws, friction: float) -> None:
     narrowest = draws.narrowest(friction)
     if narrowest > _SLACK * widest:
         doubt = doubt_of_size(thing, hand_length(draws.covering.skeleton), None)
+        also = f"; it {doubt}" if doubt else "; two hands may take it (GRASP … BOTH … AUTO)"
         raise InputError(
             f"object {thing.name}: too wide for this hand: nowhere narrower than {1e3 * narrowest:.0f} mm, and thumb "
-            f"and fingers open to {1e3 * widest:.0f} mm{f'; it {doubt}' if doubt else '; two hands may take it (GRASP … BOTH … AUTO)'}"
+            f"and fingers open to {1e3 * widest:.0f} mm{also}"
         )
 
 

@@ -11,11 +11,11 @@ from scipy.spatial.transform import Rotation
 
 from warpjld.covering import Covering
 from warpjld.covering.device import array_on
-from warpjld.grasp.found import Status
-from warpjld.grasp.moved import skin_beyond, skin_that_moves
+from warpjld.grasp.moving_skin import skin_beyond, skin_that_moves
 from warpjld.grasp.near_object import NearObject
 from warpjld.grasp.objects import Places
 from warpjld.grasp.packing import Chains, drives_on, posture_on, skin_on
+from warpjld.grasp.search_result import Status
 from warpjld.skeleton import CHANNELS, Poses, poses_from_angles
 
 __all__ = ["ClosingHands", "MovedSkin"]

@@ -1,4 +1,4 @@
-"""Edges of more than two triangles: which of the triangles round one belong together, and pieces that share no vertex."""
+"""Edges of more than two triangles: which of these belong together, and pieces that have no vertex in common."""
 
 from __future__ import annotations
 
@@ -35,7 +35,8 @@ def pairs_round_edge(
     angle = np.arctan2(away @ np.cross(axis, across), away @ across)
     # of triangles that lie on one another, those that end a solid come first
     order = np.lexsort([~forward, np.round(angle / _SAME)])
-    pairs, begun = [], []
+    pairs: list[tuple[int, int]] = []
+    begun: list[int] = []
     for n in [*order, *order]:  # twice round: a solid may begin before the first
         n = int(n)
         if any(n in pair for pair in pairs):

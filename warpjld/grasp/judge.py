@@ -11,9 +11,9 @@ from scipy.spatial.transform import Rotation
 
 from warpjld.covering import Covering
 from warpjld.errors import InputError
-from warpjld.grasp.both_ways import BothWays
 from warpjld.grasp.digits import digit_chains
 from warpjld.grasp.finer import FinerSkin
+from warpjld.grasp.hand_object_gaps import HandObjectGaps
 from warpjld.grasp.kept import kept_with
 from warpjld.grasp.objects import GraspObject
 from warpjld.grasp.quality.closure import force_closure
@@ -42,7 +42,7 @@ class Verdict:
         epsilon: Ferrari–Canny epsilon of these [N], norm L1, torques over the object's largest radius.
         digits: Digits that press, thumb included, e.g. ``thumb``.
         palm: Whether the palm presses.
-        depth: Depth of hand and object in one another [m], see ``BothWays``.
+        depth: Depth of hand and object in one another [m], see ``HandObjectGaps``.
     """
 
     closed: bool
@@ -94,7 +94,7 @@ class Judge:
         digits: Digits that the hand has, without side.
     """
 
-    def __init__(self, both: BothWays, side: str, friction: float) -> None:
+    def __init__(self, both: HandObjectGaps, side: str, friction: float) -> None:
         covering, thing = both.covering, both.thing
         self.both, self.friction = both, friction
         there = digit_chains(covering.skeleton)
@@ -130,7 +130,7 @@ class Judge:
         Args:
             poses: Of the closed hands.
             vertices: Their deformed skins [m], shape (G, V, 3).
-            depths: Of hands and object in one another [m], see ``BothWays``, shape (G,).
+            depths: Of hands and object in one another [m], see ``HandObjectGaps``, shape (G,).
         """
         return [
             self.verdict(one.contacts, one.digits, one.palm, max(float(depth), one.depth))
@@ -198,7 +198,7 @@ def judge(
     """
     side = hand_side(covering, side)
     check_friction(friction)
-    both = BothWays(covering, thing)
+    both = HandObjectGaps(covering, thing)
     skins = covering.deform(poses)
     depths = both.depths(skins).max(axis=1)
     return Judge(both, side, friction).judge(poses, skins, depths)

@@ -17,9 +17,9 @@ from warpjld.covering.paper import PaperCovering
 from warpjld.errors import InputError
 from warpjld.grasp.distance import ObjectSet
 from warpjld.grasp.facet import facet_distance
-from warpjld.grasp.found import Found, Status
 from warpjld.grasp.objects import Places
 from warpjld.grasp.packing import Chains
+from warpjld.grasp.search_result import Found, Status
 from warpjld.grasp.searches import Rows
 from warpjld.rotations import conjugate, multiply
 from warpjld.skeleton import CHANNELS, Poses, poses_from_angles

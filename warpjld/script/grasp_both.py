@@ -24,9 +24,10 @@ def both_hands(scene: Scene) -> dict[str, Actor]:
     """
     hands = {side: scene.actor_with(side) for side in ("left", "right")}
     for side, actor in hands.items():
-        if actor is hands["left"] and side == "right" or f"{side}.shoulder" in actor.skeleton.names:
+        alone = side == "left" or actor is not hands["left"]
+        if not alone or f"{side}.shoulder" in actor.skeleton.names:
             raise InputError(
-                f"GRASP … BOTH … AUTO moves hands as a whole: want an actor that is a left hand alone and one that is a "
+                "GRASP … BOTH … AUTO moves hands as a whole: want an actor that is a left hand alone and one that is a "
                 f"right hand alone; {actor.name} is more than that"
             )
         if actor.recorded is not None:

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from warpjld.grasp.both_ways import BothWays
+from warpjld.grasp.hand_object_gaps import HandObjectGaps
 from warpjld.grasp.quality import (
     Patches,
     force_closure,
@@ -24,7 +24,7 @@ __all__ = ["measure_grasp"]
 
 
 def measure_grasp(
-    hand: Hand, thing: Thing, both: BothWays, vertices: NDArray[np.float32], friction: float, how: Measuring
+    hand: Hand, thing: Thing, both: HandObjectGaps, vertices: NDArray[np.float32], friction: float, how: Measuring
 ) -> tuple[dict[str, Any], Patches]:
     """Columns of the table, and the patches of contact; definitions are in `warpjld.grasp.quality`, one a measure.
 

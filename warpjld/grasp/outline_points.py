@@ -8,12 +8,12 @@ from numpy.typing import NDArray
 from warpjld.grasp.edges import unique_edges
 from warpjld.grasp.objects import GraspObject
 
-__all__ = ["outline"]
+__all__ = ["outline_points"]
 
 _SHARP = np.cos(np.radians(10.0))
 
 
-def outline(thing: GraspObject, spacing: float = 2e-3) -> NDArray[np.float64]:
+def outline_points(thing: GraspObject, spacing: float = 2e-3) -> NDArray[np.float64]:
     """The vertices, and points along sharp edges no farther than ``spacing`` [m] apart, in the object's frame, (n, 3).
 
     An edge is sharp where its faces' normals differ by 10° or more, or where it has one face only. Inside flat parts no
