@@ -43,8 +43,8 @@ def penetration(both: HandObjectGaps, vertices: NDArray[np.floating]) -> Penetra
         skin = max(0, −min d_O(skin vertices)),   thing = max(0, −min d_S(object's outline)),
 
     the two halves of a depth by points (Zhang, Kim, Varadhan & Manocha 2007 compute the exact one), the outline being
-    the object's vertices and points of its sharp edges (`warpjld.grasp.outline_points`): a finger with few vertices does
-    not hide the edge of a box that cuts into it.
+    the object's vertices and points of its sharp edges (`warpjld.grasp.outline_points`): a finger with few
+    vertices does not hide the edge of a box that cuts into it.
 
     Args:
         both: Hand and object, which is at its own place. The hand's skin may be open, as at the wrist.
