@@ -11,7 +11,7 @@ from warpjld.errors import InputError, WarpjldError
 from warpjld.grasp.quality.closure import force_closure
 from warpjld.grasp.quality.contacts import Contacts
 from warpjld.grasp.quality.resistance import resisted_wrench
-from warpjld.grasp.quality.wrenches import grasp_matrix
+from warpjld.grasp.quality.wrenches import contact_wrenches, grasp_matrix
 
 __all__ = ["SIX_DIRECTIONS", "GravityResponse", "gravity_displacement"]
 
@@ -22,6 +22,9 @@ SIX_DIRECTIONS = np.array([[1, 0, 0], [-1, 0, 0], [0, 1, 0], [0, -1, 0], [0, 0, 
 
 # residual of the balance, as a share of the weight
 _BALANCED = 1e-5
+# sum of the normal forces beyond which an object counts as not held, in weights
+_MOST_FORCE = 1e6
+_SURE = 10.0  # times what is needed: the linear program that the margin comes from is rounded
 # a spring to the ground, as a share of k_n: of motions no contact feels, the smallest is taken
 _GROUND = 1e-10
 
@@ -127,18 +130,35 @@ def gravity_displacement(
     forces = np.full((count, len(contacts), 4), np.nan)
     residual = np.full(count, np.inf)
     springs = _Springs(contacts, grasp_matrix(contacts, center, torque_scale), stiffness)
-    preload = squeeze * force_closure(contacts, center, torque_scale=torque_scale, edges=edges).forces
-    weight = mass * gravity
+    closure = force_closure(contacts, center, torque_scale=torque_scale, edges=edges)
+    preload, weight = squeeze * closure.forces, mass * gravity
+    # what the ball resists needs no linear program
+    surely = _MOST_FORCE * _least_ball(contacts, center, torque_scale, edges, closure.margin) >= _SURE
     for d, way in enumerate(ways):
         load = weight * np.r_[way, np.zeros(3)]
-        reach = resisted_wrench(contacts, load, center, torque_scale=torque_scale, budget=1e6 * weight, edges=edges)
-        if reach < 1.0:
+        budget = _MOST_FORCE * weight
+        if not surely and (
+            resisted_wrench(contacts, load, center, torque_scale=torque_scale, budget=budget, edges=edges) < 1.0
+        ):
             continue
         held[d] = True
         motion[d], forces[d], residual[d] = springs.balance(preload, load)
         if residual[d] > _BALANCED:
             raise WarpjldError(f"gravity: direction {d}: forces are unbalanced by {residual[d]:.1e} of the weight")
     return GravityResponse(held, motion[:, :3], motion[:, 3:] / torque_scale, forces, residual)
+
+
+def _least_ball(contacts: Contacts, center: ArrayLike, torque_scale: float, edges: int, margin: float) -> float:
+    """A lower bound of epsilon (see ``wrench_space``, norm L1) from the margin of force closure, 0 without closure.
+
+    With Σ α_k w_k = 0, Σ α_k = 1 and α_k ≥ t for N wrenches, every unit u has max_k u·w_k ≥ t max_k |u·w_k| ≥ t σ₆/√N,
+    σ₆ the least singular value of the matrix of the w_k: what pulls one way is as much as what pulls the other.
+    """
+    if not margin > 0.0:
+        return 0.0
+    wrenches = np.concatenate(contact_wrenches(contacts, center, torque_scale, edges), axis=1)
+    count = wrenches.shape[1]
+    return float(margin / count * np.linalg.svd(wrenches, compute_uv=False)[5] / np.sqrt(count))
 
 
 class _Springs:
