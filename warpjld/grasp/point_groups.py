@@ -17,9 +17,9 @@ _WIDER = 1.0 + 1e-12  # radii are rounded
 
 
 def grouped_points(points: ArrayLike) -> Any:
-    """``warpjld_kernels.posed_skin.PointGroups`` of points (n, 3), n > 0, on the CPU; points come in another order."""
+    """``warpjld_kernels.points_in_skins.PointGroups`` of points (n, 3), n > 0; they come in another order."""
     import warp as wp
-    from warpjld_kernels.posed_skin import PointGroups
+    from warpjld_kernels.points_in_skins import PointGroups
 
     rows = np.asarray(points, dtype=np.float64)
     rows = rows[halved(rows)]
