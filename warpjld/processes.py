@@ -35,6 +35,7 @@ _THREADS = (
 
 
 Job = TypeVar("Job", contravariant=True)
+Each = TypeVar("Each")
 
 
 class Work(Protocol[Job]):
@@ -54,13 +55,13 @@ class Work(Protocol[Job]):
 
 
 @runtime_checkable
-class BlockWork(Work[Job], Protocol[Job]):
+class BlockWork(Work[Each], Protocol[Each]):
     """Jobs that are sooner done several at a time, with the same results."""
 
-    def blocks(self, jobs: Iterable[Job], processes: int) -> Iterable[list[Job]]:
+    def blocks(self, jobs: Iterable[Each], processes: int) -> Iterable[list[Each]]:
         """Jobs as they are handed out together."""
 
-    def do_block(self, jobs: list[Job]) -> list[str]:
+    def do_block(self, jobs: list[Each]) -> list[str]:
         """Do jobs one after another, and keep what comes of each; returns their statuses."""
 
 
