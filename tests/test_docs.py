@@ -134,7 +134,7 @@ def statuses() -> dict[str, tuple[type[Enum], str]]:
 
     return {
         "Flexion searches": (grasp.Status, "##"),
-        "Solves": (fem.Status, "##"),
+        "Solves": (fem.SolveStatus, "##"),
         "Grips": (GripStatus, "##"),
         "Trials of a grip": (TrialOutcome, "###"),
         "Forces asked for": (ForceStatus, "##"),

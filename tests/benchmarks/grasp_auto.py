@@ -26,7 +26,7 @@ from warpjld.grasp.auto import find_grasp
 from warpjld.grasp.shapes import SHAPES, box
 from warpjld.hand import build_hand
 from warpjld.io import load_rig
-from warpjld.quiet import silence_warp
+from warpjld.runtime.quiet import silence_warp
 
 ROOT = Path(__file__).resolve().parents[2]
 DATA = ROOT.parent / "shared" / "data"

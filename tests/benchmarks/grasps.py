@@ -34,7 +34,7 @@ from warpjld.grasp.obstacles import Obstacles
 from warpjld.grasp.placements import Candidates
 from warpjld.grasp.shapes import ball, box, cylinder, glass
 from warpjld.hand import build_hand
-from warpjld.quiet import silence_warp
+from warpjld.runtime.quiet import silence_warp
 from warpjld.skeleton import CHANNELS
 
 FRICTION = 0.6

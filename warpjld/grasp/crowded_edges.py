@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from warpjld.geometry.rotations import unit
 from warpjld.grasp.edges import unique_edges
-from warpjld.rotations import unit
 
 __all__ = ["pairs_round_edge", "separate_pieces", "turned_patches"]
 

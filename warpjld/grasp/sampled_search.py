@@ -15,13 +15,13 @@ from numpy.typing import NDArray
 from warpjld.covering import Covering
 from warpjld.covering.paper import PaperCovering
 from warpjld.errors import InputError
+from warpjld.geometry.rotations import conjugate, multiply
 from warpjld.grasp.distance import ObjectSet
 from warpjld.grasp.facet import facet_distance
 from warpjld.grasp.objects import Places
 from warpjld.grasp.packing import Chains
 from warpjld.grasp.search_result import Found, Status
-from warpjld.grasp.searches import Rows
-from warpjld.rotations import conjugate, multiply
+from warpjld.grasp.searches import SearchRows
 from warpjld.skeleton import CHANNELS, Poses, poses_from_angles
 
 __all__ = ["is_sampled", "sampled_search"]
@@ -53,7 +53,7 @@ def sampled_search(
     objects: ObjectSet,
     poses: Poses,
     angles: NDArray[np.float64],
-    rows: Rows,
+    rows: SearchRows,
     places: Places,
     tolerance: float,
 ) -> Found:
@@ -94,7 +94,7 @@ class _Search:
         objects: ObjectSet,
         poses: Poses,
         angles: NDArray[np.float64],
-        rows: Rows,
+        rows: SearchRows,
         places: Places,
         number: int,
     ) -> None:

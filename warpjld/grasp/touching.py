@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from warpjld.grasp.finer import FinerSkin
 from warpjld.grasp.near_object import NearObject, NearPoints
-from warpjld.grasp.quality.touch import Patches, contact_patches
+from warpjld.grasp.quality.touch import ContactPatches, contact_patches
 from warpjld.grasp.segments import SEGMENTS
 
 __all__ = ["touching_patches"]
@@ -22,7 +22,7 @@ def touching_patches(
     near: NearObject,
     local: NDArray[np.floating],
     tolerance: float,
-) -> tuple[list[Patches], NDArray[np.float64]]:
+) -> tuple[list[ContactPatches], NDArray[np.float64]]:
     """``contact_patches`` by segment of every hand, and the depth of its skin's deepest point in the object [m], (G,).
 
     Args:
@@ -32,7 +32,7 @@ def touching_patches(
         local: G deformed skins in the object's frame [m], shape (G, V, 3).
         tolerance: Largest distance that counts as contact [m].
     """
-    patches: list[Patches] = []
+    patches: list[ContactPatches] = []
     depths = np.zeros(len(local))
     for first in range(0, len(local), _TOGETHER):
         some = slice(first, first + _TOGETHER)
@@ -61,7 +61,7 @@ def _patches(
     row: NDArray[np.int64],
     found: NearPoints,
     tolerance: float,
-) -> list[Patches]:
+) -> list[ContactPatches]:
     """Patches of all hands at once: a segment of another hand is another part."""
     count, parts = points.shape[1], len(SEGMENTS)
     close = np.flatnonzero((found.distance <= tolerance) & (segments[row] >= 0))
@@ -91,8 +91,8 @@ def _patches(
     return [_some(every, slice(ends[g], ends[g + 1])) for g in range(len(points))]
 
 
-def _some(patches: Patches, rows: slice) -> Patches:
+def _some(patches: ContactPatches, rows: slice) -> ContactPatches:
     """Patches of one hand, under their segments' names."""
     names = tuple(name.partition(" ")[2] for name in patches.names[rows])
     columns = (patches.points, patches.normals, patches.skin_normals, patches.areas, patches.vertices)
-    return Patches(names, *(column[rows] for column in columns))
+    return ContactPatches(names, *(column[rows] for column in columns))

@@ -11,6 +11,7 @@ from scipy.spatial import cKDTree
 
 from warpjld.covering import Covering
 from warpjld.errors import InputError
+from warpjld.geometry.rotations import unit
 from warpjld.grasp.auto import AutoGrasp
 from warpjld.grasp.close import Closed, Closer
 from warpjld.grasp.draws import WAY, preference
@@ -20,7 +21,6 @@ from warpjld.grasp.obstacles import Obstacles
 from warpjld.grasp.placements import Candidates, around, palms_on
 from warpjld.grasp.quality.contacts import Contacts
 from warpjld.grasp.widths import Widths, sample_widths
-from warpjld.rotations import unit
 
 __all__ = ["find_two_handed"]
 

@@ -12,8 +12,8 @@ from scipy.sparse.csgraph import connected_components
 from warpjld.covering.intersections import crossing_faces
 from warpjld.covering.quality import enclosed_volume
 from warpjld.errors import InputError
+from warpjld.geometry.winding import winding_numbers
 from warpjld.grasp.crowded_edges import pairs_round_edge, separate_pieces, turned_patches
-from warpjld.winding import winding_numbers
 
 __all__ = ["Mended", "MeshReport", "mend"]
 
