@@ -19,6 +19,7 @@ wp.set_module_options({**VECTORISED, "max_unroll": 1})
 # steps towards the object, as parts of the chain's reach
 _SHORTEST = wp.constant(64)
 _LONGEST = wp.constant(8)  # a march takes at least eight steps over its reach, however far the surface is
+_FINEST = wp.constant(128)  # the same of a step by the grid, below which a vertex is marched
 _MOST = wp.constant(160)  # evaluations of one search; halving to 1e-7 needs 24, the rest is marching
 _NEVER = wp.constant(1.0e30)  # share of the reach of a vertex that never touches
 
@@ -118,24 +119,26 @@ def first_touch(
     tolerance: float,
     # scratch
     earliest: wp.array2d(dtype=float),
-    measured: wp.array2d(dtype=wp.int32),
+    speeds: wp.array2d(dtype=float),
     # out
     status_out: wp.array(dtype=wp.int32),
     closing_out: wp.array(dtype=float),
 ):
     """Least closing of a chain, row r the digit r mod D, at which one of its digit's vertices touches.
 
-    Vertices are taken by the earliest closing that their distance and speed allow; once that is later than a touch
-    already found, none of the rest can come before it.
+    Of every vertex it is known up to which closing it cannot touch. The least such closing is moved on, by the grid's
+    distance over the vertex's speed; where the grid says no more, the vertex is marched. Once it is later than a touch
+    already found, none of the rest can come before that.
     """
     r = wp.tid()
     digit = r % (first_of.shape[0] - 1)
     g = hands.drives.frame[r]
     first = first_of[digit]
     count = first_of[digit + 1] - first
+    reach = hands.drives.reach[r]
     open_hand = chain_at(hands.posture, hands.drives, r, 0.0)
     status = int(NO_CONTACT)
-    best = hands.drives.reach[r] * 1.00001  # what comes later does not come
+    best = reach * 1.00001  # what comes later does not come
     winner = int(-1)
     n = int(0)
     while n < count:
@@ -156,10 +159,10 @@ def first_touch(
             best = 0.0
             n = count
         else:
-            earliest[r, n] = distance / top_speed(hands.posture, hands.drives, r, x)
-            measured[r, n] = 0
+            speeds[r, n] = top_speed(hands.posture, hands.drives, r, x)
+            earliest[r, n] = (distance - tolerance) / speeds[r, n]
             n += 1
-    looking = winner < 0 and hands.drives.reach[r] >= 1.0e-6
+    looking = winner < 0 and reach >= 1.0e-6
     while looking:
         at = int(-1)
         soonest = best
@@ -171,17 +174,17 @@ def first_touch(
             looking = False
         else:
             v = vertex[first + at]
-            x = mapped_by(hands.skin, hands.posture, hands.drives, open_hand, r, v)
-            local = wp.vec3d(wp.quat_rotate_inv(hands.rotation[g], x - hands.position[g]))
-            two = distance_bounds(hands.solids, hands.grid, local)
-            hit = nearest(hands.solids, 0, local, two[1])
-            speed = top_speed(hands.posture, hands.drives, r, x)
-            if measured[r, at] == 0:  # so far only a bound: it may have to wait for others
-                measured[r, at] = 1
-                earliest[r, at] = (hit.distance - target) / speed
+            chain = chain_at(hands.posture, hands.drives, r, soonest)
+            two = distance_bounds(hands.solids, hands.grid, wp.vec3d(seen_from_object(hands, chain, r, v)))
+            ahead = (float(two[0]) - target - tolerance) / speeds[r, at]
+            if ahead > reach / float(_FINEST):
+                earliest[r, at] = soonest + ahead
             else:
                 earliest[r, at] = _NEVER
-                touch = march(hands, r, v, target, tolerance, best, hit, speed)
+                local = wp.vec3d(seen_from_object(hands, open_hand, r, v))
+                two = distance_bounds(hands.solids, hands.grid, local)
+                hit = nearest(hands.solids, 0, local, two[1])
+                touch = march(hands, r, v, target, tolerance, best, hit, speeds[r, at])
                 if touch.status != NO_CONTACT and (touch.closing < best or (touch.closing == best and at < winner)):
                     best = touch.closing
                     status = touch.status

@@ -22,7 +22,7 @@ _REFINE = wp.constant(2)
 _HALVE = wp.constant(3)
 _DONE = wp.constant(4)
 
-# what a search ended with: values of warpjld.grasp.found.Status
+# what a search ended with: values of warpjld.grasp.search_result.Status
 CONVERGED = wp.constant(0)
 NO_CONTACT = wp.constant(1)
 INSIDE = wp.constant(2)

@@ -139,3 +139,18 @@ def measure_near(
         distance_out[n] = hit.distance
         face_out[n] = hit.face
         point_out[n] = hit.point
+
+
+@wp.kernel
+def least_distances(
+    grid: SignedGrid,
+    solids: Solids,
+    # points in the object's frame
+    points: wp.array(dtype=wp.vec3),
+    # out
+    least_out: wp.array(dtype=float),
+):
+    """What signed distances of points are at least."""
+    n = wp.tid()
+    two = distance_bounds(solids, grid, wp.vec3d(points[n]))
+    least_out[n] = float(two[0])

@@ -6,8 +6,8 @@ import pytest
 from warpjld.errors import InputError
 from warpjld.grasp import ObjectSet
 from warpjld.grasp.auto import find_grasp
-from warpjld.grasp.both_ways import BothWays
 from warpjld.grasp.draws import WAY
+from warpjld.grasp.hand_object_gaps import HandObjectGaps
 from warpjld.grasp.judge import Judge
 from warpjld.grasp.near_object import NearObject
 from warpjld.grasp.objects import make_object
@@ -59,7 +59,7 @@ def test_finding_a_grasp(covering) -> None:
     assert found.verdict.epsilon > 0.05
     assert len(found.touching) >= 3
     skin = covering.deform(found.poses(covering.skeleton))[0]
-    seen = penetration(BothWays(covering, thing), skin)
+    seen = penetration(HandObjectGaps(covering, thing), skin)
     assert seen.depth <= 6e-4
     again = find_grasp(covering, thing, count=8, seed=1)
     np.testing.assert_array_equal(found.angles, again.angles)
@@ -74,7 +74,7 @@ def test_a_verdict_knows_which_contacts_press(covering) -> None:
     skin = covering.deform(poses)[0]
     top = skin[np.linalg.norm((skin - knuckle)[:, [0, 2]], axis=1) < 0.005][:, 1].max()
     lying = ball(0.06).placed([knuckle[0], top + 0.0301, knuckle[2]])
-    both = BothWays(covering, lying)
+    both = HandObjectGaps(covering, lying)
     (verdict,) = Judge(both, "left", 0.6).judge(poses, skin[None], both.depths(skin[None]).max(axis=1))
     assert (verdict.closed, verdict.digits, verdict.palm, verdict.score) == (False, (), False, 0.0)
 

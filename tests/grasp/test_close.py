@@ -6,9 +6,9 @@ import pytest
 from warpjld.covering.intersections import crossing_faces, surface_parts
 from warpjld.errors import InputError
 from warpjld.grasp import Places, SearchStatus
-from warpjld.grasp.both_ways import BothWays
 from warpjld.grasp.close import Closer
 from warpjld.grasp.digits import digit_chains, pad_vertex
+from warpjld.grasp.hand_object_gaps import HandObjectGaps
 from warpjld.grasp.intersection import contacts, intersection, part_vertices
 from warpjld.grasp.posed_skins import PosedSkins
 from warpjld.grasp.separate import keep_apart
@@ -38,7 +38,7 @@ def open_hand(covering):
 
 def below_the_palm(covering, poses, thing) -> Places:
     """Straight under the knuckles, just clear of the skin, from both sides."""
-    skin, both = covering.deform(poses)[0], BothWays(covering, thing)
+    skin, both = covering.deform(poses)[0], HandObjectGaps(covering, thing)
     under = np.array([0.004, 0.0, -0.062])
     low, high = 0.0, 0.3
     for _ in range(16):
@@ -60,7 +60,7 @@ def test_digits_touch_and_do_not_enter(covering, open_hand, make, coupling) -> N
     skin = covering.deform(poses_from_angles(covering.skeleton, closed.angles))[0]
     inside = intersection(covering, skin, thing, place=place)
     assert inside.deepest < ENTERS
-    assert BothWays(covering, thing).depths(skin[None], place).max() <= PRESSED
+    assert HandObjectGaps(covering, thing).depths(skin[None], place).max() <= PRESSED
     touched = {c.part for c in contacts(covering, skin, thing, place=place)}
     digits = {name for name, touch in zip(closed.digits, closed.touching()[0], strict=True) if touch}
     assert digits <= touched

@@ -2,12 +2,12 @@
 
 import numpy as np
 import pytest
-import warp as wp
 
 from tests.grasp.oracle import signed_distance
 from warpjld.covering.intersections import crossing_faces
 from warpjld.covering.quality import closing_fans
 from warpjld.grasp import GraspObject, Places
+from warpjld.grasp.point_groups import grouped_points
 from warpjld.grasp.posed_skins import PosedSkins
 from warpjld.skeleton import CHANNELS, poses_from_angles
 
@@ -39,7 +39,7 @@ def test_depths_are_those_of_the_skin_with_its_wrist_closed(covering, skins) -> 
         own = np.zeros(len(covering.surface.faces), dtype=np.int32)
         for n, wanted in enumerate(exact):
             gaps = np.full((1, len(posed.parts.names)), np.inf)
-            one = wp.array(points[n : n + 1], dtype=wp.vec3d, device="cpu")
+            one = grouped_points(points[n : n + 1])
             posed.least_distances(fitted, one, own, gaps, near=1.0, limit=1.0, outside=True)
             assert gaps[0, 0] == pytest.approx(wanted, abs=1e-7) or np.isinf(gaps[0, 0])  # a fan is no part
 

@@ -10,6 +10,8 @@ from warpjld.errors import InputError
 from warpjld.geometry.normals import vertex_normals
 from warpjld.grasp import ObjectSet, SearchStatus
 from warpjld.grasp.digits import pad_vertex
+from warpjld.grasp.draws import WAY
+from warpjld.grasp.hand_object_gaps import HandObjectGaps
 from warpjld.script.binding import cover
 from warpjld.script.grasping import placed_at, posture
 from warpjld.script.props import prop_places
@@ -198,6 +200,29 @@ def test_grasp_auto(run) -> None:
     assert np.linalg.norm(away - there) == pytest.approx(0.12, abs=1e-6)
     with pytest.raises(InputError, match="did you mean PLATE"):
         run("GRASP 35 45 LEFT apple AUTO POSTURE PLATES")
+
+
+def test_two_hands_take_a_crate(run, scene, hands) -> None:
+    crate = "OBJECT crate BOX 0.4 0.3 0.35 AT 0 1 0\n"
+    with pytest.raises(InputError, match="no actor has a right side"):
+        run(crate + "GRASP 5 15 BOTH crate AUTO")
+    scene.add("right", hands["right"])
+    with pytest.raises(InputError, match=r"two hands may take it \(GRASP … BOTH … AUTO\)"):
+        run("GRASP 5 15 LEFT crate AUTO TRIES 8")
+    run("GRASP 5 15 BOTH crate AUTO TRIES 24\nRELEASE 20 30 LEFT\nRELEASE 20 30 RIGHT")
+    left, right = scene.attempts[-2:]
+    assert (left.actor, right.actor) == ("LEFT", "RIGHT")
+    assert left.values["epsilon"] == right.values["epsilon"] > 0.0
+    assert all(name.startswith("right.") for name in right.values["digits"])
+    frames = np.array([5.0, 10.0, 15.0])
+    for attempt, side in ((left, "left"), (right, "right")):
+        actor = scene.actors[attempt.actor]
+        where = actor.placement.values("move", frames)
+        assert np.linalg.norm(where[1] - where[0]) == pytest.approx(WAY)  # it comes straight, and then stays
+        assert np.array_equal(where[1], where[2])
+        prop = scene.props["CRATE"]
+        skin = cover(actor).deform(stage(actor, frames[2:], scene.rate))
+        assert HandObjectGaps(cover(actor), placed_at(scene, prop, 15.0)).gaps(skin).min() < 1e-4, side
 
 
 def test_grasp_auto_keeps_out_of_other_objects(run) -> None:

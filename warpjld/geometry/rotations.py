@@ -43,8 +43,8 @@ def about(vectors: NDArray[np.float64]) -> NDArray[np.float64]:
 
 def multiply(a: NDArray[np.float64], b: NDArray[np.float64]) -> NDArray[np.float64]:
     """Hamilton product: first ``b``, then ``a``; shapes broadcast. Signs are kept: a rotation library may flip them."""
-    ax, ay, az, aw = np.moveaxis(a, -1, 0)
-    bx, by, bz, bw = np.moveaxis(b, -1, 0)
+    ax, ay, az, aw = a[..., 0], a[..., 1], a[..., 2], a[..., 3]
+    bx, by, bz, bw = b[..., 0], b[..., 1], b[..., 2], b[..., 3]
     return np.stack(
         [
             aw * bx + ax * bw + ay * bz - az * by,
@@ -66,8 +66,9 @@ def rotate(a: NDArray[np.float64], vectors: ArrayLike) -> NDArray[np.float64]:
 
     v + 2 u × (u × v + w v) / |q|², u the vector part.
     """
-    x, y, z, w = np.moveaxis(a, -1, 0)
-    vx, vy, vz = np.moveaxis(np.asarray(vectors, dtype=np.float64), -1, 0)
+    v = np.asarray(vectors, dtype=np.float64)
+    x, y, z, w = a[..., 0], a[..., 1], a[..., 2], a[..., 3]
+    vx, vy, vz = v[..., 0], v[..., 1], v[..., 2]
     tx, ty, tz = y * vz - z * vy + w * vx, z * vx - x * vz + w * vy, x * vy - y * vx + w * vz
     twice = 2.0 / (x * x + y * y + z * z + w * w)
     turned = (vx + twice * (y * tz - z * ty), vy + twice * (z * tx - x * tz), vz + twice * (x * ty - y * tx))

@@ -2,10 +2,10 @@
 
 from warpjld.grasp.distance import Distances, ObjectSet
 from warpjld.grasp.facet import FacetDistances, facet_distance
-from warpjld.grasp.found import Found, SearchStatus
 from warpjld.grasp.object_file import load_object
 from warpjld.grasp.objects import GraspObject, Places, make_object
 from warpjld.grasp.search import FlexionSearch
+from warpjld.grasp.search_result import Found, SearchStatus
 from warpjld.grasp.searches import NEAREST, Searches
 from warpjld.grasp.validation import MeshReport
 

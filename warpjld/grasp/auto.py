@@ -193,13 +193,16 @@ def find_grasp(
 
 def _refuse_what_is_too_wide(draws: Draws, friction: float) -> None:
     """InputError where nothing of the object fits between thumb and fingers, with its width and theirs."""
-    narrowest, widest = draws.narrowest(friction), draws.widest
+    thing, widest = draws.near.thing, draws.widest
+    if thing.size.min() <= _SLACK * widest:  # it costs to look closer, and next to none of these are
+        return
+    narrowest = draws.narrowest(friction)
     if narrowest > _SLACK * widest:
-        thing = draws.near.thing
         doubt = doubt_of_size(thing, hand_length(draws.covering.skeleton), None)
+        also = f"; it {doubt}" if doubt else "; two hands may take it (GRASP … BOTH … AUTO)"
         raise InputError(
             f"object {thing.name}: too wide for this hand: nowhere narrower than {1e3 * narrowest:.0f} mm, and thumb "
-            f"and fingers open to {1e3 * widest:.0f} mm{f'; it {doubt}' if doubt else ''}"
+            f"and fingers open to {1e3 * widest:.0f} mm{also}"
         )
 
 

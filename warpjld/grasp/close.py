@@ -9,14 +9,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from warpjld.covering import Covering
-from warpjld.grasp.both_ways import BothWays
 from warpjld.grasp.closing import ClosingHands, MovedSkin
 from warpjld.grasp.digits import digit_chains
-from warpjld.grasp.found import SearchStatus
 from warpjld.grasp.give_way import give_way
+from warpjld.grasp.hand_object_gaps import HandObjectGaps
 from warpjld.grasp.kept import kept_with
 from warpjld.grasp.objects import GraspObject, Places
 from warpjld.grasp.posed_skins import PosedSkins
+from warpjld.grasp.search_result import SearchStatus
 from warpjld.grasp.separate import keep_apart
 from warpjld.skeleton import Poses
 
@@ -36,10 +36,10 @@ class Closed:
     Attributes:
         angles: Joint angles [rad], shape (G, J, 4).
         digits: Names of the digits that closed, e.g. ``left.index``.
-        status: Per digit and joint how its search ended (values of ``Status``), shape (G, D, 3); CONVERGED is a touch,
-            NO_CONTACT the limit reached without one.
+        status: Per digit and joint how its search ended (values of ``SearchStatus``), shape (G, D, 3); CONVERGED is a
+            touch, NO_CONTACT the limit reached without one.
         gap: Smallest signed distance of every digit's skin and the object [m], looked at from both sides (see
-            ``BothWays``), after a first look from the skin's only; shape (G, D).
+            ``HandObjectGaps``), after a first look from the skin's only; shape (G, D).
         penetration: Depth of digits, or of the palm, and object in one another [m], likewise, shape (G,).
     """
 
@@ -69,7 +69,7 @@ class Closer:
     """
 
     def __init__(self, covering: Covering, thing: GraspObject) -> None:
-        self.covering, self.thing, self.both = covering, thing, BothWays(covering, thing)
+        self.covering, self.thing, self.both = covering, thing, HandObjectGaps(covering, thing)
         self._skin, self._posed = kept_with(covering, MovedSkin), kept_with(covering, PosedSkins)
 
     def close(

@@ -11,8 +11,8 @@ from numpy.typing import ArrayLike, NDArray
 from warpjld.covering import Covering
 from warpjld.errors import InputError
 from warpjld.grasp.close import Closer
-from warpjld.grasp.found import SearchStatus
 from warpjld.grasp.objects import GraspObject
+from warpjld.grasp.search_result import SearchStatus
 from warpjld.skeleton import CHANNELS, Poses, poses_from_angles
 
 __all__ = ["ClosedHand", "close_hand"]

@@ -11,11 +11,11 @@ from scipy.spatial.transform import Rotation
 
 from warpjld.covering import Covering
 from warpjld.covering.device import array_on
-from warpjld.grasp.found import SearchStatus
-from warpjld.grasp.moved import skin_beyond, skin_that_moves
+from warpjld.grasp.moving_skin import skin_beyond, skin_that_moves
 from warpjld.grasp.near_object import NearObject
 from warpjld.grasp.objects import Places
 from warpjld.grasp.packing import Chains, drives_on, posture_on, skin_on
+from warpjld.grasp.search_result import SearchStatus
 from warpjld.skeleton import Poses, poses_from_angles
 from warpjld.skeleton.channels import FLEXION
 
@@ -153,7 +153,7 @@ class ClosingHands:
             self._tolerance,
             self._tolerance,
             wp.array(earliest, dtype=float, device="cpu", copy=False),
-            wp.array(np.empty_like(earliest, dtype=np.int32), dtype=wp.int32, device="cpu", copy=False),
+            wp.array(np.empty_like(earliest), dtype=float, device="cpu", copy=False),
         ]
         outs = [
             wp.array(a.reshape(-1), dtype=kind, device="cpu", copy=False)

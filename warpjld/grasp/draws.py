@@ -22,7 +22,7 @@ from warpjld.grasp.ways import free_ways
 from warpjld.grasp.widths import Widths, sample_widths
 from warpjld.skeleton import CHANNELS, DIGITS
 
-__all__ = ["WAY", "Draws"]
+__all__ = ["WAY", "Draws", "preference"]
 
 WAY = 0.12
 """How far off a hand is before it comes straight to its placement [m]."""
@@ -112,7 +112,7 @@ class Draws:
             rows, ways = free_ways(self.near, widths, reach, self.rng)
             if not len(rows):
                 rows, ways = np.arange(len(widths)), around(unit(widths.second - widths.first), self.rng)
-            chosen = self.rng.choice(len(rows), size=across, p=_preference(widths[rows], self.near.thing))
+            chosen = self.rng.choice(len(rows), size=across, p=preference(widths[rows], self.near.thing))
             turned = self.rng.random(across) < 0.5
             picked = widths[rows[chosen]]
             ends = (
@@ -150,7 +150,7 @@ class Draws:
         return closing_in_air(self.covering, self.side, np.array(starts), self.closing)
 
 
-def _preference(widths: Widths, thing: GraspObject) -> NDArray[np.float64]:
+def preference(widths: Widths, thing: GraspObject) -> NDArray[np.float64]:
     """How likely a width is taken: straight through, and near the centre of mass."""
     centre = thing.place.apply(thing.centroid[None])[0, 0]
     off = np.linalg.norm(0.5 * (widths.first + widths.second) - centre, axis=1)

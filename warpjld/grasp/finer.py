@@ -5,6 +5,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from warpjld.grasp.edges import unique_edges
+
 __all__ = ["FinerSkin"]
 
 _MOST = 3  # rounds: every one makes four triangles of one
@@ -29,8 +31,7 @@ class FinerSkin:
         self.faces, self.parents = faces.astype(np.int32), np.arange(len(vertices))
         self._middles: list[NDArray[np.integer]] = []
         for _ in range(rounds):
-            corners = self.faces[:, [[0, 1], [1, 2], [2, 0]]]
-            edges, place = np.unique(np.sort(corners.reshape(-1, 2), axis=1), axis=0, return_inverse=True)
+            edges, place, _ = unique_edges(self.faces[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2))
             a, b, c = self.faces.T
             ab, bc, ca = (place.reshape(-1, 3) + len(self.parents)).T
             cut = [(a, ab, ca), (ab, b, bc), (ca, bc, c), (ab, bc, ca)]
@@ -38,6 +39,13 @@ class FinerSkin:
             self.parents = np.concatenate([self.parents, self.parents[edges[:, 0]]])
             self._middles.append(edges)
 
+        # every vertex beside itself: no row is empty
+        own = np.arange(len(vertices))
+        beside = np.concatenate([faces[:, [0, 1, 2]].ravel(), faces[:, [1, 2, 0]].ravel(), own])
+        others = np.concatenate([faces[:, [1, 2, 0]].ravel(), faces[:, [0, 1, 2]].ravel(), own])
+        order = np.argsort(beside, kind="stable")
+        self._edges = np.stack([beside[order], others[order]])
+        self._first_edge = np.searchsorted(beside[order], own)
         order = np.argsort(self.faces.ravel(), kind="stable")
         self._around = order // 3
         self._first = np.searchsorted(self.faces.ravel()[order], np.arange(len(self.parents) + 1))
@@ -54,6 +62,13 @@ class FinerSkin:
             middles *= np.float32(0.5)
             done += len(edges)
         return out
+
+    def longest_edges(self, vertices: NDArray[np.floating]) -> NDArray[np.float64]:
+        """Longest edge at every vertex of deformed skins (G, V, 3) [m], shape (G, V): no finer point of which it is the
+        parent is farther away."""
+        a, b = self._edges
+        length = np.linalg.norm(vertices[:, a] - vertices[:, b], axis=2)
+        return np.asarray(np.maximum.reduceat(length, self._first_edge, axis=1), dtype=np.float64)
 
     def faces_around(self, points: NDArray[np.integer]) -> NDArray[np.int64]:
         """Triangles that have one of some points as a corner, ascending."""

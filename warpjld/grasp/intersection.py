@@ -146,10 +146,10 @@ def contacts(
     tolerance: float = 5e-4,
 ) -> list[Contact]:
     """Parts of a deformed surface (V, 3) that touch an object, nearer than ``tolerance`` [m]."""
-    from warpjld.grasp.both_ways import BothWays
+    from warpjld.grasp.hand_object_gaps import HandObjectGaps
 
     where = thing.place if place is None else place
-    both = BothWays(covering, thing)
+    both = HandObjectGaps(covering, thing)
     (gaps,) = both.gaps(vertices[None], where)
     close = both.near.near(where.to_local(vertices)[0], tolerance).distance < tolerance
     counts = np.bincount(both.part_of_vertex[close], minlength=len(gaps))

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterable
 from dataclasses import dataclass
 
 import numpy as np
@@ -11,8 +11,9 @@ from scipy.spatial.transform import Rotation
 
 from warpjld.covering import Covering
 from warpjld.errors import InputError
-from warpjld.grasp.both_ways import BothWays
+from warpjld.grasp.digits import digit_chains
 from warpjld.grasp.finer import FinerSkin
+from warpjld.grasp.hand_object_gaps import HandObjectGaps
 from warpjld.grasp.kept import kept_with
 from warpjld.grasp.objects import GraspObject
 from warpjld.grasp.quality.closure import force_closure
@@ -21,9 +22,9 @@ from warpjld.grasp.quality.touch import ContactPatches
 from warpjld.grasp.quality.wrench_space import least_resistance
 from warpjld.grasp.segments import SEGMENTS, vertex_segments
 from warpjld.grasp.touching import touching_patches
-from warpjld.skeleton import Poses
+from warpjld.skeleton import DIGITS, Poses
 
-__all__ = ["Judge", "Verdict", "check_friction", "hand_side", "judge"]
+__all__ = ["Judge", "Pressing", "Verdict", "check_friction", "hand_side", "judge"]
 
 _TOUCH = 5e-4  # skin this near touches [m]
 _NEARLY = 2.5e-3  # the same at a first look [m]
@@ -41,7 +42,7 @@ class Verdict:
         epsilon: Ferrari–Canny epsilon of these [N], norm L1, torques over the object's largest radius.
         digits: Digits that press, thumb included, e.g. ``thumb``.
         palm: Whether the palm presses.
-        depth: Depth of hand and object in one another [m], see ``BothWays``.
+        depth: Depth of hand and object in one another [m], see ``HandObjectGaps``.
     """
 
     closed: bool
@@ -61,6 +62,23 @@ class Verdict:
         return self.epsilon + _DIGIT * len(self.digits) if self.closed else 0.0
 
 
+@dataclass(frozen=True, eq=False)
+class Pressing:
+    """What presses of one hand.
+
+    Attributes:
+        contacts: In the object's frame.
+        digits: Digits that press, without side.
+        palm: Whether the palm presses.
+        depth: Of the skin's deepest point in the object [m].
+    """
+
+    contacts: Contacts
+    digits: tuple[str, ...]
+    palm: bool
+    depth: float
+
+
 class Judge:
     """Judges hands that closed on an object.
 
@@ -71,11 +89,16 @@ class Judge:
         both: Hand and object, which stands at its own place.
         side: Which hand of the covering.
         friction: Coulomb coefficient.
+
+    Attributes:
+        digits: Digits that the hand has, without side.
     """
 
-    def __init__(self, both: BothWays, side: str, friction: float) -> None:
+    def __init__(self, both: HandObjectGaps, side: str, friction: float) -> None:
         covering, thing = both.covering, both.thing
         self.both, self.friction = both, friction
+        there = digit_chains(covering.skeleton)
+        self.digits = [digit for digit in DIGITS if f"{side}.{digit}" in there]
         self._center = thing.centroid
         self._radius = float(np.linalg.norm(thing.vertices - thing.centroid, axis=1).max())
         self._skin, self._finer = kept_with(covering, _skin), kept_with(covering, _finer_skin)
@@ -107,24 +130,33 @@ class Judge:
         Args:
             poses: Of the closed hands.
             vertices: Their deformed skins [m], shape (G, V, 3).
-            depths: Of hands and object in one another [m], see ``BothWays``, shape (G,).
+            depths: Of hands and object in one another [m], see ``HandObjectGaps``, shape (G,).
         """
-        found = []
-        for g, (patches, depth) in enumerate(self._patches(self._finer, vertices, _TOUCH)):
-            contacts, digits, palm = self._pressing(patches, poses.rotations[g])
-            epsilon = least_resistance(contacts, self._center, torque_scale=self._radius, edges=_EDGES)
-            # a ball about the origin inside the wrench space is force closure
-            found.append(Verdict(epsilon > 0.0, epsilon, digits, palm, max(float(depths[g]), depth)))
-        return found
+        return [
+            self.verdict(one.contacts, one.digits, one.palm, max(float(depth), one.depth))
+            for one, depth in zip(self.pressing(poses, vertices), depths, strict=True)
+        ]
+
+    def pressing(self, poses: Poses, vertices: NDArray[np.floating]) -> list[Pressing]:
+        """What presses of G closed hands, with skins (G, V, 3) [m]."""
+        return [
+            Pressing(*self._pressing(patches, poses.rotations[g]), depth)
+            for g, (patches, depth) in enumerate(self._patches(self._finer, vertices, _TOUCH))
+        ]
+
+    def verdict(self, contacts: Contacts, digits: tuple[str, ...], palm: bool, depth: float) -> Verdict:
+        """Judgement of contacts in the object's frame; a ball about the origin in the wrench space is force closure."""
+        epsilon = least_resistance(contacts, self._center, torque_scale=self._radius, edges=_EDGES)
+        return Verdict(epsilon > 0.0, epsilon, digits, palm, depth)
 
     def _patches(
         self, finer: FinerSkin, vertices: NDArray[np.floating], tolerance: float
-    ) -> Iterator[tuple[ContactPatches, float]]:
+    ) -> Iterable[tuple[ContactPatches, float]]:
         """Patches of contact in the object's frame, and depth of the skin's points, of every hand."""
         place, parts = self.both.thing.place, self._segments[finer.parents]
         local = place.to_local(vertices.reshape(-1, 3))[0].reshape(vertices.shape)
-        for skin in local:
-            yield touching_patches(finer, parts, self.both.near, skin, tolerance)
+        patches, depths = touching_patches(finer, parts, self.both.near, local, tolerance)
+        return zip(patches, depths.tolist(), strict=True)
 
     def _pressing(
         self, patches: ContactPatches, rotations: NDArray[np.float64]
@@ -168,7 +200,7 @@ def judge(
     """
     side = hand_side(covering, side)
     check_friction(friction)
-    both = BothWays(covering, thing)
+    both = HandObjectGaps(covering, thing)
     skins = covering.deform(poses)
     depths = both.depths(skins).max(axis=1)
     return Judge(both, side, friction).judge(poses, skins, depths)

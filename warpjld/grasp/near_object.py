@@ -98,6 +98,18 @@ class NearObject:
         self.least_by_part(points, np.arange(count, dtype=np.int32), np.zeros(count, dtype=np.int32), gaps)
         return gaps[:, 0]
 
+    def at_least(self, points: NDArray[np.floating]) -> NDArray[np.float32]:
+        """What signed distances of points in the object's frame (…, 3) are at least by the grid [m], shape (…)."""
+        import warp as wp
+        from warpjld_kernels.signed_grid import least_distances
+
+        out = np.empty(points.shape[:-1], dtype=np.float32)
+        flat = np.ascontiguousarray(points, np.float32).reshape(-1, 3)
+        asked = wp.array(flat, dtype=wp.vec3, device="cpu", copy=False)
+        outs = [wp.array(out.reshape(-1), dtype=float, device="cpu", copy=False)]
+        wp.launch(least_distances, out.size, inputs=[self.grid, self.objects.solids, asked], outputs=outs, device="cpu")
+        return out
+
     def near(self, points: NDArray[np.floating], limit: float) -> NearPoints:
         """Distances of points in the object's frame (n, 3) that may lie within a limit [m], or in the object."""
         import warp as wp

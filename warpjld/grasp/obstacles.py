@@ -8,8 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from warpjld.covering import Covering
-from warpjld.grasp.both_ways import BothWays
 from warpjld.grasp.distance import ObjectSet
+from warpjld.grasp.hand_object_gaps import HandObjectGaps
 from warpjld.grasp.objects import GraspObject
 
 __all__ = ["COLLIDES", "Obstacles"]
@@ -31,7 +31,7 @@ class Obstacles:
     def __init__(self, covering: Covering, things: Sequence[GraspObject]) -> None:
         self.names = tuple(thing.name for thing in things)
         self._objects = ObjectSet(things) if things else None
-        self._both = [BothWays(covering, thing) for thing in things]
+        self._both = [HandObjectGaps(covering, thing) for thing in things]
 
     def __bool__(self) -> bool:
         return bool(self.names)

@@ -16,7 +16,7 @@ from warpjld.grasp.palm import palm_of
 from warpjld.grasp.widths import Widths
 from warpjld.skeleton import Poses, Skeleton, poses_from_angles
 
-__all__ = ["Candidates", "across_widths", "around", "sample_wrists"]
+__all__ = ["Candidates", "across_widths", "around", "palms_on", "sample_wrists"]
 
 _CLEARANCE = 3e-4  # between the open hand and the object [m]
 _SPARE = 0.02  # by which a hand opens wider than what it takes [m]
@@ -156,19 +156,53 @@ def across_widths(
     return _come(covering, there.moved(-back), near, back + deeper)
 
 
+def palms_on(
+    covering: Covering,
+    angles: NDArray[np.float64],
+    near: NearObject,
+    side: str,
+    aim: NDArray[np.float64],
+    look: NDArray[np.float64],
+    fingers: NDArray[np.float64],
+) -> Candidates:
+    """Placements of an open hand with its palm's middle at points of the object, as near as it comes.
+
+    Args:
+        covering: The hand.
+        angles: Of the open hand [rad], shape (J, 4).
+        near: The object.
+        side: Which hand.
+        aim: Points [m], shape (G, 3).
+        look: Unit directions in which the palms look and the hands come, shape (G, 3).
+        fingers: Unit directions in which the fingers point, normal to those, shape (G, 3).
+    """
+    palm, count = palm_of(covering.skeleton, side), len(aim)
+    rotation = Rotation.from_matrix(palm.turned_to(look, fingers))
+    root = covering.skeleton.rest[0]
+    position = aim - (root + rotation.apply(palm.middle - root))
+    there = Candidates(position, rotation.as_quat(), look, np.repeat(angles[None], count, axis=0))
+    back = np.full(count, float(np.linalg.norm(near.thing.size)) + 0.1)
+    return _come(covering, there.moved(-back), near, 2.0 * back)
+
+
 def _come(covering: Covering, hands: Candidates, near: NearObject, reach: NDArray[np.float64]) -> Candidates:
     """Move hands along their approach, as far as ``reach`` (G,) or until their skin is next to the object."""
-    skin = covering.deform(hands.poses(covering.skeleton), threads=1)
-    moved, going = np.zeros(len(hands)), np.arange(len(hands))
-    for _ in range(_STEPS):
-        shift = (hands.approach[going] * moved[going, None])[:, None].astype(np.float32)
-        gap = near.least(skin[going] + shift)
-        # a hand that has come too near goes back by as much
-        ahead = np.minimum(gap - _CLEARANCE, reach[going] - moved[going])
-        moved[going] += np.where(ahead > 0.0, ahead, 1.05 * ahead - 1e-5)
-        going = going[(np.abs(ahead) >= _NEXT) & (moved[going] < reach[going])]
-        if not len(going):
-            break
+    import warp as wp
+    from warpjld_kernels.lines_to_object import come_near
+
+    skins = covering.deform(hands.poses(covering.skeleton), threads=1)
+    place, moved = near.thing.place, np.zeros(len(hands))
+    scratch = np.empty((2, *skins.shape[:2]), dtype=np.float32)
+    arrays = [
+        (skins, wp.vec3),
+        (np.ascontiguousarray(hands.approach), wp.vec3d),
+        (reach.astype(np.float64), wp.float64),
+    ]
+    settings = [_CLEARANCE, _NEXT, _STEPS]
+    rest = [(scratch[0], float), (scratch[1], float), (moved, wp.float64)]
+    held, out = ([wp.array(a, dtype=kind, device="cpu", copy=False) for a, kind in some] for some in (arrays, rest))
+    objects = [near.objects.solids, near.grid, wp.vec3d(*place.position[0]), wp.quatd(*place.rotation[0])]
+    wp.launch(come_near, len(hands), inputs=[*objects, *held, *settings, *out], device="cpu")
     return hands.moved(moved)
 
 

@@ -89,7 +89,7 @@ class PosedSkins:
 
         Args:
             skins: From ``fitted``.
-            points: ``wp.array`` of vec3d in the frames of the skins.
+            points: ``warpjld_kernels.points_in_skins.PointGroups`` in the frames of the skins, see ``grouped_points``.
             part_of_face: Part that each triangle of the surface counts as, shape (T,).
             gaps: What is known already, contiguous.
             near: Points farther from a skin's bounding box do not count [m].
@@ -97,10 +97,11 @@ class PosedSkins:
             outside: Whether points outside count.
         """
         import warp as wp
-        from warpjld_kernels.posed_skin import points_in_skins
+        from warpjld_kernels.points_in_skins import points_in_skins
 
         owner = np.full(len(self._faces), -1, dtype=np.int32)
         owner[: len(part_of_face)] = part_of_face
+        reach = np.empty((len(gaps), _WIDTH * len(self._tree.child)), dtype=np.float32)
         wp.launch(
             points_in_skins,
             len(gaps),
@@ -111,6 +112,7 @@ class PosedSkins:
                 limit,
                 outside,
                 wp.array(owner, dtype=wp.int32, device="cpu", copy=False),
+                wp.array(reach, dtype=float, device="cpu", copy=False),
                 wp.array(gaps, dtype=wp.float64, device="cpu", copy=False),
             ],
             device="cpu",
@@ -153,7 +155,7 @@ class PosedSkins:
 
     def _crossings(self, vertices: NDArray[np.floating], part: NDArray[np.int32] | None) -> NDArray[np.int64]:
         import warp as wp
-        from warpjld_kernels.posed_skin import count_crossings
+        from warpjld_kernels.skin_crossings import count_crossings
 
         poses, names = len(vertices), len(self.parts.names)
         skins = self.fitted(vertices, Places.of(vertices.mean(axis=1, dtype=np.float64)))

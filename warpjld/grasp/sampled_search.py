@@ -18,9 +18,9 @@ from warpjld.errors import InputError
 from warpjld.geometry.rotations import conjugate, multiply
 from warpjld.grasp.distance import ObjectSet
 from warpjld.grasp.facet import facet_distance
-from warpjld.grasp.found import Found, SearchStatus
 from warpjld.grasp.objects import Places
 from warpjld.grasp.packing import Chains
+from warpjld.grasp.search_result import Found, SearchStatus
 from warpjld.grasp.searches import SearchRows
 from warpjld.skeleton import Poses, poses_from_angles
 from warpjld.skeleton.channels import FLEXION

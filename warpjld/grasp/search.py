@@ -14,10 +14,10 @@ from warpjld.covering.device import array_on
 from warpjld.errors import InputError
 from warpjld.grasp.distance import ObjectSet
 from warpjld.grasp.facet import inside_facets
-from warpjld.grasp.found import Found, SearchStatus
 from warpjld.grasp.objects import Places
 from warpjld.grasp.packing import drives_on, posture_on, skin_on
 from warpjld.grasp.sampled_search import is_sampled, sampled_search
+from warpjld.grasp.search_result import Found, SearchStatus
 from warpjld.grasp.searches import Searches, SearchRows, search_rows
 from warpjld.runtime.threads import in_threads, threads_for
 from warpjld.skeleton import CHANNELS, Poses

@@ -1,4 +1,4 @@
-"""Patches of contact of a skin and an object, from the points that are near enough only."""
+"""Patches of contact of skins and an object, from the points that are near enough only."""
 
 from __future__ import annotations
 
@@ -6,11 +6,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from warpjld.grasp.finer import FinerSkin
-from warpjld.grasp.near_object import NearObject
+from warpjld.grasp.near_object import NearObject, NearPoints
 from warpjld.grasp.quality.touch import ContactPatches, contact_patches
 from warpjld.grasp.segments import SEGMENTS
 
 __all__ = ["touching_patches"]
+
+_TOGETHER = 16  # hands, which bounds memory
+_SLACK = 1e-6  # what float32 may add to a bound [m]
 
 
 def touching_patches(
@@ -19,29 +22,77 @@ def touching_patches(
     near: NearObject,
     local: NDArray[np.floating],
     tolerance: float,
-) -> tuple[ContactPatches, float]:
-    """``contact_patches`` by segment of the hand, and the depth of the skin's deepest point in the object [m].
+) -> tuple[list[ContactPatches], NDArray[np.float64]]:
+    """``contact_patches`` by segment of every hand, and the depth of its skin's deepest point in the object [m], (G,).
 
     Args:
         finer: The skin's points.
         segments: Place in ``SEGMENTS`` of every such point, shape (n,); -1 where it is of no interest.
         near: The object.
-        local: A deformed skin in the object's frame [m], shape (V, 3).
+        local: G deformed skins in the object's frame [m], shape (G, V, 3).
         tolerance: Largest distance that counts as contact [m].
     """
-    points = finer.points(local)
-    found = near.near(points, tolerance)
-    touching = np.flatnonzero((found.distance <= tolerance) & (segments >= 0))
-    used, corners = np.unique(finer.faces[finer.faces_around(touching)], return_inverse=True)
-    patches = contact_patches(
-        points[used],
+    patches: list[ContactPatches] = []
+    depths = np.zeros(len(local))
+    for first in range(0, len(local), _TOGETHER):
+        some = slice(first, first + _TOGETHER)
+        points, hand, row, found = _near_points(finer, near, local[some], tolerance)
+        patches += _patches(finer, segments, near, points, hand, row, found, tolerance)
+        np.maximum.at(depths[some], hand, -found.distance)
+    return patches, depths
+
+
+def _near_points(
+    finer: FinerSkin, near: NearObject, skins: NDArray[np.floating], tolerance: float
+) -> tuple[NDArray[np.float32], NDArray[np.int64], NDArray[np.int64], NearPoints]:
+    """Points of skins (G, n, 3), and of those that may touch the hand, the number and what is nearest, shape (k,)."""
+    points = finer.points(skins)
+    coarse = near.at_least(skins) - finer.longest_edges(skins) - _SLACK
+    hand, row = np.nonzero((coarse <= tolerance)[:, finer.parents])
+    return points, hand, row, near.near(points[hand, row], tolerance)
+
+
+def _patches(
+    finer: FinerSkin,
+    segments: NDArray[np.int64],
+    near: NearObject,
+    points: NDArray[np.float32],
+    hand: NDArray[np.int64],
+    row: NDArray[np.int64],
+    found: NearPoints,
+    tolerance: float,
+) -> list[ContactPatches]:
+    """Patches of all hands at once: a segment of another hand is another part."""
+    count, parts = points.shape[1], len(SEGMENTS)
+    close = np.flatnonzero((found.distance <= tolerance) & (segments[row] >= 0))
+    faces = np.concatenate(
+        [finer.faces[finer.faces_around(row[close[hand[close] == g]])] + g * count for g in range(len(points))]
+    )
+    used, corners = np.unique(faces, return_inverse=True)
+    # points beside those that touch have not all their triangles here, and count for nothing else
+    distance, nearest = np.full(len(used), np.inf), np.zeros((len(used), 3))
+    outward, part = np.zeros((len(used), 3)), np.full(len(used), -1)
+    place = np.searchsorted(used, hand[close] * count + row[close])
+    distance[place], nearest[place] = found.distance[close], found.point[close]
+    outward[place] = near.thing.normals[found.face[close]]
+    part[place] = hand[close] * parts + segments[row[close]]
+    every = contact_patches(
+        points.reshape(-1, 3)[used],
         corners.reshape(-1, 3),
-        # those beside have not all their triangles here
-        np.where(np.isin(used, touching), segments[used], -1),
-        SEGMENTS,
-        found.distance[used],
-        found.point[used],
-        near.thing.normals[found.face[used]],
+        part,
+        [f"{g} {name}" for g in range(len(points)) for name in SEGMENTS],
+        distance,
+        nearest,
+        outward,
         tolerance=tolerance,
     )
-    return patches, max(0.0, -float(found.distance.min()))
+    owner = np.array([int(name.partition(" ")[0]) for name in every.names], dtype=np.int64)
+    ends = np.searchsorted(owner, np.arange(len(points) + 1))
+    return [_some(every, slice(ends[g], ends[g + 1])) for g in range(len(points))]
+
+
+def _some(patches: ContactPatches, rows: slice) -> ContactPatches:
+    """Patches of one hand, under their segments' names."""
+    names = tuple(name.partition(" ")[2] for name in patches.names[rows])
+    columns = (patches.points, patches.normals, patches.skin_normals, patches.areas, patches.vertices)
+    return ContactPatches(names, *(column[rows] for column in columns))

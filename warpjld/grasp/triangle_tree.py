@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["TriangleTree", "build_tree", "join_trees"]
+__all__ = ["TriangleTree", "build_tree", "halved", "join_trees"]
 
 _WIDTH = 8
 _MARGIN = np.float32(4e-7)  # of the largest coordinate: points are rounded to float32 for the boxes
@@ -46,7 +46,7 @@ def build_tree(vertices: NDArray[np.float64], faces: NDArray[np.int32]) -> Trian
         faces: Triangles, shape (t, 3), t > 0.
     """
     corner = vertices.astype(np.float32)[faces]
-    order = _halved(corner.mean(axis=1, dtype=np.float64))
+    order = halved(corner.mean(axis=1, dtype=np.float64))
     leaves = -(-len(faces) // _WIDTH)
     # the last leaf is filled up with its last triangle
     order = np.concatenate([order, np.repeat(order[-1:], leaves * _WIDTH - len(order))]).reshape(leaves, _WIDTH)
@@ -94,7 +94,7 @@ def join_trees(trees: list[TriangleTree]) -> TriangleTree:
     )
 
 
-def _halved(centre: NDArray[np.float64]) -> NDArray[np.int64]:
+def halved(centre: NDArray[np.float64]) -> NDArray[np.int64]:
     """Order of points in which every aligned group of 8 · 2^k is one side of a cut."""
     count = len(centre)
     size = _WIDTH

@@ -13,6 +13,7 @@ from warpjld.covering.intersections import crossing_faces
 from warpjld.covering.quality import enclosed_volume
 from warpjld.errors import InputError
 from warpjld.geometry.winding import winding_numbers
+from warpjld.grasp.crowded_edges import pairs_round_edge, separate_pieces, turned_patches
 
 __all__ = ["Mended", "MeshReport", "mend"]
 
@@ -30,6 +31,7 @@ class MeshReport:
         open_edges: Edges with a triangle on one side only.
         components: Connected pieces.
         crossing: Triangles that pass through others.
+        crowded: Edges with more than two triangles, where pieces meet that were told apart.
         solid: Whether it is the border of a solid: closed, all pieces outward (or cavities, inward), none crossing.
             Only then does the nearest point alone tell inside from outside; elsewhere the winding number does.
     """
@@ -41,6 +43,7 @@ class MeshReport:
     components: int = 1
     crossing: int = 0
     solid: bool = True
+    crowded: int = 0
 
     @property
     def watertight(self) -> bool:
@@ -56,12 +59,16 @@ class MeshReport:
             found.append(f"{self.duplicates} duplicate triangles taken out")
         if self.flipped:
             found.append(f"{self.flipped} triangles turned to look outwards")
+        if self.crowded:
+            found.append(
+                f"{self.crowded} edges belong to more than two triangles: pieces that meet there are told apart"
+            )
         if self.open_edges:
             found.append(f"not watertight: {self.open_edges} open edges; inside and outside by winding number")
         if self.crossing:
             found.append(f"{self.crossing} triangles cross others; inside and outside by winding number")
         if self.watertight and not self.crossing and not self.solid:
-            found.append("pieces lie inside one another; inside and outside by winding number")
+            found.append("pieces touch or lie inside one another; inside and outside by winding number")
         return found
 
 
@@ -91,8 +98,10 @@ def mend(vertices: NDArray[np.float64], faces: NDArray[np.int32]) -> Mended:
         vertices: Welded positions [m], shape (V, 3).
         faces: Triangles, shape (T, 3).
 
+    Closed pieces that have edges in common get vertices of their own.
+
     Raises:
-        InputError: No triangle with an area, an edge with more than two triangles, or a one-sided (Möbius) surface.
+        InputError: No triangle with an area, or a one-sided (Möbius) surface.
     """
     rows, degenerate, duplicates = _without_waste(vertices, faces)
     kept = faces[rows]
@@ -100,13 +109,25 @@ def mend(vertices: NDArray[np.float64], faces: NDArray[np.int32]) -> Mended:
         raise InputError("the surface is empty: it has no triangle with an area")
     used, compact = np.unique(kept, return_inverse=True)
     points, triangles = vertices[used], compact.reshape(kept.shape).astype(np.int32)
-    first, second, same, open_edges = _adjacency(points, triangles)
-    piece, wrong = _orientation(len(triangles), first, second, same)
-    turn = wrong ^ _look_inwards(points, _turned(triangles, wrong), piece)[piece]
+    edges = _Edges.of(triangles)
+    pairs, crowded = edges.pairs, int((edges.count > 2).sum())
+    piece, turn = edges.pieces(pairs)
+    if crowded:
+        turn ^= turned_patches(points, _turned(triangles, turn), piece)[piece]
+        edges = _Edges.of(_turned(triangles, turn))
+        pairs = np.concatenate([edges.pairs, edges.pairs_of_crowded(points)])
+        piece, wrong = edges.pieces(pairs)
+        turn ^= wrong
+        points, triangles, own = separate_pieces(points, triangles, piece)
+        used = used[own]
+    open_edges = 3 * len(triangles) - 2 * len(pairs)
+    turn = turn ^ _look_inwards(points, _turned(triangles, turn), piece)[piece]
     triangles = _turned(triangles, turn)
     crossing = len(crossing_faces(points, triangles).faces)
     solid = open_edges == 0 and crossing == 0 and _nested_properly(points, triangles, piece)
-    report = MeshReport(degenerate, duplicates, int(turn.sum()), open_edges, int(piece.max()) + 1, crossing, solid)
+    report = MeshReport(
+        degenerate, duplicates, int(turn.sum()), open_edges, int(piece.max()) + 1, crossing, solid, crowded
+    )
     return Mended(points, triangles, report, used.astype(np.int64), rows)
 
 
@@ -131,26 +152,60 @@ def _on_crowded_edge(faces: NDArray[np.int32]) -> NDArray[np.bool_]:
     return np.asarray((count[place] > 2).reshape(3, -1).any(axis=0))
 
 
-def _adjacency(
-    vertices: NDArray[np.float64], faces: NDArray[np.int32]
-) -> tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.bool_], int]:
-    """Pairs of faces with a common edge, whether both run along it in the same direction, and the open edges."""
-    half = np.concatenate([faces[:, [0, 1]], faces[:, [1, 2]], faces[:, [2, 0]]]).astype(np.int64)
-    owner = np.tile(np.arange(len(faces)), 3)
-    low, high = half.min(axis=1), half.max(axis=1)
-    order = np.lexsort((high, low))
-    low, high, forward, owner = low[order], high[order], (half[:, 0] < half[:, 1])[order], owner[order]
-    begins = np.flatnonzero(np.r_[True, (low[1:] != low[:-1]) | (high[1:] != high[:-1])])
-    count = np.diff(np.r_[begins, len(low)])
-    if (count > 2).any():
-        edge = begins[np.argmax(count > 2)]
-        x, y, z = (vertices[low[edge]] + vertices[high[edge]]) / 2
-        raise InputError(
-            f"the surface is not manifold: {int((count > 2).sum())} edges belong to more than two triangles, "
-            f"the first near ({x:.4g}, {y:.4g}, {z:.4g}); mend it in a mesh editor"
-        )
-    pair = begins[count == 2]
-    return owner[pair], owner[pair + 1], forward[pair] == forward[pair + 1], int((count == 1).sum())
+@dataclass(frozen=True, eq=False)
+class _Edges:
+    """Sides of faces, those of an edge one after another.
+
+    Attributes:
+        low: Vertex of the lower number, shape (3 T,); likewise ``high``, and ``opposite``, the face's third.
+        forward: Whether the face runs from low to high.
+        owner: The face.
+        begins: First side of every edge, shape (E,).
+        count: Sides of every edge.
+    """
+
+    low: NDArray[np.int64]
+    high: NDArray[np.int64]
+    opposite: NDArray[np.int64]
+    forward: NDArray[np.bool_]
+    owner: NDArray[np.int64]
+    begins: NDArray[np.int64]
+    count: NDArray[np.int64]
+
+    @staticmethod
+    def of(faces: NDArray[np.int32]) -> _Edges:
+        """Those of triangles (T, 3)."""
+        half = np.concatenate([faces[:, [0, 1]], faces[:, [1, 2]], faces[:, [2, 0]]]).astype(np.int64)
+        opposite = np.concatenate([faces[:, 2], faces[:, 0], faces[:, 1]]).astype(np.int64)
+        low, high = half.min(axis=1), half.max(axis=1)
+        order = np.lexsort((high, low))
+        low, high, forward = low[order], high[order], (half[:, 0] < half[:, 1])[order]
+        begins = np.flatnonzero(np.r_[True, (low[1:] != low[:-1]) | (high[1:] != high[:-1])])
+        owner = np.tile(np.arange(len(faces)), 3)[order]
+        return _Edges(low, high, opposite[order], forward, owner, begins, np.diff(np.r_[begins, len(low)]))
+
+    @property
+    def pairs(self) -> NDArray[np.int64]:
+        """Sides of the edges with two of them, shape (n, 2)."""
+        first = self.begins[self.count == 2]
+        return np.stack([first, first + 1], axis=1)
+
+    def pairs_of_crowded(self, vertices: NDArray[np.float64]) -> NDArray[np.int64]:
+        """Sides that belong together of edges with more than two of them, shape (n, 2)."""
+        found: list[tuple[int, int]] = []
+        for edge in np.flatnonzero(self.count > 2).tolist():
+            first = int(self.begins[edge])
+            sides = slice(first, first + int(self.count[edge]))
+            ends = vertices[self.low[first]], vertices[self.high[first]]
+            pairs = pairs_round_edge(*ends, vertices[self.opposite[sides]], self.forward[sides])
+            found += [(first + a, first + b) for a, b in pairs]
+        return np.array(found, dtype=np.int64).reshape(-1, 2)
+
+    def pieces(self, pairs: NDArray[np.int64]) -> tuple[NDArray[np.int32], NDArray[np.bool_]]:
+        """Piece of every face if these sides belong together, and which run against the majority of theirs."""
+        one, other = pairs.T
+        same = self.forward[one] == self.forward[other]
+        return _orientation(len(self.low) // 3, self.owner[one], self.owner[other], same)
 
 
 def _orientation(

@@ -13,6 +13,7 @@ from warpjld.grasp.near_object import NearObject
 __all__ = ["Widths", "sample_widths"]
 
 _SURFACE = 1e-5  # a point this near lies on the surface [m]
+_STEPS = 64  # at most along a line
 _LEAN = 0.4  # how far a line may lean from the normal it starts along, as a tangent
 
 
@@ -56,20 +57,29 @@ def sample_widths(near: NearObject, count: int, rng: np.random.Generator, *, wid
     outward = thing.normals[face]
     line = -outward + rng.uniform(-_LEAN, _LEAN, size=(count, 3)) * rng.uniform(size=(count, 1))
     line = unit(line)
-    along = np.full(count, 20.0 * _SURFACE)
-    left, normal = np.zeros(count, dtype=bool), np.zeros((count, 3))
-    for _ in range(64):
-        going = np.flatnonzero(~left & (along < widest))
-        if not len(going):
-            break
-        found = near.objects.distances(local[going] + along[going, None] * line[going], threads=1)
-        depth = -found.distance[0]
-        out = depth < _SURFACE
-        left[going[out]] = True
-        normal[going[out]] = thing.normals[found.face[0][out]]
-        along[going] += np.where(out, 0.0, depth)
+    along, leaves = _followed(near, local, line, widest)
+    left = leaves >= 0
+    normal = thing.normals[leaves]
     slant = np.minimum(-(outward * line).sum(axis=1), (normal * line).sum(axis=1))
     # what leaves at once started at an edge and says nothing
     good = left & (slant > 0.0) & (along > 100.0 * _SURFACE)
     first, second = (thing.place.apply(ends[good])[0] for ends in (local, local + along[:, None] * line))
     return Widths(first, second, slant[good])
+
+
+def _followed(
+    near: NearObject, start: NDArray[np.float64], line: NDArray[np.float64], widest: float
+) -> tuple[NDArray[np.float64], NDArray[np.int32]]:
+    """How far lines go until they leave the object [m], and the triangles where they do, −1 where they do not, (n,)."""
+    import warp as wp
+    from warpjld_kernels.lines_to_object import follow_through
+
+    along, leaves = np.full(len(start), 20.0 * _SURFACE), np.empty(len(start), dtype=np.int32)
+    kinds = (wp.vec3d, wp.vec3d, wp.float64, wp.int32)
+    arrays = [
+        wp.array(a, dtype=kind, device="cpu", copy=False)
+        for a, kind in zip((start, line, along, leaves), kinds, strict=True)
+    ]
+    inputs = [near.objects.solids, *arrays[:2], _SURFACE, widest, _STEPS, *arrays[2:]]
+    wp.launch(follow_through, len(start), inputs=inputs, device="cpu")
+    return along, leaves

@@ -13,11 +13,11 @@ from concurrent.futures.process import BrokenProcessPool
 from contextlib import contextmanager
 from multiprocessing import connection, parent_process
 from multiprocessing.process import BaseProcess
-from typing import Any, Protocol, TypeVar
+from typing import Any, Protocol, TypeVar, runtime_checkable
 
 from warpjld.errors import WarpjldError
 
-__all__ = ["LIVES", "THREAD_VARIABLES", "Work", "Workers", "one_thread", "run_jobs", "worker_pool"]
+__all__ = ["LIVES", "THREAD_VARIABLES", "BlockWork", "Work", "Workers", "one_thread", "run_jobs", "worker_pool"]
 
 _AHEAD = 2  # jobs handed out for each process: keeps it busy, and few are suspected when it dies
 LIVES = 2  # times a job may kill a worker that has nothing else to do
@@ -35,6 +35,7 @@ THREAD_VARIABLES = (
 
 
 Job = TypeVar("Job", contravariant=True)
+Each = TypeVar("Each")
 
 
 class Work(Protocol[Job]):
@@ -53,8 +54,19 @@ class Work(Protocol[Job]):
         """Keep that a job ended its process, twice; returns its status."""
 
 
+@runtime_checkable
+class BlockWork(Work[Each], Protocol[Each]):
+    """Jobs that are sooner done several at a time, with the same results."""
+
+    def blocks(self, jobs: Iterable[Each], processes: int) -> Iterable[list[Each]]:
+        """Jobs as they are handed out together."""
+
+    def do_block(self, jobs: list[Each]) -> list[str]:
+        """Do jobs one after another, and keep what comes of each; returns their statuses."""
+
+
 def run_jobs(work: Work[Job], jobs: Iterable[Job], *, processes: int, done: Callable[[Job, str], None]) -> None:
-    """Do jobs.
+    """Do jobs, in blocks where ``work`` is a ``BlockWork``.
 
     When a worker dies (killed, out of memory, crashed), all that was handed out is done again one by one in a process
     of its own; a job that kills it twice is buried, and the rest goes on.
@@ -69,7 +81,7 @@ def run_jobs(work: Work[Job], jobs: Iterable[Job], *, processes: int, done: Call
         WarpjldError: Workers do not even start, or what ``Work.do`` raises.
         KeyboardInterrupt: As soon as it comes: jobs that are being done are given up.
     """
-    waiting = deque(jobs)
+    waiting = deque(work.blocks(jobs, processes) if isinstance(work, BlockWork) else ([job] for job in jobs))
     with one_thread():
         while waiting:
             suspects = _together(work, waiting, processes, done)
@@ -222,21 +234,36 @@ def _do(job: Any) -> str:
         _doing = False
 
 
-def _together(work: Work[Job], waiting: deque[Job], processes: int, done: Callable[[Job, str], None]) -> list[Job]:
+def _do_block(jobs: list[Any]) -> list[str]:
+    global _doing
+    assert _work is not None
+    _doing = True
+    try:
+        return _work.do_block(jobs) if isinstance(_work, BlockWork) else [_work.do(job) for job in jobs]
+    except SystemExit:
+        os._exit(1)
+    finally:
+        _doing = False
+
+
+def _together(
+    work: Work[Job], waiting: deque[list[Job]], processes: int, done: Callable[[Job, str], None]
+) -> list[Job]:
     """Work off ``waiting``; if the pool breaks, stop and return the jobs that were handed out."""
-    out: dict[Future[str], Job] = {}
+    out: dict[Future[list[str]], list[Job]] = {}
     try:
         with worker_pool(work, min(processes, len(waiting))) as workers:
             while waiting or out:
                 while waiting and len(out) < _AHEAD * processes:
-                    job = waiting[0]
-                    out[workers.submit(_do, job)] = job
+                    block = waiting[0]
+                    out[workers.submit(_do_block, block)] = block
                     waiting.popleft()
                 for future in workers.finished(out):
-                    done(out[future], future.result())
+                    for job, status in zip(out[future], future.result(), strict=True):
+                        done(job, status)
                     del out[future]
     except BrokenProcessPool:
-        return _settle(work, out.values(), done)
+        return _settle(work, [job for block in out.values() for job in block], done)
     return []
 
 

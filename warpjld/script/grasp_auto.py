@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from warpjld.script.props import Prop
     from warpjld.script.scene import Actor, Scene
 
-__all__ = ["grasp_by_itself"]
+__all__ = ["carry", "grasp_by_itself", "key_grip"]
 
 _BEFORE = 0.6
 """Part of the arm's way after which the open hand is before the object; then it comes straight."""
@@ -42,7 +42,6 @@ def grasp_by_itself(
     from warpjld.grasp.auto import find_grasp
     from warpjld.grasp.close import Closer
     from warpjld.grasp.intersection import intersection
-    from warpjld.skeleton import CHANNELS
 
     if actor.recorded is not None:
         raise InputError(f"actor {actor.name} is driven by a MOTION file: no angle can be searched")
@@ -56,17 +55,8 @@ def grasp_by_itself(
         found = find_grasp(
             covering, thing, closer=closer, obstacles=obstacles, side=side, count=tries, posture=posture_name
         )
-        _carry(scene, actor, found, (first, middle, last))
-    grip = {}
-    rest = actor.skeleton.initial
-    changed = np.argwhere((found.start != rest) | (found.angles != rest))
-    for joint, column in changed.tolist():
-        channel = f"{actor.skeleton.names[joint]}.{CHANNELS[column]}"
-        start, closed = float(found.start[joint, column]), float(found.angles[joint, column])
-        grip[channel] = start
-        actor.set_keys(channel, [first, middle], start, scene.spline)
-        actor.set_keys(channel, [last], closed, scene.spline)
-    scene.grips[actor.name] = scene.grips.get(actor.name, {}) | grip
+        carry(scene, actor, found, (first, middle, last))
+    key_grip(scene, actor, found, (first, middle, last))
     inside = intersection(covering, covering.deform(stage(actor, np.array([last]), scene.rate))[0], thing)
     message = (
         f"the best of {found.tried} placements, posture {found.posture}: {len(found.touching)} digits touch; {inside}"
@@ -84,7 +74,24 @@ def grasp_by_itself(
     return Attempt(f"GRASP {prop.name} AUTO", last, actor.name, prop.name, "CONVERGED", message, values)
 
 
-def _carry(scene: Scene, actor: Actor, found: AutoGrasp, frames: tuple[float, float, float]) -> None:
+def key_grip(scene: Scene, actor: Actor, found: AutoGrasp, frames: tuple[float, float, float]) -> None:
+    """Keys of the joints: open at the first two frames, closed at the last; RELEASE opens them again."""
+    from warpjld.skeleton import CHANNELS
+
+    first, middle, last = frames
+    grip = {}
+    rest = actor.skeleton.initial
+    changed = np.argwhere((found.start != rest) | (found.angles != rest))
+    for joint, column in changed.tolist():
+        channel = f"{actor.skeleton.names[joint]}.{CHANNELS[column]}"
+        start, closed = float(found.start[joint, column]), float(found.angles[joint, column])
+        grip[channel] = start
+        actor.set_keys(channel, [first, middle], start, scene.spline)
+        actor.set_keys(channel, [last], closed, scene.spline)
+    scene.grips[actor.name] = scene.grips.get(actor.name, {}) | grip
+
+
+def carry(scene: Scene, actor: Actor, found: AutoGrasp, frames: tuple[float, float, float]) -> None:
     """Move a hand as a whole: away from the object, to it, and stay."""
     from scipy.spatial.transform import Rotation
 

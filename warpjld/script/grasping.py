@@ -163,7 +163,7 @@ def close_digits(
 
 def collisions(scene: Scene, actor: Actor, held: Prop, first: float, last: float) -> list[str]:
     """Objects other than the held one that the hand enters while it closes, in words (R77)."""
-    from warpjld.grasp.both_ways import BothWays
+    from warpjld.grasp.hand_object_gaps import HandObjectGaps
     from warpjld.grasp.obstacles import COLLIDES
 
     covering, told = cover(actor), []
@@ -172,9 +172,9 @@ def collisions(scene: Scene, actor: Actor, held: Prop, first: float, last: float
     for prop in scene.props.values():
         if prop is held:
             continue
-        both = BothWays(covering, prop.thing)
+        both = HandObjectGaps(covering, prop.thing)
         if prop.deforms:
-            shapes = [BothWays(covering, placed_at(scene, prop, frame)) for frame in frames.tolist()]
+            shapes = [HandObjectGaps(covering, placed_at(scene, prop, frame)) for frame in frames.tolist()]
             depths = np.concatenate([shape.depths(skin[None]) for shape, skin in zip(shapes, skins, strict=True)])
         else:
             depths = both.depths(skins, prop_places(scene.actors, scene.rate, prop, frames))

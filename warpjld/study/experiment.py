@@ -2,17 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Hashable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any, Protocol
+from typing import Any, Protocol, runtime_checkable
 
 import numpy as np
 from numpy.typing import NDArray
 
 from warpjld.tables.columns import Column
 
-__all__ = ["Experiment", "Outcome", "generator"]
+__all__ = ["BatchedExperiment", "Experiment", "Outcome", "generator"]
 
 
 @dataclass(frozen=True, eq=False)
@@ -86,6 +86,17 @@ class Experiment(Protocol):
 
     def pictures(self, trial: int, outcome: Outcome, folder: Path) -> list[Path]:
         """Draw a trial; may draw nothing."""
+
+
+@runtime_checkable
+class BatchedExperiment(Experiment, Protocol):
+    """An experiment whose trials cost less where several that are alike are begun together, with the same results."""
+
+    def alike(self, trial: int) -> Hashable:
+        """The same for all trials that are."""
+
+    def look_ahead(self, trials: Sequence[int]) -> None:
+        """Called in a worker before it runs these trials, which are alike: what they have in common is computed."""
 
 
 def generator(seed: int, trial: int) -> np.random.Generator:

@@ -4,18 +4,21 @@ from __future__ import annotations
 
 import time
 import traceback
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Hashable, Iterable
 from dataclasses import dataclass
 from pathlib import Path
 
 from warpjld.errors import WarpjldError
 from warpjld.runtime.processes import run_jobs
 from warpjld.study.columns import COMMON_COLUMNS
-from warpjld.study.experiment import Experiment, Outcome, generator
+from warpjld.study.experiment import BatchedExperiment, Experiment, Outcome, generator
 from warpjld.study.shards import Shard, Shards
 from warpjld.tables.columns import checked_values
 
 __all__ = ["TrialWork", "perform", "performed", "run_trials"]
+
+_TOGETHER = 16  # trials that are alike, handed out at once
+_SHARES = 4  # blocks that every process gets at least
 
 
 def run_trials(
@@ -61,6 +64,24 @@ class TrialWork:
         except OSError as error:
             raise WarpjldError(f"trial {trial} cannot be kept in {self.folder}: {error}") from error
         return str(shard.row["status"])
+
+    def blocks(self, trials: Iterable[int], processes: int) -> list[list[int]]:
+        """Trials that are alike together, few enough that every process gets some; in the order of their first."""
+        order = list(trials)
+        most = min(_TOGETHER, max(1, len(order) // (_SHARES * processes)))
+        if not isinstance(self.experiment, BatchedExperiment) or most == 1:
+            return [[trial] for trial in order]
+        alike: dict[Hashable, list[int]] = {}
+        for trial in order:
+            alike.setdefault(self.experiment.alike(trial), []).append(trial)
+        blocks = [some[k : k + most] for some in alike.values() for k in range(0, len(some), most)]
+        return sorted(blocks)
+
+    def do_block(self, trials: list[int]) -> list[str]:
+        """Run trials that are alike, and keep each."""
+        if isinstance(self.experiment, BatchedExperiment) and len(trials) > 1:
+            self.experiment.look_ahead(trials)
+        return [self.do(trial) for trial in trials]
 
     def kept(self, trial: int) -> str | None:
         """Status of a trial that is kept already."""

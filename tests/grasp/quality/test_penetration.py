@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from warpjld.covering import Covering
-from warpjld.grasp.both_ways import BothWays
+from warpjld.grasp.hand_object_gaps import HandObjectGaps
 from warpjld.grasp.quality import penetration
 from warpjld.grasp.shapes import ball, box
 from warpjld.rig import Rig
@@ -18,13 +18,13 @@ def test_a_corner_between_skin_vertices_is_found_from_its_own_side(rig: Rig, cov
     middle = 0.5 * (
         rig.skeleton.rest[rig.skeleton.index("wrist")] + rig.skeleton.rest[rig.skeleton.index("middle.base")]
     )
-    away = penetration(BothWays(covering, ball(0.03).placed(middle + np.array([0.0, 0.2, 0.0]))), skin)
+    away = penetration(HandObjectGaps(covering, ball(0.03).placed(middle + np.array([0.0, 0.2, 0.0]))), skin)
     assert (away.depth, away.volume) == (0.0, 0.0)
     inner = ball(0.008, subdivisions=3).placed(middle)  # swallowed: no skin vertex is inside it
-    swallowed = penetration(BothWays(covering, inner), skin)
+    swallowed = penetration(HandObjectGaps(covering, inner), skin)
     assert swallowed.skin == 0.0
     assert swallowed.thing > 0.008 / 2.0
     assert swallowed.volume == pytest.approx(np.pi / 6.0 * 0.008**3, rel=0.05)
     palm = skin[np.linalg.norm((skin - middle)[:, [0, 2]], axis=1) < 0.01][:, 1].min()
     slab = box(0.3, 0.02, 0.3).placed([0.0, palm + 0.002 - 0.01, 0.0])  # its top is 2 mm above the palm's skin
-    assert penetration(BothWays(covering, slab), skin).skin >= 0.0019
+    assert penetration(HandObjectGaps(covering, slab), skin).skin >= 0.0019

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from warpjld.grasp.both_ways import BothWays
+from warpjld.grasp.hand_object_gaps import HandObjectGaps
 from warpjld.grasp.intersection import intersection_beside
 
 __all__ = ["Penetration", "penetration"]
@@ -35,7 +35,7 @@ class Penetration:
         return max(self.skin, self.thing)
 
 
-def penetration(both: BothWays, vertices: NDArray[np.floating]) -> Penetration:
+def penetration(both: HandObjectGaps, vertices: NDArray[np.floating]) -> Penetration:
     """Penetration of a deformed hand and an object, looked at from both sides.
 
     With d_O the signed distance to the object, d_S that to the skin, negative inside,
@@ -43,8 +43,8 @@ def penetration(both: BothWays, vertices: NDArray[np.floating]) -> Penetration:
         skin = max(0, −min d_O(skin vertices)),   thing = max(0, −min d_S(object's outline)),
 
     the two halves of a depth by points (Zhang, Kim, Varadhan & Manocha 2007 compute the exact one), the outline being
-    the object's vertices and points of its sharp edges (`warpjld.grasp.outline`): a finger with few vertices does not
-    hide the edge of a box that cuts into it.
+    the object's vertices and points of its sharp edges (`warpjld.grasp.outline_points`): a finger with few
+    vertices does not hide the edge of a box that cuts into it.
 
     Args:
         both: Hand and object, which is at its own place. The hand's skin may be open, as at the wrist.

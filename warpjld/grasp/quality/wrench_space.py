@@ -24,9 +24,7 @@ Array = NDArray[np.float64]
 _MOST_POINTS = 6_000
 _SHAKE = 1e-9
 _GROWN = 1e-12  # of the largest coordinate: what is farther beyond a facet makes the hull grow
-_TOGETHER = 24  # facets that it grows at together
-_FIRST = 12  # and so many of the longest: a hull wants seven
-_STARTS = np.concatenate([np.eye(6), -np.eye(6)])  # directions whose farthest wrenches it begins with
+_TOGETHER = 8  # facets that it grows at together
 
 
 @dataclass(frozen=True, eq=False)
@@ -115,8 +113,7 @@ def least_resistance(contacts: Contacts, center: ArrayLike, *, torque_scale: flo
     beyond = _GROWN * float(np.abs(points).max())
     inside = np.zeros(len(points), dtype=bool)
     inside[0] = True
-    inside[(points @ _STARTS.T).argmax(axis=0)] = True
-    inside[np.argsort(-np.linalg.norm(points, axis=1), kind="stable")[:_FIRST]] = True
+    inside[_independent(points)] = True
     epsilon = 0.0
     while True:
         equations = _hull(points[inside]).equations
@@ -131,6 +128,13 @@ def least_resistance(contacts: Contacts, center: ArrayLike, *, torque_scale: flo
             break
         inside[added] = True
     return epsilon if epsilon > 10.0 * _SHAKE else 0.0
+
+
+def _independent(points: Array) -> NDArray[np.integer]:
+    """Six of points (k, 6) that span all dimensions, so that a hull of them and the origin is not flat."""
+    from scipy.linalg import qr
+
+    return np.asarray(qr(points.T, mode="r", pivoting=True)[1][:6])
 
 
 def _hull(points: Array) -> ConvexHull:

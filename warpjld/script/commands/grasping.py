@@ -69,9 +69,11 @@ def auto_f_2_3(scene: Scene, arguments: Arguments) -> None:
     syntax=(
         "GRASP <key1> <key2> [LEFT/RIGHT] <object> [THUMB/INDEX/MIDDLE/RING/PINKY …] "
         "[COUPLING <second joint> <third joint>], or GRASP <key1> <key2> [LEFT/RIGHT] <object> AUTO "
-        "[TRIES <placements>] [POSTURE <SPHERE/CYLINDER/PINCH/PLATE>]"
+        "[TRIES <placements>] [POSTURE <SPHERE/CYLINDER/PINCH/PLATE>], or GRASP <key1> <key2> BOTH <object> AUTO "
+        "[TRIES <placements>]"
     ),
-    help="Digits close from key1 on and touch at key2; COUPLING bends joints together; AUTO finds a way to take it.",
+    help="Digits close from key1 on and touch at key2; COUPLING bends joints together; AUTO finds a way to take it, "
+    "BOTH with two hands.",
     group="Grasping",
 )
 def grasp(scene: Scene, arguments: Arguments) -> None:
@@ -79,6 +81,9 @@ def grasp(scene: Scene, arguments: Arguments) -> None:
     from warpjld.script.grasping import close_digits
 
     first, last = read_frames(arguments, "at which the digits begin to close", "at which they touch")
+    if arguments.keyword("BOTH"):
+        _grasp_both(scene, arguments, first, last)
+        return
     side = read_side(scene, arguments)
     prop = read_object(scene, arguments)
     _check_size(scene.actor_with(side), prop, arguments)
@@ -129,6 +134,25 @@ def _grasp_auto(  # type: ignore[no-untyped-def]
         _leave_keys(scene, actor, prop, side, first, last, ())
         return
     scene.attempts.append(grasp_by_itself(scene, actor, prop, side, first, last, tries, posture))
+
+
+def _grasp_both(scene: Scene, arguments: Arguments, first: float, last: float) -> None:
+    from warpjld.script.grasp_both import both_hands, grasp_by_both
+
+    prop = read_object(scene, arguments)
+    if not arguments.keyword("AUTO"):
+        raise arguments.expected("AUTO: two hands find their places themselves")
+    options = arguments.options(
+        tries=lambda: arguments.integer("the number of placements to try", minimum=1, maximum=100_000),
+    )
+    actors = both_hands(scene)
+    for actor in actors.values():
+        _check_size(actor, prop, arguments)
+    if scene.dry:
+        for side, actor in actors.items():
+            _leave_keys(scene, actor, prop, side, first, last, ())
+        return
+    scene.attempts.extend(grasp_by_both(scene, prop, first, last, int(cast(int, options.get("tries", 96)))))
 
 
 def _leave_keys(

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from warpjld.grasp.both_ways import BothWays
+from warpjld.grasp.hand_object_gaps import HandObjectGaps
 from warpjld.grasp.quality import (
     SIX_DIRECTIONS,
     ContactPatches,
@@ -28,7 +28,7 @@ _DOWN = int((SIX_DIRECTIONS @ [0.0, -1.0, 0.0]).argmax())
 
 
 def measure_grasp(
-    hand: Hand, thing: Thing, both: BothWays, vertices: NDArray[np.float32], friction: float, how: Measuring
+    hand: Hand, thing: Thing, both: HandObjectGaps, vertices: NDArray[np.float32], friction: float, how: Measuring
 ) -> tuple[dict[str, Any], ContactPatches]:
     """Columns of the table, and the patches of contact; definitions are in `warpjld.grasp.quality`, one a measure.
 
@@ -41,7 +41,7 @@ def measure_grasp(
         how: Settings.
     """
     body, scale = thing.body, how.torque_scale or thing.radius
-    patches, deepest = touching_patches(hand.finer, hand.parts, both.near, vertices, how.contact)
+    (patches,), (deepest,) = touching_patches(hand.finer, hand.parts, both.near, vertices[None], how.contact)
     contacts, center = patches.contacts(friction), body.centroid
     closure = force_closure(contacts, center, torque_scale=scale, edges=how.edges)
     space = wrench_space(contacts, center, torque_scale=scale, norm=how.norm, edges=how.edges)
@@ -56,7 +56,7 @@ def measure_grasp(
         edges=how.edges,
     )
     inside = penetration(both, vertices)
-    skin_inside = max(inside.skin, deepest)
+    skin_inside = max(inside.skin, float(deepest))
     areas = dict.fromkeys((*DIGITS, "palm"), 0.0)
     for digit, area in zip(patches.digits, patches.areas, strict=True):
         areas[digit if digit in DIGITS else "palm"] += float(area)

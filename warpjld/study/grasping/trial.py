@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any, ClassVar
 
@@ -20,7 +20,7 @@ from warpjld.grasp.postures import posture_for
 from warpjld.grasp.quality import ContactPatches
 from warpjld.grasp.segments import SEGMENTS
 from warpjld.skeleton import poses_from_angles
-from warpjld.study.experiment import Outcome
+from warpjld.study.experiment import Outcome, generator
 from warpjld.study.grasping.choices import HandChoice, ObjectChoice
 from warpjld.study.grasping.columns import GRASP_COLUMNS
 from warpjld.study.grasping.load import Thing, closer_of, device_identity, hand_of, opened_hand, thing_of
@@ -49,6 +49,16 @@ class _Tried:
     values: dict[str, Any]
 
 
+@dataclass(frozen=True, eq=False)
+class _Open:
+    """A hand that is held open beside the object: angles (J, 4), displacement and rotation of its root, columns."""
+
+    angles: Array
+    position: Array
+    rotation: Array
+    values: dict[str, Any]
+
+
 @dataclass(frozen=True)
 class GraspExperiment:
     """The experiment of a plan, for `warpjld.study.run_study`.
@@ -60,6 +70,7 @@ class GraspExperiment:
 
     settings: GraspPlan
     device: str = "cpu"
+    _ahead: dict[int, _Tried | Outcome] = field(default_factory=dict, compare=False, repr=False)
 
     columns: ClassVar[tuple[Column, ...]] = GRASP_COLUMNS
     success: ClassVar[str] = "success"
@@ -143,11 +154,12 @@ class GraspExperiment:
         choice, wanted, scale, friction = self.settings.combination(trial)
         hand, thing = hand_of(choice), self._thing(wanted, scale)
         best_of = self.settings.wrist.best_of
-        tried = (
-            self._best_of(best_of, choice, wanted, scale, friction, rng)
-            if best_of
-            else self._one(choice, wanted, scale, rng)
-        )
+        if trial in self._ahead:
+            tried = self._ahead.pop(trial)
+        elif best_of:
+            tried = self._best_of(best_of, choice, wanted, scale, friction, rng)
+        else:
+            (tried,) = self._closed([self._placed(choice, wanted, scale, rng)], choice, wanted, scale)
         if isinstance(tried, Outcome):
             return tried
         root = {"root_position": tried.position, "root_rotation": tried.rotation}
@@ -162,9 +174,25 @@ class GraspExperiment:
         arrays = {f"{choice.name}/{name}": array for name, array in kept.items()}
         return Outcome("closed" if tried.touches else "no contact", {**tried.values, **placed, **measured}, arrays)
 
-    def _one(
+    def alike(self, trial: int) -> tuple[HandChoice, ObjectChoice, float]:
+        """Hand, object and scale: hands on one object close together."""
+        return self.settings.combination(trial)[:3]
+
+    def look_ahead(self, trials: Sequence[int]) -> None:
+        """Close the hands of trials that are alike together. Each ends bit for bit as it does alone."""
+        self._ahead.clear()
+        if self.settings.wrist.best_of:
+            return
+        choice, wanted, scale = self.alike(trials[0])
+        try:
+            placed = [self._placed(choice, wanted, scale, generator(self.seed, trial)) for trial in trials]
+            self._ahead.update(zip(trials, self._closed(placed, choice, wanted, scale), strict=True))
+        except Exception:  # whose it is comes out when they are run alone
+            self._ahead.clear()
+
+    def _placed(
         self, choice: HandChoice, wanted: ObjectChoice, scale: float, rng: np.random.Generator
-    ) -> _Tried | Outcome:
+    ) -> _Open | Outcome:
         """One placement drawn from the plan's ranges."""
         hand, thing = hand_of(choice), self._thing(wanted, scale)
         approach = draw_approach(self.settings.wrist, rng, thing.body.size)
@@ -183,12 +211,30 @@ class GraspExperiment:
         root = hand.rig.skeleton.rest[0]
         position = turn @ root + shift + back * approach.direction - root
         rotation = Rotation.from_matrix(turn).as_quat()
-        angles = opened.angles[None]
-        poses = poses_from_angles(hand.rig.skeleton, angles, root_position=position[None], root_rotation=rotation[None])
+        return _Open(opened.angles, position, rotation, values)
+
+    def _closed(
+        self, placed: Sequence[_Open | Outcome], choice: HandChoice, wanted: ObjectChoice, scale: float
+    ) -> list[_Tried | Outcome]:
+        """Open hands on one object, closed; what is no hand stays as it is."""
+        hands = [one for one in placed if isinstance(one, _Open)]
+        if not hands:
+            return [one for one in placed if isinstance(one, Outcome)]
+        closer, angles = self._closer(choice, wanted, scale), np.stack([one.angles for one in hands])
+        poses = poses_from_angles(
+            closer.covering.skeleton,
+            angles,
+            root_position=np.stack([one.position for one in hands]),
+            root_rotation=np.stack([one.rotation for one in hands]),
+        )
         coupling = self.settings.coupling if any(self.settings.coupling) else None
-        closer = self._closer(choice, wanted, scale)
         closed = closer.close(poses, angles, digits=self.settings.digits, coupling=coupling)
-        return _Tried(closed.angles[0], position, rotation, bool(closed.touching().any()), values)
+        touches = closed.touching().any(axis=1)
+        ended = iter(
+            _Tried(closed.angles[g], one.position, one.rotation, bool(touches[g]), one.values)
+            for g, one in enumerate(hands)
+        )
+        return [one if isinstance(one, Outcome) else next(ended) for one in placed]
 
     def _best_of(
         self,

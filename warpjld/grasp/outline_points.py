@@ -5,23 +5,23 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from warpjld.grasp.edges import unique_edges
 from warpjld.grasp.objects import GraspObject
 
-__all__ = ["outline"]
+__all__ = ["outline_points"]
 
 _SHARP = np.cos(np.radians(10.0))
 
 
-def outline(thing: GraspObject, spacing: float = 2e-3) -> NDArray[np.float64]:
+def outline_points(thing: GraspObject, spacing: float = 2e-3) -> NDArray[np.float64]:
     """The vertices, and points along sharp edges no farther than ``spacing`` [m] apart, in the object's frame, (n, 3).
 
     An edge is sharp where its faces' normals differ by 10° or more, or where it has one face only. Inside flat parts no
     point is needed: what touches them are the other surface's vertices.
     """
-    edges = np.sort(thing.faces[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2), axis=1)
-    first, place, uses = np.unique(edges, axis=0, return_inverse=True, return_counts=True)
+    first, place, uses = unique_edges(thing.faces[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2))
     total = np.zeros((len(first), 3))
-    np.add.at(total, place.ravel(), np.repeat(thing.normals, 3, axis=0))
+    np.add.at(total, place, np.repeat(thing.normals, 3, axis=0))
     # |n₁ + n₂|² = 2 + 2 cos
     sharp = (uses != 2) | ((total**2).sum(axis=1) < 2.0 + 2.0 * _SHARP)
     a, b = thing.vertices[first[sharp, 0]], thing.vertices[first[sharp, 1]]

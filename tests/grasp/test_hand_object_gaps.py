@@ -4,13 +4,13 @@ import numpy as np
 import pytest
 
 from warpjld.grasp import ObjectSet
-from warpjld.grasp.both_ways import BothWays
 from warpjld.grasp.close import Closer
 from warpjld.grasp.digits import digit_chains
 from warpjld.grasp.finer import FinerSkin
 from warpjld.grasp.give_way import give_way
+from warpjld.grasp.hand_object_gaps import HandObjectGaps
 from warpjld.grasp.intersection import contacts
-from warpjld.grasp.outline import outline
+from warpjld.grasp.outline_points import outline_points
 from warpjld.grasp.quality import vertex_areas
 from warpjld.grasp.shapes import ball, box
 from warpjld.skeleton import CHANNELS, poses_from_angles
@@ -18,7 +18,7 @@ from warpjld.skeleton import CHANNELS, poses_from_angles
 
 def test_an_outline_has_points_along_sharp_edges_only() -> None:
     thing = box(0.1, 0.06, 0.04)
-    points = outline(thing, 5e-3)
+    points = outline_points(thing, 5e-3)
     half = thing.size / 2
     at_border = np.isclose(np.abs(points), half).sum(axis=1)
     extra = points[len(thing.vertices) :]
@@ -28,7 +28,7 @@ def test_an_outline_has_points_along_sharp_edges_only() -> None:
     )
     assert np.diff(along).max() <= 5e-3 + 1e-12
     np.testing.assert_allclose(along[[0, -1]], [-half[0], half[0]])
-    assert len(outline(ball(0.05, subdivisions=4))) == len(ball(0.05, subdivisions=4).vertices)
+    assert len(outline_points(ball(0.05, subdivisions=4))) == len(ball(0.05, subdivisions=4).vertices)
 
 
 def test_a_finer_skin_lies_on_the_same_triangles(rig) -> None:
@@ -46,19 +46,19 @@ def test_a_finer_skin_lies_on_the_same_triangles(rig) -> None:
 def test_a_blade_between_the_vertices_of_a_finger_is_seen(covering) -> None:
     """A thin bar cut 2 mm into the index finger from below, along it: no vertex of the finger is in it."""
     skeleton, skin = covering.skeleton, covering.surface.vertices.astype(np.float32)
-    both = BothWays(covering, ball(0.01))
+    both = HandObjectGaps(covering, ball(0.01))
     index = both.parts.index("left.index")
     own = skin[both.part_of_vertex == index]
     bone = 0.5 * (skeleton.rest[skeleton.index("index.knuckle2")] + skeleton.rest[skeleton.index("index.knuckle3")])
     below = own[np.linalg.norm((own - bone)[:, [0, 2]], axis=1) < 0.006][:, 1].min()
     blade = box(0.0004, 0.04, 0.004).placed([bone[0], below - 0.02 + 0.002, bone[2]])
     assert ObjectSet(blade).distances(skin).distance.min() > 0.0
-    depth = BothWays(covering, blade).depths(skin[None])[0, index]
+    depth = HandObjectGaps(covering, blade).depths(skin[None])[0, index]
     assert 5e-4 < depth < 2.1e-3  # the skin is rounded: nearest at its side
     told = {c.part: c.deepest for c in contacts(covering, skin, blade)}
     assert told["left.index"] == pytest.approx(depth)
     far = blade.placed([0.0, 1.0, 0.0]).place
-    assert BothWays(covering, blade).depths(skin[None], far).max() == 0.0
+    assert HandObjectGaps(covering, blade).depths(skin[None], far).max() == 0.0
 
 
 def test_digits_give_way_to_an_edge_and_do_not_pass_through(covering) -> None:
@@ -69,7 +69,7 @@ def test_digits_give_way_to_an_edge_and_do_not_pass_through(covering) -> None:
     closed[list(chains["left.index"]), 0] = np.radians([60, 60, 30])
     tip = skeleton.rest[skeleton.index("index.tip")]
     post = box(0.2, 0.004, 0.004).placed(tip + np.array([0.0, -0.03, 0.01]))  # across the finger's way
-    both = BothWays(covering, post)
+    both = HandObjectGaps(covering, post)
 
     def depths(hands: np.ndarray, angles: np.ndarray) -> np.ndarray:
         return both.depths(covering.deform(poses_from_angles(skeleton, angles)), moved=True)

@@ -39,7 +39,7 @@ class Found:
     """Results of N searches, in their order.
 
     Attributes:
-        status: Values of ``Status``, shape (N,).
+        status: Values of ``SearchStatus``, shape (N,).
         closing: How far the chain closed [rad at rate 1], shape (N,), negative where ``FlexionSearch.nearest`` turned
             it the other way; the closest approach where there is no contact.
         angles: Flexion of the joints there [rad], shape (N, 4); for a single joint the first column.

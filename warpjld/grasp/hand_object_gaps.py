@@ -8,25 +8,26 @@ from numpy.typing import NDArray
 from warpjld.covering import Covering
 from warpjld.grasp.digits import digit_chains
 from warpjld.grasp.kept import kept_with
-from warpjld.grasp.moved import share_moved
+from warpjld.grasp.moving_skin import share_moved
 from warpjld.grasp.near_object import NearObject
 from warpjld.grasp.objects import GraspObject, Places
-from warpjld.grasp.outline import outline
+from warpjld.grasp.outline_points import outline_points
+from warpjld.grasp.point_groups import grouped_points
 from warpjld.grasp.posed_skins import PosedSkins
 
-__all__ = ["BothWays"]
+__all__ = ["HandObjectGaps"]
 
 _DEEPEST = 0.015  # of the object what lies deeper in the skin or farther from it is not measured [m]
 _NEAR = 2e-3  # points this far from a hand's bounding box matter [m]
 _SWELLS = 0.02  # share of a digit from which skin of the palm counts as moved by it
 
 
-class BothWays:
+class HandObjectGaps:
     """Distances between poses of one hand and an object.
 
     A hand's vertices say how far skin is from the object, or how deep in it; the object's vertices and points of its
-    sharp edges (see ``outline``) say how deep the object is in the skin, which the vertices of a coarse finger do not
-    see.
+    sharp edges (see ``outline_points``) say how deep the object is in the skin, which the vertices of a coarse finger
+    do not see.
 
     Args:
         covering: The hand.
@@ -38,13 +39,8 @@ class BothWays:
     """
 
     def __init__(self, covering: Covering, thing: GraspObject) -> None:
-        import warp as wp
-
         self.covering, self.thing, self.near = covering, thing, NearObject(thing)
-        self._skins, self._points = (
-            kept_with(covering, PosedSkins),
-            wp.array(outline(thing), dtype=wp.vec3d, device="cpu"),
-        )
+        self._skins, self._points = kept_with(covering, PosedSkins), grouped_points(outline_points(thing))
         self.parts = self._skins.parts.names
         owned = kept_with(covering, _Owners)
         self.part_of_vertex, self._owners, self._movers = owned.owners[1], owned.owners, owned.movers

@@ -1,0 +1,178 @@
+"""What is too wide for one hand is taken by two: palms opposed across it (A §10, R90)."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial import cKDTree
+
+from warpjld.covering import Covering
+from warpjld.errors import InputError
+from warpjld.geometry.rotations import unit
+from warpjld.grasp.auto import AutoGrasp
+from warpjld.grasp.close import Closed, Closer
+from warpjld.grasp.draws import WAY, preference
+from warpjld.grasp.judge import Judge, Pressing, Verdict, check_friction
+from warpjld.grasp.objects import GraspObject
+from warpjld.grasp.obstacles import Obstacles
+from warpjld.grasp.placements import Candidates, around, palms_on
+from warpjld.grasp.quality.contacts import Contacts
+from warpjld.grasp.widths import Widths, sample_widths
+
+__all__ = ["find_two_handed"]
+
+_SIDES = ("left", "right")
+_LINES = 400  # through the object, to find where it has opposite sides
+_ROUND = 24  # placements closed together
+_DEEPEST = 6e-4  # of hands and object in one another, above which a grasp is refused [m]
+_APART = 5e-3  # between the skins of the two hands at least [m]
+_COMES = (0.0, 0.1, 0.3, 0.6, 1.0)  # parts of the way at which a hand must not be in an obstacle
+
+
+@dataclass(frozen=True, eq=False)
+class _Side:
+    """One of the two hands on the object, and how G placements of it ended."""
+
+    name: str
+    closer: Closer
+    judge: Judge
+    around: Obstacles
+
+    def closed(self, aim: NDArray[np.float64], look: NDArray[np.float64], fingers: NDArray[np.float64]) -> _Ended:
+        """Palms at points (G, 3), looking and pointing along unit directions, brought to the object and closed."""
+        covering = self.closer.covering
+        skeleton = covering.skeleton
+        hands = palms_on(covering, skeleton.initial, self.closer.both.near, self.name, aim, look, fingers)
+        digits = [f"{self.name}.{digit}" for digit in self.judge.digits]
+        closed = self.closer.close(hands.poses(skeleton), hands.angles, digits=digits, coupling=(1.0, 0.7))
+        poses = hands.poses(skeleton, closed.angles)
+        skins = covering.deform(poses, threads=1)
+        clear = np.ones(len(hands), dtype=bool)
+        if self.around:
+            opened = covering.deform(hands.poses(skeleton), threads=1)
+            shifts = -WAY * hands.approach[:, None]
+            ways = [opened + (part * shifts).astype(np.float32) for part in _COMES]
+            clear = np.all([self.around.missed(way) for way in (*ways, skins)], axis=0)
+        return _Ended(hands, closed, skins, self.judge.pressing(poses, skins), clear)
+
+
+@dataclass(frozen=True, eq=False)
+class _Ended:
+    hands: Candidates
+    closed: Closed
+    skins: NDArray[np.float32]
+    pressing: list[Pressing]
+    clear: NDArray[np.bool_]
+
+
+def find_two_handed(
+    hands: Mapping[str, Covering],
+    thing: GraspObject,
+    *,
+    obstacles: Sequence[GraspObject] = (),
+    count: int = 96,
+    friction: float = 0.6,
+    seed: int = 0,
+) -> dict[str, AutoGrasp]:
+    """Place two open hands on opposite sides of an object, close them, judge both together, keep the best.
+
+    The palms look at one another along a line that friction holds between its two ends; the fingers of both point the
+    same way. A grasp counts if the contacts of both together are force closed, both hands press, and neither is more
+    than 0.6 mm in the object or nearer than 5 mm to the other.
+
+    Args:
+        hands: The hands by side, ``left`` and ``right``, smooth method.
+        thing: The object, where it stands.
+        obstacles: Other objects where they stand.
+        count: Placements at most.
+        friction: Coulomb coefficient.
+        seed: Of the sampling.
+
+    Returns:
+        The grasp of each side; both have the verdict of the two together.
+
+    Raises:
+        InputError: A side is missing, the object has no opposite sides, or no placement ends in a grasp.
+    """
+    if sorted(hands) != sorted(_SIDES):
+        raise InputError(f"hands: want a left and a right one, got {', '.join(hands) or 'none'}")
+    if count < 1:
+        raise InputError(f"count: want 1 or more, got {count}")
+    check_friction(friction)
+    sides = [_side(name, hands[name], thing, obstacles, friction) for name in _SIDES]
+    rng = np.random.default_rng(seed)
+    near = sides[0].closer.both.near
+    widths = sample_widths(near, _LINES, rng, widest=float(np.linalg.norm(thing.size)))
+    widths = widths[np.flatnonzero(widths.slant >= np.cos(np.arctan(friction)))]
+    if not len(widths):
+        raise InputError(
+            f"object {thing.name}: nowhere has it two sides that friction {friction:g} holds between palms"
+        )
+    best: dict[str, AutoGrasp] = {}
+    tried = 0
+    while tried < count and not (best and 2 * tried >= count):
+        some = min(_ROUND, count - tried)
+        tried += some
+        ended = _placed(sides, widths, near.thing, some, rng)
+        for g in range(some):
+            verdict = _together(sides, ended, g, friction)
+            if verdict is not None and verdict.score > (best["left"].score if best else 0.0):
+                best = {side.name: _grasp(side, one, g, verdict, tried) for side, one in zip(sides, ended, strict=True)}
+    if not best:
+        widest = 1e3 * float(widths.width.max())
+        raise InputError(
+            f"object {thing.name}: none of {tried} placements of two hands ends in a grasp that holds at friction "
+            f"{friction:g}; between palms it is up to {widest:.0f} mm wide"
+        )
+    return best
+
+
+def _side(
+    name: str, covering: Covering, thing: GraspObject, obstacles: Sequence[GraspObject], friction: float
+) -> _Side:
+    closer = Closer(covering, thing)
+    return _Side(name, closer, Judge(closer.both, name, friction), Obstacles(covering, obstacles))
+
+
+def _placed(
+    sides: list[_Side], widths: Widths, thing: GraspObject, count: int, rng: np.random.Generator
+) -> list[_Ended]:
+    """Both hands at the ends of widths drawn at random, near the centre of mass rather."""
+    picked = widths[rng.choice(len(widths), size=count, p=preference(widths, thing))]
+    line = unit(picked.second - picked.first)
+    fingers, turned = around(line, rng), rng.random(count)[:, None] < 0.5
+    aims = np.where(turned, picked.second, picked.first), np.where(turned, picked.first, picked.second)
+    looks = np.where(turned, -line, line), np.where(turned, line, -line)
+    return [side.closed(aim, look, fingers) for side, aim, look in zip(sides, aims, looks, strict=True)]
+
+
+def _together(sides: list[_Side], ended: list[_Ended], g: int, friction: float) -> Verdict | None:
+    """Judgement of both hands at once; None where one does not press, is too deep, blocked or by the other."""
+    pressing = [one.pressing[g] for one in ended]
+    if not all(len(one.contacts) for one in pressing) or not all(one.clear[g] for one in ended):
+        return None
+    depth = max(max(float(one.closed.penetration[g]), one.pressing[g].depth) for one in ended)
+    if depth > _DEEPEST:
+        return None
+    distance, _ = cKDTree(ended[0].skins[g]).query(ended[1].skins[g], distance_upper_bound=_APART)
+    if np.isfinite(distance).any():
+        return None
+    several = [one.contacts for one in pressing]
+    contacts = Contacts(
+        np.concatenate([one.points for one in several]),
+        np.concatenate([one.normals for one in several]),
+        np.array(friction),
+        np.concatenate([one.spin for one in several]),
+    )
+    digits = tuple(f"{side.name}.{name}" for side, one in zip(sides, pressing, strict=True) for name in one.digits)
+    return sides[0].judge.verdict(contacts, digits, any(one.palm for one in pressing), depth)
+
+
+def _grasp(side: _Side, ended: _Ended, g: int, verdict: Verdict, tried: int) -> AutoGrasp:
+    hands = ended.hands
+    touching = tuple(name for name in verdict.digits if name.startswith(f"{side.name}."))
+    place = hands.position[g], hands.rotation[g], hands.approach[g], hands.angles[g]
+    return AutoGrasp("palms", *place, ended.closed.angles[g], verdict, touching, tried)
