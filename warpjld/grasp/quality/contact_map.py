@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from warpjld.errors import InputError
-from warpjld.grasp.both_ways import BothWays
+from warpjld.grasp.hand_object_gaps import HandObjectGaps
 from warpjld.grasp.kept import kept_with
 from warpjld.grasp.objects import Places
 from warpjld.grasp.posed_skins import PosedSkins
@@ -40,7 +40,7 @@ class ContactMap:
 
 
 def contact_map(
-    both: BothWays, vertices: NDArray[np.floating], parts: NDArray[np.int64], *, tolerance: float
+    both: HandObjectGaps, vertices: NDArray[np.floating], parts: NDArray[np.int64], *, tolerance: float
 ) -> ContactMap:
     """Signed distances by vertex, both ways, and what is in contact: d ≤ tolerance.
 
