@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 
 from warpjld.fem.arrays import Array
-from warpjld.fem.assembly.block_matrix import IndefiniteError
+from warpjld.fem.assembly.block_matrix import BlockMatrix, IndefiniteError
 from warpjld.fem.body import Body
 from warpjld.fem.contact.interface.contact_interface import Interface
 from warpjld.fem.contact.law.contact_state import ContactState
@@ -81,9 +83,11 @@ class ContactNewton:
         ]
         begun.sort(key=NewtonState.left_over)
         status, found = Status.MAX_ITERATIONS, None
+        # where nothing prescribed moves, and nothing else is known, both searches are the same
+        same = bool(begun) and np.array_equal(begun[0].u, u)
         if begun:
             status, found = self._search(begun[0], step)
-        if found is None and status not in (Status.UNHELD, Status.SLIDING):
+        if found is None and not same and status not in (Status.UNHELD, Status.SLIDING):
             again, found = self._search(
                 NewtonState(self._elastic, self._system, step, u, states, None, **self._accuracy), step
             )
@@ -126,24 +130,36 @@ class ContactNewton:
         return status, None
 
     def _solved(self, state: NewtonState, unconstrained: UnconstrainedBodies) -> Iteration:
-        """A Newton step's free displacements; damped as far as the matrix needs it to be positive definite."""
+        """A Newton step's free displacements; damped as far as the matrix needs it to be positive definite.
+
+        Bodies that contact alone holds are steadied where it does not resist all their motions, or hardly.
+        """
+        if unconstrained and self._damping.share == 0.0 and unconstrained.grasped(state.contact):
+            done = self._solved_with(state, lambda matrix: matrix)
+            if done.status is not Status.INDEFINITE:
+                return done
+        while True:
+            done = self._solved_with(state, lambda matrix: unconstrained.steadied(matrix, state.turn))
+            if done.status is not Status.INDEFINITE or not self._damping.more():
+                return done
+
+    def _solved_with(self, state: NewtonState, steadied: Callable[[BlockMatrix], BlockMatrix]) -> Iteration:
+        """A Newton step's free displacements, as damped as it is, with a matrix that is ``steadied``."""
         contact, stiffness = state.contact, state.tangent.stiffness
         assert stiffness is not None
         blocks = [t.blocks for t in contact.tractions]
-        while True:
-            matrix = with_contact(self._damping.lend(stiffness), contact.points, blocks, threads=self.body.threads)
-            matrix = unconstrained.steadied(matrix, state.turn)
-            right = state.residual - matrix.product(state.jump, threads=self.body.threads)
-            if contact.nonsymmetric is not None:
-                right -= state.free * (contact.nonsymmetric @ state.jump)
-            try:
-                done = self._solver.solve(matrix, state.free, right, contact.nonsymmetric)
-            except IndefiniteError:
-                done = Iteration(np.zeros_like(right), Status.INDEFINITE, 0, 1.0, np.empty(0))
-            self.solves += 1
-            self.iterations += done.iterations
-            if done.status is not Status.INDEFINITE or not self._damping.more():
-                return done
+        lent = self._damping.lend(stiffness)
+        matrix = steadied(with_contact(lent, contact.points, blocks, threads=self.body.threads))
+        right = state.residual - matrix.product(state.jump, threads=self.body.threads)
+        if contact.nonsymmetric is not None:
+            right -= state.free * (contact.nonsymmetric @ state.jump)
+        try:
+            done = self._solver.solve(matrix, state.free, right, contact.nonsymmetric)
+        except IndefiniteError:
+            done = Iteration(np.zeros_like(right), Status.INDEFINITE, 0, 1.0, np.empty(0))
+        self.solves += 1
+        self.iterations += done.iterations
+        return done
 
     def _advance(self, state: NewtonState, move: Array, unconstrained: UnconstrainedBodies) -> float:
         """Go along a Newton step (3N,) as far as it serves: the share of it that was gone."""

@@ -11,7 +11,7 @@ from warpjld.fem.contact.interface.contact_interface import Interface
 from warpjld.fem.contact.interface.contact_points import ContactPoints
 from warpjld.fem.contact.law.contact_state import ContactState
 from warpjld.fem.contact.solver.contact_system import ContactForces
-from warpjld.fem.load.prescribed import Prescribed, free_motions
+from warpjld.fem.load.prescribed import Prescribed, free_motions, rigid_modes
 from warpjld.fem.solver.krylov import Status
 
 __all__ = ["UnconstrainedBodies", "blocked"]
@@ -20,6 +20,8 @@ _HELD = (3e-2, 0.4, 1e-4)
 """Stiffness given to bodies that only contact holds, over their own: it slows them down, and leaves no force. At first,
 so that contact is found before they fly off; by which factor it then falls with each iteration; and the least.
 """
+_GRASPED = 1e-4
+"""Least stiffness against a motion as a whole, over the most, from which contact is taken to resist all of them."""
 _FREE = 1e-9
 """Share of a point's weights that must be free to move along its normal for it to be parted."""
 
@@ -36,7 +38,9 @@ class UnconstrainedBodies:
     def __init__(self, body: Body, prescribed: Prescribed, stiffness: Array) -> None:
         self._mesh = body.mesh
         self._stiff = stiffness
-        self._bodies = [nodes for nodes, _ in free_motions(body, prescribed)]
+        found = free_motions(body, prescribed)
+        self._bodies = [nodes for nodes, _ in found]
+        self._modes = [(nodes, rigid_modes(body.mesh.nodes[nodes]).reshape(-1, 3, 6) @ left) for nodes, left in found]
         points = np.unique(prescribed.degrees // 3)
         self._held = [int(np.isin(points, nodes).sum()) for nodes in self._bodies]
 
@@ -79,6 +83,21 @@ class UnconstrainedBodies:
         """Share of a move (3N,) by which unconstrained bodies go no farther than ``reach`` [m]."""
         far = max((float(np.abs(move.reshape(-1, 3)[nodes]).max()) for nodes in self._bodies), default=0.0)
         return min(1.0, reach / far) if far > 0.0 else 1.0
+
+    def grasped(self, contact: ContactForces) -> bool:
+        """Whether contact resists every motion of theirs as a whole: more stiffness would only slow them down."""
+        count = sum(modes.shape[2] for _, modes in self._modes)
+        stiffness = np.zeros((count, count))
+        for p, t in zip(contact.points, contact.tractions, strict=True):
+            rows = np.flatnonzero(t.active)
+            moved = []  # of the points, by each motion of each body
+            for nodes, modes in self._modes:
+                there = p.weights[rows][:, nodes] @ modes.reshape(len(nodes), -1)
+                moved.append(there.reshape(len(rows), 3, modes.shape[2]))
+            moves = np.concatenate(moved, axis=2)
+            stiffness += np.einsum("mik,mij,mjl->kl", moves, t.blocks[rows], moves)
+        resisted = np.linalg.eigvalsh(stiffness)
+        return bool(resisted[0] > _GRASPED * resisted[-1] > 0.0)
 
     def steadied(self, matrix: BlockMatrix, turn: int) -> BlockMatrix:
         """A matrix that holds unconstrained bodies back, less with every turn."""
