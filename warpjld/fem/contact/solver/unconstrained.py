@@ -10,7 +10,7 @@ from warpjld.fem.body import Body
 from warpjld.fem.contact.interface.contact_interface import Interface
 from warpjld.fem.contact.interface.contact_points import ContactPoints
 from warpjld.fem.contact.law.contact_state import ContactState
-from warpjld.fem.contact.solver.contact_system import ContactForces
+from warpjld.fem.contact.solver.contact_system import GRAZING, IMMOBILE, ContactForces, mobility
 from warpjld.fem.load.prescribed import Prescribed, free_motions, rigid_modes
 from warpjld.fem.solver.krylov import Status
 
@@ -22,8 +22,6 @@ so that contact is found before they fly off; by which factor it then falls with
 """
 _GRASPED = 1e-4
 """Least stiffness against a motion as a whole, over the most, from which contact is taken to resist all of them."""
-_FREE = 1e-9
-"""Share of a point's weights that must be free to move along its normal for it to be parted."""
 
 
 class UnconstrainedBodies:
@@ -118,7 +116,6 @@ def blocked(
     free: Mask,
     *,
     allowed: float,
-    penetration: float,
 ) -> str:
     """The deepest overlap between sides that are both prescribed, in words; nothing where there is none.
 
@@ -128,18 +125,15 @@ def blocked(
         states: Of each: overlap that is still allowed, and bonds.
         free: Degrees of freedom, shape (3N,).
         allowed: Share of the states' allowance that still counts.
-        penetration: Overlap that may be left, as a share of an edge.
     """
     worst, words = 0.0, ""
-    moves = free.reshape(-1, 3).astype(float)
     for interface, p, s in zip(interfaces, points, states, strict=True):
         if len(p.sites) == 0:
             continue
-        mobile = np.einsum("mi,mi->m", abs(p.weights) @ moves, p.normal**2)
         depth = np.where(s.bonded[p.sites], 0.0, -p.gap - allowed * s.allowance[p.sites])
-        depth = np.where(mobile < _FREE, depth, 0.0)
+        depth = np.where(mobility(p, free) < IMMOBILE, depth, 0.0)
         deepest = int(np.argmax(depth))
-        if depth[deepest] > max(penetration * interface.edge[p.sites[deepest]], worst):
+        if depth[deepest] > max(GRAZING * interface.edge[p.sites[deepest]], worst):
             worst = float(depth[deepest])
             node = interface.slave.nodes[int(np.argmax(interface.share[[p.sites[deepest]]].toarray()))]
             words = f"{interface.pair.title}: both sides are prescribed and overlap by {worst:.3g} m at node {node}"
