@@ -49,7 +49,6 @@ def test_ways_past_what_moves_along_count_for_nothing() -> None:
     assert distance_past(towards, times, [x, x, x]) == pytest.approx(0.01)
 
 
-@pytest.mark.slow
 def test_a_finger_does_not_jump_through_a_plate(run: Callable[[str], Scene], tmp_path: Path) -> None:
     """At frame 1 it is above the plate, at frame 2 below: the bone cannot have got there."""
     scene = run(

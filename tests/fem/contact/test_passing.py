@@ -104,3 +104,18 @@ def test_bodies_that_go_along_together_are_not_slowed_down() -> None:
     found = press(body, held, [Pair("up.z-", "low.z+")], loads=Loads(), check=False)
     assert found.status is SolveStatus.CONVERGED
     assert len(found.steps) == 1
+
+
+@pytest.mark.parametrize(("depth", "status"), [(0.005, SolveStatus.CONVERGED), (0.1, SolveStatus.BLOCKED)])
+def test_sides_that_are_both_prescribed_may_graze(depth: float, status: SolveStatus) -> None:
+    """As bones and a plate do that come 15 micrometres too near: an overlap of less than a fiftieth of an edge is no
+    reason to give up, more cannot be parted."""
+    lower = named(box_hexes((1, 1, 1), (2, 2, 2)), "low")
+    upper = named(box_hexes((1, 1, 1), (2, 2, 2)), "up", (0, 0, 1 - 0.5 * depth))
+    body = together({"low": (lower, RUBBER), "up": (upper, RUBBER)})
+    held = prescribe(body.mesh, "low.z+", x=0, y=0, z=0) + prescribe(body.mesh, "up.z-", x=0, y=0, z=0)
+    pair = Pair("up.z-", "low.z+", name="blocks")
+    found = press(body, held, [pair], Loads(traction={"up.z+": (0.0, 0.0, -10.0)}), check=False)
+    assert found.status is status, found.message
+    if status is SolveStatus.CONVERGED:
+        assert found.last.touches[0].normal_force == 0.0

@@ -56,6 +56,11 @@ class Loads:
     forces: Mapping[str, tuple[float, float, float]] = field(default_factory=dict)
     nodal: Array | None = None
 
+    @property
+    def follows(self) -> bool:
+        """Whether they depend on where the body is; dead loads do not."""
+        return self.centrifugal is not None or bool(self.pressure)
+
     def scaled(self, share: float) -> Loads:
         """A share of the loads: forces in proportion, and a slower turn."""
         turn = self.centrifugal

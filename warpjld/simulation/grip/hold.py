@@ -151,8 +151,9 @@ class WeightTrials(ABC):
         capacity = self.weight.most(instant) if known else float("nan")
         rate = self._rate(grip) if capacity > 0.0 else None
         slope = None if rate is None else capacity * rate
-        loaded = grip in self.lowered
-        return Trial(outcome, sliding, force, borne, share, who, note, capacity, slope, loaded)
+        loaded, closed = grip in self.lowered, self.closed(grip)
+        pressed = self.weight.force(closed.last) if closed.converged else float("nan")
+        return Trial(outcome, sliding, force, borne, share, who, note, capacity, slope, loaded, pressed)
 
     def _rate(self, grip: float) -> float | None:
         """How fast the forces between hand and object grow with the grip, as a share of them, before the weight is on;

@@ -78,6 +78,7 @@ class Trial:
             it is not known: ``borne`` counts then.
         slope: Derivative of the capacity by the grip, where it is known.
         loaded: Whether pressures were those under the weight, not those before.
+        pressed: Sum of the normal forces on the object before the weight came on [N]; NaN where it is not known.
     """
 
     outcome: TrialOutcome
@@ -90,6 +91,7 @@ class Trial:
     capacity: float = float("nan")
     slope: float | None = None
     loaded: bool = True
+    pressed: float = float("nan")
 
     @property
     def able(self) -> float:
@@ -228,6 +230,10 @@ class _Search:
         below, above = self._bracket.below, self._bracket.above
         if below is None or above is None:
             return False
+        pressed = {grip: trial.pressed for grip, trial in self.trials}
+        firmer, gentler = pressed[above.grip], pressed[below.grip]
+        if 0.0 < gentler <= firmer:  # says the same of grips that hold and those that do not
+            return firmer <= (1.0 + self._tolerance) * gentler
         share = self._bracket.width / (above.grip - self._bracket.low)
         if 0.0 < below.value < above.value:
             return above.value <= (1.0 + self._tolerance) * below.value or share <= _SAME * self._tolerance

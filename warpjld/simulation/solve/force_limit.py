@@ -112,6 +112,7 @@ class ForceLimits:
             return solve_onward(model, history, before, times)
         reached: list[ContactInstant] = []
         now = 0.0 if before is None else before.last.time
+        self._look_along(model, now, times)
         for time in self._finer(model, now, times):
             found = self._step(model, history, before, now, time)
             if not found.converged:
@@ -175,6 +176,23 @@ class ForceLimits:
             out += [now + (time - now) * (k + 1) / pieces for k in range(pieces - 1)] + [time]
             left, now = then, time
         return out
+
+    def _look_along(self, model: ContactModel, now: float, times: Sequence[float]) -> None:
+        """Refuse a way of several steps on which a bone comes to lie in an object, if its digit does not close on it
+        and so cannot stop.
+
+        Raises:
+            BoneInsideError: Where it first does.
+        """
+        if len(times) < 2:  # each step looks at its own end
+            return
+        driven, closing = self.driven(model), self._closing(model, now, times[-1])
+        for time in times:
+            inside = [one for one in self.clearance.nearest(driven, time) if one.left <= 0.0]
+            carried = [one for one in inside if _key_of(closing, one) is None]
+            if carried:
+                worst = min(carried, key=lambda one: one.left)
+                raise BoneInsideError(f"at frame {model.start + time:.4g}: {worst.text}")
 
     def _left(self, model: ContactModel, time: float) -> dict[tuple[str, str, str], float]:
         """Share of flesh that is left before bones, by actor, digit and object."""

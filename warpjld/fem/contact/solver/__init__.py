@@ -24,8 +24,10 @@ from u itself, prescribed values yet to go to their place:
 
 1. ``newton_state.assemble``: R of (1); end where (6) holds and points found afresh agree (``balanced``, ``confirmed``).
 2. ``newton_state.linearise``, ``tangent``: E; ``lagged_solver``: Δu of (4); where K + H is not positive definite
-   ``damping`` lends it stiffness at rest (Levenberg, Marquardt).
-   A search that never comes near (|R| above .3 of the forces for ten iterations) is ended.
+   ``damping`` lends it stiffness at rest (Levenberg, Marquardt). A body that nothing is prescribed of is held back by
+   a little stiffness until contact resists all its motions (``unconstrained.grasped``), and not after that.
+   A search that never comes near (|R| above .3 of the forces for ten iterations; .05 for twenty where bodies are
+   held by contact alone) is ended.
 3. How far along Δu (``contact_newton``): as far as points look ahead; elements keep a fifth of their Jacobians
    (``line_search.length_upright``); see 5 for the rest.
 4. ``newton_state.advance``: λ by (5); contact points anew; forces by (2), (3).
@@ -33,7 +35,10 @@ from u itself, prescribed values yet to go to their place:
    has λ_n > 0 presses in (2) whatever its gap, the solve says whether it lets go (primal–dual active set: Hüeber &
    Wohlmuth 2005); the last solve's λ_n bounds friction in (3), so that each solve is a convex problem (Tresca's).
 5. *Alternating phase*, after that: λ is updated only when no point came or went; a line search along Δu settles what
-   does (work, or residual where E counts); where all points slide, friction follows the present pressure (coupled).
+   does (work, or residual where E counts).
+   In either phase friction follows the present pressure (coupled) once the same points touch, slide and stick in turn
+   after turn: Tresca's bound, taken from the solve before, leaves up to .7 of the error each time. Where points that
+   stick come and go by it, the bound is taken from the solve before again.
    A search whose points, found afresh, do not agree goes on in this phase, twice at most.
 6. Bonds whose traction is too much are broken, and the step is found again; a step that fails is taken in halves.
 

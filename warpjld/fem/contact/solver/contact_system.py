@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from warpjld.fem.arrays import Array
+from warpjld.fem.arrays import Array, Mask
 from warpjld.fem.contact.interface.contact_interface import Interface
 from warpjld.fem.contact.interface.contact_points import ContactPoints
 from warpjld.fem.contact.law.contact_state import ActiveSet, ContactState
@@ -17,8 +17,21 @@ from warpjld.fem.contact.solver.tangent import friction_coupling, linearise_mort
 from warpjld.fem.load.loads import Loads
 from warpjld.fem.load.prescribed import Prescribed
 
-__all__ = ["ContactForces", "ContactSystem", "LoadStep", "same_active_set", "shifted"]
+__all__ = [
+    "GRAZING",
+    "IMMOBILE",
+    "ContactForces",
+    "ContactSystem",
+    "LoadStep",
+    "mobility",
+    "same_active_set",
+    "shifted",
+]
 
+GRAZING = 0.02
+"""Edges by which sides that are both prescribed may overlap: more is said, and less is as if they touched."""
+IMMOBILE = 1e-9
+"""Share of a point's weights that must be free to move along its normal for it to be parted."""
 _SETTLED = 2e-3
 """Share of the contact forces by which the multipliers may still change."""
 _SLOW = 0.1
@@ -101,13 +114,26 @@ class ContactSystem:
     def points(self, u: Array, step: LoadStep, normals: list[Array]) -> list[ContactPoints]:
         """Every interface's points at displacement u (3N,)."""
         x = self._rest + u.reshape(-1, 3)
-        return [i.points(x, step.before, step.time, n) for i, n in zip(self.interfaces, normals, strict=True)]
+        found = [i.points(x, step.before, step.time, n) for i, n in zip(self.interfaces, normals, strict=True)]
+        return self._parted(found, step)
 
     def refreshed(self, points: list[ContactPoints], u: Array, step: LoadStep) -> list[ContactPoints]:
         """Points between surfaces as displacement u (3N,) has them, since their derivatives are known; others stay."""
         x = self._rest + u.reshape(-1, 3)
         known = zip(self.interfaces, points, strict=True)
-        return [i.points(x, step.before, step.time) if i.slides else p for i, p in known]
+        return self._parted([i.points(x, step.before, step.time) if i.slides else p for i, p in known], step)
+
+    def _parted(self, points: list[ContactPoints], step: LoadStep) -> list[ContactPoints]:
+        """Points with what is prescribed on both sides touching, not overlapping, where it does so slightly: no force
+        can part it, and none is meant."""
+        free = step.prescribed.free(self._rest.size)
+        out = list(points)
+        for k, (interface, p) in enumerate(zip(self.interfaces, points, strict=True)):
+            slight = (p.gap < 0.0) & (p.gap > -GRAZING * interface.edge[p.sites])
+            if slight.any():
+                fixed = slight & (mobility(p, free) < IMMOBILE)
+                out[k] = replace(p, gap=np.where(fixed, 0.0, p.gap)) if fixed.any() else p
+        return out
 
     def forces(
         self,
@@ -258,6 +284,11 @@ class ContactSystem:
             off = np.where(active[q.sites], off, np.minimum(off, np.maximum(-q.gap, 0.0)))
             worst = max(worst, float((off / edge[q.sites]).max(initial=0.0)))
         return worst
+
+
+def mobility(points: ContactPoints, free: Mask) -> Array:
+    """Share of each point's weights that may move along its normal, of free degrees of freedom (3N,), shape (m,)."""
+    return np.asarray(np.einsum("mi,mi->m", abs(points.weights) @ free.reshape(-1, 3).astype(float), points.normal**2))
 
 
 def shifted(points: ContactPoints, move: Array) -> ContactPoints:

@@ -26,6 +26,7 @@ class Elastic:
         self._rest = body.at()
         self._last: Tangent | None = None
         self._there: tuple[Array, Tangent] | None = None
+        self._dead: tuple[Loads, Array] | None = None
         assert self._rest.stiffness is not None
         self.stiffness: Array = np.einsum("nii->n", self._rest.stiffness.diagonal()) / 3.0
         """Of each node at rest [N/m], shape (N,)."""
@@ -56,7 +57,11 @@ class Elastic:
 
     def external(self, loads: Loads, u: Array) -> Array:
         """Nodal forces of loads [N], shape (3N,); as the displaced body meets them at large strain."""
-        return external_forces(self.body, loads, None if self.linear else u)
+        if not self.linear and loads.follows:
+            return external_forces(self.body, loads, u)
+        if self._dead is None or self._dead[0] is not loads:
+            self._dead = loads, external_forces(self.body, loads)
+        return self._dead[1]
 
     def pressures(self, u: Array, move: Array | None = None) -> Array | None:
         """Pressure of each element [Pa], shape (E,), as foreseen after a move (3N,); None at small strain."""

@@ -35,6 +35,8 @@ _HALVINGS = 7
 _HALVINGS_UNHELD = 3
 _UNHELD = (SolveStatus.SLIDING, SolveStatus.UNHELD)
 """A body that slides away, or falls, seldom does so because the step is long."""
+_BRIEF = 25
+"""Iterations of a search where no step may be halved: who asks for that has a shorter step in hand."""
 _BREAKS = 100
 _CUTS = 400
 """Steps that those asked for are cut to at most, so that contact can follow."""
@@ -95,13 +97,14 @@ class LoadSteps:
         self.loads = loads or Loads()
         self.guess = guess
         self.halvings = halvings
-        self.penetration = penetration
         self.interfaces = interfaces_of(body.mesh, pairs, body.threads)
         self._reaches = [interface.reach for interface in self.interfaces]
         self.moduli = [contact_modulus(body, interface) for interface in self.interfaces]
         self.course = Course(body)
         self.passing = Passing(body, self.interfaces)
         self.newton = ContactNewton(body, self.interfaces, self.moduli, tolerance=tolerance, penetration=penetration)
+        if halvings == 0:
+            self.newton.most = _BRIEF
         if after is None:
             self.start = 0.0
             self.u = np.zeros(body.degrees)
@@ -253,13 +256,15 @@ class LoadSteps:
             points = [interface.points(x, step.before, step.time) for interface in self.interfaces]
         else:
             points = found.points
-        return blocked(self.interfaces, points, self.states, free, allowed=step.allowed, penetration=self.penetration)
+        return blocked(self.interfaces, points, self.states, free, allowed=step.allowed)
 
     def _find(self, step: LoadStep, carried: Array) -> tuple[SolveStatus, Equilibrium | None]:
         """Equilibrium of a step; again after every bond that did not hold."""
         guesses = self._guesses(step, carried)
         status, found = self.newton.find(self.u, self.states, step, *guesses)
-        if found is None and self._adrift_on_friction(step) and self._could_hold(step):
+        # whoever wants no step halved tries another one
+        again = self.halvings != 0 and self._adrift_on_friction(step)
+        if found is None and again and self._could_hold(step):
             status, found = from_rougher(self.newton, self.interfaces, self.u, self.states, step, status)
         for _ in range(_BREAKS):
             if found is None:

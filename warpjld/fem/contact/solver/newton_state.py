@@ -31,6 +31,12 @@ _TURNING = 1
 the gaps. That both are right is looked at once forces balance."""
 _FIXED_POINT = 8
 """Iterations with full steps and multipliers brought up to date at once; what has not settled by then takes turns."""
+_SAME = 2
+"""Iterations in a row in which the same points touch, slide and stick, after which friction follows the present
+pressure: taking what points press and what they rub in turns creeps."""
+_SHORT, _STUMBLES = 0.1, 2
+"""Shortest step of friction that follows the present pressure beside points that stick, and how often one may be
+shorter: points on the edge of sticking then come and go, and taking pressure and friction in turns is safer."""
 _MULTIPLIERS_GOOD = 1
 """Iterations after which multipliers are good enough to take the derivatives of directions with; until then those of
 the equilibrium before are."""
@@ -98,7 +104,7 @@ class NewtonState:
         self.states = self._before = system.begun(states, start, step.before)
         self.jump = np.zeros_like(start)
         self._pressures: Array | None = None
-        self._iteration, self._settled = -1, False
+        self._iteration, self._settled, self._same_for, self._stumbles = -1, False, 0, 0
         self.restarts = 0
         if guess is not None:
             self.u = guess_held(step, guess)
@@ -216,10 +222,14 @@ class NewtonState:
             self.jump = np.zeros_like(self.u)
         predicted = self.predicted(move)
         same = same_active_set(self.contact.tractions, predicted)
+        self._same_for = self._same_for + 1 if same else 0
         if not alternating or same:
             self.states = self.system.updated(self.states, self.contact, predicted, move, decides)
         points, last = self._points(predicted), alternating or self.turn + 1 >= _FIXED_POINT
-        coupled = last and same and not any((t.active & t.sticking).any() for t in predicted)
+        sticks = any((t.active & t.sticking).any() for t in predicted)
+        if self.contact.coupled and sticks and length < _SHORT:
+            self._stumbles += 1
+        coupled = same and (last or self._same_for >= _SAME) and not (sticks and self._stumbles >= _STUMBLES)
         self.contact = self.forces(points, self.u, ActiveSet.TRIAL if last else ActiveSet.FROZEN, coupled=coupled)
 
     def _points(self, predicted: list[ContactTractions]) -> list[ContactPoints]:

@@ -10,8 +10,8 @@ from warpjld.fem.body import Body
 from warpjld.fem.contact.interface.contact_interface import Interface
 from warpjld.fem.contact.interface.contact_points import ContactPoints
 from warpjld.fem.contact.law.contact_state import ContactState
-from warpjld.fem.contact.solver.contact_system import ContactForces
-from warpjld.fem.load.prescribed import Prescribed, free_motions
+from warpjld.fem.contact.solver.contact_system import GRAZING, IMMOBILE, ContactForces, mobility
+from warpjld.fem.load.prescribed import Prescribed, free_motions, rigid_modes
 from warpjld.fem.solver.krylov import SolveStatus
 
 __all__ = ["UnconstrainedBodies", "blocked"]
@@ -20,8 +20,8 @@ _HELD = (3e-2, 0.4, 1e-4)
 """Stiffness given to bodies that only contact holds, over their own: it slows them down, and leaves no force. At first,
 so that contact is found before they fly off; by which factor it then falls with each iteration; and the least.
 """
-_FREE = 1e-9
-"""Share of a point's weights that must be free to move along its normal for it to be parted."""
+_GRASPED = 1e-4
+"""Least stiffness against a motion as a whole, over the most, from which contact is taken to resist all of them."""
 
 
 class UnconstrainedBodies:
@@ -36,7 +36,9 @@ class UnconstrainedBodies:
     def __init__(self, body: Body, prescribed: Prescribed, stiffness: Array) -> None:
         self._mesh = body.mesh
         self._stiff = stiffness
-        self._bodies = [nodes for nodes, _ in free_motions(body, prescribed)]
+        found = free_motions(body, prescribed)
+        self._bodies = [nodes for nodes, _ in found]
+        self._modes = [(nodes, rigid_modes(body.mesh.nodes[nodes]).reshape(-1, 3, 6) @ left) for nodes, left in found]
         points = np.unique(prescribed.degrees // 3)
         self._held = [int(np.isin(points, nodes).sum()) for nodes in self._bodies]
 
@@ -83,6 +85,21 @@ class UnconstrainedBodies:
         far = max((float(np.abs(move.reshape(-1, 3)[nodes]).max()) for nodes in self._bodies), default=0.0)
         return min(1.0, reach / far) if far > 0.0 else 1.0
 
+    def grasped(self, contact: ContactForces) -> bool:
+        """Whether contact resists every motion of theirs as a whole: more stiffness would only slow them down."""
+        count = sum(modes.shape[2] for _, modes in self._modes)
+        stiffness = np.zeros((count, count))
+        for p, t in zip(contact.points, contact.tractions, strict=True):
+            rows = np.flatnonzero(t.active)
+            moved = []  # of the points, by each motion of each body
+            for nodes, modes in self._modes:
+                there = p.weights[rows][:, nodes] @ modes.reshape(len(nodes), -1)
+                moved.append(there.reshape(len(rows), 3, modes.shape[2]))
+            moves = np.concatenate(moved, axis=2)
+            stiffness += np.einsum("mik,mij,mjl->kl", moves, t.blocks[rows], moves)
+        resisted = np.linalg.eigvalsh(stiffness)
+        return bool(resisted[0] > _GRASPED * resisted[-1] > 0.0)
+
     def steadied(self, matrix: BlockMatrix, turn: int) -> BlockMatrix:
         """A matrix that holds unconstrained bodies back, less with every turn."""
         if not self._bodies:
@@ -102,7 +119,6 @@ def blocked(
     free: Mask,
     *,
     allowed: float,
-    penetration: float,
 ) -> str:
     """The deepest overlap between sides that are both prescribed, in words; nothing where there is none.
 
@@ -112,18 +128,15 @@ def blocked(
         states: Of each: overlap that is still allowed, and bonds.
         free: Degrees of freedom, shape (3N,).
         allowed: Share of the states' allowance that still counts.
-        penetration: Overlap that may be left, as a share of an edge.
     """
     worst, words = 0.0, ""
-    moves = free.reshape(-1, 3).astype(float)
     for interface, p, s in zip(interfaces, points, states, strict=True):
         if len(p.sites) == 0:
             continue
-        mobile = np.einsum("mi,mi->m", abs(p.weights) @ moves, p.normal**2)
         depth = np.where(s.bonded[p.sites], 0.0, -p.gap - allowed * s.allowance[p.sites])
-        depth = np.where(mobile < _FREE, depth, 0.0)
+        depth = np.where(mobility(p, free) < IMMOBILE, depth, 0.0)
         deepest = int(np.argmax(depth))
-        if depth[deepest] > max(penetration * interface.edge[p.sites[deepest]], worst):
+        if depth[deepest] > max(GRAZING * interface.edge[p.sites[deepest]], worst):
             worst = float(depth[deepest])
             node = interface.slave.nodes[int(np.argmax(interface.share[[p.sites[deepest]]].toarray()))]
             words = f"{interface.pair.title}: both sides are prescribed and overlap by {worst:.3g} m at node {node}"
