@@ -89,7 +89,7 @@ class Scene:
         quality: Quality | None = None,
     ) -> None:
         self._faces = np.asarray(faces)
-        if self._faces.ndim != 2 or self._faces.shape[1] != 3 or len(self._faces) == 0:
+        if self._faces.ndim != 2 or self._faces.shape[1] != 3 or (len(self._faces) == 0 and not solids):
             raise InputError(f"faces: want shape (n, 3) with n > 0, got {self._faces.shape}")
         if look not in ("shaded", "wireframe"):
             raise InputError(f"look: want 'shaded' or 'wireframe', got '{look}'")
@@ -102,6 +102,8 @@ class Scene:
         # distance of the picture plane [pixels]
         self._focal = 0.5 * size[1] * camera.zoom / float(np.tan(camera.angle / 2))
         self._plotter: Any = None
+        self._skin: Body | None = None
+        self._wires: Wires | None = None
 
     def draw(
         self,
@@ -126,16 +128,17 @@ class Scene:
             InputError: Something missing, of the wrong shape, or not finite.
         """
         points = _finite("vertices", vertices, (None, 3))
-        if len(points) <= self._faces.max():
+        if len(points) <= self._faces.max(initial=-1):
             raise InputError(f"vertices: faces want {self._faces.max() + 1} of them, got {len(points)}")
         bones = self._bones_from(joints)
         shares = self._shares_from(values, len(points))
         if self._plotter is None:
             self._build(points, bones)
-        self._skin.place(points)
-        if shares is not None:
+        if self._skin is not None:
+            self._skin.place(points)
+        if shares is not None and self._skin is not None:
             self._skin.paint(shares)
-        if self._wire:
+        if self._wires is not None:
             self._wires.place(points, self._camera.position)
         if bones is not None:
             self._bones.place(bone_vertices(bones, self._pairs, self._thickness))
@@ -204,14 +207,15 @@ class Scene:
         from warpjld.render.window import open_window
 
         style, times = self._style, self._quality.supersampling
-        extent = float(np.linalg.norm(np.ptp(points, axis=0)))
+        shown = points if len(points) else np.concatenate([np.asarray(s.vertices, float) for s in self._solids])
+        extent = float(np.linalg.norm(np.ptp(shown, axis=0)))
         self._plotter = open_window((self._size[0] * times, self._size[1] * times))
         self._plotter.set_background(style.background[0], top=style.background[1])
         add_lights(self._plotter)
 
-        self._skin = Body(points, self._faces, _SKIN_CREASE)
+        self._skin = Body(points, self._faces, _SKIN_CREASE) if len(self._faces) else None
         opacity = style.veil if self._wire else style.opacity
-        if opacity > 0:
+        if opacity > 0 and self._skin is not None:
             # of translucent skin only the front layer is drawn: then nothing needs sorting by depth
             culling = "back" if opacity < 1 else False
             color = self._scale.table() if self._scale else style.skin
@@ -222,7 +226,8 @@ class Scene:
                 culling=culling,
                 **(MATTE if self._wire or self._scale else SKIN),
             )
-        if self._wire:
+        self._wires = None
+        if self._wire and self._skin is not None:
             distance = float(np.linalg.norm(np.subtract(self._camera.target, self._camera.position)))
             width, unit = times * self._size[1] / 720, self._focal / distance
             self._wires = Wires(points, self._faces)

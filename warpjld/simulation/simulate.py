@@ -42,6 +42,8 @@ from warpjld.simulation.sensitivity.joint_slopes import joint_slopes
 from warpjld.simulation.sensitivity.parameters import Parameter
 from warpjld.simulation.solve.checkpoint import CheckpointFile
 from warpjld.simulation.solve.checks import check_model, check_specification
+from warpjld.simulation.solve.fallen import FallenAnimation, fallen_start, moved_by, taking_part, without
+from warpjld.simulation.solve.falling import falling_names, follow_falls
 from warpjld.simulation.solve.identity import identity_of
 from warpjld.simulation.solve.solved_frame import SolvedFrame
 from warpjld.simulation.solve.start_frame import StartFrame, find_start
@@ -231,7 +233,7 @@ def simulate(
         raise InputError("specification: want its pressing to say which frames are solved")
     check_specification(animation, specification, request)
     progress("looking for the first touch", 0, 1)
-    before = find_start(animation, specification, request)
+    specification, animation, before = _before_contact(specification, animation, request)
     progress("meshing", 0, 1)
     model, notes = _model(specification, animation, before)
     table = ContactTable(specification.strength, animation)
@@ -251,6 +253,27 @@ def simulate(
         progress=progress,
     )
     return _report(solved, before, table, request, notes)
+
+
+def _before_contact(
+    specification: ContactSpecification, animation: Animation, request: SolveSpecification
+) -> tuple[ContactSpecification, Animation, StartFrame]:
+    """What is asked of contact and what moves, once what nothing holds has fallen, and where it starts."""
+    names = falling_names(specification, request)
+    if not names:
+        return specification, animation, find_start(animation, specification, request)
+    paths = follow_falls(animation, specification, request, names)
+    start = fallen_start(paths, float(request.first), float(request.last))
+    stage, others = FallenAnimation(animation, paths), without(specification, names)
+    before = StartFrame(start, {})
+    if others.flesh or others.physical:
+        before = find_start(stage, others, request, fell=True)
+        before = replace(before, start=min(start, before.start))
+    inside = taking_part(paths, before.start)
+    outside = [name for name in names if name not in inside]
+    if outside and not (inside or others.flesh or others.physical):
+        inside, outside = names, []  # nothing else deforms, and no frame is left to solve
+    return without(specification, outside), stage, moved_by(paths, before, inside)
 
 
 def _model(

@@ -210,6 +210,7 @@ class SolveSpecification:
         pressure: What skin bears [Pa]. By default what leaves half of a fingertip's flesh between bone and wall: beyond
             it forces double every tenth of a millimetre, and laws of flesh were never measured.
         state: File the state is kept in, so that a stopped run goes on; None keeps none.
+        rate: Frames a second: how long what falls takes.
         where: Place in a script, for messages.
 
     Examples:
@@ -228,8 +229,10 @@ class SolveSpecification:
     where: SourceLocation | None = None
     rigid: bool = False
     pressure: float = 3e5
+    rate: float = 30.0
 
     def __post_init__(self) -> None:
+        _want(0.0 < self.rate < np.inf, "rate", "frames a second above 0", self.rate)
         _want(0.0 < self.pressure < np.inf, "pressure", "a pressure above 0 Pa", self.pressure)
         _want(self.last > self.first, "last", f"a frame after the first ({self.first})", self.last)
         _want(self.every >= 1, "every", "1 frame or more", self.every)

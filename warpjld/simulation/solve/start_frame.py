@@ -43,11 +43,13 @@ class StartFrame:
         start: That frame: the one before anything is held; the first one where something is held there already.
         moved: Places of free objects that hands push before they hold them, by name: frames and placements.
         began: Where these were at first [m], shape (3,), by name.
+        falls: What nothing held and fell, in words.
     """
 
     start: float
     moved: dict[str, tuple[list[float], list[Places]]]
     began: dict[str, NDArray[np.float64]] = field(default_factory=dict)
+    falls: tuple[str, ...] = ()
 
     def place(self, name: str) -> Places | None:
         """Where a free object is at the start, if not where the animation has it."""
@@ -55,8 +57,10 @@ class StartFrame:
 
     def notes(self) -> list[str]:
         """Where free objects were pushed before anything held them."""
-        out = []
+        out = [*self.falls]
         for name, (frames, places) in self.moved.items():
+            if name not in self.began:
+                continue
             way = places[-1].position[0] - self.began[name]
             far = float(np.linalg.norm(way))
             if far > _FAR:
@@ -68,17 +72,20 @@ class StartFrame:
         return out
 
 
-def find_start(animation: Animation, contact: ContactSpecification, request: SolveSpecification) -> StartFrame:
+def find_start(
+    animation: Animation, contact: ContactSpecification, request: SolveSpecification, *, fell: bool = False
+) -> StartFrame:
     """Look for the first moment that needs solving (R91, R112).
 
     Before it nothing touches, or what is touched gives way: a free object that is pushed, and that friction could not
-    hold where it is, goes where nothing pushes it any more.
+    hold where it is, goes where nothing pushes it any more. ``fell``: free objects with weight have fallen, and weights
+    count from then on.
     """
     stands = {o for o, _ in contact.prescribed} | {grip.object for grip in contact.grips if grip.lift}
     free = [name for name in contact.physical if name not in stands]
     keyed = any(state.tracks for state in contact.prescribed.values())
     # what stands on its points gives way to its weight by so little that it may do so in the first step
-    if keyed or (any(contact.gravity) and (free or not contact.grips)):
+    if keyed or (any(contact.gravity) and not fell and (free or not contact.grips)):
         return StartFrame(float(request.first), {})
     return _Approach(animation, contact, free).start(request)
 
