@@ -25,6 +25,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from warpjld.errors import InputError
+from warpjld.fem import Status
 from warpjld.fem.hand.suggestions import DigitSlopes
 from warpjld.simulation.animation import Animation
 from warpjld.simulation.bodies.flesh_body import build_flesh_body
@@ -42,7 +43,14 @@ from warpjld.simulation.sensitivity.joint_slopes import joint_slopes
 from warpjld.simulation.sensitivity.parameters import Parameter
 from warpjld.simulation.solve.checkpoint import CheckpointFile
 from warpjld.simulation.solve.checks import check_model, check_specification
-from warpjld.simulation.solve.fallen import FallenAnimation, fallen_start, moved_by, taking_part, without
+from warpjld.simulation.solve.fallen import (
+    FallenAnimation,
+    fallen_start,
+    moved_by,
+    released_bodies,
+    taking_part,
+    without,
+)
 from warpjld.simulation.solve.falling import falling_names, follow_falls
 from warpjld.simulation.solve.identity import identity_of
 from warpjld.simulation.solve.solved_frame import SolvedFrame
@@ -252,6 +260,7 @@ def simulate(
         checkpoint=_checkpoint(model, specification, request, frames, folder),
         progress=progress,
     )
+    before, solved = _after_contact(solved, specification, request, before)
     return _report(solved, before, table, request, notes)
 
 
@@ -274,6 +283,29 @@ def _before_contact(
     if outside and not (inside or others.flesh or others.physical):
         inside, outside = names, []  # nothing else deforms, and no frame is left to solve
     return without(specification, outside), stage, moved_by(paths, before, inside)
+
+
+def _after_contact(
+    solved: SolveResult, specification: ContactSpecification, request: SolveSpecification, before: StartFrame
+) -> tuple[StartFrame, SolveResult]:
+    """Where what hands no longer hold goes to, where that ended the search for equilibria."""
+    weights = any(specification.pull) and request.method != "paper"
+    if solved.status not in (Status.UNHELD, Status.SLIDING) or not weights or solved.model.animation is None:
+        return before, solved
+    bodies = released_bodies(solved.model, solved.frames, specification, request.rate)
+    if not bodies:
+        return before, solved
+    first = solved.frames[-1].frame if solved.frames else solved.start
+    known = (solved.model.animation, specification, request, list(bodies))
+    paths = follow_falls(*known, released=bodies, first=first)
+    if not any(path.told() for path in paths.values()):
+        return before, solved
+    moved = dict(before.moved)
+    for name, path in paths.items():
+        frames, places = moved.get(name, ([], []))
+        moved[name] = ([*frames, *path.frames], [*places, *path.places])
+    told = tuple(text for path in paths.values() if (text := path.told()))
+    return replace(before, moved=moved, falls=(*before.falls, *told)), replace(solved, released=first)
 
 
 def _model(

@@ -66,6 +66,7 @@ class SolveResult:
         stops: Digits that closed no farther.
         tight: Bones that came nearest to objects, of every digit and object the nearest.
         equilibria: Of each frame that this run solved, by its number: what it can be differentiated from.
+        released: Frame after which what nothing holds any more falls, if it does: contact is not solved from there on.
     """
 
     status: Status
@@ -80,6 +81,7 @@ class SolveResult:
     stops: tuple[Stop, ...] = ()
     tight: tuple[tuple[float, TightBone], ...] = ()
     equilibria: Mapping[float, KnownEquilibrium] = field(default_factory=dict)
+    released: float | None = None
 
     @property
     def start(self) -> float:

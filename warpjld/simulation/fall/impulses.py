@@ -4,7 +4,8 @@ Moreau's time stepping (J. J. Moreau 1988, Unilateral contact and dry friction i
 The non-smooth contact dynamics method, Comput. Methods Appl. Mech. Eng. 177, 235–257) without restitution: with u the
 relative velocity at the end of a step of length h, p the impulses of it, g the gap at its beginning,
 
-    p_n ≥ 0,   u_n + g/h ≥ 0,   p_n (u_n + g/h) = 0;       |p_t| ≤ μ p_n,   u_t = −κ p_t/|p_t| with κ ≥ 0 where it slides
+    p_n ≥ 0,   u_n + g/h ≥ 0,   p_n (u_n + g/h) = 0;
+    |p_t| ≤ μ p_n,   u_t = −κ p_t with κ ≥ 0 where it slides, 0 where it sticks,
 
 solved by projected Gauss–Seidel, contact by contact.
 """

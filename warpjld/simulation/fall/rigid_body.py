@@ -96,7 +96,9 @@ def _points(thing: GraspObject) -> NDArray[np.float64]:
         return np.asarray(middle + 0.5 * float(thing.size.max()) * away)
     longest = float(thing.size.max()) / _ACROSS
     corners = thing.vertices[thing.faces]
-    area = 0.5 * float(np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1).sum())
+    area = 0.5 * float(
+        np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1).sum()
+    )
     longest = max(longest, (2.0 * area / _MOST) ** 0.5)
     points, _ = trimesh.remesh.subdivide_to_size(thing.vertices, thing.faces, longest, max_iter=20)
     return np.unique(np.round(np.asarray(points, np.float64), 9), axis=0)

@@ -20,7 +20,7 @@ from warpjld.simulation.fall.rigid_body import RigidBody
 
 __all__ = ["ROLLING", "step_bodies", "steps_of"]
 
-ROLLING = 10.0
+ROLLING = 20.0
 """α: share of its spin that a touching body loses in a second, about [1/s]."""
 
 _LONGEST = 1.0 / 240.0

@@ -8,18 +8,26 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.spatial.transform import Rotation
 
 from warpjld.fem.contact import Obstacle
 from warpjld.grasp import GraspObject, Places
 from warpjld.simulation.animation import ActorAnimation, AngleEdit, Animation, ObjectAnimation
+from warpjld.simulation.bodies.deformable_body import History
+from warpjld.simulation.bodies.model import ContactModel
 from warpjld.simulation.bodies.obstacle import rigid_obstacle
+from warpjld.simulation.fall.rigid_body import RigidBody, rigid_shape
 from warpjld.simulation.solve.falling import FallPath
+from warpjld.simulation.solve.solved_frame import SolvedFrame
 from warpjld.simulation.specification import ContactSpecification
 
 if TYPE_CHECKING:
     from warpjld.simulation.solve.start_frame import StartFrame
 
-__all__ = ["FallenAnimation", "FallenObject", "fallen_start", "moved_by", "taking_part", "without"]
+__all__ = ["FallenAnimation", "FallenObject", "fallen_start", "moved_by", "released_bodies", "taking_part", "without"]
+
+_NEXT = 1.0
+"""Frames after the last that was solved: what is prescribed of an object then holds it."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -90,6 +98,44 @@ def taking_part(paths: Mapping[str, FallPath], start: float) -> list[str]:
         for name, path in paths.items()
         if path.left is None and (path.held is not None or (path.rests is not None and path.rests <= start))
     ]
+
+
+def released_bodies(
+    model: ContactModel, frames: Sequence[SolvedFrame], contact: ContactSpecification, rate: float
+) -> dict[str, RigidBody]:
+    """Objects that nothing prescribes after the last frame that was solved, as rigid bodies that move as they do there.
+
+    Args:
+        model: What was solved.
+        frames: Those that were; the last two tell velocities.
+        contact: Weights and bonds.
+        rate: Frames a second.
+    """
+    bonded = {name for bond in contact.bonds for name in (bond.one, bond.other)}
+    out = {}
+    now = frames[-1].frame if frames else model.start
+    for one in model.objects:
+        known = len(one.prescribed(now + _NEXT - model.start, History()).degrees)
+        if known or one.name in bonded or not contact.physical[one.name].density > 0.0 or model.animation is None:
+            continue
+        thing = model.animation.objects[one.name].thing
+        span = model.spans[one.name]
+        shapes = [one.mesh.nodes + frame.displacement[span] for frame in frames[-2:]] or [one.mesh.nodes]
+        body = RigidBody(rigid_shape(one.name, thing, contact.physical[one.name]), _fitted(one.local, shapes[-1]))
+        if len(shapes) == 2:
+            length = (frames[-1].frame - frames[-2].frame) / rate
+            before = RigidBody(body.shape, _fitted(one.local, shapes[0]))
+            body.velocity = (body.centre - before.centre) / length
+            body.spin = Rotation.from_matrix(body.turn @ before.turn.T).as_rotvec() / length
+        out[one.name] = body
+    return out
+
+
+def _fitted(local: NDArray[np.float64], shape: NDArray[np.float64]) -> Places:
+    """The place of a body whose points (n, 3) lie nearest to others (n, 3)."""
+    here, there = local.mean(axis=0), shape.mean(axis=0)
+    turn = Rotation.align_vectors(shape - there, local - here)[0]
+    return Places((there - turn.apply(here))[None], turn.as_quat()[None])
 
 
 def moved_by(paths: Mapping[str, FallPath], before: StartFrame, inside: Sequence[str]) -> StartFrame:

@@ -24,10 +24,12 @@ from warpjld.simulation.specification import ContactSpecification, SolveSpecific
 
 __all__ = ["FallPath", "falling_names", "follow_falls"]
 
-_STILL = 2e-3
+_STILL = 6e-3
 """Speed below which a touching body rests [m/s]."""
-_QUIET = 0.2
+_QUIET = 0.25
 """How long it must be slower than that [s]."""
+_CLOSE = 0.01
+"""Surfaces are looked at nearer than this [m]."""
 _PRESSED = 2e-4
 """Skin deeper than this inside an object presses on it [m]."""
 _MOVED = 2e-4
@@ -66,9 +68,7 @@ class FallPath:
         part = (frame - self.frames[k]) / (self.frames[k + 1] - self.frames[k])
         one, two = self.places[k], self.places[k + 1]
         turn = two.rotation * (np.sign(float(one.rotation[0] @ two.rotation[0])) or 1.0)
-        return Places.of(
-            (1.0 - part) * one.position + part * two.position, (1.0 - part) * one.rotation + part * turn
-        )
+        return Places.of((1.0 - part) * one.position + part * two.position, (1.0 - part) * one.rotation + part * turn)
 
     @property
     def way(self) -> float:
@@ -106,8 +106,8 @@ def follow_falls(
     request: SolveSpecification,
     names: Sequence[str],
     *,
+    released: Mapping[str, RigidBody] | None = None,
     first: float | None = None,
-    begin: Mapping[str, tuple[Places, NDArray[np.float64], NDArray[np.float64]]] | None = None,
 ) -> dict[str, FallPath]:
     """Paths of free objects, each until the last frame, or until hands hold it.
 
@@ -116,12 +116,14 @@ def follow_falls(
         contact: Friction, weights and whose flesh may hold.
         request: Frames and their rate.
         names: The free objects.
+        released: Of objects that hands let go, how they move at the ``first`` frame: hands hold them no more.
         first: Frame to begin at, where not the request's first.
-        begin: Place, velocity [m/s] and spin [rad/s] there, by name, of those that do not start at rest in their place.
     """
-    stage = _Stage(animation, contact, request, float(request.first) if first is None else first)
+    stage = _Stage(animation, contact, request, float(request.first) if first is None else first, bool(released))
     for name in names:
-        stage.add(name, None if begin is None else begin.get(name))
+        one = animation.objects[name]
+        body = None if released is None else released.get(name)
+        stage.add(body or RigidBody(rigid_shape(name, one.thing, contact.physical[name]), one.place(stage.start)))
     return stage.followed()
 
 
@@ -133,20 +135,16 @@ class _Stage:
     contact: ContactSpecification
     request: SolveSpecification
     start: float
+    released: bool = False
     bodies: dict[str, RigidBody] = field(default_factory=dict)
     paths: dict[str, FallPath] = field(default_factory=dict)
     quiet: dict[str, tuple[float, float]] = field(default_factory=dict)
     """Of bodies that hardly move: frame since when, and for how long [s]."""
 
-    def add(self, name: str, begin: tuple[Places, NDArray[np.float64], NDArray[np.float64]] | None) -> None:
+    def add(self, body: RigidBody) -> None:
         """Let an object fall from the start on."""
-        one = self.animation.objects[name]
-        place = one.place(self.start) if begin is None else begin[0]
-        body = RigidBody(rigid_shape(name, one.thing, self.contact.physical[name]), place)
-        if begin is not None:
-            body.velocity, body.spin = begin[1].copy(), begin[2].copy()
-        self.bodies[name] = body
-        self.paths[name] = FallPath(name, [self.start], [place])
+        self.bodies[body.shape.name] = body
+        self.paths[body.shape.name] = FallPath(body.shape.name, [self.start], [body.place])
 
     def followed(self) -> dict[str, FallPath]:
         """Frame after frame, until all are done."""
@@ -214,6 +212,8 @@ class _Stage:
         out: dict[str, Obstacle] = {}
         for name, actor in self.animation.actors.items():
             shapes = np.stack([actor.skin(before), actor.skin(after)])
+            if not any(_meet(shapes, body, (after - before) / self.request.rate) for body in self.bodies.values()):
+                continue
             times = [before - self.start, after - self.start]
             out[name] = Keyframed(actor.covering.surface.faces, times, shapes)
         return out
@@ -229,6 +229,8 @@ class _Stage:
 
     def _hold(self, frame: float, solids: dict[str, Obstacle]) -> None:
         """Take out what hands hold by friction: from here on it stays in its place for all others."""
+        if self.released:
+            return
         skins = {name: self.animation.actors[name].skin(frame) for name in self.contact.flesh}
         for name in list(self.bodies) if skins else []:
             body = self.bodies[name]
@@ -245,3 +247,10 @@ class _Stage:
                 shape = body.stage(facets.vertices)
                 solids[name] = Keyframed(facets.faces, [0.0], shape[None])
                 del self.bodies[name]
+
+
+def _meet(shapes: NDArray[np.float64], body: RigidBody, length: float) -> bool:
+    """Whether a surface (2, V, 3) comes near to a body within some seconds, at the ends of them."""
+    reach = body.shape.reach + length * (body.speed + 9.81 * length) + _CLOSE
+    low, high = shapes.min(axis=(0, 1)) - reach, shapes.max(axis=(0, 1)) + reach
+    return bool((body.centre > low).all() and (body.centre < high).all())
