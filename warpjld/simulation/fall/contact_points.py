@@ -15,13 +15,13 @@ from warpjld.simulation.fall.rigid_body import RigidBody
 
 __all__ = ["RigidContact", "contacts_with", "contacts_within"]
 
-_ALIKE = np.cos(np.radians(30.0))
+_ALIKE = np.cos(np.radians(10.0))
 """Points whose normals differ by less than this touch one side of something."""
-_SIDES = 4
+_SIDES = 6
 """Sides of one thing that another touches, at most."""
 _DEEP = 3.0
 """How far out a point must lie, over its gap, to be taken before a deeper one."""
-_AROUND = np.linspace(0.0, 2.0 * np.pi, 8, endpoint=False)
+_AROUND = 0.3 + np.linspace(0.0, 2.0 * np.pi, 5, endpoint=False)
 """Directions in which the outermost points of a side are looked for."""
 
 
@@ -68,6 +68,7 @@ def contacts_with(
     length: float,
     margin: float,
     friction: Callable[[str, str], float],
+    shapes: Mapping[str, NDArray[np.float64]],
 ) -> list[RigidContact]:
     """Where a body is nearer than a margin [m] to obstacles.
 
@@ -80,14 +81,14 @@ def contacts_with(
         length: [s].
         margin: [m].
         friction: Between two names.
+        shapes: Points of the obstacles' surfaces at the time [m], by name.
     """
     out = []
     for name, obstacle in obstacles.items():
         near = _near(body, partial(_projected, obstacle, time), margin)
         sets = [near]
         if not body.shape.radius:
-            shape = obstacle.mesh(time)[0]
-            sets.append(_reversed(body, np.asarray(shape, np.float64), margin))
+            sets.append(_reversed(body, shapes[name], margin))
         for points, normals, gaps in _sides(sets):
             after = obstacle.carried(points, time, time + step)
             carried = (after - points) / length

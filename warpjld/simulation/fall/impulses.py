@@ -13,6 +13,7 @@ solved by projected Gauss–Seidel, contact by contact.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from math import hypot
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,8 +23,8 @@ from warpjld.simulation.fall.rigid_body import RigidBody
 
 __all__ = ["impulses", "jacobian"]
 
-_SWEEPS = 200
-_EXACT = 1e-7
+_SWEEPS = 100
+_EXACT = 1e-6
 """Change of impulses over the largest of them that ends the sweeps."""
 
 
@@ -52,21 +53,22 @@ def impulses(
         friction: Coulomb's μ, shape (C,).
     """
     out = np.zeros(len(free))
-    stiff = np.diag(delassus) + 1e-300
-    tangent = np.maximum(stiff[1::3], stiff[2::3])
+    stiff = (np.diag(delassus) + 1e-300).tolist()
+    tangent = [max(stiff[i + 1], stiff[i + 2]) for i in range(0, len(stiff), 3)]
+    rows = list(delassus)
     for _ in range(_SWEEPS):
         change = 0.0
         for k in range(len(bounds)):
             i = 3 * k
             old = out[i]
-            out[i] = max(0.0, old - (delassus[i] @ out + free[i] + bounds[k]) / stiff[i])
+            out[i] = max(0.0, old - (float(rows[i] @ out) + free[i] + bounds[k]) / stiff[i])
             change = max(change, abs(out[i] - old))
             if friction[k] <= 0.0 or (out[i] == 0.0 and old == 0.0):
                 continue
             first, second = out[i + 1], out[i + 2]
-            one = first - (delassus[i + 1] @ out + free[i + 1]) / tangent[k]
-            two = second - (delassus[i + 2] @ out + free[i + 2]) / tangent[k]
-            size, most = float(np.hypot(one, two)), friction[k] * out[i]
+            one = first - (float(rows[i + 1] @ out) + free[i + 1]) / tangent[k]
+            two = second - (float(rows[i + 2] @ out) + free[i + 2]) / tangent[k]
+            size, most = hypot(one, two), friction[k] * out[i]
             share = 1.0 if size <= most else most / size
             out[i + 1], out[i + 2] = share * one, share * two
             change = max(change, abs(out[i + 1] - first), abs(out[i + 2] - second))

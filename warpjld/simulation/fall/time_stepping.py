@@ -8,12 +8,14 @@ lost or gained: energy never rises unless what moves by its animation pushes.
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
+from weakref import WeakKeyDictionary
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from warpjld.fem.contact import Obstacle
+from warpjld.fem.contact.obstacles.obstacle import Rigid
 from warpjld.simulation.fall.contact_points import RigidContact, contacts_with, contacts_within
 from warpjld.simulation.fall.impulses import impulses, jacobian
 from warpjld.simulation.fall.rigid_body import RigidBody
@@ -67,8 +69,9 @@ def step_bodies(
             one.spin = one.spin / (1.0 + ROLLING * length)
     margins = [_NEAR + 2.0 * length * one.speed for one in bodies]
     contacts = contacts_within(bodies, max(margins, default=0.0), friction)
+    shapes = {name: _shape(obstacle, time) for name, obstacle in obstacles.items()}
     for k, one in enumerate(bodies):
-        contacts += contacts_with(k, one, obstacles, time, step, length, margins[k], friction)
+        contacts += contacts_with(k, one, obstacles, time, step, length, margins[k], friction, shapes)
     pressed, parting = _impelled(bodies, contacts, length)
     for k, one in enumerate(bodies):
         mine = [c for c in pressed if k in (c.body, c.other)]
@@ -80,6 +83,19 @@ def step_bodies(
         one.centre = one.centre + moved
         one.turn = Rotation.from_rotvec(length * (one.spin + parting[k, 3:])).as_matrix() @ one.turn
     return pressed
+
+
+_shapes: WeakKeyDictionary[Obstacle, NDArray[np.float64]] = WeakKeyDictionary()
+"""Points of rigid obstacles at time 0: making them takes as long as a step does."""
+
+
+def _shape(obstacle: Obstacle, time: float) -> NDArray[np.float64]:
+    """Points of an obstacle's surface at a time [m], shape (n, 3)."""
+    if not isinstance(obstacle, Rigid):
+        return np.asarray(obstacle.mesh(time)[0], np.float64)
+    if obstacle not in _shapes:
+        _shapes[obstacle] = np.asarray(obstacle.mesh(0.0)[0], np.float64)
+    return np.asarray(obstacle.carried(_shapes[obstacle], 0.0, time))
 
 
 def _impelled(

@@ -24,7 +24,7 @@ from warpjld.simulation.specification import ContactSpecification, SolveSpecific
 
 __all__ = ["FallPath", "falling_names", "follow_falls"]
 
-_STILL = 6e-3
+_STILL = 1e-2
 """Speed below which a touching body rests [m/s]."""
 _QUIET = 0.25
 """How long it must be slower than that [s]."""
@@ -87,8 +87,7 @@ class FallPath:
             return f"{begun}, until it is held at frame {self.held:g}"
         if self.rests is not None:
             return f"{begun}, and comes to rest on {' and '.join(self.on)} at frame {self.rests:g}"
-        where = f"on {' and '.join(self.on)}" if self.on else "in the air"
-        return f"{begun}, and still moves at frame {self.frames[-1]:g}, {where}, at {self.speed:.2g} m/s: see FRAMES"
+        return f"{begun}, and still moves at frame {self.frames[-1]:g} at {self.speed:.2g} m/s: see FRAMES"
 
 
 def falling_names(contact: ContactSpecification, request: SolveSpecification) -> list[str]:
@@ -160,7 +159,7 @@ class _Stage:
         for name, path in self.paths.items():
             body = self.bodies.get(name)
             if body is not None and path.rests is None and path.left is None:
-                path.speed, path.on = body.speed, body.touching
+                path.speed = body.speed
         return self.paths
 
     def _moving(self) -> bool:
@@ -198,14 +197,16 @@ class _Stage:
     def _note(self, name: str, frame: float, length: float) -> None:
         """Whether a body rests."""
         body, path = self.bodies[name], self.paths[name]
-        if not body.touching or body.speed > _STILL:
+        if body.touching:
+            path.on = body.touching
+        if body.speed > _STILL:  # in the air it is so slow for a moment only
             self.quiet.pop(name, None)
             path.rests = None
             return
         since, long = self.quiet.get(name, (frame - length * self.request.rate, 0.0))
         self.quiet[name] = since, long + length
         if long + length >= _QUIET and path.rests is None:
-            path.rests, path.on = float(np.ceil(since - 1e-6)), body.touching
+            path.rests = float(np.ceil(since - 1e-6))
 
     def _skins(self, before: float, after: float) -> dict[str, Obstacle]:
         """Actors' surfaces between two frames."""
