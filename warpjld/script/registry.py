@@ -64,6 +64,7 @@ _BUILT_IN = (
     "reaching",
     "physical",
     "deforming",
+    "loading",
     "gripping",
     "pressing",
     "covering",

@@ -289,6 +289,9 @@ def _after_contact(
     solved: SolveResult, specification: ContactSpecification, request: SolveSpecification, before: StartFrame
 ) -> tuple[StartFrame, SolveResult]:
     """Where what hands no longer hold goes to, where that ended the search for equilibria."""
+    if _resting_alone(solved, before):
+        text = f"how what rests deforms under its own weight was not found: {solved.message}"
+        return replace(before, falls=(*before.falls, text)), replace(solved, status=Status.CONVERGED)
     weights = any(specification.pull) and request.method != "paper"
     if solved.status not in (Status.UNHELD, Status.SLIDING) or not weights or solved.model.animation is None:
         return before, solved
@@ -306,6 +309,14 @@ def _after_contact(
         moved[name] = ([*frames, *path.frames], [*places, *path.places])
     told = tuple(text for path in paths.values() if (text := path.told()))
     return replace(before, moved=moved, falls=(*before.falls, *told)), replace(solved, released=first)
+
+
+def _resting_alone(solved: SolveResult, before: StartFrame) -> bool:
+    """Whether all that deforms has fallen and rests, and no equilibrium was found from there on: where it is is known
+    all the same."""
+    failed = solved.status in (Status.MAX_ITERATIONS, Status.STAGNATED, Status.INDEFINITE)
+    fallen = all(one.name in before.moved and not one.states for one in solved.model.objects)
+    return failed and bool(before.falls) and not solved.frames and not solved.model.hands and fallen
 
 
 def _model(

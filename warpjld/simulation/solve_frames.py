@@ -275,14 +275,15 @@ def _untouched(model: ContactModel, frames: Sequence[float], watch: Watch, progr
     done: list[SolvedFrame] = []
     nothing, history = np.zeros_like(model.body.mesh.nodes), History()
     rest = Instant(1.0, nothing, nothing, 0, 0, 0.0)
-    after, before = Solution(Status.CONVERGED, (rest,), "", np.empty(0, np.int64), model.loads), 0.0
+    after, before = Solution(Status.CONVERGED, (rest,), "", np.empty(0, np.int64), model.loads_at(0.0, history)), 0.0
     for frame in frames:
         progress(f"frame {frame:g}", len(done), len(frames))
         time = frame - model.start
         known = model.prescribed(time, history)
         ahead = model.guess(before, time, after.displacement, history)
-        first = replace(after, instants=(replace(after.last, displacement=ahead),), loads=model.loads)
-        solution = solve(model.body, known, model.loads, after=first, free="hold", check=False)
+        loads = model.loads_at(time, history)
+        first = replace(after, instants=(replace(after.last, displacement=ahead),), loads=loads)
+        solution = solve(model.body, known, loads, after=first, free="hold", check=False)
         if not solution.converged:
             return SolveResult(solution.status, f"at frame {frame:g}: {solution.message}", model, tuple(done))
         after, last, before = solution, solution.last, time

@@ -11,6 +11,8 @@ from typing import TYPE_CHECKING, Literal
 import numpy as np
 
 from warpjld.errors import InputError
+from warpjld.simulation.materials import pair_friction
+from warpjld.simulation.object_loads import ObjectLoad, ObjectSpin
 from warpjld.simulation.state_variables import Points, PrescribedPoints
 from warpjld.skeleton import DIGITS
 
@@ -54,6 +56,8 @@ class ObjectMaterial:
         wall: Thickness of its wall [m]; 0 for a solid object.
         pressure: Inside a hollow one, above that outside [Pa] (R111).
         element: Edge length of its elements [m]; None chooses.
+        made_of: Its name in the catalogue of materials, if it is of one: what friction goes by.
+        prestress: Stress at rest in its own axes, xx yy zz xy yz zx [Pa] (R98): what is not held relaxes it.
         where: Place in a script, for messages.
 
     Examples:
@@ -70,9 +74,13 @@ class ObjectMaterial:
     pressure: float = 0.0
     element: float | None = None
     where: SourceLocation | None = None
+    prestress: tuple[float, ...] = (0.0,) * 6
+    made_of: str | None = None
 
     def __post_init__(self) -> None:
         self.material()
+        if len(self.prestress) != 6 or not np.isfinite(self.prestress).all():
+            raise InputError(f"prestress: want six finite stresses in Pa, xx yy zz xy yz zx, got {self.prestress}")
         if not (np.isfinite(self.wall) and self.wall >= 0.0):
             raise InputError(f"wall: want a thickness of 0 m (solid) or more, got {self.wall:g}")
         if not np.isfinite(self.pressure):
@@ -260,9 +268,12 @@ class ContactSpecification:
         flesh: Actors whose flesh deforms, by name.
         points: Named points by object and name.
         prescribed: State variables by object and points.
+        loads: Forces on objects, by object, points and kind.
+        spins: Objects that turn steadily, by name.
         bonds: Objects that stick together.
         friction: Coefficients by pair of names, in alphabetical order.
-        everywhere: Coefficient of all other pairs; None: that of skin, or none with the paper's loop, which knows none.
+        everywhere: Coefficient of all other pairs; None: that of their materials, of skin where it is not known, or
+            none with the paper's loop, which knows none.
         gravity: [m/s²].
         strength: Largest force of digits [N], by actor and digit, where it is not the default.
         grips: Grips to find, in the order of their frames.
@@ -274,6 +285,8 @@ class ContactSpecification:
     flesh: dict[str, FleshMaterial] = field(default_factory=dict)
     points: dict[tuple[str, str], Points] = field(default_factory=dict)
     prescribed: dict[tuple[str, str], PrescribedPoints] = field(default_factory=dict)
+    loads: dict[tuple[str, str, str], ObjectLoad] = field(default_factory=dict)
+    spins: dict[str, ObjectSpin] = field(default_factory=dict)
     bonds: list[BondStrength] = field(default_factory=list)
     friction: dict[tuple[str, str], float] = field(default_factory=dict)
     everywhere: float | None = None
@@ -303,6 +316,11 @@ class ContactSpecification:
         lifts = any(grip.lift for grip in self.grips)
         return (0.0, -_EARTH, 0.0) if lifts and not any(self.gravity) else self.gravity
 
+    @property
+    def loaded(self) -> set[str]:
+        """Objects that forces act on."""
+        return {name for name, _, _ in self.loads} | set(self.spins)
+
     def lifted(self, name: str) -> GripSpecification | None:
         """The grip that is to hold an object, if any."""
         return next((grip for grip in self.grips if grip.lift and grip.object == name), None)
@@ -310,8 +328,15 @@ class ContactSpecification:
     def coefficient(self, one: str, other: str) -> float:
         """Friction between two."""
         paper = self.pressing is not None and self.pressing.method == "paper"
-        usual = 0.0 if paper else _FRICTION
+        known = pair_friction(self._matter(one), self._matter(other))
+        usual = 0.0 if paper else _FRICTION if known is None else known
         return self.friction.get(name_pair(one, other), usual if self.everywhere is None else self.everywhere)
+
+    def _matter(self, name: str) -> str | None:
+        """What a body is made of, where that is known."""
+        if name in self.flesh:
+            return "skin"
+        return self.physical[name].made_of if name in self.physical else None
 
     def bond(self, one: str, other: str) -> BondStrength | None:
         """The bond between two objects, if any."""

@@ -85,7 +85,9 @@ def mesh_object(name: str, thing: GraspObject, physical: ObjectMaterial, place: 
     Raises:
         InputError: Elements too large for it, a wall too thick, or a pressure its wall cannot hold.
     """
-    key = hash_of(name, thing.origin, thing.size, thing.vertices, thing.faces, replace(physical, where=None))
+    key = hash_of(
+        name, thing.origin, thing.size, thing.vertices, thing.faces, replace(physical, where=None, prestress=(0.0,) * 6)
+    )
     local, notes = kept_value("object", key, (_Local, HexMesh, Embedding), lambda: _meshed(name, thing, physical))
     turn = place.apply(np.eye(3))[0] - place.apply(np.zeros((1, 3)))[0]
     moved = replace(local.mesh, nodes=place.apply(local.mesh.nodes)[0])
@@ -97,7 +99,7 @@ def mesh_object(name: str, thing: GraspObject, physical: ObjectMaterial, place: 
         local.visible,
         place.apply(thing.vertices)[0],
         thing.faces,
-        _turned(local.stress, turn.T),
+        _turned(local.stress + np.array(physical.prestress), turn.T),
         notes,
     )
 

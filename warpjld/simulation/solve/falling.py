@@ -96,6 +96,7 @@ def falling_names(contact: ContactSpecification, request: SolveSpecification) ->
         return []
     stands = {name for name, _ in contact.prescribed} | {grip.object for grip in contact.grips if grip.lift}
     stands |= {name for bond in contact.bonds for name in (bond.one, bond.other)}
+    stands |= contact.loaded
     return [name for name, matter in contact.physical.items() if name not in stands and matter.density > 0.0]
 
 

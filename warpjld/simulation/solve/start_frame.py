@@ -85,7 +85,7 @@ def find_start(
     free = [name for name in contact.physical if name not in stands]
     keyed = any(state.tracks for state in contact.prescribed.values())
     # what stands on its points gives way to its weight by so little that it may do so in the first step
-    if keyed or (any(contact.gravity) and not fell and (free or not contact.grips)):
+    if keyed or contact.loaded or (any(contact.gravity) and not fell and (free or not contact.grips)):
         return StartFrame(float(request.first), {})
     return _Approach(animation, contact, free).start(request)
 
