@@ -31,6 +31,7 @@ from warpjld.simulation.animation import Animation
 from warpjld.simulation.bodies.flesh_body import build_flesh_body
 from warpjld.simulation.bodies.model import ContactModel, assemble_model
 from warpjld.simulation.bodies.object_body import build_object_body
+from warpjld.simulation.bodies.skin_obstacle import bystanders
 from warpjld.simulation.display.surfaces import DeformedSurfaces
 from warpjld.simulation.grip.correct_frames import worst_digits
 from warpjld.simulation.grip.find import FoundGrip
@@ -335,6 +336,11 @@ def _model(
     notes += [f"{one.name}: {note}" for one in objects for note in one.notes]
     rigid = [name for name in animation.objects if name not in specification.physical]
     obstacles = {name: animation.objects[name].obstacle(start) for name in rigid}
+    request = specification.pressing
+    assert request is not None
+    frames = [float(frame) for frame in range(request.first, request.last + 1)]
+    free = bool(specification.physical)
+    obstacles |= bystanders(dict(animation.actors), set(specification.flesh), frames, free, start)
     model = assemble_model(hands, objects, obstacles, specification, start=start, animation=animation)
     check_model(model, specification)
     return model, notes

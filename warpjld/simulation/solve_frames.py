@@ -13,7 +13,7 @@ from warpjld.fem.contact import ContactInstant, ContactSolution
 from warpjld.simulation.animation import AngleEdit
 from warpjld.simulation.bodies.deformable_body import History
 from warpjld.simulation.bodies.model import ContactModel
-from warpjld.simulation.grip.correct_frames import CorrectedFrame, correct_frame
+from warpjld.simulation.grip.correct_frames import CorrectedFrame, correct_frame, uncorrected
 from warpjld.simulation.grip.find import FoundGrip, find_grip
 from warpjld.simulation.solve.bone_clearance import TIGHT, BoneClearance, TightBone
 from warpjld.simulation.solve.branch import solve_onward
@@ -198,8 +198,13 @@ class _Run:
             return self.ended(solution.status, reason)
         self._note_bones(driven, frame)
         self._edit(self.limits.edits(model, since, time))
-        if self.request.correct and before is not None:
-            corrected = correct_frame(model, self.history, before, solution, self.contact.strength)
+        if self.request.correct:
+            strength = self.contact.strength
+            corrected = (
+                uncorrected(model, solution, strength, frame)
+                if before is None
+                else correct_frame(model, self.history, before, solution, strength)
+            )
             self.corrections.append(corrected)
             solution = corrected.solution
             self._edit(corrected.edits)

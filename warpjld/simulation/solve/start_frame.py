@@ -15,6 +15,7 @@ from warpjld.fem.contact.obstacles.thickness import distance_past, half_thicknes
 from warpjld.grasp import Places
 from warpjld.simulation.animation import ActorAnimation, Animation
 from warpjld.simulation.bodies.free_object import settle_free_object
+from warpjld.simulation.bodies.skin_obstacle import SkinObstacle
 from warpjld.simulation.solve.friction_closure import friction_closure
 from warpjld.simulation.specification import ContactSpecification, FleshMaterial, SolveSpecification
 
@@ -96,6 +97,8 @@ class _Approach:
     def __init__(self, animation: Animation, contact: ContactSpecification, free: list[str]) -> None:
         self._animation, self._contact, self._free = animation, contact, free
         self._actors = {name: animation.actors[name] for name in contact.flesh}
+        others = {name: actor for name, actor in animation.actors.items() if name not in contact.flesh}
+        self._bystanders = others if contact.flesh or contact.physical else {}
         self._moved: dict[str, tuple[list[float], list[Places]]] = {}
         self._began: dict[str, NDArray[np.float64]] = {}
 
@@ -146,6 +149,7 @@ class _Approach:
             return None
         objects = self._animation.objects
         obstacles = {name: one.obstacle(frame) for name, one in objects.items() if name not in self._free}
+        obstacles |= {name: SkinObstacle(actor, frame) for name, actor in self._bystanders.items()}
         if any(_inside(solid, skin) for solid in obstacles.values() for skin in skins.values()):
             return None
         for name in self._contact.physical:
