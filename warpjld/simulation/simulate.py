@@ -25,7 +25,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from warpjld.errors import InputError
-from warpjld.fem import Status
 from warpjld.fem.hand.suggestions import DigitSlopes
 from warpjld.simulation.animation import Animation
 from warpjld.simulation.bodies.flesh_body import build_flesh_body
@@ -33,6 +32,7 @@ from warpjld.simulation.bodies.model import ContactModel, assemble_model
 from warpjld.simulation.bodies.object_body import build_object_body
 from warpjld.simulation.bodies.skin_obstacle import bystanders
 from warpjld.simulation.display.surfaces import DeformedSurfaces
+from warpjld.simulation.free_fall import after_contact, before_contact, rests_rigidly
 from warpjld.simulation.grip.correct_frames import worst_digits
 from warpjld.simulation.grip.find import FoundGrip
 from warpjld.simulation.report.table import ContactRow, ContactTable
@@ -44,18 +44,9 @@ from warpjld.simulation.sensitivity.joint_slopes import joint_slopes
 from warpjld.simulation.sensitivity.parameters import Parameter
 from warpjld.simulation.solve.checkpoint import CheckpointFile
 from warpjld.simulation.solve.checks import check_model, check_specification
-from warpjld.simulation.solve.fallen import (
-    FallenAnimation,
-    fallen_start,
-    moved_by,
-    released_bodies,
-    taking_part,
-    without,
-)
-from warpjld.simulation.solve.falling import falling_names, follow_falls
 from warpjld.simulation.solve.identity import identity_of
 from warpjld.simulation.solve.solved_frame import SolvedFrame
-from warpjld.simulation.solve.start_frame import StartFrame, find_start
+from warpjld.simulation.solve.start_frame import StartFrame
 from warpjld.simulation.solve_frames import Progress, SolveResult, solve_frames
 from warpjld.simulation.specification import ContactSpecification, SolveSpecification
 from warpjld.threads import one_blas_thread
@@ -242,7 +233,7 @@ def simulate(
         raise InputError("specification: want its pressing to say which frames are solved")
     check_specification(animation, specification, request)
     progress("looking for the first touch", 0, 1)
-    specification, animation, before = _before_contact(specification, animation, request)
+    specification, animation, before = before_contact(specification, animation, request)
     progress("meshing", 0, 1)
     model, notes = _model(specification, animation, before)
     table = ContactTable(specification.strength, animation)
@@ -252,6 +243,8 @@ def simulate(
         return reason if request.stop else None
 
     frames = _frames(specification, request, model.start)
+    if rigid := rests_rigidly(model, before, frames):
+        frames, before = [], replace(before, falls=(*before.falls, rigid))
     solved = solve_frames(
         model,
         frames,
@@ -261,63 +254,8 @@ def simulate(
         checkpoint=_checkpoint(model, specification, request, frames, folder),
         progress=progress,
     )
-    before, solved = _after_contact(solved, specification, request, before)
+    before, solved = after_contact(solved, specification, request, before)
     return _report(solved, before, table, request, notes)
-
-
-def _before_contact(
-    specification: ContactSpecification, animation: Animation, request: SolveSpecification
-) -> tuple[ContactSpecification, Animation, StartFrame]:
-    """What is asked of contact and what moves, once what nothing holds has fallen, and where it starts."""
-    names = falling_names(specification, request)
-    if not names:
-        return specification, animation, find_start(animation, specification, request)
-    paths = follow_falls(animation, specification, request, names)
-    start = fallen_start(paths, float(request.first), float(request.last))
-    stage, others = FallenAnimation(animation, paths), without(specification, names)
-    before = StartFrame(start, {})
-    if others.flesh or others.physical:
-        before = find_start(stage, others, request, fell=True)
-        before = replace(before, start=min(start, before.start))
-    inside = taking_part(paths, before.start)
-    outside = [name for name in names if name not in inside]
-    if outside and not (inside or others.flesh or others.physical):
-        inside, outside = names, []  # nothing else deforms, and no frame is left to solve
-    return without(specification, outside), stage, moved_by(paths, before, inside)
-
-
-def _after_contact(
-    solved: SolveResult, specification: ContactSpecification, request: SolveSpecification, before: StartFrame
-) -> tuple[StartFrame, SolveResult]:
-    """Where what hands no longer hold goes to, where that ended the search for equilibria."""
-    if _resting_alone(solved, before):
-        text = f"how what rests deforms under its own weight was not found: {solved.message}"
-        return replace(before, falls=(*before.falls, text)), replace(solved, status=Status.CONVERGED)
-    weights = any(specification.pull) and request.method != "paper"
-    if solved.status not in (Status.UNHELD, Status.SLIDING) or not weights or solved.model.animation is None:
-        return before, solved
-    bodies = released_bodies(solved.model, solved.frames, specification, request.rate)
-    if not bodies:
-        return before, solved
-    first = solved.frames[-1].frame if solved.frames else solved.start
-    known = (solved.model.animation, specification, request, list(bodies))
-    paths = follow_falls(*known, released=bodies, first=first)
-    if not any(path.told() for path in paths.values()):
-        return before, solved
-    moved = dict(before.moved)
-    for name, path in paths.items():
-        frames, places = moved.get(name, ([], []))
-        moved[name] = ([*frames, *path.frames], [*places, *path.places])
-    told = tuple(text for path in paths.values() if (text := path.told()))
-    return replace(before, moved=moved, falls=(*before.falls, *told)), replace(solved, released=first)
-
-
-def _resting_alone(solved: SolveResult, before: StartFrame) -> bool:
-    """Whether all that deforms has fallen and rests, and no equilibrium was found from there on: where it is is known
-    all the same."""
-    failed = solved.status in (Status.MAX_ITERATIONS, Status.STAGNATED, Status.INDEFINITE)
-    fallen = all(one.name in before.moved and not one.states for one in solved.model.objects)
-    return failed and bool(before.falls) and not solved.frames and not solved.model.hands and fallen
 
 
 def _model(

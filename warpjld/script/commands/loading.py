@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import asdict, replace
-from typing import Literal
+from typing import Literal, cast
 
 from warpjld.motion import Key, Track
 from warpjld.script.arguments import Arguments
@@ -67,7 +67,7 @@ def spin(scene: Scene, arguments: Arguments) -> None:
     options = arguments.options(at=lambda: arguments.vector("the place's"))
     thing = prop.thing
     middle = thing.place.apply(0.5 * (thing.vertices.min(axis=0) + thing.vertices.max(axis=0))[None])[0, 0]
-    x, y, z = options.get("at", middle.tolist())  # type: ignore[misc]
+    x, y, z = cast("tuple[float, float, float]", options.get("at", tuple(middle.tolist())))
     track = Track("spin")
     for key in keys:
         track.set(Key(key, 2.0 * math.pi * value, **asdict(scene.spline)))
