@@ -52,6 +52,12 @@ class Body:
             # light that has gone through skin is warmer
             actor.prop.ambient_color = (red, 0.84 * green, 0.78 * blue)
 
+    def show_painted(self, plotter: Any, colors: NDArray[np.uint8], **look: Any) -> None:
+        """Add it in a colour for each vertex, shape (n, 3)."""
+        self._mesh.point_data["colors"] = colors[self._shading.origin]
+        actor = plotter.add_mesh(self._mesh, smooth_shading=False, scalars="colors", rgb=True, **look)
+        actor.prop.interpolation = "Phong"
+
     def place(self, vertices: NDArray[np.floating]) -> None:
         """Move the vertices, shape (n, 3)."""
         self._mesh.points, self._mesh.point_data["Normals"] = self._shading.place(vertices)

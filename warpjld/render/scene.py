@@ -14,7 +14,7 @@ from warpjld.errors import InputError
 from warpjld.render.body import MATTE, SKIN, Body
 from warpjld.render.camera import Camera
 from warpjld.render.colors import ColorScale, as_hex
-from warpjld.render.lights import add_lights
+from warpjld.render.lights import Lamp, add_lights, place_lamps
 from warpjld.render.occlusion import occlusion, shade
 from warpjld.render.skeleton import bone_faces, bone_vertices, joint_faces, joint_vertices
 from warpjld.render.style import Quality, Style
@@ -68,6 +68,8 @@ class Scene:
             In shaded pictures bones show only where the style makes the skin translucent.
         solids: Other objects.
         scale: Colours for the values that come with each frame.
+        colors: Colours of the vertices instead of the style's, uint8 (V, 3).
+        lamps: On the stage, instead of studio light.
         style: Colours.
         quality: Effort.
 
@@ -85,9 +87,12 @@ class Scene:
         segments: ArrayLike | None = None,
         solids: Sequence[Solid] = (),
         scale: ColorScale | None = None,
+        colors: NDArray[np.uint8] | None = None,
+        lamps: Sequence[Lamp] = (),
         style: Style | None = None,
         quality: Quality | None = None,
     ) -> None:
+        self._colors, self._lamps = colors, tuple(lamps)
         self._faces = np.asarray(faces)
         if self._faces.ndim != 2 or self._faces.shape[1] != 3 or (len(self._faces) == 0 and not solids):
             raise InputError(f"faces: want shape (n, 3) with n > 0, got {self._faces.shape}")
@@ -99,11 +104,25 @@ class Scene:
         self._pairs = np.zeros((0, 2), int) if segments is None else np.asarray(segments, int).reshape(-1, 2)
         self._solids, self._scale = tuple(solids), scale
         self._style, self._quality = style or Style(), quality or Quality()
-        # distance of the picture plane [pixels]
-        self._focal = 0.5 * size[1] * camera.zoom / float(np.tan(camera.angle / 2))
         self._plotter: Any = None
+        self._made: list[Any] = []
+        self.look(camera)
         self._skin: Body | None = None
         self._wires: Wires | None = None
+
+    def look(self, camera: Camera) -> None:
+        """Take the frames that follow from elsewhere."""
+        self._camera = camera
+        # distance of the picture plane [pixels]
+        self._focal = 0.5 * self._size[1] * camera.zoom / float(np.tan(camera.angle / 2))
+        if self._plotter is not None:
+            self._aim()
+
+    def light(self, lamps: Sequence[Lamp]) -> None:
+        """Let the lamps, as many as there are, shine otherwise in the frames that follow."""
+        self._lamps = tuple(lamps)
+        if self._plotter is not None:
+            place_lamps(self._made, self._lamps)
 
     def draw(
         self,
@@ -211,7 +230,7 @@ class Scene:
         extent = float(np.linalg.norm(np.ptp(shown, axis=0)))
         self._plotter = open_window((self._size[0] * times, self._size[1] * times))
         self._plotter.set_background(style.background[0], top=style.background[1])
-        add_lights(self._plotter)
+        self._made = add_lights(self._plotter, self._lamps)
 
         self._skin = Body(points, self._faces, _SKIN_CREASE) if len(self._faces) else None
         opacity = style.veil if self._wire else style.opacity
@@ -219,13 +238,12 @@ class Scene:
             # of translucent skin only the front layer is drawn: then nothing needs sorting by depth
             culling = "back" if opacity < 1 else False
             color = self._scale.table() if self._scale else style.skin
-            self._skin.show(
-                self._plotter,
-                color,
-                opacity=opacity,
-                culling=culling,
-                **(MATTE if self._wire or self._scale else SKIN),
-            )
+            look: dict[str, Any] = {"opacity": opacity, "culling": culling}
+            look |= MATTE if self._wire or self._scale else SKIN
+            if self._colors is not None and not self._scale and not self._wire:
+                self._skin.show_painted(self._plotter, self._colors, **look)
+            else:
+                self._skin.show(self._plotter, color, **look)
         self._wires = None
         if self._wire and self._skin is not None:
             distance = float(np.linalg.norm(np.subtract(self._camera.target, self._camera.position)))
@@ -249,8 +267,7 @@ class Scene:
     def _aim(self) -> None:
         camera, wanted = self._plotter.camera, self._camera
         camera.position, camera.focal_point, camera.up = wanted.position, wanted.target, wanted.up
-        camera.view_angle = float(np.degrees(wanted.angle))
-        camera.zoom(wanted.zoom)
+        camera.view_angle = float(np.degrees(wanted.angle)) / wanted.zoom
 
     def _clip(self, points: NDArray[np.floating]) -> None:
         """Depths to draw. VTK would look at the bounds of the frame before, and frames depend on their order."""

@@ -9,7 +9,10 @@ from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.spatial.transform import Rotation
 
+from warpjld.render.style import Style
+from warpjld.script.directing import camera_at
 from warpjld.script.outputs import Camera
 from warpjld.script.props import Prop
 from warpjld.script.scene import Actor
@@ -183,14 +186,33 @@ class Crowd:
         first = self.roles[0]
         return first.poses.positions[frame, 0] - first.covering.skeleton.rest[0]
 
-    def camera(self, camera: Camera, size: tuple[int, int]) -> RenderCamera:
-        """A camera for all frames; a named view is framed so that nothing leaves the picture."""
+    @cached_property
+    def colors(self) -> NDArray[np.uint8] | None:
+        """Colours of the vertices of all, shape (V, 3); None where all actors have the usual one."""
+        from PIL import ImageColor
+
+        if all(role.actor.color is None for role in self.roles):
+            return None
+        usual = Style().skin
+        rows = [
+            np.tile(ImageColor.getrgb(role.actor.color or usual)[:3], (len(role.covering.surface.vertices), 1))
+            for role in self.roles
+        ]
+        return np.concatenate(rows).astype(np.uint8)
+
+    def camera(self, camera: Camera, size: tuple[int, int], frame: float | None = None) -> RenderCamera:
+        """A camera where it is at a frame, at the first one if left out; a named view is framed for all frames, so that
+        nothing leaves the picture."""
         from warpjld.render import Camera as RenderCamera
 
+        camera = camera_at(camera, float(self.frames[0]) if frame is None else frame)
         if camera.position is not None and camera.target is not None:
             sight = np.subtract(camera.target, camera.position)
             steep = abs(sight[1]) > 0.99 * np.linalg.norm(sight)
             above = (0.0, 0.0, -1.0) if steep else (0.0, 1.0, 0.0)
+            if camera.roll:
+                turn = Rotation.from_rotvec(camera.roll * sight / np.linalg.norm(sight))
+                above = tuple(turn.apply(above).tolist())
             return RenderCamera(camera.position, camera.target, above, zoom=camera.zoom)
         view = camera.view or self.default_view
         forward, up, side = self._facing

@@ -69,6 +69,7 @@ _BUILT_IN = (
     "pressing",
     "covering",
     "output",
+    "directing",
     "flow",
 )
 

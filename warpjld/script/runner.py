@@ -21,6 +21,7 @@ from warpjld.overwriting import check_outputs
 from warpjld.script.contact import check_contact, run_contact, write_contact
 from warpjld.script.crowd import Crowd, role_of
 from warpjld.script.destinations import check_destinations
+from warpjld.script.directing import shot_at
 from warpjld.script.failures import Failures, Writer
 from warpjld.script.folder import OutputFolder
 from warpjld.script.formats import check_available, video_is_available
@@ -289,6 +290,8 @@ def _check_lengths(scene: Scene, outputs: Sequence[Output], frames: int) -> None
         try:
             if isinstance(output, Film):
                 render.Film(output.name, rate=scene.rate)
+                if output.shots and not any(shot_at(output.shots, frame) for frame in frame_numbers(scene)):
+                    raise InputError("none of its shots has a frame that is made: see FRAMES")
             for actor in actors_of(output, scene) if isinstance(output, Export) else ():
                 open_cache(output.name, actor.rig.surface, frames=frames, rate=scene.rate)
         except InputError as error:
