@@ -23,7 +23,7 @@ EXAMPLES = Path(__file__).resolve().parents[1] / "examples"
 SCRIPTS = [
     pytest.param(path.name, marks=pytest.mark.slow if path.name == "reach.jld" else ())
     for path in sorted(EXAMPLES.glob("*.jld"))
-    if not path.name.startswith(("press_", "hold_", "falls"))
+    if not path.name.startswith(("press_", "hold_", "falls", "loads"))
 ]
 PRESSED = sorted(path.name for path in EXAMPLES.glob("press_*.jld"))
 
@@ -109,6 +109,13 @@ def overlap(folder: Path) -> float:
     assert surfaces
     depths = [-one.project(other.vertices).distance.min() for one, other in permutations(surfaces, 2)]
     return float(max(depths, default=0.0))
+
+
+def test_loads_bend_bars(tmp_path) -> None:
+    summary = run_small("loads.jld", tmp_path)
+    assert summary["press"]["status"] == "CONVERGED"
+    assert summary["notes"] == []
+    assert (tmp_path / "loads.png").stat().st_size > 1000
 
 
 @pytest.mark.slow

@@ -40,7 +40,7 @@ def test_skin_is_an_obstacle_that_moves_with_its_actor() -> None:
     assert obstacle.carried(some, 0.0, 2.0) - some == pytest.approx(
         np.tile([0.0, -0.002, 0.0], (len(some), 1)), abs=1e-5
     )
-    assert obstacle.project([*some, 0.0, 1.0, 0.0], 1.0).distance.min() > 0.5
+    assert obstacle.project(some + np.array([0.0, 1.0, 0.0]), 1.0).distance.min() > 0.5
 
 
 def test_only_actors_that_may_come_near_are_looked_at() -> None:
