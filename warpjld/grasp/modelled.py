@@ -14,8 +14,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from warpjld.errors import InputError
+from warpjld.geometry.rotations import unit
 from warpjld.grasp.objects import GraspObject, make_object
-from warpjld.rotations import unit
 
 __all__ = ["revolved", "soft", "swept"]
 

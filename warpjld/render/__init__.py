@@ -18,7 +18,7 @@ from warpjld.render.film import Film
 from warpjld.render.lights import Lamp
 from warpjld.render.numbers import Numbered, with_numbers
 from warpjld.render.pictures import shaded, wireframe
-from warpjld.render.scene import Image, Scene, Solid
+from warpjld.render.scene import Image, SceneRenderer, Solid
 from warpjld.render.sheet import contact_sheet, grid
 from warpjld.render.style import Quality, Style
 
@@ -31,7 +31,7 @@ __all__ = [
     "Lamp",
     "Numbered",
     "Quality",
-    "Scene",
+    "SceneRenderer",
     "Solid",
     "Style",
     "contact_sheet",

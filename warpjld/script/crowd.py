@@ -13,7 +13,7 @@ from scipy.spatial.transform import Rotation
 
 from warpjld.render.style import Style
 from warpjld.script.directing import camera_at
-from warpjld.script.outputs import Camera
+from warpjld.script.outputs import CameraSetting
 from warpjld.script.props import Prop
 from warpjld.script.scene import Actor
 from warpjld.script.staging import stage
@@ -179,7 +179,7 @@ class Crowd:
                 out[k] = found
         return out
 
-    def shift(self, camera: Camera, frame: int) -> NDArray[np.float64]:
+    def shift(self, camera: CameraSetting, frame: int) -> NDArray[np.float64]:
         """What to take off all positions at the frame of that place so that the camera goes along [m], shape (3,)."""
         if not camera.follow or not self.roles:
             return np.zeros(3)
@@ -200,7 +200,7 @@ class Crowd:
         ]
         return np.concatenate(rows).astype(np.uint8)
 
-    def camera(self, camera: Camera, size: tuple[int, int], frame: float | None = None) -> RenderCamera:
+    def camera(self, camera: CameraSetting, size: tuple[int, int], frame: float | None = None) -> RenderCamera:
         """A camera where it is at a frame, at the first one if left out; a named view is framed for all frames, so that
         nothing leaves the picture."""
         from warpjld.render import Camera as RenderCamera
@@ -225,7 +225,7 @@ class Crowd:
         """Where to look from where no CAMERA was chosen."""
         return "three-quarter" if self._facing[2] else "front"
 
-    def _framing(self, camera: Camera) -> NDArray[np.float64]:
+    def _framing(self, camera: CameraSetting) -> NDArray[np.float64]:
         """Points that must be in every picture [m], shape (n, 3)."""
         count = len(self.frames)
         shifts = np.stack([self.shift(camera, frame) for frame in range(count)])

@@ -10,12 +10,12 @@ from warpjld.motion import Key, Track
 from warpjld.render.lights import Lamp
 
 if TYPE_CHECKING:
-    from warpjld.script.outputs import Camera, Shot
+    from warpjld.script.outputs import CameraSetting, Shot
 
 __all__ = ["KeyedLamp", "camera_at", "shot_at"]
 
 
-def camera_at(camera: Camera, frame: float) -> Camera:
+def camera_at(camera: CameraSetting, frame: float) -> CameraSetting:
     """A camera where its keys have it at a frame, on splines as angles are; as it is where it has none."""
     if not camera.keys:
         return camera

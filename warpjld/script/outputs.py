@@ -6,23 +6,23 @@ from dataclasses import dataclass
 from typing import Literal
 
 __all__ = [
-    "Camera",
     "CameraKey",
+    "CameraSetting",
     "ContactSheet",
     "Export",
-    "Film",
+    "FilmOutput",
     "Grips",
     "MotionFile",
     "Output",
     "Picture",
+    "PictureStyle",
     "Shot",
-    "Style",
     "Table",
-    "Touch",
+    "TactileOutput",
     "Volume",
 ]
 
-Style = Literal["shaded", "wireframe", "pressure"]
+PictureStyle = Literal["shaded", "wireframe", "pressure"]
 
 
 @dataclass(frozen=True)
@@ -38,7 +38,7 @@ class CameraKey:
 
 
 @dataclass(frozen=True)
-class Camera:
+class CameraSetting:
     """Where pictures are taken from: a named view, or a position and a target [m], turned about its sight [rad].
 
     With ``follow`` it goes along with the root of the first actor; with ``keys`` it moves.
@@ -60,7 +60,7 @@ class Shot:
     name: str
     first: int
     last: int
-    camera: Camera
+    camera: CameraSetting
 
 
 @dataclass(frozen=True)
@@ -70,21 +70,21 @@ class Picture:
 
     name: str
     frame: float
-    style: Style
-    camera: Camera
+    style: PictureStyle
+    camera: CameraSetting
     only: str | None = None
     digits: tuple[str, ...] = ()
     numbers: bool = False
 
 
 @dataclass(frozen=True)
-class Film:
+class FilmOutput:
     """All frames as a film, or those of ``shots`` through their cameras; coloured by pressure perhaps of one actor or
     object ``only``, or of its ``digits``."""
 
     name: str
-    style: Style
-    camera: Camera
+    style: PictureStyle
+    camera: CameraSetting
     only: str | None = None
     digits: tuple[str, ...] = ()
     shots: tuple[Shot, ...] = ()
@@ -96,7 +96,7 @@ class ContactSheet:
 
     name: str
     frames: tuple[float, ...]
-    camera: Camera
+    camera: CameraSetting
 
 
 @dataclass(frozen=True)
@@ -123,7 +123,7 @@ class Table:
 
 
 @dataclass(frozen=True)
-class Touch:
+class TactileOutput:
     """What the skin of an actor, or of the first whose flesh deforms, feels over time: CSV, Parquet or a plot."""
 
     name: str
@@ -144,4 +144,4 @@ class Volume:
     name: str
 
 
-Output = Picture | Film | ContactSheet | Export | MotionFile | Table | Touch | Grips | Volume
+Output = Picture | FilmOutput | ContactSheet | Export | MotionFile | Table | TactileOutput | Grips | Volume

@@ -15,7 +15,7 @@ from warpjld.errors import InputError
 from warpjld.script.crowd import Crowd, role_of
 from warpjld.script.directing import shot_at
 from warpjld.script.folder import OutputFolder
-from warpjld.script.outputs import Camera, ContactSheet, Film, Picture, Style
+from warpjld.script.outputs import CameraSetting, ContactSheet, FilmOutput, Picture, PictureStyle
 from warpjld.script.pressure import PressureView
 from warpjld.script.props import prop_places
 from warpjld.script.scene import Scene
@@ -37,11 +37,11 @@ _CELLS = 6  # on a contact sheet whose frames nobody listed
 class FilmView:
     """Where a film is taken from, and how its lamps shine, frame by frame."""
 
-    def __init__(self, scene: Scene, crowd: Crowd, asked: Film, stage: render.Scene) -> None:
+    def __init__(self, scene: Scene, crowd: Crowd, asked: FilmOutput, stage: render.SceneRenderer) -> None:
         self._scene, self._crowd, self._asked, self._stage = scene, crowd, asked, stage
-        self._views: dict[Camera, render.Camera] = {}
+        self._views: dict[CameraSetting, render.Camera] = {}
 
-    def at(self, place: int) -> Camera | None:
+    def at(self, place: int) -> CameraSetting | None:
         """Turn the stage's camera and lamps to the frame of that place; the camera, or None where no shot shows it."""
         frame = float(self._crowd.frames[place])
         camera = self._asked.camera
@@ -56,7 +56,7 @@ class FilmView:
             self._stage.light(lamps_at(self._scene, frame))
         return camera
 
-    def _view(self, camera: Camera, frame: float) -> render.Camera:
+    def _view(self, camera: CameraSetting, frame: float) -> render.Camera:
         if camera.keys:
             return self._crowd.camera(camera, self._scene.size, frame)
         if camera not in self._views:
@@ -77,7 +77,9 @@ def style_of(scene: Scene) -> render.Style:
 class FilmStudio:
     """Takes frame after frame of a film."""
 
-    def __init__(self, scene: Scene, crowd: Crowd, asked: Film, stage: render.Scene, film: render.Film) -> None:
+    def __init__(
+        self, scene: Scene, crowd: Crowd, asked: FilmOutput, stage: render.SceneRenderer, film: render.Film
+    ) -> None:
         self._crowd, self._view = crowd, FilmView(scene, crowd, asked, stage)
         self._stage, self._film = stage, film
 
@@ -94,7 +96,9 @@ class FilmStudio:
 class PressureStudio:
     """Takes frame after frame of a film in the colours of contact pressure."""
 
-    def __init__(self, scene: Scene, view: PressureView, asked: Film, stage: render.Scene, film: render.Film) -> None:
+    def __init__(
+        self, scene: Scene, view: PressureView, asked: FilmOutput, stage: render.SceneRenderer, film: render.Film
+    ) -> None:
         self._view, self._shown = view, FilmView(scene, view.crowd, asked, stage)
         self._stage, self._film = stage, film
 
@@ -111,7 +115,7 @@ class PressureStudio:
 
 
 @contextmanager
-def film_studio(scene: Scene, crowd: Crowd, film: Film, path: Path) -> Iterator[FilmStudio | PressureStudio]:
+def film_studio(scene: Scene, crowd: Crowd, film: FilmOutput, path: Path) -> Iterator[FilmStudio | PressureStudio]:
     """A ``FILM`` being taken."""
     camera = crowd.camera(film.camera, scene.size)
     quality = render.Quality.film()
@@ -121,7 +125,7 @@ def film_studio(scene: Scene, crowd: Crowd, film: Film, path: Path) -> Iterator[
             with view.stage(camera, scene.size, quality, 0) as stage_:
                 yield PressureStudio(scene, view, film, stage_, writer)
             return
-        with render.Scene(
+        with render.SceneRenderer(
             crowd.faces,
             camera,
             look=film.style,
@@ -151,7 +155,7 @@ def draw_picture(scene: Scene, crowd: Crowd, picture: Picture, path: Path) -> No
         with view.stage(camera, scene.size, render.Quality(), shift) as stage_:
             render.save_picture(path, stage_.draw(points - shift, values=values))
         return
-    with render.Scene(
+    with render.SceneRenderer(
         crowd.faces,
         camera,
         look=picture.style,
@@ -215,7 +219,7 @@ def sheet_frames(scene: Scene, frames: NDArray[np.float64]) -> tuple[float, ...]
     return tuple(float(frame) for frame in frames[np.unique(chosen)])
 
 
-def preview(scene: Scene, frame: float, style: Style) -> Path:
+def preview(scene: Scene, frame: float, style: PictureStyle) -> Path:
     """A picture of any frame of the scene as it is, in the output folder (R5)."""
     roles = [role_of(a, np.array([frame]), scene.rate) for a in scene.actors.values()]
     crowd = Crowd(
@@ -230,5 +234,5 @@ def preview(scene: Scene, frame: float, style: Style) -> Path:
     return scene.folder / name
 
 
-def _bones(crowd: Crowd, style: Style) -> NDArray[np.int32] | None:
+def _bones(crowd: Crowd, style: PictureStyle) -> NDArray[np.int32] | None:
     return crowd.segments if style == "wireframe" else None

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 
-from warpjld.fem import Status
+from warpjld.fem import SolveStatus
 from warpjld.simulation.animation import Animation
 from warpjld.simulation.bodies.deformable_body import History
 from warpjld.simulation.bodies.model import ContactModel
@@ -55,7 +55,7 @@ def after_contact(
 ) -> tuple[StartFrame, SolveResult]:
     """Where what hands no longer hold goes to, where that ended the search for equilibria."""
     weights = any(specification.pull) and request.method != "paper"
-    if solved.status not in (Status.UNHELD, Status.SLIDING) or not weights or solved.model.animation is None:
+    if solved.status not in (SolveStatus.UNHELD, SolveStatus.SLIDING) or not weights or solved.model.animation is None:
         return before, solved
     bodies = released_bodies(solved.model, solved.frames, specification, request.rate)
     if not bodies:
@@ -80,6 +80,6 @@ def rests_rigidly(model: ContactModel, before: StartFrame, frames: Sequence[floa
     if not before.falls or model.hands or not fallen or not frames or not model.pairs:
         return ""
     found = solve_onward(model, History(), None, [frames[0] - model.start], halvings=_TRIAL)
-    if found.converged or found.status in (Status.UNHELD, Status.SLIDING):
+    if found.converged or found.status in (SolveStatus.UNHELD, SolveStatus.SLIDING):
         return ""
     return f"how what rests gives way to its own weight was not found, and is not shown: {found.status.value}"

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from warpjld.errors import InputError
-from warpjld.lengths import LARGEST
+from warpjld.geometry.lengths import LARGEST
 from warpjld.script.arguments import Arguments
 
 if TYPE_CHECKING:

@@ -7,19 +7,19 @@ from dataclasses import astuple, replace
 from typing import cast
 
 from warpjld.script.arguments import Arguments
-from warpjld.script.formats import EXPORTS, FILMS, MOTIONS, PICTURES, VIEWS
-from warpjld.script.keys import FINGERS
+from warpjld.script.formats import EXPORTS, FILMS, MOTIONS, PICTURES, VIEW_WORDS
+from warpjld.script.keys import DIGIT_WORDS
 from warpjld.script.outputs import (
-    Camera,
     CameraKey,
+    CameraSetting,
     ContactSheet,
     Export,
-    Film,
+    FilmOutput,
     MotionFile,
     Output,
     Picture,
+    PictureStyle,
     Shot,
-    Style,
 )
 from warpjld.script.registry import command
 from warpjld.script.scene import Scene
@@ -32,7 +32,7 @@ _SHOWN = "[SHADED/WIREFRAME/PRESSURE [<actor or object> [THUMB/INDEX/MIDDLE/RING
 @command(
     "CAMERA",
     syntax=(
-        f"CAMERA <{'/'.join(VIEWS)}> [ZOOM <factor>] [FOLLOW] or CAMERA FROM <x> <y> <z> TO <x> <y> <z> "
+        f"CAMERA <{'/'.join(VIEW_WORDS)}> [ZOOM <factor>] [FOLLOW] or CAMERA FROM <x> <y> <z> TO <x> <y> <z> "
         "[ROLL <degrees>] [AT <frame>] …"
     ),
     help="Where pictures and films after this line are taken from [m]; FOLLOW: the first actor; AT sets keys of a way.",
@@ -48,7 +48,7 @@ def camera(scene: Scene, arguments: Arguments) -> None:
         if position == target:
             raise arguments.error("the camera cannot look at its own place")
     else:
-        view = arguments.choice("a view or FROM", VIEWS).lower()
+        view = arguments.choice("a view or FROM", VIEW_WORDS).lower()
     options = arguments.options(
         zoom=lambda: arguments.number("the zoom factor", minimum=0.01, maximum=100),
         follow=lambda: True,
@@ -59,9 +59,9 @@ def camera(scene: Scene, arguments: Arguments) -> None:
     if position is None or target is None:
         if {"roll", "at"} & set(options):
             raise arguments.error("ROLL and AT are for a camera FROM a place")
-        scene.camera = Camera(view, zoom=zoom, follow="follow" in options)
+        scene.camera = CameraSetting(view, zoom=zoom, follow="follow" in options)
         return
-    made = Camera(None, position, target, zoom, follow="follow" in options, roll=roll)
+    made = CameraSetting(None, position, target, zoom, follow="follow" in options, roll=roll)
     if "at" in options:
         key = CameraKey(float(cast(float, options["at"])), position, target, zoom, roll, astuple(scene.spline))
         made = replace(made, keys=_with_key(scene, key))
@@ -117,7 +117,7 @@ def film(scene: Scene, arguments: Arguments) -> None:
     shots = _shots(scene, arguments) if arguments.keyword("SHOTS") else ()
     style = _style(arguments)
     only, digits = _only(scene, arguments, style)
-    ask_for(scene, arguments, Film(name, style, scene.camera, only, digits, shots))
+    ask_for(scene, arguments, FilmOutput(name, style, scene.camera, only, digits, shots))
 
 
 def _shots(scene: Scene, arguments: Arguments) -> tuple[Shot, ...]:
@@ -178,18 +178,18 @@ def export_motion(scene: Scene, arguments: Arguments) -> None:
     ask_for(scene, arguments, MotionFile(name, actor))
 
 
-def _style(arguments: Arguments, *beside: str) -> Style:
-    return cast(Style, arguments.choice("the style", _STYLES, beside).lower()) if arguments else "shaded"
+def _style(arguments: Arguments, *beside: str) -> PictureStyle:
+    return cast(PictureStyle, arguments.choice("the style", _STYLES, beside).lower()) if arguments else "shaded"
 
 
-def _only(scene: Scene, arguments: Arguments, style: Style) -> tuple[str | None, tuple[str, ...]]:
+def _only(scene: Scene, arguments: Arguments, style: PictureStyle) -> tuple[str | None, tuple[str, ...]]:
     """What is shown alone, and which digits of it."""
     if style != "pressure" or not arguments:
         return None, ()
     name = _shown_alone(scene, arguments)
     digits: list[str] = []
     while name in scene.actors and arguments:
-        digits.append(arguments.choice("a digit", (*FINGERS, "PALM")).lower())
+        digits.append(arguments.choice("a digit", (*DIGIT_WORDS, "PALM")).lower())
     if digits and name not in scene.contact.flesh:
         raise arguments.error(f"{name} has no flesh whose digits can be shown: FLESH {name} makes it so")
     return name, tuple(dict.fromkeys(digits))

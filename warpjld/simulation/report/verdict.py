@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from warpjld.fem import Status
+from warpjld.fem import SolveStatus
 from warpjld.simulation.report.balance import ObjectBalance, balances
 from warpjld.simulation.report.table import ContactRow
 from warpjld.simulation.report.visible_overlap import RemainingOverlap
@@ -59,7 +59,7 @@ class ContactVerdict:
     @property
     def failed(self) -> bool:
         """Whether frames that were asked for are missing, or are wrong."""
-        return self.status not in (Status.CONVERGED.name, Status.STOPPED.name, CRUSHED, RELEASED)
+        return self.status not in (SolveStatus.CONVERGED.name, SolveStatus.STOPPED.name, CRUSHED, RELEASED)
 
     def content(self) -> dict[str, Any]:
         """As plain values."""
@@ -115,7 +115,7 @@ def verdict_of(
     if solved.released is not None:
         status = RELEASED
         text = f"not held: {solved.message}; contact is not solved after frame {solved.released:g}"
-    elif solved.status not in (Status.CONVERGED, Status.STOPPED):
+    elif solved.status not in (SolveStatus.CONVERGED, SolveStatus.STOPPED):
         text = f"no equilibrium: {solved.message}"
     elif overlaps:
         status = "OVERLAP"
@@ -130,7 +130,7 @@ def verdict_of(
         worst = max(over, key=lambda row: row.share)
         need = f"{100 * worst.share:.0f} % of what muscles can do"
         text = f"not realistic: at frame {worst.frame:g} {worst.digit} needs {need}"
-    elif solved.status is Status.STOPPED:
+    elif solved.status is SolveStatus.STOPPED:
         text = solved.message
     elif not rows:
         text = "solved"
