@@ -23,7 +23,7 @@ EXAMPLES = Path(__file__).resolve().parents[1] / "examples"
 SCRIPTS = [
     pytest.param(path.name, marks=pytest.mark.slow if path.name == "reach.jld" else ())
     for path in sorted(EXAMPLES.glob("*.jld"))
-    if not path.name.startswith(("press_", "hold_"))
+    if not path.name.startswith(("press_", "hold_", "falls", "loads"))
 ]
 PRESSED = sorted(path.name for path in EXAMPLES.glob("press_*.jld"))
 
@@ -109,6 +109,32 @@ def overlap(folder: Path) -> float:
     assert surfaces
     depths = [-one.project(other.vertices).distance.min() for one, other in permutations(surfaces, 2)]
     return float(max(depths, default=0.0))
+
+
+def test_loads_bend_bars(tmp_path) -> None:
+    summary = run_small("loads.jld", tmp_path)
+    assert summary["press"]["status"] == "CONVERGED"
+    assert summary["notes"] == []
+    assert (tmp_path / "loads.png").stat().st_size > 1000
+
+
+@pytest.mark.slow
+def test_objects_alone_fall(tmp_path) -> None:
+    scene = Scene(folder=tmp_path, say=lambda text: None)
+    Interpreter(scene).run_file(EXAMPLES / "falls.jld")
+    scene.size = (120, 90)
+    Interpreter(scene).run_text("EXPORT 'seen.npz'")
+    summary = run_scene(scene, tmp_path)
+    assert summary["press"]["status"] == "CONVERGED"
+    assert (
+        "BLOCK is held by nothing: it falls from frame 0 on, and comes to rest on FLOOR" in summary["press"]["verdict"]
+    )
+    assert "comes to rest on BOWL" in summary["press"]["verdict"]
+    with np.load(tmp_path / "seen-ball.npz") as file:
+        middle = file["vertices"][-1].mean(axis=0)
+    assert np.linalg.norm(middle - [-0.16, 0.016, 0.02]) < 1e-3
+    with np.load(tmp_path / "seen-block.npz") as file:
+        assert file["vertices"][-1][:, 1].min() == pytest.approx(0.0, abs=1e-4)
 
 
 @pytest.mark.slow

@@ -131,6 +131,25 @@ def test_digits_that_bear_too_much_are_opened(run: Callable[[str], Scene], tmp_p
 
 
 @pytest.mark.slow
+def test_a_load_that_opening_cannot_lessen_is_named(run: Callable[[str], Scene], tmp_path: Path) -> None:
+    """The hand as a whole is moved down on the plate: no joint has closed."""
+    scene = run(
+        "OBJECT plate BOX 0.036 0.006 0.036 AT 0.034 -0.0275 -0.165\nFLESH LEFT INDEX ELEMENT 0.003\n"
+        "MOVE LEFT 0 0 0.002 0\nMOVE LEFT 10 0 -0.008 0\nSTRENGTH LEFT INDEX 0.1\nFRAMES 0 8\nPRESS 0 8 EVERY 2 CORRECT"
+    )
+    report = solved(scene, tmp_path)
+    assert max(row.share for row in report.rows if row.digit == "index") > 1.0
+    assert report.verdict.corrections
+    for line in report.verdict.corrections:
+        assert "index" in line
+        assert "%) was not corrected" in line
+    last = report.verdict.corrections[-1]
+    assert "LEFT at frame 8" in last
+    assert "its joints have not closed" in last
+    assert "MOVE" in last
+
+
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("lines", "status", "text"),
     [

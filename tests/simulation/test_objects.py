@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from warpjld.fem import SolveStatus
-from warpjld.script import Scene
+from warpjld.script import Interpreter, Scene
 from warpjld.script.contact import run_contact
 from warpjld.script.props import prop_places
 from warpjld.simulation.simulate import Simulation
@@ -22,6 +22,18 @@ POINTS block head UPPER Y 0
 HOLD block foot
 FRICTION 0
 """
+
+
+@pytest.fixture
+def run() -> Callable[[str], Scene]:
+    """Runs lines on a stage of objects alone: a hand there would be an obstacle."""
+
+    def run_text(text: str) -> Scene:
+        scene = Scene(say=lambda text: None)
+        Interpreter(scene).run_text(text)
+        return scene
+
+    return run_text
 
 
 def heights(report: Simulation, name: str) -> list[float]:

@@ -15,6 +15,7 @@ from warpjld.render.camera import VIEWS, Camera
 from warpjld.render.colors import ColorScale
 from warpjld.render.files import save_picture
 from warpjld.render.film import Film
+from warpjld.render.lights import Lamp
 from warpjld.render.numbers import Numbered, with_numbers
 from warpjld.render.pictures import shaded, wireframe
 from warpjld.render.scene import Image, SceneRenderer, Solid
@@ -27,6 +28,7 @@ __all__ = [
     "ColorScale",
     "Film",
     "Image",
+    "Lamp",
     "Numbered",
     "Quality",
     "SceneRenderer",

@@ -11,7 +11,7 @@ from warpjld.render.creases import Shading
 
 __all__ = ["MATTE", "SKIN", "RenderedBody"]
 
-#: Materials for `Body.show`.
+#: Materials for `RenderedBody.show`.
 SKIN: dict[str, float] = {"ambient": 0.3, "diffuse": 0.8, "specular": 0.16, "specular_power": 14.0}
 MATTE: dict[str, float] = {"ambient": 0.45, "diffuse": 0.75, "specular": 0.0}
 
@@ -51,6 +51,12 @@ class RenderedBody:
             red, green, blue = actor.prop.color.float_rgb
             # light that has gone through skin is warmer
             actor.prop.ambient_color = (red, 0.84 * green, 0.78 * blue)
+
+    def show_painted(self, plotter: Any, colors: NDArray[np.uint8], **look: Any) -> None:
+        """Add it in a colour for each vertex, shape (n, 3)."""
+        self._mesh.point_data["colors"] = colors[self._shading.origin]
+        actor = plotter.add_mesh(self._mesh, smooth_shading=False, scalars="colors", rgb=True, **look)
+        actor.prop.interpolation = "Phong"
 
     def place(self, vertices: NDArray[np.floating]) -> None:
         """Move the vertices, shape (n, 3)."""

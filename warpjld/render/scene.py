@@ -15,7 +15,7 @@ from warpjld.geometry.rotations import unit
 from warpjld.render.body import MATTE, SKIN, RenderedBody
 from warpjld.render.camera import Camera
 from warpjld.render.colors import ColorScale, as_hex
-from warpjld.render.lights import add_lights
+from warpjld.render.lights import Lamp, add_lights, place_lamps
 from warpjld.render.occlusion import occlusion, shade
 from warpjld.render.skeleton import bone_faces, bone_vertices, joint_faces, joint_vertices
 from warpjld.render.style import Quality, Style
@@ -68,6 +68,8 @@ class SceneRenderer:
             In shaded pictures bones show only where the style makes the skin translucent.
         solids: Other objects.
         scale: Colours for the values that come with each frame.
+        colors: Colours of the vertices instead of the style's, uint8 (V, 3).
+        lamps: On the stage, instead of studio light.
         style: Colours.
         quality: Effort.
 
@@ -85,11 +87,14 @@ class SceneRenderer:
         segments: ArrayLike | None = None,
         solids: Sequence[Solid] = (),
         scale: ColorScale | None = None,
+        colors: NDArray[np.uint8] | None = None,
+        lamps: Sequence[Lamp] = (),
         style: Style | None = None,
         quality: Quality | None = None,
     ) -> None:
+        self._colors, self._lamps = colors, tuple(lamps)
         self._faces = np.asarray(faces)
-        if self._faces.ndim != 2 or self._faces.shape[1] != 3 or len(self._faces) == 0:
+        if self._faces.ndim != 2 or self._faces.shape[1] != 3 or (len(self._faces) == 0 and not solids):
             raise InputError(f"faces: want shape (n, 3) with n > 0, got {self._faces.shape}")
         if look not in ("shaded", "wireframe"):
             raise InputError(f"look: want 'shaded' or 'wireframe', got '{look}'")
@@ -99,9 +104,25 @@ class SceneRenderer:
         self._pairs = np.zeros((0, 2), int) if segments is None else np.asarray(segments, int).reshape(-1, 2)
         self._solids, self._scale = tuple(solids), scale
         self._style, self._quality = style or Style(), quality or Quality()
-        # distance of the picture plane [pixels]
-        self._focal = 0.5 * size[1] * camera.zoom / float(np.tan(camera.angle / 2))
         self._plotter: Any = None
+        self._made: list[Any] = []
+        self.look(camera)
+        self._skin: RenderedBody | None = None
+        self._wires: Wires | None = None
+
+    def look(self, camera: Camera) -> None:
+        """Take the frames that follow from elsewhere."""
+        self._camera = camera
+        # distance of the picture plane [pixels]
+        self._focal = 0.5 * self._size[1] * camera.zoom / float(np.tan(camera.angle / 2))
+        if self._plotter is not None:
+            self._aim()
+
+    def light(self, lamps: Sequence[Lamp]) -> None:
+        """Let the lamps, as many as there are, shine otherwise in the frames that follow."""
+        self._lamps = tuple(lamps)
+        if self._plotter is not None:
+            place_lamps(self._made, self._lamps)
 
     def draw(
         self,
@@ -126,16 +147,17 @@ class SceneRenderer:
             InputError: Something missing, of the wrong shape, or not finite.
         """
         points = _finite("vertices", vertices, (None, 3))
-        if len(points) <= self._faces.max():
+        if len(points) <= self._faces.max(initial=-1):
             raise InputError(f"vertices: faces want {self._faces.max() + 1} of them, got {len(points)}")
         bones = self._bones_from(joints)
         shares = self._shares_from(values, len(points))
         if self._plotter is None:
             self._build(points, bones)
-        self._skin.place(points)
-        if shares is not None:
+        if self._skin is not None:
+            self._skin.place(points)
+        if shares is not None and self._skin is not None:
             self._skin.paint(shares)
-        if self._wire:
+        if self._wires is not None:
             self._wires.place(points, self._camera.position)
         if bones is not None:
             self._bones.place(bone_vertices(bones, self._pairs, self._thickness))
@@ -204,25 +226,26 @@ class SceneRenderer:
         from warpjld.render.window import open_window
 
         style, times = self._style, self._quality.supersampling
-        extent = float(np.linalg.norm(np.ptp(points, axis=0)))
+        shown = points if len(points) else np.concatenate([np.asarray(s.vertices, float) for s in self._solids])
+        extent = float(np.linalg.norm(np.ptp(shown, axis=0)))
         self._plotter = open_window((self._size[0] * times, self._size[1] * times))
         self._plotter.set_background(style.background[0], top=style.background[1])
-        add_lights(self._plotter)
+        self._made = add_lights(self._plotter, self._lamps)
 
-        self._skin = RenderedBody(points, self._faces, _SKIN_CREASE)
+        self._skin = RenderedBody(points, self._faces, _SKIN_CREASE) if len(self._faces) else None
         opacity = style.veil if self._wire else style.opacity
-        if opacity > 0:
+        if opacity > 0 and self._skin is not None:
             # of translucent skin only the front layer is drawn: then nothing needs sorting by depth
             culling = "back" if opacity < 1 else False
             color = self._scale.table() if self._scale else style.skin
-            self._skin.show(
-                self._plotter,
-                color,
-                opacity=opacity,
-                culling=culling,
-                **(MATTE if self._wire or self._scale else SKIN),
-            )
-        if self._wire:
+            look: dict[str, Any] = {"opacity": opacity, "culling": culling}
+            look |= MATTE if self._wire or self._scale else SKIN
+            if self._colors is not None and not self._scale and not self._wire:
+                self._skin.show_painted(self._plotter, self._colors, **look)
+            else:
+                self._skin.show(self._plotter, color, **look)
+        self._wires = None
+        if self._wire and self._skin is not None:
             distance = float(np.linalg.norm(np.subtract(self._camera.target, self._camera.position)))
             width, unit = times * self._size[1] / 720, self._focal / distance
             self._wires = Wires(points, self._faces)
@@ -248,8 +271,7 @@ class SceneRenderer:
     def _aim(self) -> None:
         camera, wanted = self._plotter.camera, self._camera
         camera.position, camera.focal_point, camera.up = wanted.position, wanted.target, wanted.up
-        camera.view_angle = float(np.degrees(wanted.angle))
-        camera.zoom(wanted.zoom)
+        camera.view_angle = float(np.degrees(wanted.angle)) / wanted.zoom
 
     def _clip(self, points: NDArray[np.floating]) -> None:
         """Depths to draw. VTK would look at the bounds of the frame before, and frames depend on their order."""

@@ -56,7 +56,9 @@ def run_contact(
     assert pressing is not None
     try:
         grasps = [attempt.object for attempt in scene.attempts if attempt.command.startswith("GRASP ")]
-        asked = replace(scene.contact, grasped=tuple(dict.fromkeys(grasps)))
+        asked = replace(
+            scene.contact, grasped=tuple(dict.fromkeys(grasps)), pressing=replace(pressing, rate=scene.rate)
+        )
         found = simulate(asked, SceneAnimation(scene), folder=folder, progress=progress)
     except InputError as error:
         raise located(error, pressing.where) from error

@@ -9,7 +9,10 @@ from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.spatial.transform import Rotation
 
+from warpjld.render.style import Style
+from warpjld.script.directing import camera_at
 from warpjld.script.outputs import CameraSetting
 from warpjld.script.props import Prop
 from warpjld.script.scene import Actor
@@ -81,7 +84,7 @@ class Crowd:
         """Triangles over the vertices of all, shape (T, 3)."""
         counts = np.cumsum([0, *(len(r.covering.surface.vertices) for r in self.roles)])
         faces = [r.covering.surface.faces + start for r, start in zip(self.roles, counts, strict=False)]
-        return np.concatenate(faces).astype(np.int32)
+        return np.concatenate([np.empty((0, 3), np.int32), *faces]).astype(np.int32)
 
     @cached_property
     def segments(self) -> NDArray[np.int32]:
@@ -147,14 +150,13 @@ class Crowd:
 
     def joints(self, frame: int) -> NDArray[np.float64]:
         """Joint positions of all at the frame of that place in the sequence [m], shape (J, 3)."""
-        return np.concatenate([role.poses.positions[frame] for role in self.roles])
+        return np.concatenate([np.empty((0, 3)), *(role.poses.positions[frame] for role in self.roles)])
 
     def surface(self, frame: int) -> NDArray[np.float32]:
         """Vertices of all at one frame [m], shape (V, 3)."""
         some = slice(frame, frame + 1)
-        return np.concatenate(
-            [self.worn(r, r.covering.deform(r.poses[some], device=self.device), frame)[0] for r in self.roles]
-        )
+        skins = [self.worn(r, r.covering.deform(r.poses[some], device=self.device), frame)[0] for r in self.roles]
+        return np.concatenate([np.empty((0, 3), np.float32), *skins])
 
     def worn(self, role: Role, vertices: NDArray[np.float32], start: int) -> NDArray[np.float32]:
         """Surfaces of a role (n, V, 3) from the frame of that place on: where TOUCH is on what crosses is parted and
@@ -179,19 +181,38 @@ class Crowd:
 
     def shift(self, camera: CameraSetting, frame: int) -> NDArray[np.float64]:
         """What to take off all positions at the frame of that place so that the camera goes along [m], shape (3,)."""
-        if not camera.follow:
+        if not camera.follow or not self.roles:
             return np.zeros(3)
         first = self.roles[0]
         return first.poses.positions[frame, 0] - first.covering.skeleton.rest[0]
 
-    def camera(self, camera: CameraSetting, size: tuple[int, int]) -> RenderCamera:
-        """A camera for all frames; a named view is framed so that nothing leaves the picture."""
+    @cached_property
+    def colors(self) -> NDArray[np.uint8] | None:
+        """Colours of the vertices of all, shape (V, 3); None where all actors have the usual one."""
+        from PIL import ImageColor
+
+        if all(role.actor.color is None for role in self.roles):
+            return None
+        usual = Style().skin
+        rows = [
+            np.tile(ImageColor.getrgb(role.actor.color or usual)[:3], (len(role.covering.surface.vertices), 1))
+            for role in self.roles
+        ]
+        return np.concatenate(rows).astype(np.uint8)
+
+    def camera(self, camera: CameraSetting, size: tuple[int, int], frame: float | None = None) -> RenderCamera:
+        """A camera where it is at a frame, at the first one if left out; a named view is framed for all frames, so that
+        nothing leaves the picture."""
         from warpjld.render import Camera as RenderCamera
 
+        camera = camera_at(camera, float(self.frames[0]) if frame is None else frame)
         if camera.position is not None and camera.target is not None:
             sight = np.subtract(camera.target, camera.position)
             steep = abs(sight[1]) > 0.99 * np.linalg.norm(sight)
             above = (0.0, 0.0, -1.0) if steep else (0.0, 1.0, 0.0)
+            if camera.roll:
+                turn = Rotation.from_rotvec(camera.roll * sight / np.linalg.norm(sight))
+                above = tuple(turn.apply(above).tolist())
             return RenderCamera(camera.position, camera.target, above, zoom=camera.zoom)
         view = camera.view or self.default_view
         forward, up, side = self._facing
@@ -222,9 +243,9 @@ class Crowd:
     @cached_property
     def _facing(self) -> tuple[NDArray[np.float64], NDArray[np.float64], Literal["left", "right"] | None]:
         """Where a lone hand's palm looks, what is up for it, and its side; the stage's own axes for anything else."""
-        skeleton = self.roles[0].covering.skeleton
-        side = hand_side(skeleton) if len(self.roles) == 1 else None
-        if side is None:
+        skeleton = self.roles[0].covering.skeleton if self.roles else None
+        side = hand_side(skeleton) if skeleton is not None and len(self.roles) == 1 else None
+        if skeleton is None or side is None:
             return np.array([0.0, 0.0, 1.0]), np.array([0.0, 1.0, 0.0]), None
         base, wrist = skeleton.index(f"{side}.middle.base"), skeleton.index(f"{side}.wrist")
         up = skeleton.rest[base] - skeleton.rest[wrist]

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from typing import Literal
 
 __all__ = [
+    "CameraKey",
     "CameraSetting",
     "ContactSheet",
     "Export",
@@ -15,6 +16,7 @@ __all__ = [
     "Output",
     "Picture",
     "PictureStyle",
+    "Shot",
     "Table",
     "TactileOutput",
     "Volume",
@@ -24,10 +26,22 @@ PictureStyle = Literal["shaded", "wireframe", "pressure"]
 
 
 @dataclass(frozen=True)
-class CameraSetting:
-    """Where pictures are taken from: a named view, or a position and a target [m].
+class CameraKey:
+    """Where a camera is at a frame, with the constants of the spline there: tension, continuity, bias."""
 
-    With ``follow`` it goes along with the root of the first actor.
+    frame: float
+    position: tuple[float, float, float]
+    target: tuple[float, float, float]
+    zoom: float
+    roll: float
+    spline: tuple[float, float, float]
+
+
+@dataclass(frozen=True)
+class CameraSetting:
+    """Where pictures are taken from: a named view, or a position and a target [m], turned about its sight [rad].
+
+    With ``follow`` it goes along with the root of the first actor; with ``keys`` it moves.
     """
 
     view: str | None = None
@@ -35,6 +49,18 @@ class CameraSetting:
     target: tuple[float, float, float] | None = None
     zoom: float = 1.0
     follow: bool = False
+    roll: float = 0.0
+    keys: tuple[CameraKey, ...] = ()
+
+
+@dataclass(frozen=True)
+class Shot:
+    """Frames of a film that one camera takes, both included."""
+
+    name: str
+    first: int
+    last: int
+    camera: CameraSetting
 
 
 @dataclass(frozen=True)
@@ -53,13 +79,15 @@ class Picture:
 
 @dataclass(frozen=True)
 class FilmOutput:
-    """All frames as a film; coloured by pressure perhaps of one actor or object ``only``, or of its ``digits``."""
+    """All frames as a film, or those of ``shots`` through their cameras; coloured by pressure perhaps of one actor or
+    object ``only``, or of its ``digits``."""
 
     name: str
     style: PictureStyle
     camera: CameraSetting
     only: str | None = None
     digits: tuple[str, ...] = ()
+    shots: tuple[Shot, ...] = ()
 
 
 @dataclass(frozen=True)

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from warpjld import render
 from warpjld.errors import InputError
 from warpjld.script.crowd import Crowd, role_of
+from warpjld.script.directing import shot_at
 from warpjld.script.folder import OutputFolder
 from warpjld.script.outputs import CameraSetting, ContactSheet, FilmOutput, Picture, PictureStyle
 from warpjld.script.pressure import PressureView
@@ -33,16 +34,61 @@ _CELL = (5 / 12, 19 / 36)  # of the height of a picture: a contact sheet's cell,
 _CELLS = 6  # on a contact sheet whose frames nobody listed
 
 
+class FilmView:
+    """Where a film is taken from, and how its lamps shine, frame by frame."""
+
+    def __init__(self, scene: Scene, crowd: Crowd, asked: FilmOutput, stage: render.SceneRenderer) -> None:
+        self._scene, self._crowd, self._asked, self._stage = scene, crowd, asked, stage
+        self._views: dict[CameraSetting, render.Camera] = {}
+
+    def at(self, place: int) -> CameraSetting | None:
+        """Turn the stage's camera and lamps to the frame of that place; the camera, or None where no shot shows it."""
+        frame = float(self._crowd.frames[place])
+        camera = self._asked.camera
+        if self._asked.shots:
+            shot = shot_at(self._asked.shots, frame)
+            if shot is None:
+                return None
+            camera = shot.camera
+        if camera.keys or self._asked.shots:
+            self._stage.look(self._view(camera, frame))
+        if self._scene.lamps:
+            self._stage.light(lamps_at(self._scene, frame))
+        return camera
+
+    def _view(self, camera: CameraSetting, frame: float) -> render.Camera:
+        if camera.keys:
+            return self._crowd.camera(camera, self._scene.size, frame)
+        if camera not in self._views:
+            self._views[camera] = self._crowd.camera(camera, self._scene.size)
+        return self._views[camera]
+
+
+def lamps_at(scene: Scene, frame: float) -> list[render.Lamp]:
+    """How the lamps of a scene shine at a frame."""
+    return [lamp.at(frame) for lamp in scene.lamps.values()]
+
+
+def style_of(scene: Scene) -> render.Style:
+    """Colours of a scene."""
+    return render.Style() if scene.backdrop is None else render.Style(background=scene.backdrop)
+
+
 class FilmStudio:
     """Takes frame after frame of a film."""
 
-    def __init__(self, crowd: Crowd, camera: CameraSetting, stage: render.SceneRenderer, film: render.Film) -> None:
-        self._crowd, self._camera = crowd, camera
+    def __init__(
+        self, scene: Scene, crowd: Crowd, asked: FilmOutput, stage: render.SceneRenderer, film: render.Film
+    ) -> None:
+        self._crowd, self._view = crowd, FilmView(scene, crowd, asked, stage)
         self._stage, self._film = stage, film
 
     def take(self, frame: int, vertices: NDArray[np.float32]) -> None:
         """The frame of that place in the sequence, with the vertices of all actors [m], shape (V, 3)."""
-        shift = self._crowd.shift(self._camera, frame)
+        camera = self._view.at(frame)
+        if camera is None:
+            return
+        shift = self._crowd.shift(camera, frame)
         solids = self._crowd.moved_solids(frame, shift)
         self._film.append(self._stage.draw(vertices - shift, joints=self._crowd.joints(frame) - shift, solids=solids))
 
@@ -51,14 +97,17 @@ class PressureStudio:
     """Takes frame after frame of a film in the colours of contact pressure."""
 
     def __init__(
-        self, view: PressureView, camera: CameraSetting, stage: render.SceneRenderer, film: render.Film
+        self, scene: Scene, view: PressureView, asked: FilmOutput, stage: render.SceneRenderer, film: render.Film
     ) -> None:
-        self._view, self._camera = view, camera
+        self._view, self._shown = view, FilmView(scene, view.crowd, asked, stage)
         self._stage, self._film = stage, film
 
     def take(self, frame: int, vertices: NDArray[np.float32]) -> None:
         """As `FilmStudio.take`."""
-        shift = self._view.crowd.shift(self._camera, frame)
+        camera = self._shown.at(frame)
+        if camera is None:
+            return
+        shift = self._view.crowd.shift(camera, frame)
         points, values = self._view.at(frame, vertices)
         self._film.append(
             self._stage.draw(points - shift, values=values, solids=[v - shift for v in self._view.others(frame)])
@@ -74,7 +123,7 @@ def film_studio(scene: Scene, crowd: Crowd, film: FilmOutput, path: Path) -> Ite
         if film.style == "pressure":
             view = PressureView(crowd, film.only, film.digits)
             with view.stage(camera, scene.size, quality, 0) as stage_:
-                yield PressureStudio(view, film.camera, stage_, writer)
+                yield PressureStudio(scene, view, film, stage_, writer)
             return
         with render.SceneRenderer(
             crowd.faces,
@@ -83,16 +132,19 @@ def film_studio(scene: Scene, crowd: Crowd, film: FilmOutput, path: Path) -> Ite
             size=scene.size,
             segments=_bones(crowd, film.style),
             solids=crowd.solids(),
+            colors=crowd.colors,
+            lamps=lamps_at(scene, float(crowd.frames[0])),
+            style=style_of(scene),
             quality=quality,
         ) as stage_:
-            yield FilmStudio(crowd, film.camera, stage_, writer)
+            yield FilmStudio(scene, crowd, film, stage_, writer)
 
 
 def draw_picture(scene: Scene, crowd: Crowd, picture: Picture, path: Path) -> None:
     """A ``PICTURE``; the camera shows the whole sequence, so that pictures of one scene fit together."""
     now = crowd.at(picture.frame, scene.rate)
     shift = now.shift(picture.camera, 0)
-    camera = crowd.camera(picture.camera, scene.size)
+    camera = crowd.camera(picture.camera, scene.size, picture.frame)
     if picture.style == "pressure":
         solved = [] if crowd.pressed is None else [one.frame for one in crowd.pressed.frames]
         if crowd.pressed is not None and picture.frame > max(solved, default=crowd.pressed.model.start):
@@ -110,6 +162,9 @@ def draw_picture(scene: Scene, crowd: Crowd, picture: Picture, path: Path) -> No
         size=scene.size,
         segments=_bones(crowd, picture.style),
         solids=now.solids(shift),
+        colors=now.colors,
+        lamps=lamps_at(scene, picture.frame),
+        style=style_of(scene),
     ) as stage_:
         drawn = stage_.draw(now.surface(0) - shift, joints=now.joints(0) - shift)
         if picture.numbers:

@@ -64,10 +64,12 @@ _BUILT_IN = (
     "reaching",
     "physical",
     "deforming",
+    "loading",
     "gripping",
     "pressing",
     "covering",
     "output",
+    "directing",
     "flow",
 )
 

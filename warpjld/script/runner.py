@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import ExitStack
 from dataclasses import replace
 from functools import partial
@@ -21,6 +21,7 @@ from warpjld.motion.out import check_motion_out
 from warpjld.script.contact import check_contact, run_contact, write_contact
 from warpjld.script.crowd import Crowd, role_of
 from warpjld.script.destinations import check_destinations
+from warpjld.script.directing import shot_at
 from warpjld.script.failures import Failures, Writer
 from warpjld.script.folder import OutputFolder
 from warpjld.script.formats import check_available, video_is_available
@@ -76,7 +77,8 @@ def run_scene(
         WarpjldError: Some output could not be made; all others are in the folder, and the summary names it.
         MissingExtraError: A format needs an optional dependency.
     """
-    scene.actor()  # says what to do where there is none
+    if not scene.props:
+        scene.actor()  # says what to do where there is none
     frames = frame_numbers(scene)
     summary = Summary(scene, frames, script, device)
     outputs = _wanted(scene, summary)
@@ -253,15 +255,14 @@ def _make_sequences(
         ]
         writers: list[Writer[Any]] = [*studios]
         writers += [writer for group in (*caches, *prop_caches) for writer in group]
-        for parts in zip(*blocks, strict=True):
+        for start, parts in _together(blocks, len(frames)):
             if not any(writer.works for writer in writers):
                 return
-            start = parts[0][0]
             worn = [crowd.worn(role, v, start) for role, (_, v) in zip(crowd.roles, parts, strict=True)]
             for actor_caches, vertices in zip(caches, worn, strict=True):
                 for cache in actor_caches:
                     cache.do(partial(_write, vertices=vertices))
-            count = len(parts[0][1])
+            count = len(parts[0][1]) if parts else min(_BLOCK, len(frames) - start)
             for prop, places, object_caches in zip(crowd.props, crowd.places, prop_caches, strict=True):
                 if object_caches:
                     moved = np.stack([crowd.prop_vertices(prop, places, start + k) for k in range(count)])
@@ -269,9 +270,19 @@ def _make_sequences(
                     cache.do(partial(_write, vertices=moved.astype(np.float32)))
             for k in range(count):
                 progress("frames", start + k, len(frames))
-                together = np.concatenate([vertices[k] for vertices in worn])
+                together = np.concatenate([np.empty((0, 3), np.float32), *(vertices[k] for vertices in worn)])
                 for studio in studios:
                     studio.do(partial(_take, frame=start + k, vertices=together))
+
+
+def _together(
+    blocks: Sequence[Iterator[tuple[int, NDArray[np.float32]]]], count: int
+) -> Iterator[tuple[int, tuple[tuple[int, NDArray[np.float32]], ...]]]:
+    """Blocks of frames of all actors, with the place of the first frame; of no actor where there is none."""
+    if not blocks:
+        yield from ((start, ()) for start in range(0, count, _BLOCK))
+    for parts in zip(*blocks, strict=True):
+        yield parts[0][0], parts
 
 
 def _write(cache: Cache, vertices: NDArray[np.float32]) -> None:
@@ -290,6 +301,8 @@ def _check_lengths(scene: Scene, outputs: Sequence[Output], frames: int) -> None
         try:
             if isinstance(output, FilmOutput):
                 render.Film(output.name, rate=scene.rate)
+                if output.shots and not any(shot_at(output.shots, frame) for frame in frame_numbers(scene)):
+                    raise InputError("none of its shots has a frame that is made: see FRAMES")
             for actor in actors_of(output, scene) if isinstance(output, Export) else ():
                 open_cache(output.name, actor.rig.surface, frames=frames, rate=scene.rate)
         except InputError as error:

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Literal
 
 from warpjld.errors import InputError
-from warpjld.script.outputs import CameraSetting, Output
+from warpjld.script.outputs import CameraSetting, Output, Shot
 from warpjld.script.placement import Placement
 from warpjld.simulation.specification import ContactSpecification, SourceLocation
 from warpjld.skeleton.channels import CHANNELS
@@ -19,6 +19,7 @@ if TYPE_CHECKING:
     from warpjld.covering import Covering, Parameters
     from warpjld.motion import Motion
     from warpjld.rig import Rig
+    from warpjld.script.directing import KeyedLamp
     from warpjld.script.grasping import Attempt
     from warpjld.script.props import Prop
     from warpjld.skeleton import Poses, Skeleton
@@ -51,6 +52,7 @@ class Actor:
         recorded: Poses of a motion file and their rate [1/s], which the keys then do not override.
         motion_notes: What a reader of the result should know of that file.
         placement: Keys of the actor as a whole.
+        color: Of its skin, ``#rrggbb``; None: the usual one.
         covering: The surface as bound last; ``covered`` is the method and the domains it was bound with.
     """
 
@@ -65,6 +67,7 @@ class Actor:
     recorded: tuple[Poses, float] | None = None
     motion_notes: tuple[str, ...] = ()
     placement: Placement = field(default_factory=Placement)
+    color: str | None = None
     covering: Covering | None = None
     covered: tuple[str, str] = ("", "")
 
@@ -121,6 +124,9 @@ class Scene:
         spline: Constants for the keys that follow.
         camera: For the outputs that follow.
         size: Width and height of pictures and films [pixels].
+        lamps: That stand on the stage, by name; none: studio light.
+        backdrop: Colours behind everything, below and above.
+        shots: Frames and their cameras, by name.
         outputs: Files to make, relative to the output folder.
         asked: Where in a script they were asked for, by name.
         folder: The output folder.
@@ -152,6 +158,9 @@ class Scene:
     spline: SplineConstants = SplineConstants()
     camera: CameraSetting = field(default_factory=CameraSetting)
     size: tuple[int, int] = (960, 720)
+    lamps: dict[str, KeyedLamp] = field(default_factory=dict)
+    backdrop: tuple[str, str] | None = None
+    shots: dict[str, Shot] = field(default_factory=dict)
     outputs: list[Output] = field(default_factory=list)
     asked: dict[str, SourceLocation] = field(default_factory=dict)
     folder: Path = Path("out")

@@ -31,7 +31,9 @@ from warpjld.simulation.animation import Animation
 from warpjld.simulation.bodies.flesh_body import build_flesh_body
 from warpjld.simulation.bodies.model import ContactModel, assemble_model
 from warpjld.simulation.bodies.object_body import build_object_body
+from warpjld.simulation.bodies.skin_obstacle import bystanders
 from warpjld.simulation.display.surfaces import DeformedSurfaces
+from warpjld.simulation.free_fall import after_contact, before_contact, rests_rigidly
 from warpjld.simulation.grip.correct_frames import worst_digits
 from warpjld.simulation.grip.find import FoundGrip
 from warpjld.simulation.report.table import ContactRow, ContactTable
@@ -45,7 +47,7 @@ from warpjld.simulation.solve.checkpoint import CheckpointFile
 from warpjld.simulation.solve.checks import check_model, check_specification
 from warpjld.simulation.solve.identity import identity_of
 from warpjld.simulation.solve.solved_frame import SolvedFrame
-from warpjld.simulation.solve.start_frame import StartFrame, find_start
+from warpjld.simulation.solve.start_frame import StartFrame
 from warpjld.simulation.solve_frames import Progress, SolveResult, solve_frames
 from warpjld.simulation.specification import ContactSpecification, SolveSpecification
 
@@ -231,7 +233,7 @@ def simulate(
         raise InputError("specification: want its pressing to say which frames are solved")
     check_specification(animation, specification, request)
     progress("looking for the first touch", 0, 1)
-    before = find_start(animation, specification, request)
+    specification, animation, before = before_contact(specification, animation, request)
     progress("meshing", 0, 1)
     model, notes = _model(specification, animation, before)
     table = ContactTable(specification.strength, animation)
@@ -241,6 +243,8 @@ def simulate(
         return reason if request.stop else None
 
     frames = _frames(specification, request, model.start)
+    if rigid := rests_rigidly(model, before, frames):
+        frames, before = [], replace(before, falls=(*before.falls, rigid))
     solved = solve_frames(
         model,
         frames,
@@ -250,6 +254,7 @@ def simulate(
         checkpoint=_checkpoint(model, specification, request, frames, folder),
         progress=progress,
     )
+    before, solved = after_contact(solved, specification, request, before)
     return _report(solved, before, table, request, notes)
 
 
@@ -269,6 +274,11 @@ def _model(
     notes += [f"{one.name}: {note}" for one in objects for note in one.notes]
     rigid = [name for name in animation.objects if name not in specification.physical]
     obstacles = {name: animation.objects[name].obstacle(start) for name in rigid}
+    request = specification.pressing
+    assert request is not None
+    frames = [float(frame) for frame in range(request.first, request.last + 1)]
+    free = bool(specification.physical)
+    obstacles |= bystanders(dict(animation.actors), set(specification.flesh), frames, free, start)
     model = assemble_model(hands, objects, obstacles, specification, start=start, animation=animation)
     check_model(model, specification)
     return model, notes

@@ -13,7 +13,7 @@ from warpjld.fem.contact import ContactInstant, ContactSolution
 from warpjld.simulation.animation import AngleEdit
 from warpjld.simulation.bodies.deformable_body import History
 from warpjld.simulation.bodies.model import ContactModel
-from warpjld.simulation.grip.correct_frames import CorrectedFrame, correct_frame
+from warpjld.simulation.grip.correct_frames import CorrectedFrame, correct_frame, uncorrected
 from warpjld.simulation.grip.find import FoundGrip, find_grip
 from warpjld.simulation.solve.bone_clearance import TIGHT, BoneClearance, TightBone
 from warpjld.simulation.solve.branch import solve_onward
@@ -66,6 +66,7 @@ class SolveResult:
         stops: Digits that closed no farther.
         tight: Bones that came nearest to objects, of every digit and object the nearest.
         equilibria: Of each frame that this run solved, by its number: what it can be differentiated from.
+        released: Frame after which what nothing holds any more falls, if it does: contact is not solved from there on.
     """
 
     status: SolveStatus
@@ -80,6 +81,7 @@ class SolveResult:
     stops: tuple[Stop, ...] = ()
     tight: tuple[tuple[float, TightBone], ...] = ()
     equilibria: Mapping[float, KnownEquilibrium] = field(default_factory=dict)
+    released: float | None = None
 
     @property
     def start(self) -> float:
@@ -196,8 +198,13 @@ class _Run:
             return self.ended(solution.status, reason)
         self._note_bones(driven, frame)
         self._edit(self.limits.edits(model, since, time))
-        if self.request.correct and before is not None:
-            corrected = correct_frame(model, self.history, before, solution, self.contact.strength)
+        if self.request.correct:
+            strength = self.contact.strength
+            corrected = (
+                uncorrected(model, solution, strength, frame)
+                if before is None
+                else correct_frame(model, self.history, before, solution, strength)
+            )
             self.corrections.append(corrected)
             solution = corrected.solution
             self._edit(corrected.edits)
@@ -273,14 +280,18 @@ def _untouched(model: ContactModel, frames: Sequence[float], watch: Watch, progr
     done: list[SolvedFrame] = []
     nothing, history = np.zeros_like(model.body.mesh.nodes), History()
     rest = Instant(1.0, nothing, nothing, 0, 0, 0.0)
-    after, before = Solution(SolveStatus.CONVERGED, (rest,), "", np.empty(0, np.int64), model.loads), 0.0
+    after, before = (
+        Solution(SolveStatus.CONVERGED, (rest,), "", np.empty(0, np.int64), model.loads_at(0.0, history)),
+        0.0,
+    )
     for frame in frames:
         progress(f"frame {frame:g}", len(done), len(frames))
         time = frame - model.start
         known = model.prescribed(time, history)
         ahead = model.guess(before, time, after.displacement, history)
-        first = replace(after, instants=(replace(after.last, displacement=ahead),), loads=model.loads)
-        solution = solve(model.body, known, model.loads, after=first, free="hold", check=False)
+        loads = model.loads_at(time, history)
+        first = replace(after, instants=(replace(after.last, displacement=ahead),), loads=loads)
+        solution = solve(model.body, known, loads, after=first, free="hold", check=False)
         if not solution.converged:
             return SolveResult(solution.status, f"at frame {frame:g}: {solution.message}", model, tuple(done))
         after, last, before = solution, solution.last, time

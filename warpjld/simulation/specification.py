@@ -6,16 +6,16 @@ Whoever fills them, commands of a script or a program in Python, says where each
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Literal
+from typing import Literal
 
 import numpy as np
 
 from warpjld.errors import InputError
+from warpjld.simulation.materials import pair_friction
+from warpjld.simulation.object_loads import ObjectLoad, ObjectSpin
+from warpjld.simulation.object_material import LAWS, ObjectMaterial, SourceLocation
 from warpjld.simulation.state_variables import Points, PrescribedPoints
 from warpjld.skeleton import DIGITS
-
-if TYPE_CHECKING:
-    from warpjld.fem import Material
 
 __all__ = [
     "LAWS",
@@ -34,67 +34,6 @@ _FRICTION = 0.6
 """Skin on aluminium (Seo 2009)."""
 _EARTH = 9.81
 """[m/s²]"""
-
-SourceLocation = tuple[str, int, int]
-"""File, line and column of a command, for messages."""
-
-Law = Literal["linear", "neo-hooke", "mooney-rivlin"]
-LAWS: tuple[Law, ...] = ("linear", "neo-hooke", "mooney-rivlin")
-
-
-@dataclass(frozen=True)
-class ObjectMaterial:
-    """An object that deforms (R92, R109).
-
-    Attributes:
-        law: Constitutive law.
-        young: Young's modulus at small strain [Pa].
-        poisson: Poisson's ratio at small strain.
-        density: [kg/m³].
-        wall: Thickness of its wall [m]; 0 for a solid object.
-        pressure: Inside a hollow one, above that outside [Pa] (R111).
-        element: Edge length of its elements [m]; None chooses.
-        where: Place in a script, for messages.
-
-    Examples:
-        >>> rubber = wj.ObjectMaterial(young=4e5, wall=0.003, pressure=8000)  # Pa, m, Pa
-        >>> round(rubber.material().young)  # Pa
-        400000
-    """
-
-    law: Law = "neo-hooke"
-    young: float = 1e6
-    poisson: float = 0.45
-    density: float = 1000.0
-    wall: float = 0.0
-    pressure: float = 0.0
-    element: float | None = None
-    where: SourceLocation | None = None
-
-    def __post_init__(self) -> None:
-        self.material()
-        if not (np.isfinite(self.wall) and self.wall >= 0.0):
-            raise InputError(f"wall: want a thickness of 0 m (solid) or more, got {self.wall:g}")
-        if not np.isfinite(self.pressure):
-            raise InputError(f"pressure: want a finite pressure in Pa, got {self.pressure:g}")
-        if self.pressure and not self.wall:
-            raise InputError("pressure: only a hollow object has an inside to put under pressure")
-
-    def material(self) -> Material:
-        """The law with its constants.
-
-        Raises:
-            InputError: A modulus, ratio or density that no material has.
-        """
-        from warpjld.fem import LinearElastic, MooneyRivlin, NeoHooke
-
-        if self.law == "linear":
-            return LinearElastic(self.young, self.poisson, self.density)
-        if self.law == "neo-hooke":
-            return NeoHooke(self.young, self.poisson, self.density)
-        # Mooney and Rivlin's constants in the usual ratio of rubber, of the same modulus at small strain
-        shear = self.young / (2.0 * (1.0 + self.poisson))
-        return MooneyRivlin(0.4 * shear, 0.1 * shear, self.poisson, self.density)
 
 
 @dataclass(frozen=True)
@@ -210,6 +149,7 @@ class SolveSpecification:
         pressure: What skin bears [Pa]. By default what leaves half of a fingertip's flesh between bone and wall: beyond
             it forces double every tenth of a millimetre, and laws of flesh were never measured.
         state: File the state is kept in, so that a stopped run goes on; None keeps none.
+        rate: Frames a second: how long what falls takes.
         where: Place in a script, for messages.
 
     Examples:
@@ -228,8 +168,10 @@ class SolveSpecification:
     where: SourceLocation | None = None
     rigid: bool = False
     pressure: float = 3e5
+    rate: float = 30.0
 
     def __post_init__(self) -> None:
+        _want(0.0 < self.rate < np.inf, "rate", "frames a second above 0", self.rate)
         _want(0.0 < self.pressure < np.inf, "pressure", "a pressure above 0 Pa", self.pressure)
         _want(self.last > self.first, "last", f"a frame after the first ({self.first})", self.last)
         _want(self.every >= 1, "every", "1 frame or more", self.every)
@@ -257,9 +199,12 @@ class ContactSpecification:
         flesh: Actors whose flesh deforms, by name.
         points: Named points by object and name.
         prescribed: State variables by object and points.
+        loads: Forces on objects, by object, points and kind.
+        spins: Objects that turn steadily, by name.
         bonds: Objects that stick together.
         friction: Coefficients by pair of names, in alphabetical order.
-        everywhere: Coefficient of all other pairs; None: that of skin, or none with the paper's loop, which knows none.
+        everywhere: Coefficient of all other pairs; None: that of their materials, of skin where it is not known, or
+            none with the paper's loop, which knows none.
         gravity: [m/s²].
         strength: Largest force of digits [N], by actor and digit, where it is not the default.
         grips: Grips to find, in the order of their frames.
@@ -271,6 +216,8 @@ class ContactSpecification:
     flesh: dict[str, FleshMaterial] = field(default_factory=dict)
     points: dict[tuple[str, str], Points] = field(default_factory=dict)
     prescribed: dict[tuple[str, str], PrescribedPoints] = field(default_factory=dict)
+    loads: dict[tuple[str, str, str], ObjectLoad] = field(default_factory=dict)
+    spins: dict[str, ObjectSpin] = field(default_factory=dict)
     bonds: list[BondStrength] = field(default_factory=list)
     friction: dict[tuple[str, str], float] = field(default_factory=dict)
     everywhere: float | None = None
@@ -300,6 +247,11 @@ class ContactSpecification:
         lifts = any(grip.lift for grip in self.grips)
         return (0.0, -_EARTH, 0.0) if lifts and not any(self.gravity) else self.gravity
 
+    @property
+    def loaded(self) -> set[str]:
+        """Objects that forces act on."""
+        return {name for name, _, _ in self.loads} | set(self.spins)
+
     def lifted(self, name: str) -> GripSpecification | None:
         """The grip that is to hold an object, if any."""
         return next((grip for grip in self.grips if grip.lift and grip.object == name), None)
@@ -307,8 +259,15 @@ class ContactSpecification:
     def coefficient(self, one: str, other: str) -> float:
         """Friction between two."""
         paper = self.pressing is not None and self.pressing.method == "paper"
-        usual = 0.0 if paper else _FRICTION
+        known = pair_friction(self._matter(one), self._matter(other))
+        usual = 0.0 if paper else _FRICTION if known is None else known
         return self.friction.get(name_pair(one, other), usual if self.everywhere is None else self.everywhere)
+
+    def _matter(self, name: str) -> str | None:
+        """What a body is made of, where that is known."""
+        if name in self.flesh:
+            return "skin"
+        return self.physical[name].made_of if name in self.physical else None
 
     def bond(self, one: str, other: str) -> BondStrength | None:
         """The bond between two objects, if any."""

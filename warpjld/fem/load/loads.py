@@ -28,11 +28,13 @@ class Centrifugal:
         axis: Direction of the axis, any length but zero.
         point: A point on it [m].
         speed: Angular speed [rad/s].
+        region: Region of the mesh that turns; all of it if left out.
     """
 
     axis: tuple[float, float, float]
     speed: float
     point: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    region: str | None = None
 
 
 @dataclass(frozen=True)
@@ -41,7 +43,7 @@ class Loads:
 
     Attributes:
         gravity: Acceleration [m/s²].
-        centrifugal: A steady turn, or None.
+        centrifugal: A steady turn, several of different regions, or None.
         pressure: Pressure on named faces [Pa], against their outward normal; it follows the deformed surface where the
             law is for large strain.
         traction: Force per rest area on named faces [Pa], of constant direction.
@@ -50,7 +52,7 @@ class Loads:
     """
 
     gravity: tuple[float, float, float] = (0.0, 0.0, 0.0)
-    centrifugal: Centrifugal | None = None
+    centrifugal: Centrifugal | tuple[Centrifugal, ...] | None = None
     pressure: Mapping[str, float] = field(default_factory=dict)
     traction: Mapping[str, tuple[float, float, float]] = field(default_factory=dict)
     forces: Mapping[str, tuple[float, float, float]] = field(default_factory=dict)
@@ -61,12 +63,18 @@ class Loads:
         """Whether they depend on where the body is; dead loads do not."""
         return self.centrifugal is not None or bool(self.pressure)
 
+    @property
+    def turns(self) -> tuple[Centrifugal, ...]:
+        """Steady turns."""
+        turn = self.centrifugal
+        return turn if isinstance(turn, tuple) else () if turn is None else (turn,)
+
     def scaled(self, share: float) -> Loads:
         """A share of the loads: forces in proportion, and a slower turn."""
-        turn = self.centrifugal
+        slower = tuple(replace(turn, speed=turn.speed * float(np.sqrt(share))) for turn in self.turns)
         return Loads(
             gravity=_scaled(self.gravity, share),
-            centrifugal=turn and replace(turn, speed=turn.speed * float(np.sqrt(share))),
+            centrifugal=slower or None,
             pressure={name: share * p for name, p in self.pressure.items()},
             traction={name: _scaled(t, share) for name, t in self.traction.items()},
             forces={name: _scaled(f, share) for name, f in self.forces.items()},
@@ -84,22 +92,14 @@ def external_forces(body: Body, loads: Loads, displacement: Array | None = None)
     now = mesh.nodes if displacement is None else mesh.nodes + displacement.reshape(-1, 3)
     out = np.zeros((len(mesh.nodes), 3))
     gravity = _vector(loads.gravity, "gravity")
-    if gravity.any() or loads.centrifugal is not None:
+    if gravity.any() or loads.turns:
         shape = shape_at(POINTS)
         weight = volumes(mesh) * body.density[:, None]
         if gravity.any():
             share = weight @ shape
             _scatter(out, mesh.elements, share[:, :, None] * gravity)
-        if loads.centrifugal is not None:
-            axis = _vector(loads.centrifugal.axis, "centrifugal axis")
-            length = float(np.linalg.norm(axis))
-            if length == 0.0:
-                raise InputError("loads: the centrifugal axis has no direction")
-            axis /= length
-            at = shape @ now[mesh.elements] - _vector(loads.centrifugal.point, "centrifugal point")
-            at -= (at @ axis)[:, :, None] * axis
-            pull = (loads.centrifugal.speed**2 * weight)[:, :, None] * at
-            _scatter(out, mesh.elements, np.einsum("qa,eqi->eai", shape, pull))
+        for turn in loads.turns:
+            _add_turn(out, mesh, weight, turn, now)
     for name, pressure in loads.pressure.items():
         corners = mesh.quads(_faces(mesh, name, "pressure"))
         value = float(_vector(pressure, f"pressure on {name}"))
@@ -120,6 +120,21 @@ def external_forces(body: Body, loads: Loads, displacement: Array | None = None)
             raise InputError(f"loads: nodal forces want shape {out.shape} and finite values")
         out += loads.nodal
     return out.reshape(-1)
+
+
+def _add_turn(out: Array, mesh: HexMesh, weight: Array, turn: Centrifugal, now: Array) -> None:
+    """Add the centrifugal forces of a turn, with the weight of integration points (E, 8) [kg] and nodes at ``now``."""
+    axis = _vector(turn.axis, "centrifugal axis")
+    length = float(np.linalg.norm(axis))
+    if length == 0.0:
+        raise InputError("loads: the centrifugal axis has no direction")
+    axis /= length
+    mine = np.ones(len(mesh.elements), dtype=bool) if turn.region is None else mesh.region(turn.region)
+    elements, shape = mesh.elements[mine], shape_at(POINTS)
+    at = shape @ now[elements] - _vector(turn.point, "centrifugal point")
+    at -= (at @ axis)[:, :, None] * axis
+    pull = (turn.speed**2 * weight[mine])[:, :, None] * at
+    _scatter(out, elements, np.einsum("qa,eqi->eai", shape, pull))
 
 
 def subtract_pressure_stiffness(

@@ -9,6 +9,7 @@ import numpy as np
 from warpjld.errors import InputError
 from warpjld.geometry.lengths import check_size
 from warpjld.script.arguments import Arguments
+from warpjld.script.commands.modelling import modelled
 from warpjld.script.commands.physical import read_object
 from warpjld.script.keys import DIGIT_WORDS, SIDES, named_joint, read_joint
 from warpjld.script.registry import command
@@ -18,16 +19,19 @@ if TYPE_CHECKING:
     from warpjld.grasp import GraspObject
 
 _SHAPES = ("BALL", "BOX", "CYLINDER", "PLATE", "GLASS")
+_MODELLED = ("REVOLVE", "SWEEP", "SOFT")
 
 
 @command(
     "OBJECT",
     syntax=(
         'OBJECT <name> <BALL/BOX/CYLINDER/PLATE/GLASS> [<metres> …] or OBJECT <name> "<surface file>" '
-        "[UNIT <M/CM/MM/…>] [UP <X/Y/Z>] [CENTRE], then [SCALE <factor>] [AT <x> <y> <z>] [TURN <x> <y> <z>] "
+        "[UNIT <M/CM/MM/…>] [UP <X/Y/Z>] [CENTRE] or OBJECT <name> REVOLVE <radius> <y> … or "
+        "OBJECT <name> SWEEP <u> <v> … ALONG <x> <y> <z> … or OBJECT <name> SOFT <x> <y> <z> <radius> …, "
+        "then [SCALE <factor>] [AT <x> <y> <z>] [TURN <x> <y> <z>] "
         '[COLOR "<colour>"]'
     ),
-    help="Bring on an object: a built-in shape of given sizes, or a surface from a file; animated ones (.npz) deform.",
+    help="Bring on an object: a shape, a file's surface (.npz: it deforms), a profile turned or swept, a soft one [m].",
     group="Grasping",
 )
 def object_(scene: Scene, arguments: Arguments) -> None:
@@ -42,12 +46,14 @@ def object_(scene: Scene, arguments: Arguments) -> None:
     name = arguments.new_name("the object's name").upper()
     if name in scene.props or name in scene.actors:
         raise arguments.error(f"there is an object or actor {name} already")
-    shape, sizes, path = None, [], None
+    shape, sizes, path, made = None, [], None, None
     if arguments.has_text():
         path = arguments.input_file("a surface file")
     else:
-        shape = arguments.choice("a shape, or a surface file in quotes", _SHAPES).lower()
-        while arguments.has_number():
+        shape = arguments.choice("a shape, or a surface file in quotes", (*_SHAPES, *_MODELLED)).lower()
+        if shape.upper() in _MODELLED:
+            made = modelled(arguments, shape, name.lower())
+        while made is None and arguments.has_number():
             sizes.append(arguments.number("a size in metres", above=0.0, maximum=100.0))
     where = arguments.last
     options = arguments.options(
@@ -69,7 +75,8 @@ def object_(scene: Scene, arguments: Arguments) -> None:
             shapes = load_keyframes(path, name=name.lower(), scale=float(cast(float, options.get("scale", 1.0))))
             thing = shapes.thing
         else:
-            thing = _made(name.lower(), shape, sizes, path, options)
+            scale = float(cast(float, options.get("scale", 1.0)))
+            thing = made.scaled(scale) if made is not None else _made(name.lower(), shape, sizes, path, options)
     except TypeError:
         raise arguments.error(f"too many sizes for a {str(shape).upper()}", where) from None
     except InputError as error:

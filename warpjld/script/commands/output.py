@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+import math
+from dataclasses import astuple, replace
 from typing import cast
 
 from warpjld.script.arguments import Arguments
 from warpjld.script.formats import EXPORTS, FILMS, MOTIONS, PICTURES, VIEW_WORDS
 from warpjld.script.keys import DIGIT_WORDS
 from warpjld.script.outputs import (
+    CameraKey,
     CameraSetting,
     ContactSheet,
     Export,
@@ -16,6 +19,7 @@ from warpjld.script.outputs import (
     Output,
     Picture,
     PictureStyle,
+    Shot,
 )
 from warpjld.script.registry import command
 from warpjld.script.scene import Scene
@@ -27,8 +31,11 @@ _SHOWN = "[SHADED/WIREFRAME/PRESSURE [<actor or object> [THUMB/INDEX/MIDDLE/RING
 
 @command(
     "CAMERA",
-    syntax=f"CAMERA <{'/'.join(VIEW_WORDS)}> [ZOOM <factor>] [FOLLOW] or CAMERA FROM <x> <y> <z> TO <x> <y> <z> …",
-    help="Where the pictures and films after this line are taken from [m]; FOLLOW goes along with the first actor.",
+    syntax=(
+        f"CAMERA <{'/'.join(VIEW_WORDS)}> [ZOOM <factor>] [FOLLOW] or CAMERA FROM <x> <y> <z> TO <x> <y> <z> "
+        "[ROLL <degrees>] [AT <frame>] …"
+    ),
+    help="Where pictures and films after this line are taken from [m]; FOLLOW: the first actor; AT sets keys of a way.",
     group="Output",
 )
 def camera(scene: Scene, arguments: Arguments) -> None:
@@ -43,10 +50,29 @@ def camera(scene: Scene, arguments: Arguments) -> None:
     else:
         view = arguments.choice("a view or FROM", VIEW_WORDS).lower()
     options = arguments.options(
-        zoom=lambda: arguments.number("the zoom factor", minimum=0.01, maximum=100), follow=lambda: True
+        zoom=lambda: arguments.number("the zoom factor", minimum=0.01, maximum=100),
+        follow=lambda: True,
+        roll=lambda: math.radians(arguments.number("the roll in degrees", minimum=-3600.0, maximum=3600.0)),
+        at=lambda: arguments.number("the key (a frame)"),
     )
-    zoom = cast(float, options.get("zoom", 1.0))
-    scene.camera = CameraSetting(view, position, target, zoom, follow="follow" in options)
+    zoom, roll = (float(cast(float, options.get(name, value))) for name, value in (("zoom", 1.0), ("roll", 0.0)))
+    if position is None or target is None:
+        if {"roll", "at"} & set(options):
+            raise arguments.error("ROLL and AT are for a camera FROM a place")
+        scene.camera = CameraSetting(view, zoom=zoom, follow="follow" in options)
+        return
+    made = CameraSetting(None, position, target, zoom, follow="follow" in options, roll=roll)
+    if "at" in options:
+        key = CameraKey(float(cast(float, options["at"])), position, target, zoom, roll, astuple(scene.spline))
+        made = replace(made, keys=_with_key(scene, key))
+    scene.camera = made
+
+
+def _with_key(scene: Scene, key: CameraKey) -> tuple[CameraKey, ...]:
+    """The keys of the camera's way and another; a shot ends a way."""
+    taken = any(shot.camera is scene.camera for shot in scene.shots.values())
+    others = () if taken else tuple(one for one in scene.camera.keys if one.frame != key.frame)
+    return tuple(sorted((*others, key), key=lambda one: one.frame))
 
 
 @command(
@@ -81,15 +107,34 @@ def picture(scene: Scene, arguments: Arguments) -> None:
 
 @command(
     "FILM",
-    syntax=f'FILM "<name>{"/".join(FILMS)}" {_SHOWN}',
-    help="A film of all frames.",
+    syntax=f'FILM "<name>{"/".join(FILMS)}" [SHOTS <shot> …] {_SHOWN}',
+    help="A film of all frames, or of shots in their order.",
     group="Output",
 )
 def film(scene: Scene, arguments: Arguments) -> None:
     """A film of all frames (R67)."""
     name = arguments.output_name("the film's name", FILMS)
+    shots = _shots(scene, arguments) if arguments.keyword("SHOTS") else ()
     style = _style(arguments)
-    ask_for(scene, arguments, FilmOutput(name, style, scene.camera, *_only(scene, arguments, style)))
+    only, digits = _only(scene, arguments, style)
+    ask_for(scene, arguments, FilmOutput(name, style, scene.camera, only, digits, shots))
+
+
+def _shots(scene: Scene, arguments: Arguments) -> tuple[Shot, ...]:
+    """Shots of a film: one after another, since frames are made in their order."""
+    out: list[Shot] = []
+    while (name := arguments.keyword(*scene.shots)) is not None:
+        shot = scene.shots[name]
+        if out and shot.first <= out[-1].last:
+            raise arguments.error(
+                f"shot {name} begins at frame {shot.first}, before {out[-1].name} has ended ({out[-1].last}): shots "
+                "of a film follow one another"
+            )
+        out.append(shot)
+    if not out:
+        known = ", ".join(scene.shots) or "none"
+        raise arguments.error(f"SHOTS wants names of shots; there are {known}: SHOT <name> <first> <last> makes one")
+    return tuple(out)
 
 
 @command(

@@ -9,6 +9,7 @@ from warpjld.script.arguments import Arguments
 from warpjld.script.keys import DIGIT_WORDS
 from warpjld.script.registry import command
 from warpjld.script.scene import Scene
+from warpjld.simulation.materials import MATERIALS
 from warpjld.simulation.specification import (
     LAWS,
     BondStrength,
@@ -28,10 +29,10 @@ _LAWS = tuple(law.upper() for law in LAWS)
 @command(
     "PHYSICAL",
     syntax=(
-        f"PHYSICAL <object> [LAW <{'/'.join(_LAWS)}>] [YOUNG <pascals>] [POISSON <ratio>] [DENSITY <kg/m³>] "
-        "[HOLLOW <wall in metres>] [PRESSURE <pascals>] [ELEMENT <metres>]"
+        f"PHYSICAL <object> [OF <material>] [LAW <{'/'.join(_LAWS)}>] [YOUNG <pascals>] [POISSON <ratio>] "
+        "[DENSITY <kg/m³>] [HOLLOW <wall in metres>] [PRESSURE <pascals>] [ELEMENT <metres>]"
     ),
-    help="An object deforms: its law and moduli; a wall makes it hollow, with a pressure inside; its elements' size.",
+    help="An object deforms: OF what it is made, or law and moduli; a wall makes it hollow; its elements' size.",
     group="Contact",
 )
 def physical(scene: Scene, arguments: Arguments) -> None:
@@ -41,6 +42,7 @@ def physical(scene: Scene, arguments: Arguments) -> None:
     if prop.deforms:
         raise arguments.error(f"{prop.name} is deformed by key frames or by formula: it cannot be physical as well")
     options = arguments.options(
+        of=lambda: arguments.choice("a material", [name.upper() for name in MATERIALS]).lower(),
         law=lambda: arguments.choice("the law", _LAWS).lower(),
         young=lambda: arguments.number("Young's modulus in Pa", above=0.0),
         poisson=lambda: arguments.number("Poisson's ratio", above=-1.0, maximum=0.4999),
@@ -49,6 +51,17 @@ def physical(scene: Scene, arguments: Arguments) -> None:
         pressure=lambda: arguments.number("the pressure in Pa"),
         element=lambda: arguments.number("the elements' size in metres", above=0.0),
     )
+    if "of" in options:
+        name = str(options.pop("of"))
+        matter = MATERIALS[name]
+        options = {
+            "law": matter.law,
+            "young": matter.young,
+            "poisson": matter.poisson,
+            "density": matter.density,
+            "made_of": name,
+            **options,
+        }
     if "hollow" in options:
         options["wall"] = options.pop("hollow")
     if float(cast(float, options.get("wall", 0.0))) >= 0.5 * prop.thing.size.min():

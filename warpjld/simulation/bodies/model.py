@@ -101,7 +101,13 @@ class ContactModel:
             if fading is not None:
                 out = out if len(out) else np.zeros_like(self.body.mesh.nodes)
                 out[self.spans[one.name]] += fading
-        return replace(self.loads, nodal=out) if len(out) else self.loads
+        loads, frame = self.loads, self.start + time
+        for one in self.objects:
+            if one.loads:
+                out = out if len(out) else np.zeros_like(self.body.mesh.nodes)
+                out[self.spans[one.name]] += one.loads.forces(frame, len(one.mesh.nodes))
+                loads = one.loads.added_to(loads, frame)
+        return replace(loads, nodal=out) if len(out) else loads
 
     def after(
         self,

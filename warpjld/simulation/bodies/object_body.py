@@ -16,6 +16,7 @@ from warpjld.fem import Prescribed
 from warpjld.fem.load.loads import volumes
 from warpjld.grasp import Places
 from warpjld.simulation.animation import ObjectAnimation
+from warpjld.simulation.bodies.applied_loads import AppliedLoads, applied_loads
 from warpjld.simulation.bodies.deformable_body import DeformableBody, History, Surroundings
 from warpjld.simulation.bodies.object_mesh import ObjectMesh, mesh_object
 from warpjld.simulation.bodies.support import ObjectSupport, handle_of
@@ -40,6 +41,7 @@ class ObjectBody(DeformableBody):
         support: What it stands on until a hand takes its weight.
         other: What is prescribed instead of all this, at a time.
         notes: What is to be told of its mesh.
+        loads: Forces on it.
     """
 
     local: NDArray[np.float64]
@@ -49,6 +51,7 @@ class ObjectBody(DeformableBody):
     support: ObjectSupport | None = None
     other: Callable[[float], Prescribed] | None = None
     notes: tuple[str, ...] = ()
+    loads: AppliedLoads | None = None
 
     def deformed(
         self, displacement: NDArray[np.float64], covered: NDArray[np.floating] | None = None
@@ -157,9 +160,11 @@ def build_object_body(
             if not states:
                 foot = Points("lower" if contact.pull[support.axis] < 0.0 else "upper", support.axis, _FOOT)
                 states.append((PrescribedPoints(foot, held=True), foot.choose(volume.mesh.nodes, volume.mesh.nodes)))
+        loads, mesh = applied_loads(contact, name, volume.mesh, volume.local)
+        volume = replace(volume, mesh=mesh)
     except InputError as error:
         raise located(InputError(f"{name}: {error.message}"), physical.where) from error
-    return object_body(volume, at, states, start, support)
+    return replace(object_body(volume, at, states, start, support), loads=loads)
 
 
 def object_body(

@@ -86,10 +86,10 @@ def mesh_object(name: str, thing: GraspObject, physical: ObjectMaterial, place: 
     Raises:
         InputError: Elements too large for it, a wall too thick, or a pressure its wall cannot hold.
     """
-    key = hash_of(name, thing.origin, thing.size, thing.vertices, thing.faces, replace(physical, where=None))
-    local, notes = kept_value(
-        "object", key, (_Local, HexMesh, Embedding), lambda: _meshed(name, thing, physical), modules=MESHING
-    )
+    shape = replace(physical, where=None, prestress=(0.0,) * 6)
+    key = hash_of(name, thing.origin, thing.size, thing.vertices, thing.faces, shape)
+    classes = (_Local, HexMesh, Embedding)
+    local, notes = kept_value("object", key, classes, lambda: _meshed(name, thing, physical), modules=MESHING)
     turn = place.apply(np.eye(3))[0] - place.apply(np.zeros((1, 3)))[0]
     moved = replace(local.mesh, nodes=place.apply(local.mesh.nodes)[0])
     return ObjectMesh(
@@ -100,7 +100,7 @@ def mesh_object(name: str, thing: GraspObject, physical: ObjectMaterial, place: 
         local.visible,
         place.apply(thing.vertices)[0],
         thing.faces,
-        _turned(local.stress, turn.T),
+        _turned(local.stress + np.array(physical.prestress), turn.T),
         notes,
     )
 

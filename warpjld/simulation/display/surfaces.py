@@ -49,8 +49,8 @@ class DeformedSurfaces:
     )
 
     def moves(self, name: str) -> bool:
-        """Whether an object is shown as contact has it."""
-        return any(one.name == name for one in self.model.objects) and len(self.frames) > 0
+        """Whether an object is shown as contact has it, or as it falls."""
+        return name in self.pushed or (any(one.name == name for one in self.model.objects) and len(self.frames) > 0)
 
     def skin(self, actor: str, frame: float) -> NDArray[np.float64] | None:
         """An actor's surface (V, 3) at a frame; None where contact was not solved."""
@@ -60,14 +60,13 @@ class DeformedSurfaces:
 
     def object(self, name: str, frame: float) -> NDArray[np.float64] | None:
         """An object's surface (V, 3) at a frame; None where contact was not solved."""
-        if not any(one.name == name for one in self.model.objects):
-            return None
-        if self._displacement(frame) is not None:
+        if any(one.name == name for one in self.model.objects) and self._displacement(frame) is not None:
             return self.separated(frame).vertices[name]
         frames, places = self.pushed.get(name, (np.empty(0), ()))
-        if not len(frames) or not frames[0] <= frame <= frames[-1]:
+        if not len(frames) or frame < frames[0]:
             return None
-        return np.asarray(places[int(np.searchsorted(frames, frame))].apply(self.shapes[name])[0])
+        k = min(int(np.searchsorted(frames, frame - 1e-9)), len(frames) - 1)  # what has fallen stays there
+        return np.asarray(places[k].apply(self.shapes[name])[0])
 
     def refined(self, name: str, faces: NDArray[np.int32], count: int) -> RefinedSurface:
         """An actor's or object's surface, with triangles split where anything ever presses on them.

@@ -26,10 +26,12 @@ from warpjld.simulation.solve.branch import solve_branch
 from warpjld.skeleton import Poses
 from warpjld.skeleton.channels import FLEXION
 
-__all__ = ["CorrectedDigit", "CorrectedFrame", "correct_frame", "worst_digits"]
+__all__ = ["CorrectedDigit", "CorrectedFrame", "correct_frame", "uncorrected", "worst_digits"]
 
 _AIM = 1.0
 """Share of their limits that digits may reach."""
+_STILL = 1e-3
+"""Flexion that is none [rad]."""
 
 
 @dataclass(frozen=True)
@@ -152,8 +154,8 @@ class _Hand:
         chosen = [solution for angles, solution in tried if np.array_equal(angles, corrected.angles)]
         frame = self.model.start + time
         if corrected.status is not Correction.CORRECTED or not chosen:
-            text = f"{self.hand.name} at frame {frame:g}: {corrected.status.value}"
-            return CorrectedFrame(found, failed=(text,))
+            closed = np.abs(wanted - opened)[:, FLEXION]
+            return CorrectedFrame(found, failed=(_not_corrected(self.hand, frame, first, corrected.status, closed),))
         edits, digits = self._edits(corrected, since, time), self._digits(corrected, first, frame)
         return CorrectedFrame(chosen[-1], edits, digits)
 
@@ -210,6 +212,39 @@ class _Hand:
     def _effort(self, angles: NDArray[np.float64], solution: ContactSolution) -> Effort:
         poses = self.hand.bones.posed(angles, solution.last.time)
         return effort_at(self.model, self.hand, poses, solution.last, self.limits)
+
+
+def uncorrected(
+    model: ContactModel, found: ContactSolution, limits: Mapping[str, Mapping[str, float]], frame: float
+) -> CorrectedFrame:
+    """The first frame that is solved: what bears too much there is named, since nothing came before to open from."""
+    failed = []
+    for hand in model.hands:
+        if hand.bones.bendable:
+            poses = hand.bones.posed(hand.bones.angles(found.last.time), found.last.time)
+            effort = effort_at(model, hand, poses, found.last, limits.get(hand.name))
+            if effort.share > _AIM:
+                why = "it is the first frame solved, and there is none to open from: begin PRESS earlier"
+                failed.append(f"{_too_much(hand, frame, effort)}: {why}")
+    return CorrectedFrame(found, failed=tuple(failed))
+
+
+def _too_much(hand: FleshBody, frame: float, effort: Effort) -> str:
+    """``LEFT at frame 8: index 61 N of 59 N (104 %) was not corrected``."""
+    over = "; ".join(f"{one.text} ({100.0 * one.share:.0f} %)" for one in effort.digits if one.share > _AIM)
+    return f"{hand.name} at frame {frame:g}: {over} was not corrected"
+
+
+def _not_corrected(
+    hand: FleshBody, frame: float, effort: Effort, status: Correction, closed: NDArray[np.float64]
+) -> str:
+    """What bears too much, and why opening does not help, of joints (J,) that have closed by so much [rad]."""
+    names = [one.digit for one in effort.digits if one.share > _AIM]
+    joints = [hand.bones.skeleton.index(f"{name}.{knuckle}") for name in names for knuckle in KNUCKLES]
+    why = status.value
+    if status is not Correction.NO_SOLUTION and (closed[joints] < _STILL).all():
+        why = "its joints have not closed, and have no way back: MOVE, TURN or the object presses it; move that away"
+    return f"{_too_much(hand, frame, effort)}: {why}"
 
 
 def _posed_along(

@@ -17,10 +17,12 @@ from warpjld.simulation.solve.digit_loads import CRUSHING
 if TYPE_CHECKING:
     from warpjld.simulation.solve_frames import SolveResult
 
-__all__ = ["CRUSHED", "ContactVerdict", "verdict_of"]
+__all__ = ["CRUSHED", "RELEASED", "ContactVerdict", "verdict_of"]
 
 CRUSHED = "CRUSHED"
 """Status of what is pressed beyond what flesh bears."""
+RELEASED = "RELEASED"
+"""Status of what nothing holds any more, and falls."""
 _PUSHED = 1e-5
 """Way of a free object that something has pushed [m]: without weight it stays where it is."""
 _BEARS = 0.05
@@ -33,7 +35,7 @@ class ContactVerdict:
 
     Attributes:
         status: Name of the solver's status; ``OVERLAP`` where it did not keep apart what it was to, ``CRUSHED`` where
-            flesh is pressed beyond what any bears.
+            flesh is pressed beyond what any bears, ``RELEASED`` where nothing holds an object any more, and it falls.
         text: One line.
         lines: One for each digit that touched.
         suggestions: What to change.
@@ -57,7 +59,7 @@ class ContactVerdict:
     @property
     def failed(self) -> bool:
         """Whether frames that were asked for are missing, or are wrong."""
-        return self.status not in (SolveStatus.CONVERGED.name, SolveStatus.STOPPED.name, CRUSHED)
+        return self.status not in (SolveStatus.CONVERGED.name, SolveStatus.STOPPED.name, CRUSHED, RELEASED)
 
     def content(self) -> dict[str, Any]:
         """As plain values."""
@@ -110,7 +112,10 @@ def verdict_of(
     last = balances(solved.model, solved.frames[-1]) if solved.frames else []
     touched = any(row.force_n > 0.0 for row in rows)
     status = solved.status.name
-    if solved.status not in (SolveStatus.CONVERGED, SolveStatus.STOPPED):
+    if solved.released is not None:
+        status = RELEASED
+        text = f"not held: {solved.message}; contact is not solved after frame {solved.released:g}"
+    elif solved.status not in (SolveStatus.CONVERGED, SolveStatus.STOPPED):
         text = f"no equilibrium: {solved.message}"
     elif overlaps:
         status = "OVERLAP"

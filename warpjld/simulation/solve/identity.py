@@ -52,6 +52,11 @@ def identity_of(model: ContactModel, contact: ContactSpecification, frames: Sequ
         elements = mesh.elements[(mesh.elements[:, 0] >= rows.start) & (mesh.elements[:, 0] < rows.stop)]
         out[f"shape of {one.name}"] = _hash([elements, mesh.nodes[rows]])
         out[f"path of {one.name}"] = _hash(_sampled([one.prescribed(time, History()) for time in times]))
+    if contact.loaded:
+        loads = [model.loads_at(time, History()) for time in times]
+        plain = [[list(one.pressure.items()), list(one.traction.items()), str(one.turns)] for one in loads]
+        forces = [np.empty((0, 3)) if one.nodal is None else one.nodal for one in loads]
+        out["loads"] = hashlib.sha256((json.dumps(plain) + _hash(forces)).encode()).hexdigest()
     for name, obstacle in model.obstacles.items():
         out[f"shape of {name}"] = _hash([obstacle.mesh(0.0)[1]])
         out[f"path of {name}"] = _hash([np.asarray(obstacle.mesh(time)[0]) for time in times])

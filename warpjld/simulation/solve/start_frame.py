@@ -15,6 +15,7 @@ from warpjld.fem.contact.obstacles.thickness import distance_past, half_thicknes
 from warpjld.grasp import Places
 from warpjld.simulation.animation import ActorAnimation, Animation
 from warpjld.simulation.bodies.free_object import settle_free_object
+from warpjld.simulation.bodies.skin_obstacle import SkinObstacle
 from warpjld.simulation.solve.friction_closure import friction_closure
 from warpjld.simulation.specification import ContactSpecification, FleshMaterial, SolveSpecification
 
@@ -43,11 +44,13 @@ class StartFrame:
         start: That frame: the one before anything is held; the first one where something is held there already.
         moved: Places of free objects that hands push before they hold them, by name: frames and placements.
         began: Where these were at first [m], shape (3,), by name.
+        falls: What nothing held and fell, in words.
     """
 
     start: float
     moved: dict[str, tuple[list[float], list[Places]]]
     began: dict[str, NDArray[np.float64]] = field(default_factory=dict)
+    falls: tuple[str, ...] = ()
 
     def place(self, name: str) -> Places | None:
         """Where a free object is at the start, if not where the animation has it."""
@@ -55,8 +58,10 @@ class StartFrame:
 
     def notes(self) -> list[str]:
         """Where free objects were pushed before anything held them."""
-        out = []
+        out = [*self.falls]
         for name, (frames, places) in self.moved.items():
+            if name not in self.began:
+                continue
             way = places[-1].position[0] - self.began[name]
             far = float(np.linalg.norm(way))
             if far > _FAR:
@@ -68,17 +73,20 @@ class StartFrame:
         return out
 
 
-def find_start(animation: Animation, contact: ContactSpecification, request: SolveSpecification) -> StartFrame:
+def find_start(
+    animation: Animation, contact: ContactSpecification, request: SolveSpecification, *, fell: bool = False
+) -> StartFrame:
     """Look for the first moment that needs solving (R91, R112).
 
     Before it nothing touches, or what is touched gives way: a free object that is pushed, and that friction could not
-    hold where it is, goes where nothing pushes it any more.
+    hold where it is, goes where nothing pushes it any more. ``fell``: free objects with weight have fallen, and weights
+    count from then on.
     """
     stands = {o for o, _ in contact.prescribed} | {grip.object for grip in contact.grips if grip.lift}
     free = [name for name in contact.physical if name not in stands]
     keyed = any(state.tracks for state in contact.prescribed.values())
     # what stands on its points gives way to its weight by so little that it may do so in the first step
-    if keyed or (any(contact.gravity) and (free or not contact.grips)):
+    if keyed or contact.loaded or (any(contact.gravity) and not fell and (free or not contact.grips)):
         return StartFrame(float(request.first), {})
     return _Approach(animation, contact, free).start(request)
 
@@ -89,6 +97,8 @@ class _Approach:
     def __init__(self, animation: Animation, contact: ContactSpecification, free: list[str]) -> None:
         self._animation, self._contact, self._free = animation, contact, free
         self._actors = {name: animation.actors[name] for name in contact.flesh}
+        others = {name: actor for name, actor in animation.actors.items() if name not in contact.flesh}
+        self._bystanders = others if contact.flesh or contact.physical else {}
         self._moved: dict[str, tuple[list[float], list[Places]]] = {}
         self._began: dict[str, NDArray[np.float64]] = {}
 
@@ -139,6 +149,7 @@ class _Approach:
             return None
         objects = self._animation.objects
         obstacles = {name: one.obstacle(frame) for name, one in objects.items() if name not in self._free}
+        obstacles |= {name: SkinObstacle(actor, frame) for name, actor in self._bystanders.items()}
         if any(_inside(solid, skin) for solid in obstacles.values() for skin in skins.values()):
             return None
         for name in self._contact.physical:

@@ -1,0 +1,193 @@
+"""What nothing holds: it falls, slides, rolls and comes to rest as mechanics has it, or leaves the stage."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+import trimesh
+from numpy.typing import NDArray
+from scipy.spatial.transform import Rotation
+
+from warpjld.errors import InputError
+from warpjld.fem.contact.obstacles.obstacle import Obstacle
+from warpjld.fem.contact.obstacles.solids import Box, Plane
+from warpjld.grasp import Places
+from warpjld.grasp.shapes import ball, box
+from warpjld.script import Interpreter, Scene
+from warpjld.script.contact import SceneAnimation, run_contact
+from warpjld.simulation.fall.impulses import impulses
+from warpjld.simulation.fall.rigid_body import RigidBody, rigid_shape
+from warpjld.simulation.fall.time_stepping import step_bodies
+from warpjld.simulation.recorded import RecordedAnimation, RecordedObject
+from warpjld.simulation.simulate import Simulation
+from warpjld.simulation.solve.falling import falling_names, follow_falls
+from warpjld.simulation.specification import ContactSpecification, ObjectMaterial, SolveSpecification
+
+G = np.array([0.0, -9.81, 0.0])
+STEP = 1.0 / 240.0
+TILT = np.radians(25.0)
+
+
+def steps(bodies: list[RigidBody], obstacles: dict[str, Obstacle], friction: float, seconds: float) -> NDArray:
+    """Energy after each step [J]."""
+    energy = [sum(one.energy(G) for one in bodies)]
+    for k in range(round(seconds / STEP)):
+        step_bodies(bodies, obstacles, G, lambda a, b: friction, time=float(k), step=1.0, length=STEP)
+        energy.append(sum(one.energy(G) for one in bodies))
+    return np.array(energy)
+
+
+def on_slope() -> tuple[RigidBody, dict[str, Obstacle]]:
+    """A box on a plate that is tilted by 25°."""
+    turn = Rotation.from_rotvec((0.0, 0.0, TILT))
+    plate = Box((2.0, 0.01, 0.1), (0.0, 0.0, 0.0), 1e-3, lambda time: ((0.0, 0.0, 0.0), turn.as_quat()))
+    shape = rigid_shape("box", box(0.03, 0.03, 0.03), ObjectMaterial())
+    up = turn.apply((0.0, 0.005 + 0.015 + 1e-5, 0.0))
+    return RigidBody(shape, Places.of(up, turn.as_quat())), {"plate": plate}
+
+
+def bowl(radius: float = 0.06, wall: float = 0.005) -> trimesh.Trimesh:
+    """A spherical bowl with its rim above, its lowest inner point ``radius`` below the origin."""
+    profile = np.linspace(0.0, 0.45 * np.pi, 24)
+    profile = np.concatenate([np.stack([np.sin(profile), -np.cos(profile)], axis=1)])
+    points = np.concatenate([radius * profile, (radius + wall) * profile[::-1]])
+    return trimesh.creation.revolve(
+        points, sections=64, transform=trimesh.transformations.rotation_matrix(-np.pi / 2, (1, 0, 0))
+    )
+
+
+def test_the_mass_of_solid_and_hollow_balls() -> None:
+    solid = rigid_shape("a", ball(0.1), ObjectMaterial(density=500.0))
+    shell = rigid_shape("b", ball(0.1), ObjectMaterial(density=500.0, wall=0.001))
+    assert solid.mass == pytest.approx(500.0 * 4.0 / 3.0 * np.pi * 0.05**3, rel=0.005)
+    assert shell.mass == pytest.approx(500.0 * 0.001 * 4.0 * np.pi * 0.05**2, rel=0.005)
+    assert np.diag(solid.inertia) == pytest.approx(0.4 * solid.mass * 0.05**2 * np.ones(3), rel=0.01)
+    assert np.diag(shell.inertia) == pytest.approx(2.0 / 3.0 * shell.mass * 0.05**2 * np.ones(3), rel=0.01)
+
+
+def test_in_the_air_it_is_a_parabola_and_energy_stays() -> None:
+    body = RigidBody(rigid_shape("box", box(0.02, 0.03, 0.05), ObjectMaterial()), Places.of((0.0, 1.0, 0.0)))
+    body.velocity = np.array([1.0, 2.0, 0.0])
+    energy = steps([body], {}, 0.5, 0.5)
+    assert body.centre == pytest.approx([0.5, 1.0 + 2.0 * 0.5 - 0.5 * 9.81 * 0.25, 0.0], abs=1e-9)
+    assert np.ptp(energy) < 1e-12
+
+
+@pytest.mark.parametrize("friction", [0.0, 0.3, 0.45])
+def test_a_box_slides_as_coulomb_has_it(friction: float) -> None:
+    body, stage = on_slope()
+    energy = steps([body], stage, friction, 0.5)
+    acceleration = 9.81 * (np.sin(TILT) - friction * np.cos(TILT))
+    assert np.linalg.norm(body.velocity) == pytest.approx(acceleration * 0.5, rel=1e-3)
+    assert np.diff(energy).max() < 1e-7  # what overlaps by rounding is parted: a lift of a millionth of a millimetre
+
+
+def test_a_box_stays_where_friction_is_enough() -> None:
+    body, stage = on_slope()
+    before = body.centre.copy()
+    steps([body], stage, 0.5, 0.5)
+    assert np.linalg.norm(body.centre - before) < 1e-5
+
+
+def test_a_ball_rolls_without_sliding() -> None:
+    turn = Rotation.from_rotvec((0.0, 0.0, TILT))
+    body = RigidBody(rigid_shape("ball", ball(0.04), ObjectMaterial()), Places.of(turn.apply((0.0, 0.02, 0.0))))
+    steps([body], {"plane": Plane((0.0, 0.0, 0.0), turn.apply((0.0, 1.0, 0.0)))}, 0.6, 0.3)
+    lowest = body.middle - 0.02 * turn.apply((0.0, 1.0, 0.0))
+    assert np.linalg.norm(body.moving(lowest[None])) < 1e-3 * np.linalg.norm(body.velocity)
+
+
+def test_boxes_stand_on_one_another() -> None:
+    shape = rigid_shape("box", box(0.03, 0.03, 0.03), ObjectMaterial())
+    bodies = [RigidBody(shape, Places.of((0.004 * k, 0.0151 + 0.0301 * k, 0.0))) for k in range(2)]
+    energy = steps(bodies, {"floor": Plane()}, 0.5, 0.2)
+    assert [one.middle[1] for one in bodies] == pytest.approx([0.015, 0.045], abs=1e-4)
+    assert bodies[1].middle[0] == pytest.approx(0.004, abs=1e-4)
+    assert np.diff(energy).max() < 1e-6
+
+
+def test_impulses_hold_the_laws_of_contact() -> None:
+    rng = np.random.default_rng(7)
+    for _ in range(20):
+        root = rng.normal(size=(6, 6))
+        delassus, free = root @ root.T + np.eye(6), rng.normal(size=6)
+        found = impulses(delassus, free, np.zeros(2), np.array([0.4, 0.0]))
+        after = delassus @ found + free
+        normal, tangent = found[::3], found.reshape(2, 3)[:, 1:]
+        assert (normal >= 0.0).all()
+        assert (after[::3] > -1e-4).all()
+        assert np.abs(normal * after[::3]).max() < 1e-4
+        assert np.linalg.norm(tangent[0]) <= 0.4 * normal[0] + 1e-9
+        assert not tangent[1].any()
+
+
+def drop(things: dict[str, RecordedObject], last: int, friction: float = 0.5) -> dict:
+    """Paths of the first of some objects."""
+    name = next(iter(things))
+    contact = ContactSpecification(physical={name: ObjectMaterial()}, everywhere=friction, gravity=tuple(G))
+    request = SolveSpecification(0, last)
+    return follow_falls(RecordedAnimation(objects=things.values()), contact, request, falling_names(contact, request))
+
+
+def test_a_ball_dropped_into_a_bowl_rests_at_its_bottom() -> None:
+    things = {
+        "ball": RecordedObject("ball", ball(0.02), positions=(0.03, 0.0, 0.01)),
+        "bowl": RecordedObject("bowl", bowl()),
+    }
+    path = drop(things, 110)["ball"]
+    assert path.rests is not None
+    assert path.on == ("bowl",)
+    middle = path.places[-1].position[0]
+    assert np.linalg.norm(middle - [0.0, -0.05, 0.0]) < 1e-3
+    assert "comes to rest on bowl" in path.told()
+
+
+def test_what_has_nothing_below_leaves_the_stage() -> None:
+    things = {
+        "ball": RecordedObject("ball", ball(0.02), positions=(0.2, 0.1, 0.0)),
+        "table": RecordedObject("table", box(0.1, 0.02, 0.1)),
+    }
+    path = drop(things, 30)["ball"]
+    assert path.left is not None
+    assert path.rests is None
+    assert "leaves the stage" in path.told()
+
+
+def run(text: str) -> tuple[Scene, Simulation]:
+    from pathlib import Path
+
+    scene = Scene(say=lambda text: None)
+    Interpreter(scene).run_text(text)
+    return scene, run_contact(scene, Path())
+
+
+def test_a_script_of_objects_alone() -> None:
+    _, found = run(
+        "OBJECT TABLE BOX 0.1 0.02 0.1 AT 0 -0.01 0\nOBJECT BLOCK BOX 0.03 0.03 0.03 AT 0 0.02 0\n"
+        "PHYSICAL BLOCK YOUNG 200000 ELEMENT 0.015\nGRAVITY 0 -9.81 0\nFRAMES 0 20\nPRESS 0 20 EVERY 10\n"
+    )
+    assert found.verdict.status == "CONVERGED"
+    assert "BLOCK is held by nothing: it falls from frame 0 on, and comes to rest on TABLE" in found.verdict.text
+    assert found.force("BLOCK")[-1] == pytest.approx([0.0, 1000.0 * 0.03**3 * 9.81, 0.0], rel=1e-3, abs=1e-4)
+
+
+def test_what_is_let_go_falls() -> None:
+    scene, found = run(
+        "OBJECT TABLE BOX 0.1 0.02 0.1 AT 0 -0.01 0\nOBJECT BLOCK BOX 0.03 0.03 0.03 AT 0 0.05 0\n"
+        "PHYSICAL BLOCK YOUNG 200000 ELEMENT 0.015\nGRAVITY 0 -9.81 0\nFRAMES 0 20\n"
+        "POINTS BLOCK TOP UPPER Y 0.05\nHOLD BLOCK TOP 5\nPRESS 0 20 EVERY 5\n"
+    )
+    assert found.verdict.status == "RELEASED"
+    assert not found.verdict.failed
+    assert "nothing holds 'BLOCK'" in found.verdict.text
+    assert "it falls from frame 5 on, and comes to rest on TABLE" in found.verdict.text
+    shape = found.surfaces.object("BLOCK", 20.0)
+    assert shape is not None
+    assert shape[:, 1].min() == pytest.approx(0.0, abs=1e-4)
+    assert found.surfaces.object("BLOCK", 7.0)[:, 1].min() == pytest.approx(0.035 - 0.5 * 9.81 / 225.0, abs=1e-4)
+    assert list(SceneAnimation(scene).objects) == ["TABLE", "BLOCK"]
+
+
+def test_a_rate_that_is_none_is_refused() -> None:
+    with pytest.raises(InputError, match="rate: want frames a second above 0, got 0"):
+        SolveSpecification(0, 10, rate=0.0)

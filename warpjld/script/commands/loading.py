@@ -1,0 +1,120 @@
+"""Loads on objects: forces on points, tractions and pressures on faces, turning (B eqs. 1–4, R97)."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import asdict, replace
+from typing import Literal, cast
+
+from warpjld.motion import Key, Track
+from warpjld.script.arguments import Arguments
+from warpjld.script.commands.physical import read_object
+from warpjld.script.registry import command
+from warpjld.script.scene import Scene
+from warpjld.simulation.object_loads import ObjectLoad, ObjectSpin
+from warpjld.suggest import did_you_mean
+
+_KEYS = "<key1> <key2> <step>"
+
+
+@command(
+    "FORCE",
+    syntax=f"FORCE <object> <points> {_KEYS} <x> <y> <z>",
+    help="Force on object points, shared by all of them, at key1, key1 + step, … up to key2 [N].",
+    group="Contact",
+)
+def force(scene: Scene, arguments: Arguments) -> None:
+    """Force on object points, shared by all of them [N] (R97)."""
+    _read(scene, arguments, "force", "xyz")
+
+
+@command(
+    "TRACTION",
+    syntax=f"TRACTION <object> <points> {_KEYS} <x> <y> <z>",
+    help="Force per area on the faces between object points, of a direction that stays [Pa].",
+    group="Contact",
+)
+def traction(scene: Scene, arguments: Arguments) -> None:
+    """Force per area on the faces between object points, of a direction that stays [Pa] (R97)."""
+    _read(scene, arguments, "traction", "xyz")
+
+
+@command(
+    "PRESSURE",
+    syntax=f"PRESSURE <object> <points> {_KEYS} <pascals>",
+    help="Pressure on the faces between object points, against them wherever they turn [Pa].",
+    group="Contact",
+)
+def pressure(scene: Scene, arguments: Arguments) -> None:
+    """Pressure on the faces between object points, against them wherever they turn [Pa] (R97)."""
+    _read(scene, arguments, "pressure", ("pressure",))
+
+
+@command(
+    "SPIN",
+    syntax=f"SPIN <object> <X/Y/Z> {_KEYS} <turns a second> [AT <x> <y> <z>]",
+    help="An object bears the centrifugal force of a steady turn about an axis of the stage through its middle, or AT.",
+    group="Contact",
+)
+def spin(scene: Scene, arguments: Arguments) -> None:
+    """An object bears the centrifugal force of a steady turn about an axis of the stage (R97)."""
+    prop = read_object(scene, arguments)
+    _want_physical(scene, arguments, prop.name)
+    if prop.name in scene.contact.spins:
+        raise arguments.error(f"{prop.name} turns about an axis already")
+    axis = ["X", "Y", "Z"].index(arguments.choice("the axis", ("X", "Y", "Z")))
+    keys, value = arguments.keys_and_value("the turns a second")
+    options = arguments.options(at=lambda: arguments.vector("the place's"))
+    thing = prop.thing
+    middle = thing.place.apply(0.5 * (thing.vertices.min(axis=0) + thing.vertices.max(axis=0))[None])[0, 0]
+    x, y, z = cast("tuple[float, float, float]", options.get("at", tuple(middle.tolist())))
+    track = Track("spin")
+    for key in keys:
+        track.set(Key(key, 2.0 * math.pi * value, **asdict(scene.spline)))
+    way = (float(axis == 0), float(axis == 1), float(axis == 2))
+    scene.contact.spins[prop.name] = ObjectSpin(way, (float(x), float(y), float(z)), track)
+
+
+@command(
+    "PRESTRESS",
+    syntax="PRESTRESS <object> <xx> <yy> <zz> [<xy> <yz> <zx>]",
+    help="Stress that an object has at rest, along its own axes [Pa]: tension above 0; what is not held relaxes it.",
+    group="Contact",
+)
+def prestress(scene: Scene, arguments: Arguments) -> None:
+    """Stress that an object has at rest, along its own axes [Pa] (R98)."""
+    prop = read_object(scene, arguments)
+    _want_physical(scene, arguments, prop.name)
+    values = [arguments.number(f"the stress {name} in Pa") for name in ("xx", "yy", "zz")]
+    if arguments:
+        values += [arguments.number(f"the stress {name} in Pa") for name in ("xy", "yz", "zx")]
+    matter = scene.contact.physical[prop.name]
+    scene.contact.physical[prop.name] = replace(matter, prestress=tuple([*values, 0.0, 0.0, 0.0][:6]))
+
+
+def _read(
+    scene: Scene, arguments: Arguments, kind: Literal["force", "traction", "pressure"], channels: str | tuple[str, ...]
+) -> None:
+    """Read an object, its points, keys and a value for each channel."""
+    prop = read_object(scene, arguments)
+    _want_physical(scene, arguments, prop.name)
+    name = arguments.name("the name of points").upper()
+    known = [mine for one, mine in scene.contact.points if one == prop.name]
+    if name not in known:
+        more = did_you_mean(name, known) or f"; name them with POINTS {prop.name} {name} …"
+        raise arguments.error(f"{prop.name} has no points {name}{more}")
+    first = channels[0]
+    keys, value = arguments.keys_and_value(f"the {kind}{'' if first == kind else f' along {first}'}")
+    values = [value, *(arguments.number(f"the {kind} along {channel}") for channel in channels[1:])]
+    load = scene.contact.loads.setdefault(
+        (prop.name, name, kind), ObjectLoad(kind, scene.contact.points[prop.name, name])
+    )
+    for channel, number in zip(channels, values, strict=True):
+        track = load.tracks.setdefault(channel, Track(channel))
+        for key in keys:
+            track.set(Key(key, number, **asdict(scene.spline)))
+
+
+def _want_physical(scene: Scene, arguments: Arguments, name: str) -> None:
+    if name not in scene.contact.physical:
+        raise arguments.error(f"{name} is not physical: make it so with PHYSICAL {name}")

@@ -1,0 +1,97 @@
+"""Loads on an object's mesh: nodes and face sets they act on, and what they are at a time (R97)."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from warpjld.errors import InputError
+from warpjld.fem import Centrifugal, HexMesh, Loads
+from warpjld.simulation.object_loads import ObjectLoad, ObjectSpin
+from warpjld.simulation.specification import ContactSpecification
+
+__all__ = ["AppliedLoads", "applied_loads"]
+
+
+@dataclass(frozen=True, eq=False)
+class AppliedLoads:
+    """Of one object.
+
+    Attributes:
+        name: Of the object.
+        nodal: Forces on points, and the nodes of each.
+        faces: Loads on faces, and the face set of each.
+        spin: A steady turn, if any.
+    """
+
+    name: str
+    nodal: Sequence[tuple[ObjectLoad, NDArray[np.int64]]] = ()
+    faces: Sequence[tuple[ObjectLoad, str]] = ()
+    spin: ObjectSpin | None = None
+
+    def __bool__(self) -> bool:
+        return bool(self.nodal or self.faces or self.spin is not None)
+
+    def forces(self, frame: float, count: int) -> NDArray[np.float64]:
+        """Concentrated forces at a frame [N], shape (count, 3): of each load evenly on its nodes."""
+        out = np.zeros((count, 3))
+        for load, nodes in self.nodal:
+            out[nodes] += np.array([load.at(axis, frame) for axis in "xyz"]) / len(nodes)
+        return out
+
+    def added_to(self, loads: Loads, frame: float) -> Loads:
+        """Loads with those on faces, and of turning, at a frame."""
+        pressure = {face: one.at("pressure", frame) for one, face in self.faces if one.kind == "pressure"}
+        traction = {
+            face: (one.at("x", frame), one.at("y", frame), one.at("z", frame))
+            for one, face in self.faces
+            if one.kind == "traction"
+        }
+        turns = loads.turns
+        if self.spin is not None:
+            turns = (*turns, Centrifugal(self.spin.axis, self.spin.at(frame), self.spin.point, self.name))
+        return replace(
+            loads,
+            pressure={**loads.pressure, **pressure},
+            traction={**loads.traction, **traction},
+            centrifugal=turns or None,
+        )
+
+
+def applied_loads(
+    contact: ContactSpecification, name: str, mesh: HexMesh, local: NDArray[np.float64]
+) -> tuple[AppliedLoads, HexMesh]:
+    """Loads on an object, and its mesh with the faces they act on named.
+
+    Args:
+        contact: What is asked.
+        name: Of the object.
+        mesh: On the stage.
+        local: Its nodes in the object's own frame [m], shape (N, 3).
+
+    Raises:
+        InputError: Points where the object has none, or no whole face between them.
+    """
+    nodal, faces, sets = [], [], dict(mesh.faces)
+    for (one, points, kind), load in contact.loads.items():
+        if one != name:
+            continue
+        try:
+            nodes = load.points.choose(local, mesh.nodes)
+        except InputError as error:
+            raise InputError(f"points {points}: {error.message}") from None
+        if kind == "force":
+            nodal.append((load, nodes))
+            continue
+        outside = mesh.faces[name]
+        whole = np.isin(mesh.quads(outside), nodes).all(axis=1)
+        if not whole.any():
+            raise InputError(f"points {points}: no face of the surface lies between them: take more of the object")
+        face = f"{name}.{points}.{kind}"
+        sets[face] = outside[whole]
+        faces.append((load, face))
+    out = AppliedLoads(name, tuple(nodal), tuple(faces), contact.spins.get(name))
+    return out, replace(mesh, faces=sets) if faces else mesh

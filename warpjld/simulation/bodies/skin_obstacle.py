@@ -1,0 +1,81 @@
+"""An actor whose flesh does not deform, as something that pushes and does not give way (R94, R126)."""
+
+from __future__ import annotations
+
+from functools import lru_cache
+
+import numpy as np
+
+from warpjld.fem.arrays import Ints32
+from warpjld.fem.contact.obstacles.facets import Facets
+from warpjld.fem.contact.obstacles.obstacle import ClosestPoints, Obstacle, Points, checked_points
+from warpjld.simulation.animation import ActorAnimation
+
+__all__ = ["SkinObstacle", "bystanders"]
+
+
+class SkinObstacle(Obstacle):
+    """The surface of an actor as its covering has it; times are in frames from ``start``."""
+
+    def __init__(self, actor: ActorAnimation, start: float) -> None:
+        self._actor, self._start = actor, start
+        self._shape = lru_cache(maxsize=8)(self._covered)
+        self._facets = Facets(self._shape(0.0), actor.covering.surface.faces)
+        self._now = 0.0
+
+    def project(self, points: Points, time: float) -> ClosestPoints:
+        """See `Obstacle.project`."""
+        return self._at(time).project(checked_points(points))
+
+    def carried(self, points: Points, time_from: float, time_to: float) -> Points:
+        """See `Obstacle.carried`; the offset from the nearest facet turns with it."""
+        if time_from == time_to or not len(points):
+            return checked_points(points)
+        facets = self._at(time_from)
+        found, place = facets.locate(checked_points(points))
+        before, after = facets.vertices, self._shape(time_to)
+        offset = np.einsum("nij,nj->ni", facets.frames(place, before), points - found.closest)
+        turned = np.einsum("nij,ni->nj", facets.frames(place, after), offset)
+        return np.asarray(facets.at(place, after) + turned)
+
+    def mesh(self, time: float) -> tuple[Points, Ints32]:
+        """See `Obstacle.mesh`."""
+        return self._shape(time), self._facets.faces
+
+    def _covered(self, time: float) -> Points:
+        return np.asarray(self._actor.skin(self._start + time), np.float64)
+
+    def _at(self, time: float) -> Facets:
+        if time != self._now:
+            self._facets.move(self._shape(time))
+            self._now = time
+        return self._facets
+
+
+def bystanders(
+    actors: dict[str, ActorAnimation], fleshed: set[str], frames: list[float], free: bool, start: float
+) -> dict[str, Obstacle]:
+    """Actors without flesh that may come to touch something, as obstacles by name.
+
+    Args:
+        actors: All of them.
+        fleshed: Names of those whose flesh deforms.
+        frames: At which they are looked at.
+        free: Whether objects deform, which may go anywhere.
+        start: Frame of time 0.
+    """
+    out: dict[str, Obstacle] = {}
+    for name, actor in actors.items():
+        if name not in fleshed and (free or any(_meets(actor, actors[other], frames) for other in sorted(fleshed))):
+            out[name] = SkinObstacle(actor, start)
+    return out
+
+
+def _meets(one: ActorAnimation, other: ActorAnimation, frames: list[float]) -> bool:
+    """Whether boxes around two actors, in all their places at frames, meet."""
+    boxes = []
+    for actor in (one, other):
+        skins = [actor.skin(frame) for frame in frames]
+        boxes.append((np.min([s.min(axis=0) for s in skins], axis=0), np.max([s.max(axis=0) for s in skins], axis=0)))
+    (low, high), (least, most) = boxes
+    return bool((low < most).all() and (least < high).all())

@@ -1,0 +1,85 @@
+"""Free fall before and after what is solved as contact (B §3.4, R139)."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+from warpjld.fem import SolveStatus
+from warpjld.simulation.animation import Animation
+from warpjld.simulation.bodies.deformable_body import History
+from warpjld.simulation.bodies.model import ContactModel
+from warpjld.simulation.solve.branch import solve_onward
+from warpjld.simulation.solve.fallen import (
+    FallenAnimation,
+    fallen_start,
+    moved_by,
+    released_bodies,
+    taking_part,
+    without,
+)
+from warpjld.simulation.solve.falling import falling_names, follow_falls
+from warpjld.simulation.solve.start_frame import StartFrame, find_start
+from warpjld.simulation.solve_frames import SolveResult
+from warpjld.simulation.specification import ContactSpecification, SolveSpecification
+
+__all__ = ["after_contact", "before_contact", "rests_rigidly"]
+
+_TRIAL = 1
+"""Halvings of the step in which what has fallen gives way to its weight: what does not rest then is left rigid."""
+
+
+def before_contact(
+    specification: ContactSpecification, animation: Animation, request: SolveSpecification
+) -> tuple[ContactSpecification, Animation, StartFrame]:
+    """What is asked of contact and what moves, once what nothing holds has fallen, and where it starts."""
+    names = falling_names(specification, request)
+    if not names:
+        return specification, animation, find_start(animation, specification, request)
+    paths = follow_falls(animation, specification, request, names)
+    start = fallen_start(paths, float(request.first), float(request.last))
+    stage, others = FallenAnimation(animation, paths), without(specification, names)
+    before = StartFrame(start, {})
+    if others.flesh or others.physical:
+        before = find_start(stage, others, request, fell=True)
+        before = replace(before, start=min(start, before.start))
+    inside = taking_part(paths, before.start)
+    outside = [name for name in names if name not in inside]
+    if outside and not (inside or others.flesh or others.physical):
+        inside, outside = names, []  # nothing else deforms, and no frame is left to solve
+    return without(specification, outside), stage, moved_by(paths, before, inside)
+
+
+def after_contact(
+    solved: SolveResult, specification: ContactSpecification, request: SolveSpecification, before: StartFrame
+) -> tuple[StartFrame, SolveResult]:
+    """Where what hands no longer hold goes to, where that ended the search for equilibria."""
+    weights = any(specification.pull) and request.method != "paper"
+    if solved.status not in (SolveStatus.UNHELD, SolveStatus.SLIDING) or not weights or solved.model.animation is None:
+        return before, solved
+    bodies = released_bodies(solved.model, solved.frames, specification, request.rate)
+    if not bodies:
+        return before, solved
+    first = solved.frames[-1].frame if solved.frames else solved.start
+    known = (solved.model.animation, specification, request, list(bodies))
+    paths = follow_falls(*known, released=bodies, first=first)
+    if not any(path.told() for path in paths.values()):
+        return before, solved
+    moved = dict(before.moved)
+    for name, path in paths.items():
+        frames, places = moved.get(name, ([], []))
+        moved[name] = ([*frames, *path.frames], [*places, *path.places])
+    told = tuple(text for path in paths.values() if (text := path.told()))
+    return replace(before, moved=moved, falls=(*before.falls, *told)), replace(solved, released=first)
+
+
+def rests_rigidly(model: ContactModel, before: StartFrame, frames: Sequence[float]) -> str:
+    """Why how all that deforms, has fallen and rests gives way to its own weight is not known, in words; nothing where
+    it is, or where anything else is to be solved."""
+    fallen = all(one.name in before.moved and not one.states for one in model.objects)
+    if not before.falls or model.hands or not fallen or not frames or not model.pairs:
+        return ""
+    found = solve_onward(model, History(), None, [frames[0] - model.start], halvings=_TRIAL)
+    if found.converged or found.status in (SolveStatus.UNHELD, SolveStatus.SLIDING):
+        return ""
+    return f"how what rests gives way to its own weight was not found, and is not shown: {found.status.value}"

@@ -1,0 +1,82 @@
+"""What a deformable object is made of (R92, R109)."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Literal
+
+import numpy as np
+
+from warpjld.errors import InputError
+
+if TYPE_CHECKING:
+    from warpjld.fem import Material
+
+__all__ = ["LAWS", "Law", "ObjectMaterial", "SourceLocation"]
+
+SourceLocation = tuple[str, int, int]
+"""File, line and column of a command, for messages."""
+
+Law = Literal["linear", "neo-hooke", "mooney-rivlin"]
+LAWS: tuple[Law, ...] = ("linear", "neo-hooke", "mooney-rivlin")
+
+
+@dataclass(frozen=True)
+class ObjectMaterial:
+    """An object that deforms (R92, R109).
+
+    Attributes:
+        law: Constitutive law.
+        young: Young's modulus at small strain [Pa].
+        poisson: Poisson's ratio at small strain.
+        density: [kg/m³].
+        wall: Thickness of its wall [m]; 0 for a solid object.
+        pressure: Inside a hollow one, above that outside [Pa] (R111).
+        element: Edge length of its elements [m]; None chooses.
+        made_of: Its name in the catalogue of materials, if it is of one: what friction goes by.
+        prestress: Stress at rest in its own axes, xx yy zz xy yz zx [Pa] (R98): what is not held relaxes it.
+        where: Place in a script, for messages.
+
+    Examples:
+        >>> rubber = wj.ObjectMaterial(young=4e5, wall=0.003, pressure=8000)  # Pa, m, Pa
+        >>> round(rubber.material().young)  # Pa
+        400000
+    """
+
+    law: Law = "neo-hooke"
+    young: float = 1e6
+    poisson: float = 0.45
+    density: float = 1000.0
+    wall: float = 0.0
+    pressure: float = 0.0
+    element: float | None = None
+    where: SourceLocation | None = None
+    prestress: tuple[float, ...] = (0.0,) * 6
+    made_of: str | None = None
+
+    def __post_init__(self) -> None:
+        self.material()
+        if len(self.prestress) != 6 or not np.isfinite(self.prestress).all():
+            raise InputError(f"prestress: want six finite stresses in Pa, xx yy zz xy yz zx, got {self.prestress}")
+        if not (np.isfinite(self.wall) and self.wall >= 0.0):
+            raise InputError(f"wall: want a thickness of 0 m (solid) or more, got {self.wall:g}")
+        if not np.isfinite(self.pressure):
+            raise InputError(f"pressure: want a finite pressure in Pa, got {self.pressure:g}")
+        if self.pressure and not self.wall:
+            raise InputError("pressure: only a hollow object has an inside to put under pressure")
+
+    def material(self) -> Material:
+        """The law with its constants.
+
+        Raises:
+            InputError: A modulus, ratio or density that no material has.
+        """
+        from warpjld.fem import LinearElastic, MooneyRivlin, NeoHooke
+
+        if self.law == "linear":
+            return LinearElastic(self.young, self.poisson, self.density)
+        if self.law == "neo-hooke":
+            return NeoHooke(self.young, self.poisson, self.density)
+        # Mooney and Rivlin's constants in the usual ratio of rubber, of the same modulus at small strain
+        shear = self.young / (2.0 * (1.0 + self.poisson))
+        return MooneyRivlin(0.4 * shear, 0.1 * shear, self.poisson, self.density)

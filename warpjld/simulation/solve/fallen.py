@@ -1,0 +1,152 @@
+"""What is asked of contact once free objects have fallen: from where, and which of them take part (R139)."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial.transform import Rotation
+
+from warpjld.fem.contact import Obstacle
+from warpjld.grasp import GraspObject, Places
+from warpjld.simulation.animation import ActorAnimation, AngleEdit, Animation, ObjectAnimation
+from warpjld.simulation.bodies.deformable_body import History
+from warpjld.simulation.bodies.model import ContactModel
+from warpjld.simulation.bodies.obstacle import rigid_obstacle
+from warpjld.simulation.fall.rigid_body import RigidBody, rigid_shape
+from warpjld.simulation.solve.falling import FallPath
+from warpjld.simulation.solve.solved_frame import SolvedFrame
+from warpjld.simulation.specification import ContactSpecification
+
+if TYPE_CHECKING:
+    from warpjld.simulation.solve.start_frame import StartFrame
+
+__all__ = ["FallenAnimation", "FallenObject", "fallen_start", "moved_by", "released_bodies", "taking_part", "without"]
+
+_NEXT = 1.0
+"""Frames after the last that was solved: what is prescribed of an object then holds it."""
+
+
+@dataclass(frozen=True, eq=False)
+class FallenObject:
+    """An object on its path, as a simulation asks for it."""
+
+    name: str
+    thing: GraspObject
+    path: FallPath
+
+    def place(self, frame: float) -> Places:
+        """Where it is."""
+        return self.path.at(frame)
+
+    def obstacle(self, start: float) -> Obstacle:
+        """It as something that does not give way; the obstacle's time is in frames from ``start``."""
+
+        def motion(time: float) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+            here = self.path.at(start + time)
+            return here.position[0], here.rotation[0]
+
+        return rigid_obstacle(self.thing, motion)
+
+
+class FallenAnimation:
+    """An animation in which some objects go where they fall."""
+
+    def __init__(self, animation: Animation, paths: Mapping[str, FallPath]) -> None:
+        self._animation, self._paths = animation, paths
+        fallen = {name: FallenObject(name, animation.objects[name].thing, path) for name, path in paths.items()}
+        self._objects: dict[str, ObjectAnimation] = {**animation.objects, **fallen}
+
+    @property
+    def actors(self) -> Mapping[str, ActorAnimation]:
+        """As they were."""
+        return self._animation.actors
+
+    @property
+    def objects(self) -> Mapping[str, ObjectAnimation]:
+        """In their order on the stage."""
+        return self._objects
+
+    def edited(self, edits: Sequence[AngleEdit]) -> FallenAnimation:
+        """The same with edits laid over its actors; what falls stays the same object."""
+        out = FallenAnimation(self._animation.edited(edits), self._paths)
+        out._objects |= {name: self._objects[name] for name in self._paths}
+        return out
+
+
+def fallen_start(paths: Mapping[str, FallPath], first: float, last: float) -> float:
+    """Frame from which on contact is solved with what has fallen: when all rest, or before the first is held."""
+    held = [path.held for path in paths.values() if path.held is not None]
+    if held:
+        return max(first, np.ceil(min(held)) - 1.0)
+    return max((path.rests for path in paths.values() if path.rests is not None), default=last)
+
+
+def without(contact: ContactSpecification, names: Sequence[str]) -> ContactSpecification:
+    """The same in which some objects do not deform."""
+    physical = {name: matter for name, matter in contact.physical.items() if name not in names}
+    return replace(contact, physical=physical)
+
+
+def taking_part(paths: Mapping[str, FallPath], start: float) -> list[str]:
+    """Objects that rest at a frame, or are held."""
+    return [
+        name
+        for name, path in paths.items()
+        if path.left is None and (path.held is not None or (path.rests is not None and path.rests <= start))
+    ]
+
+
+def released_bodies(
+    model: ContactModel, frames: Sequence[SolvedFrame], contact: ContactSpecification, rate: float
+) -> dict[str, RigidBody]:
+    """Objects that nothing prescribes after the last frame that was solved, as rigid bodies that move as they do there.
+
+    Args:
+        model: What was solved.
+        frames: Those that were; the last two tell velocities.
+        contact: Weights and bonds.
+        rate: Frames a second.
+    """
+    bonded = {name for bond in contact.bonds for name in (bond.one, bond.other)}
+    out = {}
+    now = frames[-1].frame if frames else model.start
+    for one in model.objects:
+        known = len(one.prescribed(now + _NEXT - model.start, History()).degrees)
+        if known or one.name in bonded or not contact.physical[one.name].density > 0.0 or model.animation is None:
+            continue
+        thing = model.animation.objects[one.name].thing
+        span = model.spans[one.name]
+        shapes = [one.mesh.nodes + frame.displacement[span] for frame in frames[-2:]] or [one.mesh.nodes]
+        body = RigidBody(rigid_shape(one.name, thing, contact.physical[one.name]), _fitted(one.local, shapes[-1]))
+        if len(shapes) == 2:
+            length = (frames[-1].frame - frames[-2].frame) / rate
+            before = RigidBody(body.shape, _fitted(one.local, shapes[0]))
+            body.velocity = (body.centre - before.centre) / length
+            body.spin = Rotation.from_matrix(body.turn @ before.turn.T).as_rotvec() / length
+        out[one.name] = body
+    return out
+
+
+def _fitted(local: NDArray[np.float64], shape: NDArray[np.float64]) -> Places:
+    """The place of a body whose points (n, 3) lie nearest to others (n, 3)."""
+    here, there = local.mean(axis=0), shape.mean(axis=0)
+    turn = Rotation.align_vectors(shape - there, local - here)[0]
+    return Places((there - turn.apply(here))[None], turn.as_quat()[None])
+
+
+def moved_by(paths: Mapping[str, FallPath], before: StartFrame, inside: Sequence[str]) -> StartFrame:
+    """The start of contact, with the ways of what fell: up to the start of what takes part, all of the others'."""
+    moved = dict(before.moved)
+    for name, path in paths.items():
+        end = before.start if name in inside else np.inf
+        rows = [k for k, frame in enumerate(path.frames) if frame < end]
+        frames, places = [path.frames[k] for k in rows], [path.places[k] for k in rows]
+        if name in inside:
+            frames, places = [*frames, before.start], [*places, path.at(before.start)]
+        moved[name] = (frames, places)
+    told = tuple(text for path in paths.values() if (text := path.told()))
+    return replace(before, moved=moved, falls=told)
