@@ -1,0 +1,113 @@
+"""The studio's server with its panels on one state."""
+
+from __future__ import annotations
+
+import secrets
+import sys
+import traceback
+from collections.abc import Callable, Hashable
+from contextlib import redirect_stdout
+from io import StringIO
+from typing import Any
+
+from warpjld.errors import MissingExtraError, WarpjldError
+from warpjld.studio.guard import Guard, guarding
+from warpjld.studio.panels.messages import MessagesPanel
+from warpjld.studio.panels.script import ScriptPanel
+from warpjld.studio.panels.sliders import SlidersPanel
+from warpjld.studio.panels.stage import StagePanel
+from warpjld.studio.panels.timeline import TimelinePanel
+from warpjld.studio.state import StudioState
+from warpjld.studio.worker import Worker
+
+__all__ = ["Room"]
+
+LOCAL = "127.0.0.1"
+
+
+class Room:
+    """A studio that windows connect to; all of them show and change the same state.
+
+    Args:
+        state: What is shown and changed.
+        host: Address to listen on. Any but this machine's own asks windows for a token.
+        port: Port to listen on, or the next that is free; 0 for any.
+
+    Attributes:
+        address: What to open in a browser.
+    """
+
+    def __init__(self, state: StudioState, *, host: str = LOCAL, port: int = 8080) -> None:
+        self.state = state
+        local = host in (LOCAL, "localhost", "::1")
+        token = None if local else secrets.token_urlsafe(24)
+        self.server = _server(Guard(host, token), port)
+        self.worker = Worker(self.refresh, self._failed)
+        self.panels: list[Any] = []
+        self._furnish()
+        shown = LOCAL if host in ("0.0.0.0", "::") else host
+        shown = f"[{shown}]" if ":" in shown else shown
+        self.address = f"http://{shown}:{self.server.get_port()}/" + (f"?token={token}" if token else "")
+        self.post(lambda: None)
+
+    def post(self, job: Callable[[], None], key: Hashable = None) -> None:
+        """Have something done to the state, and the panels refreshed."""
+        self.worker.post(job, key)
+
+    def by_hand(self, event: Any, job: Callable[[], None], key: Hashable = None) -> None:
+        """As ``post``, unless a control changed because a panel refreshed it."""
+        if event.client_id is not None:
+            self.post(job, key)
+
+    def refresh(self) -> None:
+        """Show the state as it is."""
+        for panel in self.panels:
+            panel.refresh()
+
+    def stop(self) -> None:
+        """Keep what is not saved, and close."""
+        self.worker.stop()
+        self._autosave()
+        with redirect_stdout(StringIO()):
+            self.server.stop()
+
+    def _furnish(self) -> None:
+        gui = self.server.gui
+        gui.configure_theme(control_width="large", show_logo=False, show_share_button=False)
+        gui.set_panel_label("warpjld studio")
+        gui.main_panel.dock_right()
+        tabs = gui.add_tab_group()
+        with tabs.add_tab("Pose"):
+            stage, sliders = StagePanel(self), SlidersPanel(self)
+        with tabs.add_tab("Script"):
+            script = ScriptPanel(self)
+        timeline, messages = TimelinePanel(self), MessagesPanel(self)
+        self.panels = [stage, sliders, script, timeline, messages]
+
+    def _failed(self, error: BaseException) -> None:
+        """Show what a job raised: nothing is swallowed, and nothing ends the studio."""
+        if isinstance(error, WarpjldError):
+            self.state.error = error
+        else:
+            traceback.print_exception(error, file=sys.stderr)
+            self.state.error = WarpjldError(f"unexpected {type(error).__name__}: {error} (a fault of warpjld)")
+        self.panels[-1].refresh()
+
+    def _autosave(self) -> None:
+        try:
+            self.state.document.autosave()
+        except OSError as error:
+            self.state.messages.append(f"cannot keep the script beside its file: {error.strerror}")
+
+
+def _server(guard: Guard, port: int) -> Any:
+    try:
+        import viser
+        from viser import _messages
+    except ImportError:
+        raise MissingExtraError("the studio", "studio") from None
+    with guarding(guard), redirect_stdout(StringIO()):  # it prints a table of addresses, without the token
+        server = viser.ViserServer(host=guard.host, port=port, verbose=False)
+    # viser's own button for this is hidden; a message that asks for a public tunnel must not open one either
+    server._websock_server.unregister_handler(_messages.ShareUrlRequest)
+    return server
