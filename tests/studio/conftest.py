@@ -45,6 +45,14 @@ def browser() -> Iterator[Any]:
         chromium.close()
 
 
+@pytest.fixture(autouse=True)
+def kept(monkeypatch: pytest.MonkeyPatch, tmp_path_factory: pytest.TempPathFactory) -> None:
+    """The hand is built, and bound, once for all of these tests."""
+    folder = tmp_path_factory.getbasetemp() / "kept"
+    folder.mkdir(exist_ok=True)
+    monkeypatch.setenv("WARPJLD_CACHE", str(folder))
+
+
 @pytest.fixture
 def script(tmp_path: Path) -> Path:
     """A small hand, and a key."""
@@ -54,7 +62,7 @@ def script(tmp_path: Path) -> Path:
 
 
 @pytest.fixture
-def room(script: Path) -> Iterator[Room]:
+def room(script: Path, kept: None) -> Iterator[Room]:
     """A studio with that script."""
     pytest.importorskip("viser", reason="viser is not installed")
     made = Room(opened(script, script.parent / "out"), port=0)

@@ -59,6 +59,8 @@ RESERVED = (
 _BUILT_IN = (
     "actors",
     "animation",
+    "key_editing",
+    "posing",
     "objects",
     "grasping",
     "reaching",
