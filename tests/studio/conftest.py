@@ -128,6 +128,6 @@ def until(holds: Callable[[], bool], what: str, timeout: float = 20.0) -> None:
 @pytest.fixture
 def window(browser: Any, room: Room) -> Iterator[Window]:
     """One page of it."""
-    page = browser.new_page(viewport={"width": 1100, "height": 700})
+    page = browser.new_page(viewport={"width": 900, "height": 600})
     yield Window(page, room)
     page.close()

@@ -2,18 +2,130 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+
 from tests.studio.conftest import Window, until
+from warpjld.script import all_commands
+from warpjld.script.plugin import load_commands
+
+INDEX = "left.index.base.flexion"
+
+TRICK = """
+import warpjld as wj
+
+@wj.menu("Pose/My trick")
+@wj.command("TRICK", syntax="TRICK <LEFT/RIGHT> <key> [FAST]", help="Bend the index finger.")
+def trick(scene, arguments):
+    side = arguments.choice("the side", ("LEFT", "RIGHT"))
+    key = arguments.number("the key")
+    angle = 60 if arguments.keyword("FAST") else 30
+    arguments.interpreter.run_text(f"FINGER1 {side} INDEX FLEXION AT {key} {angle}", "<TRICK>")
+"""
+
+
+@pytest.fixture
+def trick(tmp_path: Path) -> Iterator[None]:
+    """A user's command is there."""
+    path = tmp_path / "trick.py"
+    path.write_text(TRICK)
+    load_commands(path)
+    yield
+    all_commands().remove("TRICK")
 
 
 def test_a_dragged_slider_bends_the_finger_on_screen_and_in_the_script(window: Window) -> None:
     before, state = window.pixels(), window.room.state
     window.drag_slider("base flexion", 0.9)
     until(lambda: window.changed(before) > 500, "the finger is drawn bent")
-    until(lambda: state.angles()["left.index.base.flexion"] > 50, "the state has it bent")
+    until(lambda: state.angles()[INDEX] > 50, "the state has it bent")
     assert state.document.text.splitlines()[-1].startswith("JOINT left.index.base FLEXION AT 0 ")
     window.tab("Script")
     shown = window.page.locator("textarea").first
     until(lambda: shown.input_value() == state.document.text, "the pane shows the script")
     window.press("undo")
-    until(lambda: state.angles()["left.index.base.flexion"] == 0, "it is undone")
+    until(lambda: state.angles()[INDEX] == 0, "it is undone")
     until(lambda: window.changed(before) < 50, "the finger is drawn as before")
+
+
+def test_a_key_is_set_scrubbed_past_and_deleted(window: Window) -> None:
+    state = window.room.state
+    window.drag_slider("Frame", 0.5)
+    until(lambda: 20 <= state.frame <= 28, "the frame is shown")
+    window.drag_slider("base flexion", 0.95)
+    until(lambda: state.angles()[INDEX] > 60, "a key is set there")
+    assert state.keys == [0, state.frame]
+    bent = window.pixels()
+    window.drag_slider("Frame", 0.0)
+    until(lambda: state.frame == 0, "the first frame is shown")
+    until(lambda: window.changed(bent) > 500, "the finger is drawn straight there")
+    window.press("key ▸")
+    until(lambda: state.frame == state.keys[-1], "the next key is shown")
+    until(lambda: window.changed(bent) < 50, "the finger is drawn bent again")
+    window.press("delete")
+    until(lambda: state.keys == [0], "the key is gone")
+    assert state.document.text.splitlines()[-1] == f"KEYS DELETE {state.frame:g} LEFT"
+
+
+def test_what_is_typed_is_done_and_a_fault_is_shown_at_its_line(window: Window) -> None:
+    state = window.room.state
+    window.tab("Script")
+    pane = window.page.locator("textarea").first
+    text = state.document.text
+    pane.fill(f"{text}JOINT left.index.base FLEXION AT 0 400\n")
+    error = window.page.locator("#studio-error")
+    error.wait_for()
+    assert "wave.jld:3:36: flexion of left.index.base goes from -45° to 90°, got 400°" in error.inner_text()
+    pane.fill(f"{text}JOINT left.index.base FLEXION AT 0 40\n")
+    error.wait_for(state="detached")
+    assert round(state.angles()[INDEX]) == 40
+
+
+def test_a_users_command_has_a_menu_entry_with_a_form(trick: None, window: Window) -> None:
+    state, page = window.room.state, window.page
+    before = window.pixels()
+    window.tab("Menus")
+    page.get_by_text("Pose", exact=True).last.click()
+    window.press("My trick")
+    form = page.get_by_role("dialog")
+    form.get_by_text("Bend the index finger.").wait_for()
+    form.get_by_label("fast").check()
+    line = form.get_by_label("line")
+    until(lambda: line.input_value() == "TRICK LEFT 0 FAST", "the form shows its line")
+    form.get_by_role("button", name="Do it").click()
+    until(lambda: round(state.angles()[INDEX]) == 60, "the command is done")
+    assert state.document.text.splitlines()[-1] == "TRICK LEFT 0 FAST"
+    form.wait_for(state="detached")
+    until(lambda: window.changed(before) > 500, "it is seen")
+
+
+def test_two_windows_show_the_same_and_a_closed_one_or_a_reload_loses_nothing(window: Window, browser: Any) -> None:
+    state, room = window.room.state, window.room
+    page = browser.new_page(viewport={"width": 900, "height": 600})
+    other = Window(page, room)
+    before = other.pixels()
+    window.drag_slider("base flexion", 0.9)
+    until(lambda: other.changed(before) > 500, "the other window shows it")
+    bent = window.pixels()
+    page.close()
+    window.page.reload()
+    until(lambda: window.skin() > 1000, "the hand is drawn")
+    until(lambda: window.changed(bent) < 50, "it is as it was")
+    value = window.control("base flexion").get_by_role("slider").get_attribute("aria-valuenow")
+    assert abs(float(value) - state.angles()[INDEX]) < 0.5
+
+
+def test_the_page_asks_nothing_of_other_machines(browser: Any, room: Any) -> None:
+    page = browser.new_page()
+    asked: list[str] = []
+    page.on("request", lambda request: asked.append(request.url))
+    page.on("websocket", lambda socket: asked.append(socket.url))
+    page.goto(room.address)
+    page.get_by_text("Joints", exact=True).wait_for()
+    page.close()
+    host = room.address.removeprefix("http://")
+    assert len(asked) >= 2
+    assert all(url.split("://")[-1].startswith(host.rstrip("/")) or url.startswith(("data:", "blob:")) for url in asked)

@@ -12,6 +12,7 @@ from typing import Any
 
 from warpjld.errors import MissingExtraError, WarpjldError
 from warpjld.studio.guard import Guard, guarding
+from warpjld.studio.panels.menus import MenusPanel
 from warpjld.studio.panels.messages import MessagesPanel
 from warpjld.studio.panels.script import ScriptPanel
 from warpjld.studio.panels.sliders import SlidersPanel
@@ -81,8 +82,10 @@ class Room:
             stage, sliders = StagePanel(self), SlidersPanel(self)
         with tabs.add_tab("Script"):
             script = ScriptPanel(self)
+        with tabs.add_tab("Menus"):
+            menus = MenusPanel(self)
         timeline, messages = TimelinePanel(self), MessagesPanel(self)
-        self.panels = [stage, sliders, script, timeline, messages]
+        self.panels = [stage, sliders, script, menus, timeline, messages]
 
     def _failed(self, error: BaseException) -> None:
         """Show what a job raised: nothing is swallowed, and nothing ends the studio."""

@@ -16,9 +16,9 @@ __all__ = ["Choice", "Field", "Option", "Text", "Way", "line_of", "ways_of"]
 _TOKEN = re.compile(r'"<[^>]*>[^"\s]*"|<[^>]*>|\[|\]|…|[^\s\[\]<>"…]+')
 _WAYS = re.compile(r",? or (?=[A-Z_0-9]+ )|, (?=[A-Z_0-9]+ [<\"A-Z])")
 _NUMBER = re.compile(
-    r"\b(key\d?|other key|frames?|step|degrees|metres|m|factor|pascals|newtons|percent|ratio|coefficient|x|y|z|radius|share"
-    r"|vertices|value|number|smallest|largest|start|stop|first|last|tension|continuity|bias|width|height|exponent|kg/m³"
-    r"|placements|shear|second joint|third joint|from|to|amount|angle)\b"
+    r"\b(key\d?|other key|frames?|step|degrees|metres|m|factor|pascals|newtons|percent|ratio|coefficient|x|y|z|radius"
+    r"|share|vertices|value|number|smallest|largest|start|stop|first|last|tension|continuity|bias|width|height|exponent"
+    r"|kg/m³|placements|shear|second joint|third joint|from|to|amount|angle)\b"
 )
 
 
@@ -125,6 +125,10 @@ def _fields(tokens: list[str], k: int) -> tuple[list[Field], int]:
         k += 1
         if token == "]":
             break
+        if token.startswith("/"):  # another choice than the one before, with options of its own: it can be typed
+            while k < len(tokens) and tokens[k] != "]":
+                k = _fields(tokens, k + 1)[1] if tokens[k] == "[" else k + 1
+            continue
         if token == "[":
             inner, k = _fields(tokens, k)
             fields.append(_option(inner))
@@ -145,12 +149,18 @@ def _field(token: str) -> Field:
         inside = token.strip("<>")
         options = inside.split("/")
         if len(options) > 1 and all(re.fullmatch(r"[A-Z][A-Z0-9_\-]*", option) for option in options):
-            return Choice(inside.lower() if len(inside) < 24 else "which", tuple(options))
+            return Choice(_called(options), tuple(options))
         return Text(inside, number=bool(_NUMBER.search(inside)) and " or " not in inside)
     options = token.split("/")
     if len(options) > 1 and all(options):
-        return Choice("which", tuple(options))
+        return Choice(_called(options), tuple(options))
     return Keyword(token)
+
+
+def _called(options: list[str]) -> str:
+    """What a choice is between."""
+    names = {"LEFT": "side", "THUMB": "digit", "FLEXION": "angle", "KNUCKLES2": "joint", "X": "axis"}
+    return names.get(options[0], "which" if len("/".join(options)) > 24 else " or ".join(options).lower())
 
 
 def _option(inner: list[Field]) -> Field:

@@ -47,9 +47,7 @@ def _key(track: Track, frame: float) -> Key | None:
     return next((key for key in track.keys if key.frame == frame), None)
 
 
-def _change(
-    tracks: dict[str, Track], what: str, frame: float, other: float, constants: SplineConstants | None
-) -> None:
+def _change(tracks: dict[str, Track], what: str, frame: float, other: float, constants: SplineConstants | None) -> None:
     for channel in [*tracks]:
         track = tracks[channel]
         found = _key(track, frame)

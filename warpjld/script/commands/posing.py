@@ -16,7 +16,7 @@ from warpjld.script.scene import Scene
 
 @command(
     "POSE",
-    syntax=f'POSE <LEFT/RIGHT> <{"/".join(SHIPPED).upper()}> <key> [SHARE <percent>] or '
+    syntax=f"POSE <LEFT/RIGHT> <{'/'.join(SHIPPED).upper()}> <key> [SHARE <percent>] or "
     'POSE <LEFT/RIGHT> "<pose file>" <key> [SHARE <percent>]',
     help="A whole pose of the digits at a key, from the library or a file; SHARE: only a part of the way to it.",
     group="Animation",

@@ -5,6 +5,8 @@ from __future__ import annotations
 import threading
 from typing import TYPE_CHECKING
 
+from warpjld.studio.key_lines import number
+
 if TYPE_CHECKING:
     from warpjld.studio.room import Room
 
@@ -23,6 +25,7 @@ class TimelinePanel:
         self.loop = gui.add_checkbox("Loop", True)
         self.keys = gui.add_button_group("Keys", ("set all", "delete"))
         self.frame.on_update(lambda event: room.by_hand(event, self._scrub, key="frame"))
+        self.keys.on_click(lambda event: self._key(event.target.value))
         self.play.on_click(lambda event: self._press(event.target.value))
 
     def refresh(self) -> None:
@@ -49,6 +52,14 @@ class TimelinePanel:
                 self._room.post(lambda: self._go([k for k in state.keys if k < state.frame][-1:]))
             case _:
                 self._room.post(lambda: self._go([k for k in state.keys if k > state.frame][:1]))
+
+    def _key(self, which: str) -> None:
+        state = self._room.state
+        frame, actor = number(state.frame), state.actor
+        if which == "set all":
+            self._room.post(state.key_all)
+        elif actor is not None:
+            self._room.post(lambda: state.do(f"KEYS DELETE {frame} {actor.name}"))
 
     def _go(self, found: list[float]) -> None:
         if found:
