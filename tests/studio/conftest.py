@@ -84,6 +84,18 @@ class Window:
         shot = self.page.locator("canvas").first.screenshot()
         return np.asarray(Image.open(BytesIO(shot)).convert("RGB"), np.int16)
 
+    def still(self) -> np.ndarray:
+        """The canvas when all that was asked for is drawn."""
+        assert self.room.worker.settle()
+        seen = [self.pixels()]
+
+        def same() -> bool:
+            seen.append(self.pixels())
+            return bool(np.array_equal(seen[-1], seen[-2]))
+
+        until(same, "the canvas is still")
+        return seen[-1]
+
     def skin(self) -> int:
         """How many pixels are reddish, as skin is."""
         pixels = self.pixels()

@@ -38,7 +38,7 @@ def trick(tmp_path: Path) -> Iterator[None]:
 
 
 def test_a_dragged_slider_bends_the_finger_on_screen_and_in_the_script(window: Window) -> None:
-    before, state = window.pixels(), window.room.state
+    before, state = window.still(), window.room.state
     window.drag_slider("base flexion", 0.9)
     until(lambda: window.changed(before) > 500, "the finger is drawn bent")
     until(lambda: state.angles()[INDEX] > 50, "the state has it bent")
@@ -58,7 +58,7 @@ def test_a_key_is_set_scrubbed_past_and_deleted(window: Window) -> None:
     window.drag_slider("base flexion", 0.95)
     until(lambda: state.angles()[INDEX] > 60, "a key is set there")
     assert state.keys == [0, state.frame]
-    bent = window.pixels()
+    bent = window.still()
     window.drag_slider("Frame", 0.0)
     until(lambda: state.frame == 0, "the first frame is shown")
     until(lambda: window.changed(bent) > 500, "the finger is drawn straight there")
@@ -86,14 +86,14 @@ def test_what_is_typed_is_done_and_a_fault_is_shown_at_its_line(window: Window) 
 
 def test_a_users_command_has_a_menu_entry_with_a_form(trick: None, window: Window) -> None:
     state, page = window.room.state, window.page
-    before = window.pixels()
+    before = window.still()
     window.tab("Menus")
     page.get_by_text("Pose", exact=True).last.click()
     window.press("My trick")
     form = page.get_by_role("dialog")
     form.get_by_text("Bend the index finger.").wait_for()
     form.get_by_label("fast").check()
-    line = form.get_by_label("line")
+    line = form.locator("input").first
     until(lambda: line.input_value() == "TRICK LEFT 0 FAST", "the form shows its line")
     form.get_by_role("button", name="Do it").click()
     until(lambda: round(state.angles()[INDEX]) == 60, "the command is done")
@@ -106,10 +106,10 @@ def test_two_windows_show_the_same_and_a_closed_one_or_a_reload_loses_nothing(wi
     state, room = window.room.state, window.room
     page = browser.new_page(viewport={"width": 900, "height": 600})
     other = Window(page, room)
-    before = other.pixels()
+    before = other.still()
     window.drag_slider("base flexion", 0.9)
     until(lambda: other.changed(before) > 500, "the other window shows it")
-    bent = window.pixels()
+    bent = window.still()
     page.close()
     window.page.reload()
     until(lambda: window.skin() > 1000, "the hand is drawn")

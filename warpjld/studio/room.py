@@ -12,8 +12,10 @@ from typing import Any
 
 from warpjld.errors import MissingExtraError, WarpjldError
 from warpjld.studio.guard import Guard, guarding
+from warpjld.studio.panels.drag import DragPanel
 from warpjld.studio.panels.menus import MenusPanel
 from warpjld.studio.panels.messages import MessagesPanel
+from warpjld.studio.panels.pose_tools import PoseToolsPanel
 from warpjld.studio.panels.script import ScriptPanel
 from warpjld.studio.panels.sliders import SlidersPanel
 from warpjld.studio.panels.stage import StagePanel
@@ -51,11 +53,11 @@ class Room:
         self.address = f"http://{shown}:{self.server.get_port()}/" + (f"?token={token}" if token else "")
         self.post(lambda: None)
 
-    def post(self, job: Callable[[], None], key: Hashable = None) -> None:
+    def post(self, job: Callable[[], object], key: Hashable = None) -> None:
         """Have something done to the state, and the panels refreshed."""
         self.worker.post(job, key)
 
-    def by_hand(self, event: Any, job: Callable[[], None], key: Hashable = None) -> None:
+    def by_hand(self, event: Any, job: Callable[[], object], key: Hashable = None) -> None:
         """As ``post``, unless a control changed because a panel refreshed it."""
         if event.client_id is not None:
             self.post(job, key)
@@ -79,13 +81,16 @@ class Room:
         gui.main_panel.dock_right()
         tabs = gui.add_tab_group()
         with tabs.add_tab("Pose"):
-            stage, sliders = StagePanel(self), SlidersPanel(self)
+            stage, tools, drag, sliders = StagePanel(self), PoseToolsPanel(self), DragPanel(self), SlidersPanel(self)
         with tabs.add_tab("Script"):
             script = ScriptPanel(self)
         with tabs.add_tab("Menus"):
             menus = MenusPanel(self)
-        timeline, messages = TimelinePanel(self), MessagesPanel(self)
-        self.panels = [stage, sliders, script, menus, timeline, messages]
+        below = gui.add_panel()
+        with below.add_tab("Time"):
+            timeline, messages = TimelinePanel(self), MessagesPanel(self)
+        below.dock_below(gui.main_panel)
+        self.panels = [stage, tools, drag, sliders, script, menus, timeline, messages]
 
     def _failed(self, error: BaseException) -> None:
         """Show what a job raised: nothing is swallowed, and nothing ends the studio."""

@@ -166,15 +166,19 @@ class StudioState:
         """Set keys of all channels at the frame that is shown, where they are."""
         return self.set_angles(self.angles())
 
-    def undo(self) -> None:
-        """Take back what was done last."""
-        if self.document.undo():
+    def undo(self) -> bool:
+        """Take back what was done last; False where there is nothing to."""
+        done = self.document.undo()
+        if done:
             self._run()
+        return done
 
-    def redo(self) -> None:
-        """Do again what was taken back last."""
-        if self.document.redo():
+    def redo(self) -> bool:
+        """Do again what was taken back last; False where there is nothing to."""
+        done = self.document.redo()
+        if done:
             self._run()
+        return done
 
     def open(self, document: Document) -> None:
         """Another script."""

@@ -20,14 +20,14 @@ class Worker:
 
     def __init__(self, idle: Callable[[], None], failed: Callable[[BaseException], None]) -> None:
         self._idle, self._failed = idle, failed
-        self._jobs: OrderedDict[Hashable, Callable[[], None]] = OrderedDict()
+        self._jobs: OrderedDict[Hashable, Callable[[], object]] = OrderedDict()
         self._wake = threading.Condition()
         self._running = True
         self._busy = False
         self._thread = threading.Thread(target=self._work, name="studio", daemon=True)
         self._thread.start()
 
-    def post(self, job: Callable[[], None], key: Hashable = None) -> None:
+    def post(self, job: Callable[[], object], key: Hashable = None) -> None:
         """Have a job done; one with this key that waits is not done."""
         with self._wake:
             self._jobs[object() if key is None else key] = job

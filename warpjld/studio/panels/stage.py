@@ -116,9 +116,9 @@ def _light(server: Any) -> None:
     server.scene.configure_environment_map(None)
     server.scene.configure_default_lights(False)
     server.scene.add_light_hemisphere(
-        "/light/sky", sky_color=(255, 252, 246), ground_color=(150, 140, 150), intensity=2.0
+        "/light/sky", sky_color=(255, 252, 246), ground_color=(150, 140, 150), intensity=1.3
     )
-    server.scene.add_light_directional("/light/lamp", intensity=1.6, position=(1.0, 2.0, 1.0))
+    server.scene.add_light_directional("/light/lamp", intensity=2.4, position=(1.0, 2.0, 1.0))
     server.scene.add_light_directional("/light/rim", intensity=0.5, position=(-1.5, 0.5, -1.0))
 
 
