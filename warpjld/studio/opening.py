@@ -8,6 +8,7 @@ from pathlib import Path
 from warpjld.errors import InputError, WarpjldError
 from warpjld.studio.document import Document
 from warpjld.studio.state import StudioState
+from warpjld.text_file import read_text
 
 __all__ = ["opened"]
 
@@ -29,6 +30,8 @@ def opened(path: Path | None, folder: Path, *, device: str = "cpu") -> StudioSta
         document = Document.open(path.resolve())
     else:
         document = Document(path.resolve().with_suffix(".jld"), _staging(path))
+    if document.autosaved.is_file() and (kept := read_text(document.autosaved)) != document.text:
+        document.edit(kept)  # what was not saved when the studio ended; undoing it brings back the file's text
     return StudioState(document, folder, within=[document.path.parent, *_named(document)], device=device)
 
 

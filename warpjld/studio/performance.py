@@ -82,9 +82,9 @@ class Performance:
             if time.perf_counter() - began > _LONG:
                 self._keep(number + 1)
 
-    def forget(self) -> None:
-        """Run everything anew next time: files that the statements read may have changed."""
-        self._path = None
+    def copied(self) -> Scene:
+        """A scene like the one that is there, which nothing of what happens here changes."""
+        return moment_of(self._interpreter).scene
 
     def _nodes(self, text: str) -> tuple[Node, ...]:
         """The statements of a text; those before the first line that differs from the text before stay as they are."""

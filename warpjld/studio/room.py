@@ -20,6 +20,7 @@ from warpjld.studio.panels.script import ScriptPanel
 from warpjld.studio.panels.sliders import SlidersPanel
 from warpjld.studio.panels.stage import StagePanel
 from warpjld.studio.panels.timeline import TimelinePanel
+from warpjld.studio.panels.work import WorkPanel
 from warpjld.studio.state import StudioState
 from warpjld.studio.worker import Worker
 
@@ -47,6 +48,7 @@ class Room:
         self.server = _server(Guard(host, token), port)
         self.worker = Worker(self.refresh, self._failed)
         self.panels: list[Any] = []
+        self._kept = state.document.text
         self._furnish()
         shown = LOCAL if host in ("0.0.0.0", "::") else host
         shown = f"[{shown}]" if ":" in shown else shown
@@ -66,6 +68,9 @@ class Room:
         """Show the state as it is."""
         for panel in self.panels:
             panel.refresh()
+        if self.state.document.text != self._kept:
+            self._kept = self.state.document.text
+            self._autosave()
 
     def stop(self) -> None:
         """Keep what is not saved, and close."""
@@ -84,13 +89,15 @@ class Room:
             stage, tools, drag, sliders = StagePanel(self), PoseToolsPanel(self), DragPanel(self), SlidersPanel(self)
         with tabs.add_tab("Script"):
             script = ScriptPanel(self)
+        with tabs.add_tab("Work"):
+            work = WorkPanel(self)
         with tabs.add_tab("Menus"):
             menus = MenusPanel(self)
         below = gui.add_panel()
         with below.add_tab("Time"):
             timeline, messages = TimelinePanel(self), MessagesPanel(self)
         below.dock_below(gui.main_panel)
-        self.panels = [stage, tools, drag, sliders, script, menus, timeline, messages]
+        self.panels = [stage, tools, drag, sliders, script, work, menus, timeline, messages]
 
     def _failed(self, error: BaseException) -> None:
         """Show what a job raised: nothing is swallowed, and nothing ends the studio."""

@@ -14,8 +14,9 @@ from warpjld.script.staging import frame_numbers
 from warpjld.skeleton import CHANNELS
 from warpjld.studio.document import Document
 from warpjld.studio.key_lines import number, with_keys
+from warpjld.studio.making import Pressed
 from warpjld.studio.performance import Performance
-from warpjld.studio.surfaces import Shown, Surfaces
+from warpjld.studio.surfaces import Coloring, Shown, Surfaces
 
 __all__ = ["StudioState"]
 
@@ -39,6 +40,8 @@ class StudioState:
         error: What is wrong with the script or with the last command; None where nothing is.
         broken: Whether the script as it stands cannot be run.
         messages: What commands said last.
+        coloring: What skin is coloured by.
+        solved: The contact that was solved last.
     """
 
     def __init__(
@@ -56,6 +59,8 @@ class StudioState:
         self.error: WarpjldError | None = None
         self.broken = False
         self.messages: deque[str] = deque(maxlen=_MESSAGES)
+        self.coloring: Coloring = "skin"
+        self.solved: Pressed | None = None
         self.surfaces = Surfaces(device)
         self.performance = Performance(folder, say=self.messages.append, within=within)
         self._actor: str | None = None
@@ -122,8 +127,27 @@ class StudioState:
         }
 
     def shown(self) -> list[Shown]:
-        """The surfaces at the frame that is shown."""
-        return self.surfaces.at(self.scene, self.frame)
+        """The surfaces at the frame that is shown; as contact has them, as long as it is that of this script."""
+        solved = self.pressed
+        if solved is None:
+            return self.surfaces.at(self.scene, self.frame, self.coloring)
+        return self.surfaces.at(solved.scene, self.frame, self.coloring, solved.simulation.surfaces)
+
+    @property
+    def pressed(self) -> Pressed | None:
+        """The contact that was solved, if it is that of this script."""
+        solved = self.solved
+        return solved if solved is not None and solved.text == self.document.text else None
+
+    def copied_scene(self) -> Scene:
+        """A scene like this one, to be worked on beside it.
+
+        Raises:
+            WarpjldError: The script cannot be run as it stands.
+        """
+        if self.broken and self.error is not None:
+            raise self.error
+        return self.performance.copied()
 
     # ---- what is done --------------------------------------------------------------------------------------------
 

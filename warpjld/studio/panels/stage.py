@@ -5,10 +5,11 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+import trimesh
 from numpy.typing import NDArray
 
 from warpjld.render.style import Style
-from warpjld.studio.surfaces import Shown
+from warpjld.studio.surfaces import COLORINGS, Shown
 
 if TYPE_CHECKING:
     from warpjld.studio.room import Room
@@ -34,6 +35,8 @@ class StagePanel:
         server.initial_camera.fov = _FIELD
         server.initial_camera.near = 0.005
         gui = server.gui
+        self.coloring = gui.add_dropdown("Colours", COLORINGS, initial_value="skin")
+        self.coloring.on_update(lambda event: room.by_hand(event, self._color, key="coloring"))
         self.style = gui.add_dropdown("Skin", ("shaded", "wire-frame", "x-ray"), initial_value="shaded")
         self.skeleton = gui.add_checkbox("Skeleton", False)
         for control in (self.style, self.skeleton):
@@ -41,10 +44,12 @@ class StagePanel:
 
     def refresh(self) -> None:
         """Draw what changed."""
+        if self.coloring.value != self._room.state.coloring:
+            self.coloring.value = self._room.state.coloring
         shown = {one.name: one for one in self._room.state.shown()}
         with self._room.server.atomic():
             for name in [*self._meshes]:
-                if name not in shown or shown[name].faces is not self._drawn[name].faces:
+                if name not in shown or _other_kind(shown[name], self._drawn[name]):
                     self._remove(name)
             for name, one in shown.items():
                 self._draw(name, one)
@@ -55,6 +60,9 @@ class StagePanel:
         self._looked_at = bool(shown)
 
     def _draw(self, name: str, one: Shown) -> None:
+        if one.colors is not None:
+            self._draw_colored(name, one)
+            return
         style = self.style.value
         opacity = 0.35 if style == "x-ray" else None
         if name not in self._meshes:
@@ -75,6 +83,18 @@ class StagePanel:
             mesh.vertices = one.vertices
         mesh.wireframe = style == "wire-frame"
         mesh.opacity = opacity
+
+    def _draw_colored(self, name: str, one: Shown) -> None:
+        old = self._drawn.get(name)
+        if name in self._meshes and old is not None and _same_colored(one, old):
+            return
+        mesh = trimesh.Trimesh(one.vertices, one.faces, vertex_colors=one.colors, process=False)
+        self._meshes[name] = self._room.server.scene.add_mesh_trimesh(
+            f"/stage/{name}", mesh, cast_shadow=False, receive_shadow=False
+        )
+
+    def _color(self) -> None:
+        self._room.state.coloring = self.coloring.value
 
     def _draw_skeleton(self, name: str, one: Shown) -> None:
         if one.joints is None or one.bones is None:
@@ -109,6 +129,20 @@ class StagePanel:
         for client in self._room.server.get_clients().values():
             with client.atomic():
                 client.camera.position, client.camera.look_at = eye, centre
+
+
+def _same_colored(one: Shown, old: Shown) -> bool:
+    """Whether a coloured surface is drawn as it is."""
+    if one.colors is None or old.colors is None:
+        return False
+    return np.array_equal(old.colors, one.colors) and np.array_equal(old.vertices, one.vertices)
+
+
+def _other_kind(one: Shown, old: Shown) -> bool:
+    """Whether a surface must be sent anew, not only its vertices."""
+    if (one.colors is None) != (old.colors is None):
+        return True
+    return one.colors is None and not np.array_equal(one.faces, old.faces)
 
 
 def _light(server: Any) -> None:
