@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from warpjld.studio.guard import Guard
+from warpjld.page.guard import Guard
 from warpjld.studio.opening import opened
 from warpjld.studio.room import Room
 

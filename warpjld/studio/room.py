@@ -6,12 +6,11 @@ import secrets
 import sys
 import traceback
 from collections.abc import Callable, Hashable
-from contextlib import redirect_stdout
-from io import StringIO
 from typing import Any
 
-from warpjld.errors import MissingExtraError, WarpjldError
-from warpjld.studio.guard import Guard, guarding
+from warpjld.errors import WarpjldError
+from warpjld.page.guard import Guard
+from warpjld.page.server import guarded_server, stop
 from warpjld.studio.panels.drag import DragPanel
 from warpjld.studio.panels.menus import MenusPanel
 from warpjld.studio.panels.messages import MessagesPanel
@@ -45,7 +44,7 @@ class Room:
         self.state = state
         local = host in (LOCAL, "localhost", "::1")
         token = None if local else secrets.token_urlsafe(24)
-        self.server = _server(Guard(host, token), port)
+        self.server = guarded_server(Guard(host, token), port, "the studio")
         self.worker = Worker(self.refresh, self._failed)
         self.panels: list[Any] = []
         self._kept = state.document.text
@@ -76,8 +75,7 @@ class Room:
         """Keep what is not saved, and close."""
         self.worker.stop()
         self._autosave()
-        with redirect_stdout(StringIO()):
-            self.server.stop()
+        stop(self.server)
 
     def _furnish(self) -> None:
         gui = self.server.gui
@@ -113,16 +111,3 @@ class Room:
             self.state.document.autosave()
         except OSError as error:
             self.state.messages.append(f"cannot keep the script beside its file: {error.strerror}")
-
-
-def _server(guard: Guard, port: int) -> Any:
-    try:
-        import viser
-        from viser import _messages
-    except ImportError:
-        raise MissingExtraError("the studio", "studio") from None
-    with guarding(guard), redirect_stdout(StringIO()):  # it prints a table of addresses, without the token
-        server = viser.ViserServer(host=guard.host, port=port, verbose=False)
-    # viser's own button for this is hidden; a message that asks for a public tunnel must not open one either
-    server._websock_server.unregister_handler(_messages.ShareUrlRequest)
-    return server

@@ -5,9 +5,8 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import trimesh
-from numpy.typing import NDArray
 
+from warpjld.page.server import add_colored, add_surface, look, rgb
 from warpjld.render.style import Style
 from warpjld.studio.surfaces import COLORINGS, Shown
 
@@ -15,8 +14,6 @@ if TYPE_CHECKING:
     from warpjld.studio.room import Room
 
 __all__ = ["StagePanel"]
-
-_FIELD = 0.6  # vertical opening of the camera [rad]
 
 
 class StagePanel:
@@ -28,13 +25,7 @@ class StagePanel:
         self._bones: dict[str, Any] = {}
         self._drawn: dict[str, Shown] = {}
         self._looked_at = False
-        server = room.server
-        server.scene.set_up_direction("+y")
-        server.scene.world_axes.visible = False
-        _light(server)
-        server.initial_camera.fov = _FIELD
-        server.initial_camera.near = 0.005
-        gui = server.gui
+        gui = room.server.gui
         self.coloring = gui.add_dropdown("Colours", COLORINGS, initial_value="skin")
         self.coloring.on_update(lambda event: room.by_hand(event, self._color, key="coloring"))
         self.style = gui.add_dropdown("Skin", ("shaded", "wire-frame", "x-ray"), initial_value="shaded")
@@ -56,7 +47,7 @@ class StagePanel:
                 self._draw_skeleton(name, one)
         self._drawn = shown
         if shown and not self._looked_at:
-            self._look(np.concatenate([one.vertices for one in shown.values()]))
+            look(self._room.server, np.concatenate([one.vertices for one in shown.values()]))
         self._looked_at = bool(shown)
 
     def _draw(self, name: str, one: Shown) -> None:
@@ -66,16 +57,14 @@ class StagePanel:
         style = self.style.value
         opacity = 0.35 if style == "x-ray" else None
         if name not in self._meshes:
-            self._meshes[name] = self._room.server.scene.add_mesh_simple(
+            self._meshes[name] = add_surface(
+                self._room.server,
                 f"/stage/{name}",
                 one.vertices,
-                one.faces.astype(np.uint32),
-                color=_rgb(one.color or Style().skin),
+                one.faces,
+                one.color or Style().skin,
                 wireframe=style == "wire-frame",
                 opacity=opacity,
-                side="double",
-                cast_shadow=False,
-                receive_shadow=False,
             )
             return
         mesh = self._meshes[name]
@@ -88,10 +77,8 @@ class StagePanel:
         old = self._drawn.get(name)
         if name in self._meshes and old is not None and _same_colored(one, old):
             return
-        mesh = trimesh.Trimesh(one.vertices, one.faces, vertex_colors=one.colors, process=False)
-        self._meshes[name] = self._room.server.scene.add_mesh_trimesh(
-            f"/stage/{name}", mesh, cast_shadow=False, receive_shadow=False
-        )
+        assert one.colors is not None
+        self._meshes[name] = add_colored(self._room.server, f"/stage/{name}", one.vertices, one.faces, one.colors)
 
     def _color(self) -> None:
         self._room.state.coloring = self.coloring.value
@@ -108,7 +95,7 @@ class StagePanel:
         if name not in self._bones:
             size = float(np.ptp(one.vertices, axis=0).max())
             self._bones[name] = self._room.server.scene.add_line_segments(
-                f"/bones/{name}", points, np.array(_rgb(Style().bone), np.uint8), thickness=0.008 * size
+                f"/bones/{name}", points, np.array(rgb(Style().bone), np.uint8), thickness=0.008 * size
             )
         elif not np.array_equal(points, self._bones[name].points):
             self._bones[name].points = points
@@ -117,18 +104,6 @@ class StagePanel:
         self._meshes.pop(name).remove()
         if name in self._bones:
             self._bones.pop(name).remove()
-
-    def _look(self, points: NDArray[np.float32]) -> None:
-        """Set every window's camera so that these points fill it."""
-        low, high = points.min(axis=0), points.max(axis=0)
-        centre = (low + high) / 2.0
-        away = float(np.linalg.norm(high - low)) / 2.0 / np.tan(_FIELD / 2.0) * 1.1
-        eye = centre + away * np.array([0.45, 0.75, 0.5]) / np.linalg.norm([0.45, 0.75, 0.5])
-        first = self._room.server.initial_camera
-        first.position, first.look_at = tuple(eye), tuple(centre)
-        for client in self._room.server.get_clients().values():
-            with client.atomic():
-                client.camera.position, client.camera.look_at = eye, centre
 
 
 def _same_colored(one: Shown, old: Shown) -> bool:
@@ -143,18 +118,3 @@ def _other_kind(one: Shown, old: Shown) -> bool:
     if (one.colors is None) != (old.colors is None):
         return True
     return one.colors is None and not np.array_equal(one.faces, old.faces)
-
-
-def _light(server: Any) -> None:
-    """Light from all sides and one lamp over the shoulder, without shadows: what bends is seen, and drawn fast."""
-    server.scene.configure_environment_map(None)
-    server.scene.configure_default_lights(False)
-    server.scene.add_light_hemisphere(
-        "/light/sky", sky_color=(255, 252, 246), ground_color=(150, 140, 150), intensity=1.3
-    )
-    server.scene.add_light_directional("/light/lamp", intensity=2.4, position=(1.0, 2.0, 1.0))
-    server.scene.add_light_directional("/light/rim", intensity=0.5, position=(-1.5, 0.5, -1.0))
-
-
-def _rgb(color: str) -> tuple[int, int, int]:
-    return int(color[1:3], 16), int(color[3:5], 16), int(color[5:7], 16)
