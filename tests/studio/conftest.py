@@ -113,6 +113,7 @@ class Window:
     def drag_slider(self, label: str, share: float) -> None:
         """Drag a slider with the mouse to a share of its way."""
         control = self.control(label)
+        control.scroll_into_view_if_needed()
         thumb, track = control.get_by_role("slider"), control.locator(".mantine-Slider-track")
         here, way = thumb.bounding_box(), track.bounding_box()
         mouse = self.page.mouse
@@ -140,6 +141,6 @@ def until(holds: Callable[[], bool], what: str, timeout: float = 20.0) -> None:
 @pytest.fixture
 def window(browser: Any, room: Room) -> Iterator[Window]:
     """One page of it."""
-    page = browser.new_page(viewport={"width": 900, "height": 600})
+    page = browser.new_page(viewport={"width": 900, "height": 800})
     yield Window(page, room)
     page.close()

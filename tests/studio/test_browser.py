@@ -104,7 +104,7 @@ def test_a_users_command_has_a_menu_entry_with_a_form(trick: None, window: Windo
 
 def test_two_windows_show_the_same_and_a_closed_one_or_a_reload_loses_nothing(window: Window, browser: Any) -> None:
     state, room = window.room.state, window.room
-    page = browser.new_page(viewport={"width": 900, "height": 600})
+    page = browser.new_page(viewport={"width": 900, "height": 800})
     other = Window(page, room)
     before = other.still()
     window.drag_slider("base flexion", 0.9)

@@ -1,47 +1,55 @@
-"""Keys as lines of a script: set by replacing the number of a line at the end, or by a line more."""
+"""Values as lines of a script: set by replacing the number of a line at the end, or by a line more."""
 
 from __future__ import annotations
 
 import re
 from collections.abc import Mapping
 
-__all__ = ["number", "with_keys"]
+__all__ = ["number", "with_keys", "with_values"]
 
-_KEY = re.compile(r"JOINT (?P<joint>\S+) (?P<channel>[A-Z]+) AT (?P<frame>\S+) (?P<value>\S+)\Z")
+_VALUE = re.compile(
+    r"(?P<what>JOINT \S+ [A-Z]+ AT \S+|(?:MOVE|TURN) \S+ \S+|PARAMETER \S+ (?:INFLATION|MUSCLE|PEAK|PALM)) "
+    r"[-+.\d\seE]+\Z"
+)
 
 
-def with_keys(text: str, angles: Mapping[str, float], frame: float, *, actor: str | None = None) -> str:
-    """A script with keys of some channels at a frame.
+def with_values(text: str, values: Mapping[str, str], *, actor: str | None = None) -> str:
+    """A script with lines that set values.
 
-    Lines that set keys and stand last in the script are edited in place, since nothing that follows could depend on
-    them; others are left as they are, and overruled by lines at the end.
+    Lines of values that stand last in the script are edited in place, since nothing that follows could depend on them;
+    others are left as they are, and overruled by lines at the end.
 
     Args:
         text: The script.
-        angles: Degrees by channel, such as ``left.index.base.flexion``.
-        frame: The key.
+        values: What stands behind the words that a line begins with, such as ``MOVE LEFT 20`` and ``0 0.1 0``.
         actor: Name of the actor to speak to first, where it is not the current one.
     """
     lines = text.rstrip("\n").split("\n") if text.strip() else []
     if actor is not None:
         lines.append(f"ACTOR {actor}")
-    found: dict[tuple[str, str, str], int] = {}
+    found: dict[str, int] = {}
     for k in range(len(lines) - 1, -1, -1):
-        match = _KEY.match(lines[k])
+        match = _VALUE.match(lines[k])
         if match is None:
             break
-        found.setdefault((match["joint"], match["channel"], match["frame"]), k)
-    for name, degrees in angles.items():
-        joint, _, channel = name.rpartition(".")
-        key = (joint, channel.upper(), number(frame))
-        line = f"JOINT {joint} {key[1]} AT {key[2]} {number(degrees)}"
-        if key in found:
-            lines[found[key]] = line
+        found.setdefault(match["what"], k)
+    for what, value in values.items():
+        if what in found:
+            lines[found[what]] = f"{what} {value}"
         else:
-            lines.append(line)
+            lines.append(f"{what} {value}")
     return "\n".join(lines) + "\n"
 
 
-def number(value: float) -> str:
-    """A number as a script has it, to a hundredth."""
-    return f"{round(value, 2) + 0.0:.10g}"
+def with_keys(text: str, angles: Mapping[str, float], frame: float, *, actor: str | None = None) -> str:
+    """As ``with_values``, with keys of some channels, such as ``left.index.base.flexion``, at a frame [degrees]."""
+    values = {}
+    for name, degrees in angles.items():
+        joint, _, channel = name.rpartition(".")
+        values[f"JOINT {joint} {channel.upper()} AT {number(frame)}"] = number(degrees)
+    return with_values(text, values, actor=actor)
+
+
+def number(value: float, digits: int = 2) -> str:
+    """A number as a script has it, rounded to so many digits."""
+    return f"{round(value, digits) + 0.0:.10g}"

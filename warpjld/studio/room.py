@@ -11,13 +11,16 @@ from typing import Any
 from warpjld.errors import WarpjldError
 from warpjld.page.guard import Guard
 from warpjld.page.server import guarded_server, stop
+from warpjld.studio.panels.curves import CurvesPanel
 from warpjld.studio.panels.drag import DragPanel
 from warpjld.studio.panels.menus import MenusPanel
 from warpjld.studio.panels.messages import MessagesPanel
 from warpjld.studio.panels.pose_tools import PoseToolsPanel
 from warpjld.studio.panels.script import ScriptPanel
+from warpjld.studio.panels.skin import SkinPanel
 from warpjld.studio.panels.sliders import SlidersPanel
 from warpjld.studio.panels.stage import StagePanel
+from warpjld.studio.panels.things import ThingsPanel
 from warpjld.studio.panels.timeline import TimelinePanel
 from warpjld.studio.panels.work import WorkPanel
 from warpjld.studio.state import StudioState
@@ -82,9 +85,11 @@ class Room:
         gui.configure_theme(control_width="large", show_logo=False, show_share_button=False)
         gui.set_panel_label("warpjld studio")
         gui.main_panel.dock_right()
+        messages = MessagesPanel(self)  # above all tabs: an error is seen wherever one is
         tabs = gui.add_tab_group()
         with tabs.add_tab("Pose"):
-            stage, tools, drag, sliders = StagePanel(self), PoseToolsPanel(self), DragPanel(self), SlidersPanel(self)
+            pose = [StagePanel(self), PoseToolsPanel(self), DragPanel(self), ThingsPanel(self), SkinPanel(self)]
+            pose.append(SlidersPanel(self))
         with tabs.add_tab("Script"):
             script = ScriptPanel(self)
         with tabs.add_tab("Work"):
@@ -93,9 +98,11 @@ class Room:
             menus = MenusPanel(self)
         below = gui.add_panel()
         with below.add_tab("Time"):
-            timeline, messages = TimelinePanel(self), MessagesPanel(self)
+            timeline = TimelinePanel(self)
+        with below.add_tab("Keys"):
+            curves = CurvesPanel(self)
         below.dock_below(gui.main_panel)
-        self.panels = [stage, tools, drag, sliders, script, work, menus, timeline, messages]
+        self.panels = [*pose, script, work, menus, timeline, curves, messages]
 
     def _failed(self, error: BaseException) -> None:
         """Show what a job raised: nothing is swallowed, and nothing ends the studio."""

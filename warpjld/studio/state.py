@@ -36,7 +36,6 @@ class StudioState:
     Attributes:
         document: The script.
         frame: The frame that is shown.
-        selected: Channels whose curves are shown.
         error: What is wrong with the script or with the last command; None where nothing is.
         broken: Whether the script as it stands cannot be run.
         messages: What commands said last.
@@ -55,7 +54,6 @@ class StudioState:
         self.document = document
         self.folder = folder
         self.frame = 0.0
-        self.selected: tuple[str, ...] = ()
         self.error: WarpjldError | None = None
         self.broken = False
         self.messages: deque[str] = deque(maxlen=_MESSAGES)
@@ -207,7 +205,7 @@ class StudioState:
     def open(self, document: Document) -> None:
         """Another script."""
         self.document = document
-        self.frame, self.selected, self._actor = 0.0, (), None
+        self.frame, self._actor = 0.0, None
         self._run()
 
     def _run(self) -> None:

@@ -10,7 +10,7 @@ if TYPE_CHECKING:
 
 __all__ = ["MessagesPanel"]
 
-_LAST = 6
+_LAST = 3
 
 
 class MessagesPanel:
