@@ -1,6 +1,6 @@
 """Pictures of the studio for the documentation, taken in Chromium.
 
-    python docs/make_studio_pictures.py [NAME …]        # into docs/pictures/, about two minutes
+python docs/make_studio_pictures.py [NAME …]        # into docs/pictures/, about two minutes
 """
 
 from __future__ import annotations

@@ -75,8 +75,19 @@ class Window:
 
     def __init__(self, page: Any, room: Room) -> None:
         self.page, self.room = page, room
+        page.set_default_timeout(60_000)  # a machine that does much else beside is no fault
         page.goto(room.address)
-        page.get_by_text("Joints", exact=True).wait_for()
+        self._drawn()
+
+    def reload(self) -> None:
+        """Load the page anew."""
+        self.page.reload()
+        self._drawn()
+
+    def _drawn(self) -> None:
+        # the hint that WebGL is computed in software comes and goes over the canvas
+        self.page.add_style_tag(content=".mantine-Notifications-root, .mantine-Notification-root {display: none}")
+        self.page.get_by_text("Joints", exact=True).wait_for()
         until(lambda: self.skin() > 1000, "the hand is drawn")
 
     def pixels(self) -> np.ndarray:
@@ -110,8 +121,8 @@ class Window:
         name = self.page.locator("label", has_text=re.compile(f"^{label}$")).locator("visible=true").first
         return self.page.locator(f'[id="{name.get_attribute("for")}"]')
 
-    def drag_slider(self, label: str, share: float) -> None:
-        """Drag a slider with the mouse to a share of its way."""
+    def drag_slider(self, label: str, share: float) -> float:
+        """Drag a slider with the mouse to a share of its way; the value it shows then."""
         control = self.control(label)
         control.scroll_into_view_if_needed()
         thumb, track = control.get_by_role("slider"), control.locator(".mantine-Slider-track")
@@ -121,6 +132,7 @@ class Window:
         mouse.down()
         mouse.move(way["x"] + share * way["width"], way["y"] + way["height"] / 2, steps=8)
         mouse.up()
+        return float(thumb.get_attribute("aria-valuenow"))
 
     def press(self, name: str) -> None:
         """Press a button."""
@@ -131,7 +143,7 @@ class Window:
         self.page.get_by_role("tab", name=name, exact=True).click()
 
 
-def until(holds: Callable[[], bool], what: str, timeout: float = 20.0) -> None:
+def until(holds: Callable[[], bool], what: str, timeout: float = 60.0) -> None:
     """Wait for a condition; fail naming it where it does not come."""
     end = time.monotonic() + timeout
     while not holds():
