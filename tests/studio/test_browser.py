@@ -11,6 +11,8 @@ import pytest
 from tests.studio.conftest import Window, until
 from warpjld.script import all_commands
 from warpjld.script.plugin import load_commands
+from warpjld.studio.opening import opened
+from warpjld.studio.room import Room
 
 INDEX = "left.index.base.flexion"
 
@@ -132,3 +134,33 @@ def test_the_page_asks_nothing_of_other_machines(browser: Any, room: Any) -> Non
     host = room.address.removeprefix("http://")
     assert len(asked) >= 2
     assert all(url.split("://")[-1].startswith(host.rstrip("/")) or url.startswith(("data:", "blob:")) for url in asked)
+
+
+def test_contact_is_solved_beside_and_seen_in_colours(browser: Any, tmp_path: Path) -> None:
+    script = tmp_path / "plate.jld"
+    script.write_text(
+        "HAND LEFT BUILTIN RESOLUTION 1500\nFRAMES 0 10\nOBJECT PLATE BOX 0.036 0.006 0.036 AT 0.034 -0.0275 -0.165\n"
+        "MOVE LEFT 0 0 0.003 0\nMOVE LEFT 10 0 -0.0055 0\nFLESH LEFT INDEX ELEMENT 0.005\nPRESS 0 10 EVERY 5\n"
+    )
+    room = Room(opened(script, tmp_path / "out"), port=0)
+    page = browser.new_page(viewport={"width": 900, "height": 800})
+    try:
+        window = Window(page, room)
+        room.post(lambda: setattr(room.state, "frame", 10.0))
+        window.tab("Work")
+        window.press("PRESS: solve contact")
+        page.locator("#studio-verdict").wait_for(timeout=240_000)
+        assert room.state.pressed is not None
+        assert "kPa" in page.locator("#studio-verdict").inner_text()
+        eye, tip = (0.06, -0.11, -0.22), (0.034, -0.018, -0.162)  # at the pad, past the plate's edge
+        for client in room.server.get_clients().values():
+            client.camera.position, client.camera.look_at = eye, tip
+
+        def red() -> bool:
+            pixels = window.pixels()
+            return int(((pixels[..., 0] > 100) & (pixels[..., 1] < 0.6 * pixels[..., 0])).sum()) > 20
+
+        until(red, "pressure is seen on the pad")
+    finally:
+        page.close()
+        room.stop()
