@@ -54,9 +54,12 @@ def press(page: Any, room: Room) -> None:
     page.get_by_role("button", name="PRESS: solve contact").click()
     page.locator("#studio-verdict").wait_for(timeout=600_000)
     room.post(lambda: setattr(room.state, "frame", 20.0))
+    page.get_by_role("tab", name="Pose", exact=True).click()
+    page.get_by_label("Objects", exact=True).uncheck()
+    page.get_by_role("tab", name="Work", exact=True).click()
     for client in room.server.get_clients().values():
         with client.atomic():
-            client.camera.position, client.camera.look_at = (0.13, -0.13, -0.27), (0.03, -0.015, -0.15)
+            client.camera.position, client.camera.look_at = (0.07, -0.14, -0.24), (0.02, -0.015, -0.13)
 
 
 def main() -> None:

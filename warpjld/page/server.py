@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from warpjld.errors import MissingExtraError
+from warpjld.page.colored_glb import colored_glb
 from warpjld.page.guard import Guard, guarding
 
 __all__ = ["FIELD", "add_colored", "add_surface", "guarded_server", "look", "rgb", "stop"]
@@ -75,10 +76,7 @@ def add_colored(
     server: Any, name: str, vertices: NDArray[np.float32], faces: NDArray[np.int32], colors: NDArray[np.uint8]
 ) -> Any:
     """A surface with colours of its vertices; adding it again replaces it."""
-    import trimesh
-
-    mesh = trimesh.Trimesh(vertices, faces, vertex_colors=colors, process=False)
-    return server.scene.add_mesh_trimesh(name, mesh, cast_shadow=False, receive_shadow=False)
+    return server.scene.add_glb(name, colored_glb(vertices, faces, colors), cast_shadow=False, receive_shadow=False)
 
 
 def look(server: Any, points: NDArray[np.floating], direction: tuple[float, float, float] = (0.45, 0.75, 0.5)) -> None:

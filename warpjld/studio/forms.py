@@ -9,7 +9,8 @@ from warpjld.studio.syntax import Text, Way, ways_of
 
 __all__ = ["first_value", "known_names", "ways_of_command", "ways_of_macro"]
 
-_FRAME = ("key", "key1", "key2", "frame", "first", "last", "other key", "start", "stop")
+_FIRST, _LAST = ("key", "key1", "frame", "first", "start"), ("key2", "last", "other key", "stop")
+_LONG = 20.0  # frames from one to the other
 
 
 def ways_of_command(command: Command) -> tuple[Way, ...]:
@@ -40,5 +41,7 @@ def known_names(field: Text, scene: Scene) -> list[str]:
 
 
 def first_value(field: Text, frame: float) -> float:
-    """What a number is before it is typed: the frame that is shown, where it is a frame."""
-    return frame if field.label in _FRAME else 0.0
+    """What a number is before it is typed: the frame that is shown, where it is a frame, or one a while later."""
+    if field.label in _LAST:
+        return frame + _LONG
+    return frame if field.label in _FIRST else 0.0

@@ -83,13 +83,14 @@ class Way:
             match field:
                 case Keyword(word):
                     words.append(word)
-                case Choice(_, options, _, _):
+                case Choice(_, options, False, _):
                     words.append("/".join(options[:3]))
                 case Text(label, _, _, _, _):
                     words.append(f"<{label}>")
-                case Option():
-                    break
-        return " ".join(words[:4]) or "plain"
+                case Option(keyword, _):
+                    if keyword:
+                        words.append(f"[{keyword}]")
+        return " ".join(words[:6]) or "plain"
 
 
 def ways_of(name: str, syntax: str) -> tuple[Way, ...]:

@@ -29,7 +29,11 @@ class FormWindow:
 
     def __init__(self, room: Room, client: Any, name: str, about: str, ways: Sequence[Way]) -> None:
         self._room, self._gui, self._name = room, client.gui, name
-        self._ways = {way.title: way for way in ways}
+        named = [way.title for way in ways]
+        self._ways = {
+            title if named.count(title) == 1 else f"{title} ({k})": way
+            for k, (title, way) in enumerate(zip(named, ways, strict=True), start=1)
+        }
         self._controls: dict[tuple[int, ...], Any] = {}
         self._made: list[Any] = []
         self._modal = client.gui.add_modal(name)

@@ -30,14 +30,17 @@ class StagePanel:
         self.coloring.on_update(lambda event: room.by_hand(event, self._color, key="coloring"))
         self.style = gui.add_dropdown("Skin", ("shaded", "wire-frame", "x-ray"), initial_value="shaded")
         self.skeleton = gui.add_checkbox("Skeleton", False)
-        for control in (self.style, self.skeleton):
+        self.objects = gui.add_checkbox("Objects", True)
+        for control in (self.style, self.skeleton, self.objects):
             control.on_update(lambda event: room.by_hand(event, lambda: None, key="style"))
 
     def refresh(self) -> None:
         """Draw what changed."""
         if self.coloring.value != self._room.state.coloring:
             self.coloring.value = self._room.state.coloring
-        shown = {one.name: one for one in self._room.state.shown()}
+        things = self._room.state.scene.props
+        every = self._room.state.shown()
+        shown = {one.name: one for one in every if self.objects.value or one.name not in things}
         with self._room.server.atomic():
             for name in [*self._meshes]:
                 if name not in shown or _other_kind(shown[name], self._drawn[name]):
