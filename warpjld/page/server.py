@@ -103,4 +103,5 @@ def _light(server: Any) -> None:
     scene.configure_default_lights(False)
     scene.add_light_hemisphere("/light/sky", sky_color=(255, 252, 246), ground_color=(150, 140, 150), intensity=1.3)
     scene.add_light_directional("/light/lamp", intensity=2.4, position=(1.0, 2.0, 1.0))
+    scene.add_light_directional("/light/below", intensity=0.9, position=(0.5, -1.5, 0.5))
     scene.add_light_directional("/light/rim", intensity=0.5, position=(-1.5, 0.5, -1.0))
