@@ -152,7 +152,7 @@ def test_contact_is_solved_beside_and_seen_in_colours(browser: Any, tmp_path: Pa
         page.locator("#studio-verdict").wait_for(timeout=240_000)
         assert room.state.pressed is not None
         assert "kPa" in page.locator("#studio-verdict").inner_text()
-        eye, tip = (0.06, -0.11, -0.22), (0.034, -0.018, -0.162)  # at the pad, past the plate's edge
+        eye, tip = (0.06, -0.11, -0.22), (0.034, -0.018, -0.162)  # at the pad
         for client in room.server.get_clients().values():
             client.camera.position, client.camera.look_at = eye, tip
 
