@@ -16,7 +16,7 @@ from typing import Any
 from PIL import Image
 from playwright.sync_api import sync_playwright
 
-from warpjld.quiet import silence_warp
+from warpjld.runtime.quiet import silence_warp
 from warpjld.studio.opening import opened
 from warpjld.studio.room import Room
 

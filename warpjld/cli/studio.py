@@ -25,7 +25,7 @@ def command(
 ) -> None:
     """Open SCRIPT, or a rig, in a studio that is seen in the browser: pose, key, grasp, press. Files are read from the
     script's folder only. Ctrl-C ends it; what is not saved is kept beside the script and found again."""
-    from warpjld.quiet import silence_warp
+    from warpjld.runtime.quiet import silence_warp
     from warpjld.script.plugin import load_commands
     from warpjld.studio.opening import opened
     from warpjld.studio.room import Room

@@ -11,9 +11,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from warpjld.errors import InputError
+from warpjld.files.whole_file import whole_file
 from warpjld.page.guard import Guard
 from warpjld.page.server import add_colored, add_surface, guarded_server, look, stop
-from warpjld.whole_file import whole_file
 
 __all__ = ["PageRecording"]
 

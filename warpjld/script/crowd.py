@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from warpjld.script.outputs import Camera
+from warpjld.script.outputs import CameraSetting
 from warpjld.script.props import Prop
 from warpjld.script.scene import Actor
 from warpjld.script.staging import stage
@@ -177,14 +177,14 @@ class Crowd:
                 out[k] = found
         return out
 
-    def shift(self, camera: Camera, frame: int) -> NDArray[np.float64]:
+    def shift(self, camera: CameraSetting, frame: int) -> NDArray[np.float64]:
         """What to take off all positions at the frame of that place so that the camera goes along [m], shape (3,)."""
         if not camera.follow:
             return np.zeros(3)
         first = self.roles[0]
         return first.poses.positions[frame, 0] - first.covering.skeleton.rest[0]
 
-    def camera(self, camera: Camera, size: tuple[int, int]) -> RenderCamera:
+    def camera(self, camera: CameraSetting, size: tuple[int, int]) -> RenderCamera:
         """A camera for all frames; a named view is framed so that nothing leaves the picture."""
         from warpjld.render import Camera as RenderCamera
 
@@ -204,7 +204,7 @@ class Crowd:
         """Where to look from where no CAMERA was chosen."""
         return "three-quarter" if self._facing[2] else "front"
 
-    def _framing(self, camera: Camera) -> NDArray[np.float64]:
+    def _framing(self, camera: CameraSetting) -> NDArray[np.float64]:
         """Points that must be in every picture [m], shape (n, 3)."""
         count = len(self.frames)
         shifts = np.stack([self.shift(camera, frame) for frame in range(count)])

@@ -18,7 +18,7 @@ __all__ = [
     "PAGE",
     "PICTURES",
     "TABLES",
-    "VIEWS",
+    "VIEW_WORDS",
     "VOLUMES",
     "check_available",
     "video_is_available",
@@ -32,7 +32,7 @@ _VIDEO = FILMS[:3]
 PAGE = ".html"
 EXPORTS = tuple(FORMATS)
 MOTIONS = tuple(MOTION_OUT)
-VIEWS = tuple(name.upper() for name in _VIEWS)
+VIEW_WORDS = tuple(name.upper() for name in _VIEWS)
 
 
 def video_is_available() -> bool:

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from warpjld.page.recording import PageRecording
 from warpjld.render.style import Style
 from warpjld.script.crowd import Crowd
-from warpjld.script.outputs import Film
+from warpjld.script.outputs import FilmOutput
 from warpjld.script.pressure import PressureView
 from warpjld.script.scene import Scene
 
@@ -22,7 +22,7 @@ __all__ = ["PageStudio", "page_studio"]
 class PageStudio:
     """Takes frame after frame of a page."""
 
-    def __init__(self, crowd: Crowd, film: Film, page: PageRecording) -> None:
+    def __init__(self, crowd: Crowd, film: FilmOutput, page: PageRecording) -> None:
         self._crowd, self._film, self._page = crowd, film, page
         self._view = PressureView(crowd, film.only, film.digits) if film.style == "pressure" else None
 
@@ -43,7 +43,7 @@ class PageStudio:
 
 
 @contextmanager
-def page_studio(scene: Scene, crowd: Crowd, film: Film, path: Path) -> Iterator[PageStudio]:
+def page_studio(scene: Scene, crowd: Crowd, film: FilmOutput, path: Path) -> Iterator[PageStudio]:
     """A page being made."""
     with PageRecording(path, rate=scene.rate) as page:
         yield PageStudio(crowd, film, page)

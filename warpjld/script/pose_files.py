@@ -15,11 +15,11 @@ from pathlib import Path
 import numpy as np
 
 from warpjld.errors import InputError
+from warpjld.files.text_file import read_text
+from warpjld.files.whole_file import whole_file
 from warpjld.script.scene import Actor
 from warpjld.skeleton import CHANNELS, DIGITS
 from warpjld.suggest import one_of
-from warpjld.text_file import read_text
-from warpjld.whole_file import whole_file
 
 __all__ = ["SHIPPED", "hand_channels", "load_pose", "save_pose", "shipped_pose"]
 

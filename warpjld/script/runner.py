@@ -15,9 +15,9 @@ from numpy.typing import NDArray
 from warpjld import render
 from warpjld.covering.device import checked_device
 from warpjld.errors import InputError, WarpjldError
+from warpjld.files.names import folded
+from warpjld.files.overwriting import check_outputs
 from warpjld.motion.out import check_motion_out
-from warpjld.names import folded
-from warpjld.overwriting import check_outputs
 from warpjld.script.contact import check_contact, run_contact, write_contact
 from warpjld.script.crowd import Crowd, role_of
 from warpjld.script.destinations import check_destinations
@@ -26,7 +26,7 @@ from warpjld.script.folder import OutputFolder
 from warpjld.script.formats import PAGE, check_available, video_is_available
 from warpjld.script.grasping import contact_reports
 from warpjld.script.motion_files import write_motions
-from warpjld.script.outputs import ContactSheet, Export, Film, Grips, MotionFile, Output, Picture, Table
+from warpjld.script.outputs import ContactSheet, Export, FilmOutput, Grips, MotionFile, Output, Picture, Table
 from warpjld.script.page_film import PageStudio, page_studio
 from warpjld.script.per_actor import actors_of, file_of
 from warpjld.script.pictures import FilmStudio, PressureStudio, draw_contact_sheet, draw_picture, film_studio
@@ -37,8 +37,8 @@ from warpjld.script.summary import Summary
 from warpjld.simulation.specification import located
 
 if TYPE_CHECKING:
+    from warpjld.geometry.surface import Surface
     from warpjld.io.caches import Cache
-    from warpjld.surface import Surface
 
 __all__ = ["Report", "cast", "run_scene"]
 
@@ -87,12 +87,12 @@ def run_scene(
     if not outputs:
         outputs = [Export("surface.npz", None), ContactSheet("contact.png", (), scene.camera)]
         video = video_is_available()
-        outputs.insert(1, Film("film.mp4" if video else "film.gif", "shaded", scene.camera))
+        outputs.insert(1, FilmOutput("film.mp4" if video else "film.gif", "shaded", scene.camera))
         if not video:
             summary.notes.append("the film is a GIF; for MP4: pip install 'warpjld[film]'")
     if page:
         name = "film.html" if script is None else f"{script.stem}.html"
-        outputs.append(Film(name, "shaded" if scene.contact.pressing is None else "pressure", scene.camera))
+        outputs.append(FilmOutput(name, "shaded" if scene.contact.pressing is None else "pressure", scene.camera))
     if scene.contact.pressing is not None and not any(isinstance(output, Table) for output in outputs):
         outputs.append(Table("contact.csv"))
     if scene.contact.pressing is not None and scene.contact.grips:
@@ -215,13 +215,13 @@ def _make_sequences(
         timing: dict[str, Any] = {"frames": len(frames), "rate": scene.rate, "start_frame": int(frames[0])}
         return Writer(name, place, lambda: open_cache(place, surface, name=label.lower(), **timing), failures)
 
-    def studio_of(film: Film) -> Writer[Studio]:
+    def studio_of(film: FilmOutput) -> Writer[Studio]:
         place = out.place(film.name)
         begin = page_studio if film.name.lower().endswith(PAGE) else film_studio
         return Writer(film.name, place, lambda: begin(scene, crowd, film, place), failures)
 
     exports = [output for output in outputs if isinstance(output, Export)]
-    films = [output for output in outputs if isinstance(output, Film)]
+    films = [output for output in outputs if isinstance(output, FilmOutput)]
     if not exports and not films:
         return
     with ExitStack() as stack:
@@ -285,7 +285,7 @@ def _check_lengths(scene: Scene, outputs: Sequence[Output], frames: int) -> None
 
     for output in outputs:
         try:
-            if isinstance(output, Film) and not output.name.lower().endswith(PAGE):
+            if isinstance(output, FilmOutput) and not output.name.lower().endswith(PAGE):
                 render.Film(output.name, rate=scene.rate)
             for actor in actors_of(output, scene) if isinstance(output, Export) else ():
                 open_cache(output.name, actor.rig.surface, frames=frames, rate=scene.rate)

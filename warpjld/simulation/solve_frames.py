@@ -8,7 +8,7 @@ from functools import partial
 
 import numpy as np
 
-from warpjld.fem import Instant, Solution, Status, solve
+from warpjld.fem import Instant, Solution, SolveStatus, solve
 from warpjld.fem.contact import ContactInstant, ContactSolution
 from warpjld.simulation.animation import AngleEdit
 from warpjld.simulation.bodies.deformable_body import History
@@ -68,7 +68,7 @@ class SolveResult:
         equilibria: Of each frame that this run solved, by its number: what it can be differentiated from.
     """
 
-    status: Status
+    status: SolveStatus
     message: str
     model: ContactModel
     frames: tuple[SolvedFrame, ...] = ()
@@ -116,7 +116,7 @@ def solve_frames(
         run.resume(found)
         for solved in found.frames:
             if reason := watch(run.model, solved):
-                return run.ended(Status.STOPPED, reason)
+                return run.ended(SolveStatus.STOPPED, reason)
     if not model.pairs:
         return _untouched(model, frames, watch, progress)
     for frame in frames[len(run.done) :]:
@@ -127,14 +127,14 @@ def solve_frames(
         if checkpoint is not None and run.last is not None:
             checkpoint.save(run.done, run.last, run.edits, run.limits.content())
         if reason := watch(run.model, run.done[-1]):
-            return run.ended(Status.STOPPED, reason)
+            return run.ended(SolveStatus.STOPPED, reason)
         for grip in contact.grips:
             if grip.first == frame:
                 progress(f"looking for a grip, frame {frame:g}", len(run.done), len(frames))
                 searched = run.find(grip, partial(_tell, progress, frame, len(run.done), len(frames)))
                 if searched.interrupted:
-                    return run.ended(Status.STOPPED, f"at frame {frame:g}: {searched.text}")
-    return run.ended(Status.CONVERGED, Status.CONVERGED.value)
+                    return run.ended(SolveStatus.STOPPED, f"at frame {frame:g}: {searched.text}")
+    return run.ended(SolveStatus.CONVERGED, SolveStatus.CONVERGED.value)
 
 
 @dataclass(eq=False)
@@ -181,12 +181,12 @@ class _Run:
             try:
                 solution = self.limits.solve(model, self.history, before, steps)
             except BoneInsideError as error:
-                return self.ended(Status.BLOCKED, str(error))
+                return self.ended(SolveStatus.BLOCKED, str(error))
             driven = self.limits.driven(model)
         else:
             driven = model
             if (inside := self._bone_inside(model, steps)) is not None:
-                return self.ended(Status.BLOCKED, inside)
+                return self.ended(SolveStatus.BLOCKED, inside)
             solution = solve_onward(
                 model, self.history, before, steps, method=self.request.method, aitken=self.request.aitken
             )
@@ -232,7 +232,7 @@ class _Run:
             self.model = replace(self.model, objects=tuple(objects))
         return found
 
-    def ended(self, status: Status, message: str) -> SolveResult:
+    def ended(self, status: SolveStatus, message: str) -> SolveResult:
         """All of it."""
         return SolveResult(
             status,
@@ -273,7 +273,7 @@ def _untouched(model: ContactModel, frames: Sequence[float], watch: Watch, progr
     done: list[SolvedFrame] = []
     nothing, history = np.zeros_like(model.body.mesh.nodes), History()
     rest = Instant(1.0, nothing, nothing, 0, 0, 0.0)
-    after, before = Solution(Status.CONVERGED, (rest,), "", np.empty(0, np.int64), model.loads), 0.0
+    after, before = Solution(SolveStatus.CONVERGED, (rest,), "", np.empty(0, np.int64), model.loads), 0.0
     for frame in frames:
         progress(f"frame {frame:g}", len(done), len(frames))
         time = frame - model.start
@@ -289,5 +289,5 @@ def _untouched(model: ContactModel, frames: Sequence[float], watch: Watch, progr
         )
         done.append(solved_frame(float(frame), [instant]))
         if reason := watch(model, done[-1]):
-            return SolveResult(Status.STOPPED, reason, model, tuple(done))
-    return SolveResult(Status.CONVERGED, Status.CONVERGED.value, model, tuple(done))
+            return SolveResult(SolveStatus.STOPPED, reason, model, tuple(done))
+    return SolveResult(SolveStatus.CONVERGED, SolveStatus.CONVERGED.value, model, tuple(done))

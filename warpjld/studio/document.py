@@ -7,8 +7,8 @@ from collections.abc import Callable, Hashable
 from dataclasses import dataclass
 from pathlib import Path
 
-from warpjld.text_file import read_text
-from warpjld.whole_file import whole_file
+from warpjld.files.text_file import read_text
+from warpjld.files.whole_file import whole_file
 
 __all__ = ["Document"]
 

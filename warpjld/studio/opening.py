@@ -6,9 +6,9 @@ from contextlib import suppress
 from pathlib import Path
 
 from warpjld.errors import InputError, WarpjldError
+from warpjld.files.text_file import read_text
 from warpjld.studio.document import Document
 from warpjld.studio.state import StudioState
-from warpjld.text_file import read_text
 
 __all__ = ["opened"]
 

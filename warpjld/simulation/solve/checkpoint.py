@@ -12,14 +12,14 @@ from typing import Any
 import numpy as np
 
 from warpjld.errors import InputError
-from warpjld.fem import Loads, Status
+from warpjld.fem import Loads, SolveStatus
 from warpjld.fem.contact import ContactInstant, ContactSolution
 from warpjld.fem.contact.law.contact_state import ContactState
 from warpjld.fem.contact.results.nodal_contact import NodalContact
+from warpjld.files.whole_file import whole_file
 from warpjld.simulation.animation import AngleEdit
 from warpjld.simulation.solve.identity import differences
 from warpjld.simulation.solve.solved_frame import SolvedFrame
-from warpjld.whole_file import whole_file
 
 __all__ = ["Checkpoint", "CheckpointFile", "load_checkpoint", "save_checkpoint"]
 
@@ -151,5 +151,5 @@ def load_checkpoint(path: Path) -> Checkpoint:
         raise InputError(f"no state of a contact solve: {error}", path=path) from error
     last = frames[-1]
     instant = ContactInstant(time, last.displacement, last.reactions, (), last.solves, 0, 0.0)
-    solution = ContactSolution(Status.CONVERGED, (instant,), "", memory, (), Loads(), correction_rate)
+    solution = ContactSolution(SolveStatus.CONVERGED, (instant,), "", memory, (), Loads(), correction_rate)
     return Checkpoint(identity, tuple(frames), solution, edits, limits)

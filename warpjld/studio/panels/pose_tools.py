@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from warpjld.errors import InputError
-from warpjld.names import check_name
+from warpjld.files.names import check_name
 from warpjld.script.pose_files import SHIPPED, hand_channels, save_pose
 from warpjld.studio.hand_pose import COARSE, coarse_angles, coarse_share, mixed, of_side, on_side
 from warpjld.studio.key_lines import number

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from warpjld.errors import InputError
-from warpjld.names import check_name
+from warpjld.files.names import check_name
 from warpjld.studio.background import Background, Progress
 from warpjld.studio.document import Document
 from warpjld.studio.making import made, pressed
