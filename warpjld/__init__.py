@@ -31,6 +31,7 @@ if TYPE_CHECKING:
     from warpjld.motion import Motion, load_motion
     from warpjld.rig import Rig
     from warpjld.script import Arguments, Scene, command
+    from warpjld.script.menus import menu
     from warpjld.script.run_script import run_script
     from warpjld.simulation.recorded import RecordedActor, RecordedAnimation, RecordedObject
     from warpjld.simulation.simulate import simulate
@@ -96,6 +97,7 @@ _WHERE = {
     # scripts and studies
     "run_script": "script.run_script",
     "command": "script",
+    "menu": "script.menus",
     "Scene": "script",
     "Arguments": "script",
     "Study": "study.grasping",
@@ -151,6 +153,7 @@ __all__ = [
     "load_parameters",
     "load_rig",
     "make_object",
+    "menu",
     "open_cache",
     "poses_from_angles",
     "propose_points",

@@ -25,6 +25,7 @@ _TRACEBACK = "WARPJLD_TRACEBACK"
 _COMMANDS = {
     "run": "Run a script: animation, grasping, contact; pictures, films, exports.",
     "shell": "Type a script's commands one by one and look at the result.",
+    "studio": "Pose, key, grasp and press in the browser, and see it.",
     "example": "List, run or copy the examples that come with the package.",
     "inspect": "Report what was recognised in a rig.",
     "place": "Propose the named points of a body or hand in a bare surface.",

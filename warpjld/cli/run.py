@@ -19,6 +19,7 @@ __all__ = ["run_command"]
 @options.threads
 @options.commands
 @click.option("--check", is_flag=True, help="Read the script and say what it would make; compute nothing.")
+@click.option("--html", is_flag=True, help="Make a page (HTML) too, in which the animation is turned with the mouse.")
 @options.json
 @options.quiet
 def run_command(
@@ -28,6 +29,7 @@ def run_command(
     threads: int | None,
     commands: tuple[Path, ...],
     check: bool,
+    html: bool,
     as_json: bool,
     quiet: bool,
 ) -> None:
@@ -46,7 +48,15 @@ def run_command(
 
     with progress(quiet) as report:
         summary = run_script(
-            script, out, commands=commands, check=check, device=device, threads=threads, say=say, progress=report
+            script,
+            out,
+            commands=commands,
+            check=check,
+            page=html,
+            device=device,
+            threads=threads,
+            say=say,
+            progress=report,
         )
     if as_json:
         answer(summary)

@@ -48,6 +48,11 @@ class Track:
         self._keys[key.frame] = key
         self._spline = None
 
+    def remove(self, frame: float) -> None:
+        """Forget the key at a frame, if there is one."""
+        self._keys.pop(frame, None)
+        self._spline = None
+
     @property
     def keys(self) -> tuple[Key, ...]:
         """The keys, frames increasing."""

@@ -244,6 +244,8 @@ class Arguments:
         script = Path(self.last.path)
         folder = Path() if self.last.path.startswith("<") else script.parent
         path = folder / expanded(name)
+        if not self.interpreter.scene.may_read(path):
+            raise self.error(f"'{name}' is outside the folder of this script, and nothing there may be read from here")
         if not path.is_file():
             if path.is_dir():
                 raise self.error(f"'{path}' is a folder; want a file")

@@ -15,6 +15,7 @@ __all__ = [
     "EXPORTS",
     "FILMS",
     "MOTIONS",
+    "PAGE",
     "PICTURES",
     "TABLES",
     "VIEW_WORDS",
@@ -26,8 +27,9 @@ __all__ = [
 PICTURES = (".png",)
 TABLES = (".csv", ".parquet")
 VOLUMES = (".pvd",)
-FILMS = (".mp4", ".mov", ".mkv", ".gif", ".webp")
+FILMS = (".mp4", ".mov", ".mkv", ".gif", ".webp", ".html")
 _VIDEO = FILMS[:3]
+PAGE = ".html"
 EXPORTS = tuple(FORMATS)
 MOTIONS = tuple(MOTION_OUT)
 VIEW_WORDS = tuple(name.upper() for name in _VIEWS)
@@ -44,6 +46,8 @@ def check_available(names: Iterable[str]) -> None:
         suffix = PurePosixPath(name).suffix.lower()
         if suffix in _VIDEO and not video_is_available():
             raise MissingExtraError(f"the film '{name}'", "film")
+        if suffix == PAGE and find_spec("viser") is None:
+            raise MissingExtraError(f"the page '{name}'", "studio")
         if suffix == ".parquet" and find_spec("pyarrow") is None:
             raise MissingExtraError(f"the table '{name}'", "study")
         if suffix in (".usd", ".usda", ".usdc") and find_spec("pxr") is None:

@@ -104,7 +104,7 @@ class Interpreter:
     def _macro_names(self, nodes: Sequence[Node], seen: set[Path]) -> set[str]:
         """Macros that these statements and the files they include define."""
         names = {node.name.text.upper() for node in nodes if isinstance(node, MacroDefinition)}
-        for path, position in _includes(nodes):
+        for path, position in self._includes(nodes):
             self._refuse_cycle(path, position)
             if path.resolve() in seen:
                 continue
@@ -118,12 +118,15 @@ class Interpreter:
         for node in nodes:
             for statement in node.body if isinstance(node, MacroDefinition) else (node,):
                 self._check_name(statement.name, macros)
-        for path, _ in _includes(nodes):
+        for path, _ in self._includes(nodes):
             if path.resolve() in seen:
                 continue
             seen.add(path.resolve())
             with self._inside(path):
                 self._check(self._read(path), macros, seen)
+
+    def _includes(self, nodes: Sequence[Node]) -> Iterator[tuple[Path, Position]]:
+        return ((path, position) for path, position in _includes(nodes) if self.scene.may_read(path))
 
     def _check_name(self, word: Word, macros: set[str]) -> None:
         name = word.text.upper()

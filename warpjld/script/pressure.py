@@ -13,6 +13,7 @@ from warpjld.simulation.display.refine import RefinedSurface, refine_surface
 
 if TYPE_CHECKING:
     from warpjld.script.crowd import Crowd
+    from warpjld.script.props import Prop
 
 __all__ = ["PressureView"]
 
@@ -61,6 +62,21 @@ class PressureView:
         title = "contact pressure, kPa"
         self._scale = render.ColorScale(0.0, highest, title, _COLORS, factor=1e-3, highest=True)
 
+    @property
+    def faces(self) -> NDArray[np.int32]:
+        """Triangles of what is coloured, over the vertices that ``at`` gives, shape (T, 3)."""
+        return self._faces
+
+    @property
+    def scale(self) -> render.ColorScale:
+        """Colours of pressures [Pa]."""
+        return self._scale
+
+    @property
+    def plain(self) -> list[Prop]:
+        """Objects that are shown in their own colour."""
+        return [self.crowd.props[k] for k in self._plain]
+
     def stage(
         self,
         camera: render.Camera,
@@ -69,10 +85,9 @@ class PressureView:
         shift: NDArray[np.float64] | float,
     ) -> render.SceneRenderer:
         """A window to draw in."""
-        props = [self.crowd.props[k] for k in self._plain]
         solids = [
             render.Solid(vertices - shift, prop.thing.faces, color=prop.color)
-            for prop, vertices in zip(props, self.others(0), strict=True)
+            for prop, vertices in zip(self.plain, self.others(0), strict=True)
         ]
         return render.SceneRenderer(self._faces, camera, size=size, solids=solids, scale=self._scale, quality=quality)
 

@@ -25,7 +25,17 @@ if TYPE_CHECKING:
     from warpjld.script.arguments import Arguments
     from warpjld.script.scene import Scene
 
-__all__ = ["GROUPS", "NOTES", "RESERVED", "Command", "Registry", "all_commands", "command", "commands_table"]
+__all__ = [
+    "GROUPS",
+    "NOTES",
+    "RESERVED",
+    "Command",
+    "Function",
+    "Registry",
+    "all_commands",
+    "command",
+    "commands_table",
+]
 
 ENTRY_POINTS = "warpjld.commands"
 GROUPS = ("Actors", "Animation", "Grasping", "Contact", "Covering", "Output", "Flow")
@@ -59,6 +69,8 @@ RESERVED = (
 _BUILT_IN = (
     "actors",
     "animation",
+    "key_editing",
+    "posing",
     "objects",
     "grasping",
     "reaching",

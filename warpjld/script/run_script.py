@@ -20,6 +20,7 @@ def run_script(
     *,
     commands: Sequence[str | Path] = (),
     check: bool = False,
+    page: bool = False,
     device: str = "cpu",
     threads: int | None = None,
     say: Callable[[str], None] = print,
@@ -33,6 +34,7 @@ def run_script(
         out: Output folder; made if missing. Files appear in it when all that can be made are complete.
         commands: Python files that add commands (see ``command``).
         check: Read the script and say what it would make; compute and write nothing.
+        page: Make a page (HTML) of the animation, too: it plays, and is turned with the mouse, in any browser.
         device: Warp device.
         threads: CPU threads; None for as many as pay.
         say: Where PRINT and SHOW write.
@@ -64,4 +66,6 @@ def run_script(
     folder, file = Path(out), Path(script)
     scene = Scene(folder=folder, say=say, dry=check, device=device)
     Interpreter(scene).run_file(file)
-    return run_scene(scene, folder, script=file, device=device, threads=threads, dry=check, progress=progress)
+    return run_scene(
+        scene, folder, script=file, device=device, threads=threads, dry=check, page=page, progress=progress
+    )

@@ -24,10 +24,11 @@ from warpjld.script.destinations import check_destinations
 from warpjld.script.directing import shot_at
 from warpjld.script.failures import Failures, Writer
 from warpjld.script.folder import OutputFolder
-from warpjld.script.formats import check_available, video_is_available
+from warpjld.script.formats import PAGE, check_available, video_is_available
 from warpjld.script.grasping import contact_reports
 from warpjld.script.motion_files import write_motions
 from warpjld.script.outputs import ContactSheet, Export, FilmOutput, Grips, MotionFile, Output, Picture, Table
+from warpjld.script.page_film import PageStudio, page_studio
 from warpjld.script.per_actor import actors_of, file_of
 from warpjld.script.pictures import FilmStudio, PressureStudio, draw_contact_sheet, draw_picture, film_studio
 from warpjld.script.props import Prop, prop_places, prop_surface
@@ -44,6 +45,7 @@ __all__ = ["Report", "cast", "run_scene"]
 
 _BLOCK = 16  # frames deformed at once: memory does not grow with the length of the film
 
+Studio = FilmStudio | PressureStudio | PageStudio
 Report = Callable[[str, int, int], None]
 """Called with what is being done, how much of it is done, and how much there is."""
 
@@ -56,6 +58,7 @@ def run_scene(
     device: str = "cpu",
     threads: int | None = None,
     dry: bool = False,
+    page: bool = False,
     progress: Report = lambda what, done, total: None,
 ) -> dict[str, Any]:
     """Make everything a scene asks for; if it asks for nothing, an animated surface, a film and a contact sheet.
@@ -67,6 +70,7 @@ def run_scene(
         device: Warp device of the covering.
         threads: CPU threads of the covering; None leaves the choice to it.
         dry: Check everything that can be checked, but compute and write nothing.
+        page: Make a page (HTML) of the animation, too, in the colours of pressure where contact is solved.
         progress: Told about the work as it goes.
 
     Returns:
@@ -81,7 +85,7 @@ def run_scene(
         scene.actor()  # says what to do where there is none
     frames = frame_numbers(scene)
     summary = Summary(scene, frames, script, device)
-    outputs = _wanted(scene, summary)
+    outputs = _wanted(scene, summary, page, script)
     checked_device(device)
     _check_outputs(scene, outputs, folder, script, len(frames))
     summary.notes += check_contact(scene, outputs, frames)
@@ -135,7 +139,7 @@ def run_scene(
     return content
 
 
-def _wanted(scene: Scene, summary: Summary) -> list[Output]:
+def _wanted(scene: Scene, summary: Summary, page: bool, script: Path | None) -> list[Output]:
     """What was asked for, or what a run makes by itself; tables of contact always."""
     outputs = list(scene.outputs)
     if not outputs:
@@ -144,6 +148,9 @@ def _wanted(scene: Scene, summary: Summary) -> list[Output]:
         outputs.insert(1, FilmOutput("film.mp4" if video else "film.gif", "shaded", scene.camera))
         if not video:
             summary.notes.append("the film is a GIF; for MP4: pip install 'warpjld[film]'")
+    if page:
+        name = "film.html" if script is None else f"{script.stem}.html"
+        outputs.append(FilmOutput(name, "shaded" if scene.contact.pressing is None else "pressure", scene.camera))
     if scene.contact.pressing is not None and not any(isinstance(output, Table) for output in outputs):
         outputs.append(Table("contact.csv"))
     if scene.contact.pressing is not None and scene.contact.grips:
@@ -221,9 +228,10 @@ def _make_sequences(
         timing: dict[str, Any] = {"frames": len(frames), "rate": scene.rate, "start_frame": int(frames[0])}
         return Writer(name, place, lambda: open_cache(place, surface, name=label.lower(), **timing), failures)
 
-    def studio_of(film: FilmOutput) -> Writer[FilmStudio | PressureStudio]:
+    def studio_of(film: FilmOutput) -> Writer[Studio]:
         place = out.place(film.name)
-        return Writer(film.name, place, lambda: film_studio(scene, crowd, film, place), failures)
+        begin = page_studio if film.name.lower().endswith(PAGE) else film_studio
+        return Writer(film.name, place, lambda: begin(scene, crowd, film, place), failures)
 
     exports = [output for output in outputs if isinstance(output, Export)]
     films = [output for output in outputs if isinstance(output, FilmOutput)]
@@ -289,7 +297,7 @@ def _write(cache: Cache, vertices: NDArray[np.float32]) -> None:
     cache.write(vertices)
 
 
-def _take(studio: FilmStudio | PressureStudio, frame: int, vertices: NDArray[np.float32]) -> None:
+def _take(studio: Studio, frame: int, vertices: NDArray[np.float32]) -> None:
     studio.take(frame, vertices)
 
 
@@ -299,7 +307,7 @@ def _check_lengths(scene: Scene, outputs: Sequence[Output], frames: int) -> None
 
     for output in outputs:
         try:
-            if isinstance(output, FilmOutput):
+            if isinstance(output, FilmOutput) and not output.name.lower().endswith(PAGE):
                 render.Film(output.name, rate=scene.rate)
                 if output.shots and not any(shot_at(output.shots, frame) for frame in frame_numbers(scene)):
                     raise InputError("none of its shots has a frame that is made: see FRAMES")

@@ -132,6 +132,7 @@ class Scene:
         folder: The output folder.
         dry: Whether searches only leave their keys, without angles: what ``--check`` does.
         read: Files that were read, which no output may take the place of.
+        within: Folders that files may be read from; None for anywhere.
         say: Where PRINT and SHOW write.
         warn: Told what is probably wrong with a rig or a motion, as it is met; ``warnings`` keeps it for the summary.
         device: Warp device of searches.
@@ -166,6 +167,7 @@ class Scene:
     folder: Path = Path("out")
     dry: bool = False
     read: list[Path] = field(default_factory=list)
+    within: tuple[Path, ...] | None = None
     say: Callable[[str], None] = print
     warn: Callable[[str], None] = _to_stderr
     warnings: list[str] = field(default_factory=list)
@@ -182,6 +184,10 @@ class Scene:
         for line in lines:
             self.warnings.append(line)
             self.warn(line)
+
+    def may_read(self, path: Path) -> bool:
+        """Whether a file lies in a folder that files may be read from."""
+        return self.within is None or any(path.resolve().is_relative_to(allowed) for allowed in self.within)
 
     def add(self, name: str, rig: Rig) -> Actor:
         """Bring a rig on stage; it becomes the current actor.

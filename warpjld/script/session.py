@@ -2,18 +2,17 @@
 
 from __future__ import annotations
 
-import copy
 from collections.abc import Callable
-from dataclasses import dataclass
 from pathlib import Path
 
 from warpjld.errors import InputError
 from warpjld.files.names import expanded
 from warpjld.files.whole_file import whole_file
 from warpjld.script.interpreter import Interpreter
+from warpjld.script.moment import Moment, moment_of
 from warpjld.script.parser import UnfinishedError, parse, parse_file
 from warpjld.script.scene import Scene
-from warpjld.script.statements import MacroDefinition, Node, Statement, Text
+from warpjld.script.statements import Node, Statement, Text
 from warpjld.skeleton import CHANNELS, DIGITS
 
 __all__ = ["AUTOSAVED", "Session"]
@@ -21,14 +20,6 @@ __all__ = ["AUTOSAVED", "Session"]
 AUTOSAVED = "autosaved.jld"
 
 _OWN = ("RUN", "SAVE", "UNDO", "QUIT", "EXIT")
-
-
-@dataclass(frozen=True, eq=False)
-class _Moment:
-    """A scene and its macros before a line was typed."""
-
-    scene: Scene
-    macros: dict[str, MacroDefinition]
 
 
 class Session:
@@ -54,7 +45,7 @@ class Session:
         self._folder, self._say = folder, say
         self._script: Path | None = None
         self._kept: list[str] = []
-        self._before: list[_Moment] = []
+        self._before: list[Moment] = []
         self._pending: list[str] = []
         self._typed = 0
         self._start()
@@ -112,7 +103,7 @@ class Session:
         if nodes and _only_looks(nodes):
             self._interpreter.execute(nodes, None)
         elif nodes:
-            moment = self._moment()
+            moment = moment_of(self._interpreter)
             try:
                 self._interpreter.execute(nodes, None)
             except BaseException:  # whatever of the line has happened is taken back
@@ -190,20 +181,9 @@ class Session:
         self._back_to(self._before.pop())
         self._say(f"forgotten: {gone}")
 
-    def _moment(self) -> _Moment:
-        """The scene as it is now: rigs, bound surfaces and objects, which nothing changes, are not copied."""
-        scene = self.scene
-        fixed: list[object] = [scene.say, scene.warn]
-        for actor in scene.actors.values():
-            fixed += [actor.rig, actor.skeleton, actor.parameters, actor.covering, actor.recorded]
-        for prop in scene.props.values():
-            fixed += [prop.thing, prop.shapes]
-        return _Moment(copy.deepcopy(scene, {id(one): one for one in fixed}), dict(self._interpreter.macros))
-
-    def _back_to(self, moment: _Moment) -> None:
+    def _back_to(self, moment: Moment) -> None:
+        self._interpreter = moment.resume()
         self.scene = moment.scene
-        self._interpreter = Interpreter(self.scene)
-        self._interpreter.macros = dict(moment.macros)
 
 
 def _only_looks(nodes: tuple[Node, ...]) -> bool:

@@ -1,0 +1,158 @@
+"""A studio and a real browser, once for all tests of a session."""
+
+from __future__ import annotations
+
+import os
+import re
+import shutil
+import time
+from collections.abc import Callable, Iterator
+from io import BytesIO
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from PIL import Image
+
+from warpjld.studio.opening import opened
+from warpjld.studio.room import Room
+
+_FLAGS = [
+    "--headless=new",
+    "--no-sandbox",
+    "--use-gl=angle",
+    "--use-angle=swiftshader",
+    "--enable-unsafe-swiftshader",
+    "--disable-quic",
+    "--no-first-run",
+    "--disable-background-networking",
+    "--disable-component-update",
+    "--disable-sync",
+]
+
+
+@pytest.fixture(scope="session")
+def browser() -> Iterator[Any]:
+    """Chromium with WebGL in software; tests that want it are skipped where there is none."""
+    api = pytest.importorskip("playwright.sync_api", reason="playwright is not installed")
+    found = os.environ.get("WARPJLD_CHROMIUM") or shutil.which("chromium") or shutil.which("chromium-browser")
+    if found is None:
+        pytest.skip("there is no chromium on this machine")
+    with api.sync_playwright() as playwright:
+        chromium = playwright.chromium.launch(executable_path=found, args=_FLAGS)
+        yield chromium
+        chromium.close()
+
+
+@pytest.fixture(autouse=True)
+def kept(monkeypatch: pytest.MonkeyPatch, tmp_path_factory: pytest.TempPathFactory) -> None:
+    """The hand is built, and bound, once for all of these tests."""
+    folder = tmp_path_factory.getbasetemp() / "kept"
+    folder.mkdir(exist_ok=True)
+    monkeypatch.setenv("WARPJLD_CACHE", str(folder))
+
+
+@pytest.fixture
+def script(tmp_path: Path) -> Path:
+    """A small hand, and a key."""
+    path = tmp_path / "wave.jld"
+    path.write_text("HAND LEFT BUILTIN RESOLUTION 1500\nJOINT left.index.base FLEXION AT 0 0\n")
+    return path
+
+
+@pytest.fixture
+def room(script: Path, kept: None) -> Iterator[Room]:
+    """A studio with that script."""
+    pytest.importorskip("viser", reason="viser is not installed")
+    made = Room(opened(script, script.parent / "out"), port=0)
+    yield made
+    made.stop()
+
+
+class Window:
+    """A page of a studio in the browser."""
+
+    def __init__(self, page: Any, room: Room) -> None:
+        self.page, self.room = page, room
+        page.set_default_timeout(60_000)  # a machine that does much else beside is no fault
+        page.goto(room.address)
+        self._drawn()
+
+    def reload(self) -> None:
+        """Load the page anew."""
+        self.page.reload()
+        self._drawn()
+
+    def _drawn(self) -> None:
+        # the hint that WebGL is computed in software comes and goes over the canvas
+        self.page.add_style_tag(content=".mantine-Notifications-root, .mantine-Notification-root {display: none}")
+        self.page.get_by_text("Joints", exact=True).wait_for()
+        until(lambda: self.skin() > 1000, "the hand is drawn")
+
+    def pixels(self) -> np.ndarray:
+        """The canvas, shape (H, W, 3)."""
+        shot = self.page.locator("canvas").first.screenshot()
+        return np.asarray(Image.open(BytesIO(shot)).convert("RGB"), np.int16)
+
+    def still(self) -> np.ndarray:
+        """The canvas when all that was asked for is drawn."""
+        assert self.room.worker.settle()
+        seen = [self.pixels()]
+
+        def same() -> bool:
+            seen.append(self.pixels())
+            return bool(np.array_equal(seen[-1], seen[-2]))
+
+        until(same, "the canvas is still")
+        return seen[-1]
+
+    def skin(self) -> int:
+        """How many pixels are reddish, as skin is."""
+        pixels = self.pixels()
+        return int((pixels[..., 0] > pixels[..., 2] + 15).sum())
+
+    def changed(self, before: np.ndarray) -> int:
+        """How many pixels differ clearly from those."""
+        return int((np.abs(self.pixels() - before).max(axis=-1) > 20).sum())
+
+    def control(self, label: str) -> Any:
+        """The control with that label, in an open folder."""
+        name = self.page.locator("label", has_text=re.compile(f"^{label}$")).locator("visible=true").first
+        return self.page.locator(f'[id="{name.get_attribute("for")}"]')
+
+    def drag_slider(self, label: str, share: float) -> float:
+        """Drag a slider with the mouse to a share of its way; the value it shows then."""
+        control = self.control(label)
+        control.scroll_into_view_if_needed()
+        thumb, track = control.get_by_role("slider"), control.locator(".mantine-Slider-track")
+        here, way = thumb.bounding_box(), track.bounding_box()
+        mouse = self.page.mouse
+        mouse.move(here["x"] + here["width"] / 2, here["y"] + here["height"] / 2)
+        mouse.down()
+        mouse.move(way["x"] + share * way["width"], way["y"] + way["height"] / 2, steps=8)
+        mouse.up()
+        return float(thumb.get_attribute("aria-valuenow"))
+
+    def press(self, name: str) -> None:
+        """Press a button."""
+        self.page.get_by_role("button", name=name, exact=True).first.click()
+
+    def tab(self, name: str) -> None:
+        """Show a tab."""
+        self.page.get_by_role("tab", name=name, exact=True).click()
+
+
+def until(holds: Callable[[], bool], what: str, timeout: float = 60.0) -> None:
+    """Wait for a condition; fail naming it where it does not come."""
+    end = time.monotonic() + timeout
+    while not holds():
+        assert time.monotonic() < end, f"in {timeout:g} s it did not come about that {what}"
+
+
+@pytest.fixture
+def window(browser: Any, room: Room) -> Iterator[Window]:
+    """One page of it."""
+    page = browser.new_page(viewport={"width": 900, "height": 800})
+    yield Window(page, room)
+    page.close()

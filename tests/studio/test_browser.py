@@ -1,0 +1,169 @@
+"""The studio in a real browser: what the mouse does is seen, and is in the script."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from tests.studio.conftest import Window, until
+from warpjld.script import all_commands
+from warpjld.script.plugin import load_commands
+from warpjld.studio.opening import opened
+from warpjld.studio.room import Room
+
+INDEX = "left.index.base.flexion"
+
+TRICK = """
+import warpjld as wj
+
+@wj.menu("Pose/My trick")
+@wj.command("TRICK", syntax="TRICK <LEFT/RIGHT> <key> [FAST]", help="Bend the index finger.")
+def trick(scene, arguments):
+    side = arguments.choice("the side", ("LEFT", "RIGHT"))
+    key = arguments.number("the key")
+    angle = 60 if arguments.keyword("FAST") else 30
+    arguments.interpreter.run_text(f"FINGER1 {side} INDEX FLEXION AT {key} {angle}", "<TRICK>")
+"""
+
+
+@pytest.fixture
+def trick(tmp_path: Path) -> Iterator[None]:
+    """A user's command is there."""
+    path = tmp_path / "trick.py"
+    path.write_text(TRICK)
+    load_commands(path)
+    yield
+    all_commands().remove("TRICK")
+
+
+def test_a_dragged_slider_bends_the_finger_on_screen_and_in_the_script(window: Window) -> None:
+    before, state = window.still(), window.room.state
+    angle = window.drag_slider("base flexion", 0.9)
+    assert angle > 50
+    until(lambda: window.changed(before) > 500, "the finger is drawn bent")
+    until(lambda: abs(state.angles()[INDEX] - angle) < 0.1, "the state has it bent")
+    assert state.document.text.splitlines()[-1].startswith("JOINT left.index.base FLEXION AT 0 ")
+    window.tab("Script")
+    shown = window.page.locator("textarea").first
+    until(lambda: shown.input_value() == state.document.text, "the pane shows the script")
+    window.press("undo")
+    until(lambda: state.angles()[INDEX] == 0, "it is undone")
+    until(lambda: window.changed(before) < 50, "the finger is drawn as before")
+
+
+def test_a_key_is_set_scrubbed_past_and_deleted(window: Window) -> None:
+    state = window.room.state
+    frame = window.drag_slider("Frame", 0.5)
+    assert 20 <= frame <= 28
+    until(lambda: state.frame == frame, "the frame is shown")
+    angle = window.drag_slider("base flexion", 0.95)
+    assert angle > 60
+    until(lambda: abs(state.angles()[INDEX] - angle) < 0.1, "a key is set there")
+    assert state.keys == [0, state.frame]
+    bent = window.still()
+    window.drag_slider("Frame", 0.0)
+    until(lambda: state.frame == 0, "the first frame is shown")
+    until(lambda: window.changed(bent) > 500, "the finger is drawn straight there")
+    straight = window.still()
+    window.press("key ▸")
+    until(lambda: state.frame == state.keys[-1], "the next key is shown")
+    until(lambda: window.changed(straight) > 500, "the finger is drawn bent again")
+    window.press("delete")
+    until(lambda: state.keys == [0], "the key is gone")
+    assert state.document.text.splitlines()[-1] == f"KEYS DELETE {state.frame:g} LEFT"
+
+
+def test_what_is_typed_is_done_and_a_fault_is_shown_at_its_line(window: Window) -> None:
+    state = window.room.state
+    window.tab("Script")
+    pane = window.page.locator("textarea").first
+    text = state.document.text
+    pane.fill(f"{text}JOINT left.index.base FLEXION AT 0 400\n")
+    error = window.page.locator("#studio-error")
+    error.wait_for()
+    assert "wave.jld:3:36: flexion of left.index.base goes from -45° to 90°, got 400°" in error.inner_text()
+    pane.fill(f"{text}JOINT left.index.base FLEXION AT 0 40\n")
+    error.wait_for(state="detached")
+    assert round(state.angles()[INDEX]) == 40
+
+
+def test_a_users_command_has_a_menu_entry_with_a_form(trick: None, window: Window) -> None:
+    state, page = window.room.state, window.page
+    before = window.still()
+    window.tab("Menus")
+    page.get_by_text("Pose", exact=True).last.click()
+    window.press("My trick")
+    form = page.get_by_role("dialog")
+    form.get_by_text("Bend the index finger.").wait_for()
+    form.get_by_label("fast").check()
+    line = form.locator("input").first
+    until(lambda: line.input_value() == "TRICK LEFT 0 FAST", "the form shows its line")
+    form.get_by_role("button", name="Do it").click()
+    until(lambda: round(state.angles()[INDEX]) == 60, "the command is done")
+    assert state.document.text.splitlines()[-1] == "TRICK LEFT 0 FAST"
+    form.wait_for(state="detached")
+    until(lambda: window.changed(before) > 500, "it is seen")
+
+
+def test_two_windows_show_the_same_and_a_closed_one_or_a_reload_loses_nothing(window: Window, browser: Any) -> None:
+    state, room = window.room.state, window.room
+    page = browser.new_page(viewport={"width": 900, "height": 800})
+    other = Window(page, room)
+    before = other.still()
+    angle = window.drag_slider("base flexion", 0.9)
+    until(lambda: abs(state.angles()[INDEX] - angle) < 0.1, "a key is set there")
+    until(lambda: other.changed(before) > 500, "the other window shows it")
+    bent = window.still()
+    page.close()
+    window.reload()
+    until(lambda: window.changed(bent) < 50, "it is as it was")
+    value = window.control("base flexion").get_by_role("slider").get_attribute("aria-valuenow")
+    assert abs(float(value) - state.angles()[INDEX]) < 0.5
+
+
+def test_the_page_asks_nothing_of_other_machines(browser: Any, room: Any) -> None:
+    page = browser.new_page()
+    asked: list[str] = []
+    page.on("request", lambda request: asked.append(request.url))
+    page.on("websocket", lambda socket: asked.append(socket.url))
+    page.goto(room.address)
+    page.get_by_text("Joints", exact=True).wait_for()
+    page.close()
+    host = room.address.removeprefix("http://")
+    assert len(asked) >= 2
+    assert all(url.split("://")[-1].startswith(host.rstrip("/")) or url.startswith(("data:", "blob:")) for url in asked)
+
+
+def test_contact_is_solved_beside_and_seen_in_colours(browser: Any, tmp_path: Path) -> None:
+    script = tmp_path / "plate.jld"
+    script.write_text(
+        "HAND LEFT BUILTIN RESOLUTION 1500\nFRAMES 0 10\nOBJECT PLATE BOX 0.036 0.006 0.036 AT 0.034 -0.0275 -0.165\n"
+        "MOVE LEFT 0 0 0.003 0\nMOVE LEFT 10 0 -0.0055 0\nFLESH LEFT INDEX ELEMENT 0.005\nPRESS 0 10 EVERY 5\n"
+    )
+    room = Room(opened(script, tmp_path / "out"), port=0)
+    page = browser.new_page(viewport={"width": 900, "height": 800})
+    try:
+        window = Window(page, room)
+        room.post(lambda: setattr(room.state, "frame", 10.0))
+        window.tab("Work")
+        window.press("PRESS: solve contact")
+        page.locator("#studio-verdict").wait_for(timeout=240_000)
+        assert room.state.pressed is not None
+        assert "kPa" in page.locator("#studio-verdict").inner_text()
+        window.tab("Pose")
+        page.get_by_label("Objects", exact=True).uncheck()  # the plate lies before what it presses
+        eye, tip = (0.06, -0.11, -0.22), (0.034, -0.018, -0.162)  # at the pad
+        for client in room.server.get_clients().values():
+            client.camera.position, client.camera.look_at = eye, tip
+
+        def red() -> bool:
+            pixels = window.pixels()
+            return int(((pixels[..., 0] > 100) & (pixels[..., 1] < 0.6 * pixels[..., 0])).sum()) > 20
+
+        until(red, "pressure is seen on the pad")
+    finally:
+        page.close()
+        room.stop()

@@ -1,0 +1,106 @@
+"""Contact solved beside the studio, and what it is shown as."""
+
+from __future__ import annotations
+
+import threading
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from warpjld.errors import InputError
+from warpjld.studio.background import Background
+from warpjld.studio.document import Document
+from warpjld.studio.making import pressed
+from warpjld.studio.state import StudioState
+
+HAND = "HAND LEFT BUILTIN RESOLUTION 1500\n"
+PLATE = (
+    HAND + "FRAMES 0 10\nOBJECT PLATE BOX 0.036 0.006 0.036 AT 0.034 -0.0275 -0.165\n"
+    "MOVE LEFT 0 0 0.003 0\nMOVE LEFT 10 0 -0.0055 0\nFLESH LEFT INDEX ELEMENT 0.005\nPRESS 0 10 EVERY 5\n"
+)
+
+
+def quiet(what: str, done: int, total: int) -> None:
+    """Nobody is told."""
+
+
+@pytest.fixture
+def state(tmp_path: Path) -> StudioState:
+    return StudioState(Document(tmp_path / "a.jld", PLATE), tmp_path / "out", within=[tmp_path])
+
+
+def test_contact_is_seen_as_it_was_solved_until_the_script_changes(state: StudioState) -> None:
+    state.frame = 10
+    before = {one.name: one.vertices for one in state.shown()}
+    state.solved = pressed(state.document.text, state.copied_scene(), quiet)
+    assert state.solved.rows(10)
+    after = {one.name: one.vertices for one in state.shown()}
+    moved = np.linalg.norm(after["LEFT"] - before["LEFT"], axis=1)
+    assert moved.max() > 1e-4
+    state.coloring = "pressure"
+    (colored,) = [one for one in state.shown() if one.colors is not None]
+    assert colored.colors is not None
+    assert len(np.unique(colored.colors, axis=0)) > 2
+    state.do("RATE 25")
+    assert state.pressed is None
+    assert np.array_equal({one.name: one.vertices for one in state.shown()}["LEFT"], before["LEFT"])
+
+
+def test_without_press_there_is_nothing_to_solve(tmp_path: Path) -> None:
+    state = StudioState(Document(tmp_path / "a.jld", HAND), tmp_path / "out")
+    with pytest.raises(InputError, match="nothing to solve"):
+        pressed(state.document.text, state.copied_scene(), quiet)
+
+
+@pytest.mark.parametrize("coloring", ["domains", "stretch"])
+def test_skin_is_coloured_by_vertex(tmp_path: Path, coloring) -> None:
+    text = f"{HAND}POSE LEFT FLAT 0\nPOSE LEFT FIST 10\n"
+    state = StudioState(Document(tmp_path / "a.jld", text), tmp_path / "out")
+    state.coloring = coloring
+    (rest,) = state.shown()
+    state.frame = 10
+    (bent,) = state.shown()
+    assert rest.colors is not None
+    assert bent.colors is not None
+    assert rest.colors.shape == rest.vertices.shape
+    assert rest.colors.dtype == np.uint8
+    same = np.array_equal(rest.colors, bent.colors)
+    assert same == (coloring == "domains")
+
+
+def test_work_is_cancelled_where_it_tells_of_its_progress_and_its_errors_are_handed_on() -> None:
+    ended = threading.Event()
+    found: list[tuple[object, BaseException | None]] = []
+
+    def end(result: object, error: BaseException | None) -> None:
+        found.append((result, error))
+        ended.set()
+
+    work, begun = Background(lambda: None), threading.Event()
+
+    def endless(progress) -> None:
+        try:
+            while True:
+                begun.set()
+                progress("step", 1, 2)
+        except Exception:  # a solver that handles errors must not go on
+            pass
+
+    assert work.start("endless", endless, end)
+    assert begun.wait(10)
+    assert not work.start("another", endless, end)
+    work.cancel()
+    assert ended.wait(10)
+    assert found.pop() == (None, None)
+    ended.clear()
+
+    def fails(progress) -> None:
+        raise ValueError("broken")
+
+    assert work.start("fails", fails, end)
+    assert ended.wait(10)
+    (result, error) = found.pop()
+    assert result is None
+    assert isinstance(error, ValueError)
+    assert work.running is None

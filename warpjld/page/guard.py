@@ -1,0 +1,122 @@
+"""Who may talk to the studio's server: pages that it served itself, and where it listens to the network those that
+know its token.
+
+A browser lets any page open a WebSocket to any address, this machine's own included, and sends along where the page
+is from. So a request counts only if its ``Origin`` is the host it is made to, and if that host is what the server was
+told to be (else a name of the page's own that was made to point here would do).
+"""
+
+from __future__ import annotations
+
+import hmac
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
+from dataclasses import dataclass
+from http.cookies import CookieError, SimpleCookie
+from typing import Any
+from urllib.parse import parse_qs, urlsplit
+
+__all__ = ["Guard", "guarding"]
+
+_COOKIE = "warpjld_studio"
+_HERE = ("127.0.0.1", "localhost", "::1")
+
+
+@dataclass(frozen=True)
+class Guard:
+    """Says which requests are answered.
+
+    Attributes:
+        host: The address that is listened on.
+        token: What pages must bring along, in the address or as the cookie they then get; None for nothing.
+    """
+
+    host: str
+    token: str | None = None
+
+    def refuses(self, path: str, headers: Mapping[str, str]) -> str | None:
+        """Why a request for this path with these headers is refused; None where it is not."""
+        host = headers.get("Host", "")
+        if not self._is_mine(host):
+            return "this server is not called so"
+        origin = headers.get("Origin")
+        upgrades = headers.get("Upgrade", "").lower() == "websocket"
+        if upgrades and origin is None:
+            return "a connection says which page it is from"
+        if origin is not None and urlsplit(origin).netloc.lower() != host.lower():
+            return "only the studio's own page may connect"
+        if self.token is not None and not self._knows(path, headers):
+            return "the address lacks its token: take the whole address that the studio printed"
+        return None
+
+    def cookie(self, path: str) -> str | None:
+        """Header that lets a page which brought the token in its address connect; None where it did not."""
+        if self.token is None or not _same(_token_in(path), self.token):
+            return None
+        return f"{_COOKIE}={self.token}; HttpOnly; SameSite=Strict; Path=/"
+
+    def _is_mine(self, host: str) -> bool:
+        try:
+            name = urlsplit(f"//{host}").hostname or ""
+        except ValueError:
+            return False
+        if self.host in _HERE:
+            return name in _HERE
+        # on all interfaces this machine has more names than it knows: the token decides
+        return self.host in ("0.0.0.0", "::") or name == self.host.lower()
+
+    def _knows(self, path: str, headers: Mapping[str, str]) -> bool:
+        cookies: SimpleCookie = SimpleCookie()
+        try:
+            cookies.load(headers.get("Cookie", ""))
+        except CookieError:
+            return False
+        kept = cookies[_COOKIE].value if _COOKIE in cookies else ""
+        assert self.token is not None
+        return _same(_token_in(path), self.token) or _same(kept, self.token)
+
+
+def _token_in(path: str) -> str:
+    return parse_qs(urlsplit(path).query).get("token", [""])[0]
+
+
+def _same(given: str, token: str) -> bool:
+    return hmac.compare_digest(given.encode(), token.encode())
+
+
+@contextmanager
+def guarding(guard: Guard) -> Iterator[None]:
+    """A server of viser's that is made inside asks this guard first: viser has no place of its own for that, so what it
+    hands to ``websockets`` is changed on the way."""
+    import websockets.asyncio.server as websockets_server
+
+    original = websockets_server.serve
+
+    def serve(handler: Any, host: str, port: int, **options: Any) -> Any:
+        options["process_request"] = _first(guard, options["process_request"])
+        return original(handler, host, port, **options)
+
+    websockets_server.serve = serve
+    try:
+        yield
+    finally:
+        websockets_server.serve = original
+
+
+def _first(guard: Guard, answer: Callable[[Any, Any], Any]) -> Callable[[Any, Any], Any]:
+    """A handler of requests that lets the guard look at them first."""
+
+    def process(connection: Any, request: Any) -> Any:
+        reason = guard.refuses(request.path, request.headers)
+        if reason is not None:
+            return connection.respond(403, reason + "\n")
+        response = answer(connection, request)
+        cookie = guard.cookie(request.path)
+        if response is not None:
+            response.headers["X-Frame-Options"] = "SAMEORIGIN"
+            response.headers["Referrer-Policy"] = "no-referrer"
+            if cookie is not None:
+                response.headers["Set-Cookie"] = cookie
+        return response
+
+    return process

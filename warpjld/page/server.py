@@ -1,0 +1,107 @@
+"""A server of pages that nobody else drives, quiet, with a stage that is lit."""
+
+from __future__ import annotations
+
+from contextlib import redirect_stdout
+from io import StringIO
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from warpjld.errors import MissingExtraError
+from warpjld.page.colored_glb import colored_glb
+from warpjld.page.guard import Guard, guarding
+
+__all__ = ["FIELD", "add_colored", "add_surface", "guarded_server", "look", "rgb", "stop"]
+
+FIELD = 0.6
+"""Vertical opening of the camera [rad]."""
+
+
+def guarded_server(guard: Guard, port: int, purpose: str) -> Any:
+    """viser's server on the guard's host, at a port or the next that is free (0: any), with an empty stage.
+
+    Raises:
+        MissingExtraError: viser is not installed.
+    """
+    try:
+        import viser
+        from viser import _messages
+    except ImportError:
+        raise MissingExtraError(purpose, "studio") from None
+    with guarding(guard), redirect_stdout(StringIO()):  # it prints a table of addresses, without the token
+        server = viser.ViserServer(host=guard.host, port=port, verbose=False)
+    # viser's own button for this is hidden; a message that asks for a public tunnel must not open one either
+    server._websock_server.unregister_handler(_messages.ShareUrlRequest)
+    _light(server)
+    server.scene.set_up_direction("+y")
+    server.scene.world_axes.visible = False
+    server.initial_camera.fov = FIELD
+    server.initial_camera.near = 0.005
+    return server
+
+
+def stop(server: Any) -> None:
+    """End it, without a word."""
+    with redirect_stdout(StringIO()):
+        server.stop()
+
+
+def add_surface(
+    server: Any,
+    name: str,
+    vertices: NDArray[np.float32],
+    faces: NDArray[np.int32],
+    color: str,
+    *,
+    wireframe: bool = False,
+    opacity: float | None = None,
+) -> Any:
+    """A surface of one colour, whose ``vertices`` may then be set."""
+    return server.scene.add_mesh_simple(
+        name,
+        vertices,
+        faces.astype(np.uint32),
+        color=rgb(color),
+        wireframe=wireframe,
+        opacity=opacity,
+        side="double",
+        cast_shadow=False,
+        receive_shadow=False,
+    )
+
+
+def add_colored(
+    server: Any, name: str, vertices: NDArray[np.float32], faces: NDArray[np.int32], colors: NDArray[np.uint8]
+) -> Any:
+    """A surface with colours of its vertices; adding it again replaces it."""
+    return server.scene.add_glb(name, colored_glb(vertices, faces, colors), cast_shadow=False, receive_shadow=False)
+
+
+def look(server: Any, points: NDArray[np.floating], direction: tuple[float, float, float] = (0.45, 0.75, 0.5)) -> None:
+    """Set the camera of every window so that these points (n, 3) fill it, seen from a direction."""
+    low, high = points.min(axis=0), points.max(axis=0)
+    centre = (low + high) / 2.0
+    away = float(np.linalg.norm(high - low)) / 2.0 / np.tan(FIELD / 2.0) * 1.1
+    eye = centre + away * np.array(direction) / np.linalg.norm(direction)
+    server.initial_camera.position, server.initial_camera.look_at = tuple(eye), tuple(centre)
+    for client in server.get_clients().values():
+        with client.atomic():
+            client.camera.position, client.camera.look_at = eye, centre
+
+
+def rgb(color: str) -> tuple[int, int, int]:
+    """Red, green and blue of ``#rrggbb``."""
+    return int(color[1:3], 16), int(color[3:5], 16), int(color[5:7], 16)
+
+
+def _light(server: Any) -> None:
+    """Light from all sides and one lamp over the shoulder, without shadows: what bends is seen, and drawn fast."""
+    scene = server.scene
+    scene.configure_environment_map(None)
+    scene.configure_default_lights(False)
+    scene.add_light_hemisphere("/light/sky", sky_color=(255, 252, 246), ground_color=(150, 140, 150), intensity=1.3)
+    scene.add_light_directional("/light/lamp", intensity=2.4, position=(1.0, 2.0, 1.0))
+    scene.add_light_directional("/light/below", intensity=0.9, position=(0.5, -1.5, 0.5))
+    scene.add_light_directional("/light/rim", intensity=0.5, position=(-1.5, 0.5, -1.0))

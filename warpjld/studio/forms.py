@@ -1,0 +1,47 @@
+"""What a command's form asks for on this stage, and the line that it comes to."""
+
+from __future__ import annotations
+
+from warpjld.script.registry import Command
+from warpjld.script.scene import Scene
+from warpjld.script.statements import MacroDefinition
+from warpjld.studio.syntax import Text, Way, ways_of
+
+__all__ = ["first_value", "known_names", "ways_of_command", "ways_of_macro"]
+
+_FIRST, _LAST = ("key", "key1", "frame", "first", "start"), ("key2", "last", "other key", "stop")
+_LONG = 20.0  # frames from one to the other
+
+
+def ways_of_command(command: Command) -> tuple[Way, ...]:
+    """The ways to call a command."""
+    return ways_of(command.name, command.syntax)
+
+
+def ways_of_macro(macro: MacroDefinition) -> tuple[Way, ...]:
+    """The one way to call a macro: a value for each parameter."""
+    return (Way(tuple(Text(word.text.lower()) for word in macro.parameters)),)
+
+
+def known_names(field: Text, scene: Scene) -> list[str]:
+    """Names on stage that a value may be; empty where it may be anything."""
+    actors, objects = [*scene.actors], [*scene.props]
+    match field.label:
+        case "actor or object":
+            return [*actors, *objects]
+        case "actor":
+            return actors
+        case "object":
+            return objects
+        case "joint" | "joint or ALL":
+            joints = [name for actor in scene.actors.values() for name in actor.skeleton.names]
+            return [*(["ALL"] if "ALL" in field.label else []), *dict.fromkeys(joints)]
+        case _:
+            return []
+
+
+def first_value(field: Text, frame: float) -> float:
+    """What a number is before it is typed: the frame that is shown, where it is a frame, or one a while later."""
+    if field.label in _LAST:
+        return frame + _LONG
+    return frame if field.label in _FIRST else 0.0

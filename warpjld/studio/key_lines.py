@@ -1,0 +1,55 @@
+"""Values as lines of a script: set by replacing the number of a line at the end, or by a line more."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping
+
+__all__ = ["number", "with_keys", "with_values"]
+
+_VALUE = re.compile(
+    r"(?P<what>JOINT \S+ [A-Z]+ AT \S+|(?:MOVE|TURN) \S+ \S+|PARAMETER \S+ (?:INFLATION|MUSCLE|PEAK|PALM)) "
+    r"[-+.\d\seE]+\Z"
+)
+
+
+def with_values(text: str, values: Mapping[str, str], *, actor: str | None = None) -> str:
+    """A script with lines that set values.
+
+    Lines of values that stand last in the script are edited in place, since nothing that follows could depend on them;
+    others are left as they are, and overruled by lines at the end.
+
+    Args:
+        text: The script.
+        values: What stands behind the words that a line begins with, such as ``MOVE LEFT 20`` and ``0 0.1 0``.
+        actor: Name of the actor to speak to first, where it is not the current one.
+    """
+    lines = text.rstrip("\n").split("\n") if text.strip() else []
+    if actor is not None:
+        lines.append(f"ACTOR {actor}")
+    found: dict[str, int] = {}
+    for k in range(len(lines) - 1, -1, -1):
+        match = _VALUE.match(lines[k])
+        if match is None:
+            break
+        found.setdefault(match["what"], k)
+    for what, value in values.items():
+        if what in found:
+            lines[found[what]] = f"{what} {value}"
+        else:
+            lines.append(f"{what} {value}")
+    return "\n".join(lines) + "\n"
+
+
+def with_keys(text: str, angles: Mapping[str, float], frame: float, *, actor: str | None = None) -> str:
+    """As ``with_values``, with keys of some channels, such as ``left.index.base.flexion``, at a frame [degrees]."""
+    values = {}
+    for name, degrees in angles.items():
+        joint, _, channel = name.rpartition(".")
+        values[f"JOINT {joint} {channel.upper()} AT {number(frame)}"] = number(degrees)
+    return with_values(text, values, actor=actor)
+
+
+def number(value: float, digits: int = 2) -> str:
+    """A number as a script has it, rounded to so many digits."""
+    return f"{round(value, digits) + 0.0:.10g}"

@@ -1,0 +1,55 @@
+"""What a studio begins with: a script, a rig, or a hand."""
+
+from __future__ import annotations
+
+from contextlib import suppress
+from pathlib import Path
+
+from warpjld.errors import InputError, WarpjldError
+from warpjld.files.text_file import read_text
+from warpjld.studio.document import Document
+from warpjld.studio.state import StudioState
+
+__all__ = ["opened"]
+
+_NEW = "HAND LEFT BUILTIN\n"
+
+
+def opened(path: Path | None, folder: Path, *, device: str = "cpu") -> StudioState:
+    """A studio with a script (.jld), a rig, or the built-in hand. Files may be read from the script's folder, and those
+    that the script as it is opened names, wherever they are.
+
+    Raises:
+        InputError: There is no such file, or the rig cannot be read.
+    """
+    if path is None:
+        document = Document(Path("untitled.jld").resolve(), _NEW)
+    elif not path.is_file():
+        raise InputError("no such file", path=path)
+    elif path.suffix.lower() == ".jld":
+        document = Document.open(path.resolve())
+    else:
+        document = Document(path.resolve().with_suffix(".jld"), _staging(path))
+    if document.autosaved.is_file() and (kept := read_text(document.autosaved)) != document.text:
+        document.edit(kept)  # what was not saved when the studio ended; undoing it brings back the file's text
+    return StudioState(document, folder, within=[document.path.parent, *_named(document)], device=device)
+
+
+def _staging(path: Path) -> str:
+    """The line that brings a rig on stage."""
+    from warpjld.io import load_rig
+
+    names = load_rig(path).skeleton.names
+    sides = [side for side in ("left", "right") if f"{side}.wrist" in names]
+    body = len(sides) != 1
+    return f'BODY "{path.name}"\n' if body else f'HAND {sides[0].upper()} "{path.name}"\n'
+
+
+def _named(document: Document) -> list[Path]:
+    """Files that a script reads as it stands."""
+    from warpjld.studio.performance import Performance
+
+    trial = Performance(Path("out"), say=lambda line: None)
+    with suppress(WarpjldError):  # it is shown where the script is
+        trial.run(document.text, document.path)
+    return [*trial.scene.read]

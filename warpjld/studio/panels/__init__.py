@@ -1,0 +1,1 @@
+"""The studio's panels: what the state is shown and changed with. Each refreshes itself from the state."""

@@ -1,0 +1,60 @@
+"""The covering's parameters by slider, seen as they change."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+from warpjld.studio.key_lines import number, with_values
+
+if TYPE_CHECKING:
+    from warpjld.studio.room import Room
+
+__all__ = ["SkinPanel"]
+
+_RANGES = {"inflation": (0.0, 2.0), "muscle": (0.0, 1.0), "peak": (0.05, 0.95), "palm": (0.0, 6.0)}
+_ALL = "ALL"
+
+
+class SkinPanel:
+    """Parameters of a joint, or of all."""
+
+    def __init__(self, room: Room) -> None:
+        self._room = room
+        gui = room.server.gui
+        with gui.add_folder("Skin at a joint", expand_by_default=False):
+            self.joint = gui.add_dropdown("Joint", (_ALL,), initial_value=_ALL)
+            self.sliders = {name: self._slider(name, *_RANGES[name]) for name in _RANGES}
+        self.joint.on_update(lambda event: room.by_hand(event, lambda: None))
+
+    def refresh(self) -> None:
+        """Show the values of the joint; of all joints those of the first that bends."""
+        actor = self._room.state.actor
+        if actor is None:
+            return
+        names = (_ALL, *actor.skeleton.names)
+        if tuple(self.joint.options) != names:
+            self.joint.options = names
+        if self.joint.value == _ALL:
+            joint = int((actor.skeleton.limits[:, 0, 1] > 0).argmax())
+        else:
+            joint = actor.skeleton.names.index(self.joint.value)
+        for name, slider in self.sliders.items():
+            value = float(getattr(actor.parameters, name)[joint])
+            if abs(slider.value - value) > 0.006 and not self._room.worker.waits(("parameter", name)):
+                slider.value = min(max(value, slider.min), slider.max)
+
+    def _slider(self, name: str, low: float, high: float) -> Any:
+        room = self._room
+        slider = room.server.gui.add_slider(name.capitalize(), min=low, max=high, step=0.01, initial_value=low)
+
+        def change() -> None:
+            state = room.state
+            if state.actor is None:
+                return
+            what = f"PARAMETER {self.joint.value} {name.upper()}"
+            other = None if state.scene.current == state.actor.name else state.actor.name
+            text = with_values(state.document.text, {what: number(slider.value)}, actor=other)
+            state.put(text, kind=("parameter", name, self.joint.value))
+
+        slider.on_update(lambda event: room.by_hand(event, change, key=("parameter", name)))
+        return slider

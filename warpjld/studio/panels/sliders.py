@@ -1,0 +1,74 @@
+"""A slider for every channel that may move, by digit; dragging one sets a key at the frame that is shown."""
+
+from __future__ import annotations
+
+from itertools import groupby
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from warpjld.studio.room import Room
+
+__all__ = ["SlidersPanel"]
+
+_STEP = 0.5  # degrees
+
+
+class SlidersPanel:
+    """The sliders of the actor."""
+
+    def __init__(self, room: Room) -> None:
+        self._room = room
+        self._parent = room.server.gui.add_folder("Joints")
+        self._sliders: dict[str, Any] = {}
+        self._folders: list[Any] = []
+        self._of: object = None
+
+    def refresh(self) -> None:
+        """Show the angles at the frame."""
+        state = self._room.state
+        channels = state.channels()
+        if self._of != (made := tuple(channels.items())):
+            self._make(channels)
+            self._of = made
+        for name, degrees in state.angles().items():
+            slider = self._sliders[name]
+            if abs(slider.value - degrees) > 0.5 * _STEP and not self._room.worker.waits(("angle", name)):
+                slider.value = degrees
+
+    def _make(self, channels: dict[str, tuple[float, float]]) -> None:
+        for folder in self._folders:
+            folder.remove()
+        self._folders, self._sliders = [], {}
+        gui = self._room.server.gui
+        with self._parent:
+            for part, names in groupby(sorted(channels, key=_part), key=_part):
+                folder = gui.add_folder(part, expand_by_default=part.endswith("index"))
+                self._folders.append(folder)
+                with folder:
+                    for name in names:
+                        self._sliders[name] = self._slider(name, *channels[name])
+
+    def _slider(self, name: str, low: float, high: float) -> Any:
+        joint = name.split(".", maxsplit=2)[-1] if name.count(".") > 2 else name
+        hint = f"{name}, from {low:.4g}° to {high:.4g}°"
+        room = self._room
+        slider = room.server.gui.add_slider(
+            joint.removeprefix("left.").removeprefix("right.").replace(".", " "),
+            min=low,
+            max=high,
+            step=_STEP,
+            initial_value=min(max(0.0, low), high),
+            hint=hint,
+        )
+
+        def turn() -> None:
+            room.state.set_angles({name: slider.value}, kind=("angle", name, room.state.frame))
+
+        slider.on_update(lambda event: room.by_hand(event, turn, key=("angle", name)))
+        return slider
+
+
+def _part(channel: str) -> str:
+    """The digit or the limb that a channel belongs to."""
+    names = channel.split(".")
+    return " ".join(names[:2]) if len(names) > 3 else names[0] if names[0] in ("left", "right") else "body"

@@ -1,0 +1,88 @@
+"""Fingertips brought to places: the angles of a hand nearest to those it has, inside its limits."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from warpjld.script.scene import Actor
+from warpjld.skeleton import CHANNELS, DIGITS, poses_from_angles
+
+__all__ = ["reach_tips", "tips"]
+
+_NEAR = 2e-3  # weight of staying [1/rad] beside distances over the hand's length
+_BEGIN = (0.05, 0.35)
+"""How far inside the limits searches begin, as a share of their range."""
+_REACHED = 1e-3  # of the hand's length
+_STEP = 1e-6  # of differences [rad]
+
+
+def tips(actor: Actor, side: str) -> dict[str, int]:
+    """Joint numbers of the fingertips of one side, by digit."""
+    names = actor.skeleton.names
+    return {digit: names.index(f"{side}.{digit}.tip") for digit in DIGITS if f"{side}.{digit}.tip" in names}
+
+
+def reach_tips(
+    actor: Actor, side: str, frame: float, targets: Mapping[str, NDArray[np.float64]], *, wrist: bool = False
+) -> dict[str, float]:
+    """Degrees by channel with which fingertips come nearest to places on the stage.
+
+    Args:
+        actor: Whose.
+        side: Of which hand.
+        frame: At which frame; everything that is not moved is as it is there.
+        targets: Places of the tips by digit [m], shape (3,); digits that are not among them keep their angles.
+        wrist: Whether the wrist bends, too.
+    """
+    from scipy.optimize import least_squares
+
+    skeleton = actor.skeleton
+    base = np.clip(actor.motion.sample([frame], skeleton, limits="clamp")[0][0], *np.moveaxis(skeleton.limits, -1, 0))
+    free = _free(actor, side, [*targets], wrist)
+    joints, columns = np.array(free, dtype=int).T
+    low, high = skeleton.limits[joints, columns].T
+    start = np.clip(base[joints, columns], low + 1e-9, high - 1e-9)
+    ends = np.array([tips(actor, side)[digit] for digit in targets])
+    wanted = np.stack([targets[digit] for digit in targets])
+    length = float(np.linalg.norm(skeleton.rest[ends] - skeleton.rest[skeleton.parents[joints[0]]], axis=1).max())
+
+    def residuals(values: NDArray[np.float64]) -> NDArray[np.float64]:
+        angles = np.repeat(base[None], len(values), axis=0)
+        angles[:, joints, columns] = values
+        poses = poses_from_angles(skeleton, angles)
+        placed = actor.placement.apply(poses, np.full(len(values), frame))
+        away = (placed.positions[:, ends] - wanted) / length
+        return np.concatenate([away.reshape(len(values), -1), _NEAR * (values - start)], axis=1)
+
+    def slopes(values: NDArray[np.float64]) -> NDArray[np.float64]:
+        shifts = _STEP * np.eye(len(values))
+        both = residuals(np.concatenate([values + shifts, values - shifts]))
+        return np.asarray((both[: len(values)] - both[len(values) :]).T / (2.0 * _STEP))
+
+    # from a straight finger, whose joints stand at their limits, no small step leads on: the search begins inside
+    best, least = start, float((residuals(start[None]) ** 2).sum()) / 2.0
+    for inside in _BEGIN:
+        begin = np.clip(start, low + inside * (high - low), high - inside * (high - low))
+        solved = least_squares(lambda x: residuals(x[None])[0], begin, jac=slopes, bounds=(low, high), max_nfev=30)
+        if solved.cost < least:
+            best, least = solved.x, float(solved.cost)
+        if np.abs(residuals(best[None])[0, : 3 * len(ends)]).max() < _REACHED:
+            break
+    degrees = np.degrees(best)
+    return {f"{skeleton.names[j]}.{CHANNELS[c]}": float(v) for (j, c), v in zip(free, degrees, strict=True)}
+
+
+def _free(actor: Actor, side: str, digits: Sequence[str], wrist: bool) -> list[tuple[int, int]]:
+    """Joints and channels that may change: those of the digits, parents first."""
+    found = []
+    for joint, name in enumerate(actor.skeleton.names):
+        parts = name.split(".")
+        mine = parts[0] == side and (parts[1] in digits or (wrist and parts[1] == "wrist"))
+        for column in range(len(CHANNELS)):
+            low, high = actor.skeleton.limits[joint, column]
+            if mine and low < high and parts[-1] != "carpometacarpal":
+                found.append((joint, column))
+    return found

@@ -1,0 +1,120 @@
+"""The studio's server with its panels on one state."""
+
+from __future__ import annotations
+
+import secrets
+import sys
+import traceback
+from collections.abc import Callable, Hashable
+from typing import Any
+
+from warpjld.errors import WarpjldError
+from warpjld.page.guard import Guard
+from warpjld.page.server import guarded_server, stop
+from warpjld.studio.panels.curves import CurvesPanel
+from warpjld.studio.panels.drag import DragPanel
+from warpjld.studio.panels.menus import MenusPanel
+from warpjld.studio.panels.messages import MessagesPanel
+from warpjld.studio.panels.pose_tools import PoseToolsPanel
+from warpjld.studio.panels.script import ScriptPanel
+from warpjld.studio.panels.skin import SkinPanel
+from warpjld.studio.panels.sliders import SlidersPanel
+from warpjld.studio.panels.stage import StagePanel
+from warpjld.studio.panels.things import ThingsPanel
+from warpjld.studio.panels.timeline import TimelinePanel
+from warpjld.studio.panels.work import WorkPanel
+from warpjld.studio.state import StudioState
+from warpjld.studio.worker import Worker
+
+__all__ = ["Room"]
+
+LOCAL = "127.0.0.1"
+
+
+class Room:
+    """A studio that windows connect to; all of them show and change the same state.
+
+    Args:
+        state: What is shown and changed.
+        host: Address to listen on. Any but this machine's own asks windows for a token.
+        port: Port to listen on, or the next that is free; 0 for any.
+
+    Attributes:
+        address: What to open in a browser.
+    """
+
+    def __init__(self, state: StudioState, *, host: str = LOCAL, port: int = 8080) -> None:
+        self.state = state
+        local = host in (LOCAL, "localhost", "::1")
+        token = None if local else secrets.token_urlsafe(24)
+        self.server = guarded_server(Guard(host, token), port, "the studio")
+        self.worker = Worker(self.refresh, self._failed)
+        self.panels: list[Any] = []
+        self._kept = state.document.text
+        self._furnish()
+        shown = LOCAL if host in ("0.0.0.0", "::") else host
+        shown = f"[{shown}]" if ":" in shown else shown
+        self.address = f"http://{shown}:{self.server.get_port()}/" + (f"?token={token}" if token else "")
+        self.post(lambda: None)
+
+    def post(self, job: Callable[[], object], key: Hashable = None) -> None:
+        """Have something done to the state, and the panels refreshed."""
+        self.worker.post(job, key)
+
+    def by_hand(self, event: Any, job: Callable[[], object], key: Hashable = None) -> None:
+        """As ``post``, unless a control changed because a panel refreshed it."""
+        if event.client_id is not None:
+            self.post(job, key)
+
+    def refresh(self) -> None:
+        """Show the state as it is."""
+        for panel in self.panels:
+            panel.refresh()
+        if self.state.document.text != self._kept:
+            self._kept = self.state.document.text
+            self._autosave()
+
+    def stop(self) -> None:
+        """Keep what is not saved, and close."""
+        self.worker.stop()
+        self._autosave()
+        stop(self.server)
+
+    def _furnish(self) -> None:
+        gui = self.server.gui
+        gui.configure_theme(control_width="large", show_logo=False, show_share_button=False)
+        gui.set_panel_label("warpjld studio")
+        gui.main_panel.dock_right()
+        messages = MessagesPanel(self)  # above all tabs: an error is seen wherever one is
+        tabs = gui.add_tab_group()
+        with tabs.add_tab("Pose"):
+            pose = [StagePanel(self), PoseToolsPanel(self), DragPanel(self), ThingsPanel(self), SkinPanel(self)]
+            pose.append(SlidersPanel(self))
+        with tabs.add_tab("Script"):
+            script = ScriptPanel(self)
+        with tabs.add_tab("Work"):
+            work = WorkPanel(self)
+        with tabs.add_tab("Menus"):
+            menus = MenusPanel(self)
+        below = gui.add_panel()
+        with below.add_tab("Time"):
+            timeline = TimelinePanel(self)
+        with below.add_tab("Keys"):
+            curves = CurvesPanel(self)
+        below.dock_below(gui.main_panel)
+        self.panels = [*pose, script, work, menus, timeline, curves, messages]
+
+    def _failed(self, error: BaseException) -> None:
+        """Show what a job raised: nothing is swallowed, and nothing ends the studio."""
+        if isinstance(error, WarpjldError):
+            self.state.error = error
+        else:
+            traceback.print_exception(error, file=sys.stderr)
+            self.state.error = WarpjldError(f"unexpected {type(error).__name__}: {error} (a fault of warpjld)")
+        self.panels[-1].refresh()
+
+    def _autosave(self) -> None:
+        try:
+            self.state.document.autosave()
+        except OSError as error:
+            self.state.messages.append(f"cannot keep the script beside its file: {error.strerror}")

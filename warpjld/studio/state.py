@@ -1,0 +1,225 @@
+"""What a studio is about, without any of its panels: a document, the scene it describes, a frame, a selection."""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Hashable, Mapping, Sequence
+from pathlib import Path
+
+import numpy as np
+
+from warpjld.errors import InputError, WarpjldError
+from warpjld.script.scene import Actor, Scene
+from warpjld.script.staging import frame_numbers
+from warpjld.skeleton import CHANNELS
+from warpjld.studio.document import Document
+from warpjld.studio.key_lines import number, with_keys
+from warpjld.studio.making import Pressed
+from warpjld.studio.performance import Performance
+from warpjld.studio.surfaces import Coloring, Shown, Surfaces
+
+__all__ = ["StudioState"]
+
+_SHORTEST = 48  # frames of the timeline where there are hardly any keys
+_MESSAGES = 100
+
+
+class StudioState:
+    """A script being made. Every change of it goes through ``write`` (typed) or ``do`` (by mouse).
+
+    Args:
+        document: The script.
+        folder: The output folder.
+        within: Folders that files may be read from; None for anywhere.
+        device: Warp device of the covering.
+
+    Attributes:
+        document: The script.
+        frame: The frame that is shown.
+        error: What is wrong with the script or with the last command; None where nothing is.
+        broken: Whether the script as it stands cannot be run.
+        messages: What commands said last.
+        coloring: What skin is coloured by.
+        solved: The contact that was solved last.
+    """
+
+    def __init__(
+        self,
+        document: Document,
+        folder: Path = Path("out"),
+        *,
+        within: Sequence[Path] | None = None,
+        device: str = "cpu",
+    ) -> None:
+        self.document = document
+        self.folder = folder
+        self.frame = 0.0
+        self.error: WarpjldError | None = None
+        self.broken = False
+        self.messages: deque[str] = deque(maxlen=_MESSAGES)
+        self.coloring: Coloring = "skin"
+        self.solved: Pressed | None = None
+        self.surfaces = Surfaces(device)
+        self.performance = Performance(folder, say=self.messages.append, within=within)
+        self._actor: str | None = None
+        self._run()
+
+    # ---- what there is -------------------------------------------------------------------------------------------
+
+    @property
+    def scene(self) -> Scene:
+        """What the script describes; where it is broken, what its lines before the fault do."""
+        return self.performance.scene
+
+    @property
+    def actor(self) -> Actor | None:
+        """The actor that sliders move: the chosen one, else the script's current one."""
+        if self._actor in self.scene.actors:
+            return self.scene.actors[self._actor]
+        return self.scene.actor() if self.scene.actors else None
+
+    def choose(self, actor: str) -> None:
+        """Let sliders move this actor."""
+        self._actor = self.scene.actor(actor).name
+
+    @property
+    def span(self) -> tuple[int, int]:
+        """First and last frame of the timeline."""
+        try:
+            frames = frame_numbers(self.scene)
+        except InputError:
+            frames = np.zeros(1)
+        first, last = int(min(frames[0], 0)), int(max(frames[-1], 0))
+        fixed = self.scene.first is not None
+        return (int(frames[0]), int(frames[-1])) if fixed and last > first else (first, max(last, first + _SHORTEST))
+
+    @property
+    def keys(self) -> list[float]:
+        """Frames that hold keys, of all actors and objects."""
+        scene = self.scene
+        found = [key for actor in scene.actors.values() for key in actor.key_frames]
+        return sorted({*found, *(key for prop in scene.props.values() for key in prop.key_frames)})
+
+    def channels(self) -> dict[str, tuple[float, float]]:
+        """Channels of the actor that may move, with their limits in degrees."""
+        actor = self.actor
+        if actor is None or actor.recorded is not None:
+            return {}
+        limits = np.degrees(actor.skeleton.limits)
+        return {
+            f"{name}.{channel}": (float(limits[j, c, 0]), float(limits[j, c, 1]))
+            for j, name in enumerate(actor.skeleton.names)
+            for c, channel in enumerate(CHANNELS)
+            if limits[j, c, 0] < limits[j, c, 1]
+        }
+
+    def angles(self, frame: float | None = None) -> dict[str, float]:
+        """Degrees of every channel that may move at a frame, the one that is shown at first, held at their limits."""
+        actor = self.actor
+        at = self.frame if frame is None else frame
+        if actor is None:
+            return {}
+        return {
+            name: float(np.clip(np.degrees(actor.value(name, at)), low, high))
+            for name, (low, high) in self.channels().items()
+        }
+
+    def shown(self) -> list[Shown]:
+        """The surfaces at the frame that is shown; as contact has them, as long as it is that of this script."""
+        solved = self.pressed
+        if solved is None:
+            return self.surfaces.at(self.scene, self.frame, self.coloring)
+        return self.surfaces.at(solved.scene, self.frame, self.coloring, solved.simulation.surfaces)
+
+    @property
+    def pressed(self) -> Pressed | None:
+        """The contact that was solved, if it is that of this script."""
+        solved = self.solved
+        return solved if solved is not None and solved.text == self.document.text else None
+
+    def copied_scene(self) -> Scene:
+        """A scene like this one, to be worked on beside it.
+
+        Raises:
+            WarpjldError: The script cannot be run as it stands.
+        """
+        if self.broken and self.error is not None:
+            raise self.error
+        return self.performance.copied()
+
+    # ---- what is done --------------------------------------------------------------------------------------------
+
+    def write(self, text: str, kind: Hashable = None) -> None:
+        """The script is this text: typed, and kept with its faults."""
+        self.document.edit(text, kind)
+        self._run()
+
+    def do(self, lines: str, kind: Hashable = None) -> bool:
+        """Add lines to the script; False where they cannot be done, and then it is as it was."""
+        body = self.document.text.rstrip("\n")
+        return self.put(f"{body}\n{lines}\n" if body else f"{lines}\n", kind)
+
+    def put(self, text: str, kind: Hashable = None) -> bool:
+        """Make this the script if it can be run; False where it cannot, and then it is as it was."""
+        if self.broken:
+            assert self.error is not None
+            self.messages.append("nothing can be done by mouse before the script's fault is mended")
+            return False
+        try:
+            self.performance.run(text, self.document.path)
+        except WarpjldError as error:
+            self.performance.run(self.document.text, self.document.path)
+            self.error = error
+            return False
+        self.document.edit(text, kind)
+        self.error = None
+        return True
+
+    def set_angles(self, angles: Mapping[str, float], kind: Hashable = None) -> bool:
+        """Set keys [degrees] of some channels at the frame that is shown; they are held at their limits."""
+        limits, actor = self.channels(), self.actor
+        if actor is None:
+            return False
+        held = {name: _within(angles[name], *limits[name]) for name in angles if name in limits}
+        other = None if self.scene.current == actor.name else actor.name
+        return self.put(with_keys(self.document.text, held, self.frame, actor=other), kind)
+
+    def key_all(self) -> bool:
+        """Set keys of all channels at the frame that is shown, where they are."""
+        return self.set_angles(self.angles())
+
+    def undo(self) -> bool:
+        """Take back what was done last; False where there is nothing to."""
+        done = self.document.undo()
+        if done:
+            self._run()
+        return done
+
+    def redo(self) -> bool:
+        """Do again what was taken back last; False where there is nothing to."""
+        done = self.document.redo()
+        if done:
+            self._run()
+        return done
+
+    def open(self, document: Document) -> None:
+        """Another script."""
+        self.document = document
+        self.frame, self._actor = 0.0, None
+        self._run()
+
+    def _run(self) -> None:
+        try:
+            self.performance.run(self.document.text, self.document.path)
+        except WarpjldError as error:
+            self.error, self.broken = error, True
+        else:
+            self.error, self.broken = None, False
+
+
+def _within(degrees: float, low: float, high: float) -> float:
+    """The nearest angle within limits that a line can say: to a hundredth."""
+    value = round(min(max(degrees, low), high), 2)
+    if value > high:
+        value -= 0.01
+    return float(number(value + 0.01 if value < low else value))

@@ -1,0 +1,68 @@
+"""One thread that does all that windows ask for, in order; what is overtaken while it waits is left out."""
+
+from __future__ import annotations
+
+import threading
+from collections import OrderedDict
+from collections.abc import Callable, Hashable
+
+__all__ = ["Worker"]
+
+
+class Worker:
+    """Jobs are done one after another. A job that waits is replaced by a later one with the same key, so that a slider
+    that is dragged faster than the stage can be drawn skips places and does not lag behind.
+
+    Args:
+        idle: Called when nothing waits any more after jobs, and every ``tick`` seconds while ``ticking`` says so.
+        failed: Told of what a job raised.
+    """
+
+    def __init__(self, idle: Callable[[], None], failed: Callable[[BaseException], None]) -> None:
+        self._idle, self._failed = idle, failed
+        self._jobs: OrderedDict[Hashable, Callable[[], object]] = OrderedDict()
+        self._wake = threading.Condition()
+        self._running = True
+        self._busy = False
+        self._thread = threading.Thread(target=self._work, name="studio", daemon=True)
+        self._thread.start()
+
+    def post(self, job: Callable[[], object], key: Hashable = None) -> None:
+        """Have a job done; one with this key that waits is not done."""
+        with self._wake:
+            self._jobs[object() if key is None else key] = job
+            self._wake.notify_all()
+
+    def waits(self, key: Hashable) -> bool:
+        """Whether a job with this key waits."""
+        with self._wake:
+            return key in self._jobs
+
+    def settle(self, timeout: float = 60.0) -> bool:
+        """Wait until everything that was posted is done; False where it is not in time."""
+        with self._wake:
+            return self._wake.wait_for(lambda: not self._jobs and not self._busy, timeout)
+
+    def stop(self) -> None:
+        """Do what is being done to its end, and nothing more."""
+        with self._wake:
+            self._running = False
+            self._wake.notify_all()
+        if threading.current_thread() is not self._thread:
+            self._thread.join(timeout=5.0)
+
+    def _work(self) -> None:
+        while True:
+            with self._wake:
+                self._busy = False
+                self._wake.notify_all()
+                self._wake.wait_for(lambda: bool(self._jobs) or not self._running)
+                if not self._running:
+                    return
+                _, job = self._jobs.popitem(last=False)
+                self._busy = True
+            for step in (job, self._idle):
+                try:
+                    step()
+                except BaseException as error:  # nothing that a job does may end the studio
+                    self._failed(error)
