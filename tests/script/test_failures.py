@@ -13,7 +13,7 @@ from tests.finger import finger
 from warpjld.errors import InputError, WarpjldError
 from warpjld.io.caches.npz import NpzCache
 from warpjld.script import Interpreter, Scene
-from warpjld.script import runner as module
+from warpjld.script import making as module
 from warpjld.script.runner import run_scene
 from warpjld.whole_file import machine
 

@@ -115,7 +115,7 @@ def test_a_hundred_thousand_frames_of_a_hand_within_450_mb(tmp_path: Path) -> No
         "FINGER1 LEFT INDEX FLEXION 99999 99999 1 60\nEXPORT 'x.pc2'\n"
     )
     assert _peak("run", str(script), "-o", str(tmp_path / "out"), "--quiet") < 450.0
-    assert (tmp_path / "out" / "x.pc2").stat().st_size > 100_000 * 1500 * 12
+    assert (tmp_path / "out" / "x.pc2").stat().st_size > 100_000 * 1400 * 12
 
 
 @pytest.mark.slow
@@ -131,7 +131,8 @@ def test_a_million_frames_run(tmp_path: Path) -> None:
     rig = skinned_files.Skinned(["one", "two", "three"], [-1, 0, 1], offsets, turns, vertices, faces, joints, weights)
     skinned_files.write(tmp_path / "rig.glb", rig, {})
     (tmp_path / "long.jld").write_text(
-        'BODY "rig.glb" UNIT M NAME finger\nFRAMES 0 999999\nMOVE finger 0 0 0 0\nMOVE finger 999999 0.1 0 0\nEXPORT "x.pc2"\n'
+        'BODY "rig.glb" UNIT M NAME finger\nFRAMES 0 999999\nMOVE finger 0 0 0 0\n'
+        'MOVE finger 999999 0.1 0 0\nEXPORT "x.pc2"\n'
     )
     assert _peak("run", str(tmp_path / "long.jld"), "-o", str(tmp_path / "out"), "--quiet") < 450.0
     assert (tmp_path / "out" / "x.pc2").stat().st_size >= 1_000_000 * 12 * 12

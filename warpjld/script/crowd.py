@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from warpjld.script.outputs import Camera
 from warpjld.script.outermost import outermost
+from warpjld.script.outputs import Camera
 from warpjld.script.props import Prop
 from warpjld.script.scene import Actor
 from warpjld.script.staging import stage, staged

@@ -8,8 +8,9 @@ from functools import partial
 
 import numpy as np
 
-from warpjld.fem import Instant, Solution, Status, solve
-from warpjld.fem.contact import ContactInstant, ContactSolution
+from warpjld.fem import Status
+from warpjld.fem.contact import ContactSolution
+from warpjld.reading import reading
 from warpjld.simulation.animation import AngleEdit
 from warpjld.simulation.bodies.deformable_body import History
 from warpjld.simulation.bodies.model import ContactModel
@@ -23,9 +24,10 @@ from warpjld.simulation.solve.grasp_balance import weight_of
 from warpjld.simulation.solve.missed_contacts import MissedContact, missed_contacts
 from warpjld.simulation.solve.solved_frame import SolvedFrame, solved_frame
 from warpjld.simulation.solve.substeps import Substeps
+from warpjld.simulation.solve.untouched import solve_untouched
 from warpjld.simulation.specification import ContactSpecification, GripSpecification, SolveSpecification
 
-__all__ = ["KnownEquilibrium", "Progress", "SolveResult", "solve_frames"]
+__all__ = ["KnownEquilibrium", "Progress", "Save", "SolveResult", "solve_frames"]
 
 Progress = Callable[[str, int, int], None]
 """Told what is being done, how much of it is done, and how much there is."""
@@ -48,6 +50,9 @@ class KnownEquilibrium:
 
 Watch = Callable[[ContactModel, SolvedFrame], str | None]
 
+Save = Callable[[CheckpointFile], bool]
+"""Saves what is solved so far; False where there is nothing to go on from."""
+
 
 @dataclass(frozen=True, eq=False)
 class SolveResult:
@@ -66,6 +71,7 @@ class SolveResult:
         stops: Digits that closed no farther.
         tight: Bones that came nearest to objects, of every digit and object the nearest.
         equilibria: Of each frame that this run solved, by its number: what it can be differentiated from.
+        interrupted: Whether Ctrl-C ended it.
     """
 
     status: Status
@@ -80,6 +86,7 @@ class SolveResult:
     stops: tuple[Stop, ...] = ()
     tight: tuple[tuple[float, TightBone], ...] = ()
     equilibria: Mapping[float, KnownEquilibrium] = field(default_factory=dict)
+    interrupted: bool = False
 
     @property
     def start(self) -> float:
@@ -95,9 +102,10 @@ def solve_frames(
     *,
     watch: Watch = lambda model, solved: None,
     checkpoint: CheckpointFile | None = None,
+    saving: Callable[[Save], None] = lambda save: None,
     progress: Progress = lambda what, done, total: None,
 ) -> SolveResult:
-    """Solve contact at frames.
+    """Solve contact at frames; Ctrl-C ends it with those that were solved, if any were.
 
     Args:
         model: What may touch, at rest at its start: before anything touches, or where overlaps begin to part (R112).
@@ -106,26 +114,55 @@ def solve_frames(
         request: How to solve.
         watch: Told the model and each frame as it is solved; a text stops the run there (R118).
         checkpoint: Holds what was solved so far; an earlier run's is gone on from.
+        saving: Told before the first frame what saves, at any time, the frames that are solved by then.
         progress: Told about the work.
 
     Raises:
         InputError: A state that belongs to something else.
     """
     run = _Run(model, contact, request)
-    if checkpoint is not None and (found := checkpoint.load()) is not None:
-        run.resume(found)
+    saving(run.save)
+    if checkpoint is not None and (found := checkpoint.load(model, frames)) is not None:
+        with reading(checkpoint.path, "a state of a contact solve"):
+            run.resume(found)
         for solved in found.frames:
             if reason := watch(run.model, solved):
                 return run.ended(Status.STOPPED, reason)
     if not model.pairs:
         return _untouched(model, frames, watch, progress)
+    try:
+        return _solve_on(run, frames, watch, checkpoint, progress)
+    except KeyboardInterrupt:
+        if not run.done:
+            raise
+        return run.interrupted()
+
+
+def _untouched(model: ContactModel, frames: Sequence[float], watch: Watch, progress: Progress) -> SolveResult:
+    """Frames of bodies with nothing to touch."""
+    done: list[SolvedFrame] = []
+    try:
+        status, message = solve_untouched(model, frames, done, watch, progress)
+    except KeyboardInterrupt:
+        if not done:
+            raise
+        message = f"interrupted after frame {done[-1].frame:g}"
+        return SolveResult(Status.STOPPED, message, model, tuple(done), interrupted=True)
+    return SolveResult(status, message, model, tuple(done))
+
+
+def _solve_on(
+    run: _Run, frames: Sequence[float], watch: Watch, checkpoint: CheckpointFile | None, progress: Progress
+) -> SolveResult:
+    """Solve the frames that are not done yet."""
+    contact = run.contact
     for frame in frames[len(run.done) :]:
         progress(f"contact, frame {frame:g}", len(run.done), len(frames))
         failure = run.solve(frame)
         if failure is not None:
             return failure
-        if checkpoint is not None and run.last is not None:
-            checkpoint.save(run.done, run.last, run.edits, run.limits.content())
+        if checkpoint is not None:
+            run.save(checkpoint)
         if reason := watch(run.model, run.done[-1]):
             return run.ended(Status.STOPPED, reason)
         for grip in contact.grips:
@@ -133,7 +170,8 @@ def solve_frames(
                 progress(f"looking for a grip, frame {frame:g}", len(run.done), len(frames))
                 searched = run.find(grip, partial(_tell, progress, frame, len(run.done), len(frames)))
                 if searched.interrupted:
-                    return run.ended(Status.STOPPED, f"at frame {frame:g}: {searched.text}")
+                    ended = run.ended(Status.STOPPED, f"at frame {frame:g}: {searched.text}")
+                    return replace(ended, interrupted=True)
     return run.ended(Status.CONVERGED, Status.CONVERGED.value)
 
 
@@ -154,6 +192,7 @@ class _Run:
     corrections: list[CorrectedFrame] = field(default_factory=list)
     tight: dict[tuple[str, str, str], tuple[float, TightBone]] = field(default_factory=dict)
     equilibria: dict[float, KnownEquilibrium] = field(default_factory=dict)
+    settled: tuple[ContactModel, Checkpoint] | None = None
 
     def __post_init__(self) -> None:
         self.substeps = Substeps(self.model)
@@ -167,9 +206,12 @@ class _Run:
         """Go on from what another run left."""
         self.done, self.last, self.resumed = list(found.frames), found.solution, len(found.frames)
         self.limits.restore(found.limits)
+        self.missed = list(found.missed)
+        self.tight = {(one.actor, one.digit, one.object): (frame, one) for frame, one in found.tight}
         self._edit(found.edits)
         for solved in self.done:
             self._note(solved)
+        self._settle()
 
     def solve(self, frame: float) -> SolveResult | None:
         """Add a frame; what ended all where it cannot be solved."""
@@ -202,11 +244,40 @@ class _Run:
             solution = corrected.solution
             self._edit(corrected.edits)
         self.equilibria[float(frame)] = KnownEquilibrium(self.model, self.history, _bare(solution))
-        self.missed += missed_contacts(model, None if before is None else before.last, solution.instants)
+        self.missed += missed_contacts(model, self.done[-1] if self.done else None, solution.instants)
         self.last = solution
         self.done.append(solved_frame(float(frame), solution.instants))
         self._note(self.done[-1])
+        self._settle()
         return None
+
+    def save(self, checkpoint: CheckpointFile) -> bool:
+        """Save all frames that are solved; False where none is, or grips and corrections would be lost."""
+        if self.settled is None or self.contact.grips or self.request.correct:
+            return False
+        checkpoint.save(self.settled[1])
+        return True
+
+    def interrupted(self) -> SolveResult:
+        """All of it as it was after the last frame that was solved."""
+        if self.settled is not None:
+            self.model, known = self.settled
+            self.done, self.edits, self.missed = list(known.frames), list(known.edits), list(known.missed)
+        after = self.done[-1].frame
+        return replace(self.ended(Status.STOPPED, f"interrupted after frame {after:g}"), interrupted=True)
+
+    def _settle(self) -> None:
+        """Remember how things are between two frames: an interrupt falls anywhere within one."""
+        assert self.last is not None
+        known = Checkpoint(
+            tuple(self.done),
+            self.last,
+            tuple(self.edits),
+            self.limits.content(),
+            tuple(self.missed),
+            tuple(self.tight.values()),
+        )
+        self.settled = self.model, known
 
     def _bone_inside(self, model: ContactModel, times: Sequence[float]) -> str | None:
         """A bone that lies in an object at one of some times, in words: no force can part them."""
@@ -230,6 +301,7 @@ class _Run:
         if found.release is not None:
             objects = [found.release.applied(one) for one in self.model.objects]
             self.model = replace(self.model, objects=tuple(objects))
+        self._settle()
         return found
 
     def ended(self, status: Status, message: str) -> SolveResult:
@@ -266,28 +338,3 @@ def _tell(progress: Progress, frame: float, done: int, total: int, line: str) ->
 def _bare(solution: ContactSolution) -> ContactSolution:
     """The last equilibrium, without the tables of what touches: those are large, and found again."""
     return replace(solution, instants=(replace(solution.last, touches=()),))
-
-
-def _untouched(model: ContactModel, frames: Sequence[float], watch: Watch, progress: Progress) -> SolveResult:
-    """Frames of bodies with nothing to touch."""
-    done: list[SolvedFrame] = []
-    nothing, history = np.zeros_like(model.body.mesh.nodes), History()
-    rest = Instant(1.0, nothing, nothing, 0, 0, 0.0)
-    after, before = Solution(Status.CONVERGED, (rest,), "", np.empty(0, np.int64), model.loads), 0.0
-    for frame in frames:
-        progress(f"frame {frame:g}", len(done), len(frames))
-        time = frame - model.start
-        known = model.prescribed(time, history)
-        ahead = model.guess(before, time, after.displacement, history)
-        first = replace(after, instants=(replace(after.last, displacement=ahead),), loads=model.loads)
-        solution = solve(model.body, known, model.loads, after=first, free="hold", check=False)
-        if not solution.converged:
-            return SolveResult(solution.status, f"at frame {frame:g}: {solution.message}", model, tuple(done))
-        after, last, before = solution, solution.last, time
-        instant = ContactInstant(
-            time, last.displacement, last.reactions, (), last.newton, last.iterations, last.residual
-        )
-        done.append(solved_frame(float(frame), [instant]))
-        if reason := watch(model, done[-1]):
-            return SolveResult(Status.STOPPED, reason, model, tuple(done))
-    return SolveResult(Status.CONVERGED, Status.CONVERGED.value, model, tuple(done))

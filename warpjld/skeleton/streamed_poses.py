@@ -27,6 +27,10 @@ class StreamedPoses(Poses):
         posed: Poses of some of them; of each the same, whichever others are asked for.
     """
 
+    _frames: NDArray[np.float64]
+    _posed: Callable[[NDArray[np.float64]], Poses]
+    _held: tuple[int, Poses]
+
     def __init__(self, frames: NDArray[np.float64], posed: Callable[[NDArray[np.float64]], Poses]) -> None:
         self.__dict__ |= {"_frames": frames, "_posed": posed, "_held": (0, posed(frames[:1])[:0])}
 
@@ -51,17 +55,17 @@ class StreamedPoses(Poses):
         return self._posed(self._frames)
 
     @property
-    def positions(self) -> NDArray[np.float64]:  # type: ignore[override]
+    def positions(self) -> NDArray[np.float64]:
         """Joint positions [m], shape (F, J, 3)."""
         return self._whole.positions
 
     @property
-    def rotations(self) -> NDArray[np.float64]:  # type: ignore[override]
+    def rotations(self) -> NDArray[np.float64]:
         """Rotations of the bones from rest, shape (F, J, 4)."""
         return self._whole.rotations
 
     @property
-    def flexion(self) -> NDArray[np.float64]:  # type: ignore[override]
+    def flexion(self) -> NDArray[np.float64]:
         """Vertical flexions [rad], shape (F, J)."""
         return self._whole.flexion
 
