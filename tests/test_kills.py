@@ -1,5 +1,5 @@
-"""``kill -9`` at random moments: old outputs stay whole, and what the next run leaves is, byte for byte, what one leaves
-that nobody disturbed. Fifty-four moments over six commands; minutes each, so run with ``-m slow``."""
+"""``kill -9`` at random moments: old outputs stay whole, and what the next run leaves is, byte for byte, what is left
+by one that nobody disturbed. Fifty-four moments over six commands; minutes each, so run with ``-m slow``."""
 
 from __future__ import annotations
 
