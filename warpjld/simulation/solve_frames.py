@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from functools import partial
 
 import numpy as np
 
@@ -16,6 +15,7 @@ from warpjld.simulation.bodies.deformable_body import History
 from warpjld.simulation.bodies.model import ContactModel
 from warpjld.simulation.grip.correct_frames import CorrectedFrame, correct_frame
 from warpjld.simulation.grip.find import FoundGrip, find_grip
+from warpjld.simulation.grip.kept import grip_content, restored_grip
 from warpjld.simulation.solve.bone_clearance import TIGHT, BoneClearance, TightBone
 from warpjld.simulation.solve.branch import solve_onward
 from warpjld.simulation.solve.checkpoint import Checkpoint, CheckpointFile
@@ -161,17 +161,17 @@ def _solve_on(
         failure = run.solve(frame)
         if failure is not None:
             return failure
-        if checkpoint is not None:
+        grip = next((one for one in contact.grips if one.first == frame), None)
+        if checkpoint is not None and grip is None:
             run.save(checkpoint)
         if reason := watch(run.model, run.done[-1]):
             return run.ended(Status.STOPPED, reason)
-        for grip in contact.grips:
-            if grip.first == frame:
-                progress(f"looking for a grip, frame {frame:g}", len(run.done), len(frames))
-                searched = run.find(grip, partial(_tell, progress, frame, len(run.done), len(frames)))
-                if searched.interrupted:
-                    ended = run.ended(Status.STOPPED, f"at frame {frame:g}: {searched.text}")
-                    return replace(ended, interrupted=True)
+        if grip is not None:
+            searched = run.find(grip, progress, len(frames))
+            if searched.interrupted:
+                return replace(run.ended(Status.STOPPED, f"at frame {frame:g}: {searched.text}"), interrupted=True)
+            if checkpoint is not None:
+                run.save(checkpoint)
     return run.ended(Status.CONVERGED, Status.CONVERGED.value)
 
 
@@ -208,6 +208,9 @@ class _Run:
         self.limits.restore(found.limits)
         self.missed = list(found.missed)
         self.tight = {(one.actor, one.digit, one.object): (frame, one) for frame, one in found.tight}
+        self.grips = [restored_grip(content, self.contact) for content in found.grips]
+        for grip in self.grips:
+            self._release(grip)
         self._edit(found.edits)
         for solved in self.done:
             self._note(solved)
@@ -248,12 +251,13 @@ class _Run:
         self.last = solution
         self.done.append(solved_frame(float(frame), solution.instants))
         self._note(self.done[-1])
-        self._settle()
+        if all(grip.first != frame for grip in self.contact.grips):  # else when the grip is found
+            self._settle()
         return None
 
     def save(self, checkpoint: CheckpointFile) -> bool:
-        """Save all frames that are solved; False where none is, or grips and corrections would be lost."""
-        if self.settled is None or self.contact.grips or self.request.correct:
+        """Save all frames that are solved; False where none is, or corrections would be lost."""
+        if self.settled is None or self.request.correct:
             return False
         checkpoint.save(self.settled[1])
         return True
@@ -263,20 +267,16 @@ class _Run:
         if self.settled is not None:
             self.model, known = self.settled
             self.done, self.edits, self.missed = list(known.frames), list(known.edits), list(known.missed)
+            self.grips = self.grips[: len(known.grips)]
         after = self.done[-1].frame
         return replace(self.ended(Status.STOPPED, f"interrupted after frame {after:g}"), interrupted=True)
 
     def _settle(self) -> None:
         """Remember how things are between two frames: an interrupt falls anywhere within one."""
         assert self.last is not None
-        known = Checkpoint(
-            tuple(self.done),
-            self.last,
-            tuple(self.edits),
-            self.limits.content(),
-            tuple(self.missed),
-            tuple(self.tight.values()),
-        )
+        known = Checkpoint(tuple(self.done), self.last, tuple(self.edits), self.limits.content(), tuple(self.missed))
+        grips = tuple(map(grip_content, self.grips))
+        known = replace(known, tight=tuple(self.tight.values()), grips=grips)
         self.settled = self.model, known
 
     def _bone_inside(self, model: ContactModel, times: Sequence[float]) -> str | None:
@@ -291,18 +291,29 @@ class _Run:
             if one.left < TIGHT and (place not in self.tight or one.left < self.tight[place][1].left):
                 self.tight[place] = (frame, one)
 
-    def find(self, grip: GripSpecification, tell: Callable[[str], None]) -> FoundGrip:
-        """Look for a grip, and go on with it; ``tell`` hears of every grip that is tried."""
+    def find(self, grip: GripSpecification, progress: Progress, total: int) -> FoundGrip:
+        """Look for a grip, and go on with it; ``progress`` hears of every grip that is tried."""
+        what = f"looking for a grip, frame {grip.first:g}"
+        progress(what, len(self.done), total)
         assert self.last is not None
         limits = self.contact.strength.get(grip.actor, {})
+
+        def tell(line: str) -> None:
+            progress(f"{what}: {line}", len(self.done), total)
+
         found = find_grip(self.model, self.history, grip, self.last, limits, tell)
         self.grips.append(found)
         self._edit(found.edits)
+        self._release(found)
+        if not found.interrupted:
+            self._settle()
+        return found
+
+    def _release(self, found: FoundGrip) -> None:
+        """Let the support go as a grip has it."""
         if found.release is not None:
             objects = [found.release.applied(one) for one in self.model.objects]
             self.model = replace(self.model, objects=tuple(objects))
-        self._settle()
-        return found
 
     def ended(self, status: Status, message: str) -> SolveResult:
         """All of it."""
@@ -328,11 +339,6 @@ class _Run:
     def _note(self, solved: SolvedFrame) -> None:
         time = solved.frame - self.model.start
         self.history = self.model.after(self.history, time, solved.displacement, solved.reactions, solved.nodal)
-
-
-def _tell(progress: Progress, frame: float, done: int, total: int, line: str) -> None:
-    """One grip that was tried."""
-    progress(f"looking for a grip, frame {frame:g}: {line}", done, total)
 
 
 def _bare(solution: ContactSolution) -> ContactSolution:

@@ -46,6 +46,7 @@ class Checkpoint:
         limits: Digits that have stopped: ``ForceLimits.content``.
         missed: Touches between frames.
         tight: Bones that came near to objects, and at which frame.
+        grips: Grips that were found, as plain values (``grip_content``).
         identity: What it belongs to: hashes by name (see ``identity_of``).
     """
 
@@ -55,6 +56,7 @@ class Checkpoint:
     limits: dict[str, Any] = field(default_factory=dict)
     missed: tuple[MissedContact, ...] = ()
     tight: tuple[tuple[float, TightBone], ...] = ()
+    grips: tuple[dict[str, Any], ...] = ()
     identity: Mapping[str, str] = field(default_factory=dict)
 
 
@@ -116,6 +118,7 @@ def save_checkpoint(path: Path, state: Checkpoint, identity: Mapping[str, str]) 
         "limits": json.dumps(state.limits),
         "missed": json.dumps([asdict(one) for one in state.missed]),
         "tight": json.dumps([[frame, asdict(bone)] for frame, bone in state.tight]),
+        "grips": json.dumps(state.grips, default=lambda number: number.item()),
         "memories": len(solution.states),
     }
     # one array a field, over all frames: a long run has no more members than a short one
@@ -182,6 +185,7 @@ def _read(file: Any) -> Checkpoint:
         dict(_json(file, "limits")),
         tuple(plain_record(MissedContact, one) for one in _json(file, "missed")),
         tuple((float(frame), plain_record(TightBone, bone)) for frame, bone in _json(file, "tight")),
+        tuple(dict(one) for one in _json(file, "grips")),
         {str(name): str(value) for name, value in dict(_json(file, "identity")).items()},
     )
 
