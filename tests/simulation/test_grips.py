@@ -195,12 +195,11 @@ def test_a_state_keeps_the_grip_that_was_found(
     def stopped(*_: object) -> None:
         raise RuntimeError("cut off")
 
-    with monkeypatch.context() as patch:  # while the grip is looked for: its frame does not count as done
+    with monkeypatch.context() as patch:  # while the grip is looked for: its frame, the first, does not count as done
         patch.setattr("warpjld.simulation.solve_frames.find_grip", stopped)
         with pytest.raises(RuntimeError, match="cut off"):
             again("first")
-    with np.load(tmp_path / "first" / "s.npz") as file:
-        assert file["frames.frame"].max() < 5.0
+    assert not (tmp_path / "first" / "s.npz").exists()
     again("first")
     out, _, _ = pressed
     for table in ("contact.csv", "grips.csv"):
