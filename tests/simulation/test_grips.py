@@ -183,6 +183,7 @@ def test_grips_that_cannot_be_are_refused(
         run_contact(run(BALL + lines), tmp_path)
 
 
+@pytest.mark.slow
 def test_a_state_keeps_the_grip_that_was_found(
     pressed: tuple[Path, dict, Scene], rig, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
