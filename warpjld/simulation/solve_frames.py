@@ -124,10 +124,9 @@ def solve_frames(
     saving(run.save)
     if checkpoint is not None and (found := checkpoint.load(model, frames)) is not None:
         with reading(checkpoint.path, "a state of a contact solve"):
-            run.resume(found)
-        for solved in found.frames:
-            if reason := watch(run.model, solved):
-                return run.ended(Status.STOPPED, reason)
+            reasons = run.resume(found, watch)
+        if reasons:
+            return run.ended(Status.STOPPED, reasons[0])
     if not model.pairs:
         return _untouched(model, frames, watch, progress)
     try:
@@ -185,6 +184,7 @@ class _Run:
     history: History = field(default_factory=History)
     last: ContactSolution | None = None
     done: list[SolvedFrame] = field(default_factory=list)
+    edited: list[int] = field(default_factory=list)
     resumed: int = 0
     missed: list[MissedContact] = field(default_factory=list)
     edits: list[AngleEdit] = field(default_factory=list)
@@ -202,19 +202,28 @@ class _Run:
         weights = {name: weight_of(self.model.obstacles[name]) for name in held}
         self.limits = ForceLimits(self.contact.strength, self.request.pressure, weights, self.clearance)
 
-    def resume(self, found: Checkpoint) -> None:
-        """Go on from what another run left."""
-        self.done, self.last, self.resumed = list(found.frames), found.solution, len(found.frames)
+    def resume(self, found: Checkpoint, watch: Watch) -> list[str]:
+        """Go on from what another run left, with the model of each frame as it was then; what ``watch`` says."""
+        self.last, self.resumed, self.missed = found.solution, len(found.frames), list(found.missed)
         self.limits.restore(found.limits)
-        self.missed = list(found.missed)
         self.tight = {(one.actor, one.digit, one.object): (frame, one) for frame, one in found.tight}
-        self.grips = [restored_grip(content, self.contact) for content in found.grips]
-        for grip in self.grips:
-            self._release(grip)
-        self._edit(found.edits)
-        for solved in self.done:
-            self._note(solved)
+        grips, reasons = [restored_grip(content, self.contact) for content in found.grips], []
+        for solved, count in zip(found.frames, found.edited, strict=True):
+            self._edit(found.edits[len(self.edits) : count])
+            self._add(solved)
+            reasons += [reason] if (reason := watch(self.model, solved)) else []
+            for grip in (one for one in grips if one.request.first == solved.frame):
+                self.grips.append(grip)
+                self._edit(found.edits[len(self.edits) : len(self.edits) + len(grip.edits)])
+                self._release(grip)
         self._settle()
+        return reasons
+
+    def _add(self, solved: SolvedFrame) -> None:
+        """Note a frame that is solved, and how many edits there were by then."""
+        self.done.append(solved)
+        self.edited.append(len(self.edits))
+        self._note(solved)
 
     def solve(self, frame: float) -> SolveResult | None:
         """Add a frame; what ended all where it cannot be solved."""
@@ -246,11 +255,11 @@ class _Run:
             self.corrections.append(corrected)
             solution = corrected.solution
             self._edit(corrected.edits)
-        self.equilibria[float(frame)] = KnownEquilibrium(self.model, self.history, _bare(solution))
+        bare = replace(solution, instants=(replace(solution.last, touches=()),))
+        self.equilibria[float(frame)] = KnownEquilibrium(self.model, self.history, bare)
         self.missed += missed_contacts(model, self.done[-1] if self.done else None, solution.instants)
         self.last = solution
-        self.done.append(solved_frame(float(frame), solution.instants))
-        self._note(self.done[-1])
+        self._add(solved_frame(float(frame), solution.instants))
         if all(grip.first != frame for grip in self.contact.grips):  # else when the grip is found
             self._settle()
         return None
@@ -267,16 +276,16 @@ class _Run:
         if self.settled is not None:
             self.model, known = self.settled
             self.done, self.edits, self.missed = list(known.frames), list(known.edits), list(known.missed)
-            self.grips = self.grips[: len(known.grips)]
+            self.grips, self.edited = self.grips[: len(known.grips)], list(known.edited)
         after = self.done[-1].frame
         return replace(self.ended(Status.STOPPED, f"interrupted after frame {after:g}"), interrupted=True)
 
     def _settle(self) -> None:
         """Remember how things are between two frames: an interrupt falls anywhere within one."""
         assert self.last is not None
-        known = Checkpoint(tuple(self.done), self.last, tuple(self.edits), self.limits.content(), tuple(self.missed))
-        grips = tuple(map(grip_content, self.grips))
-        known = replace(known, tight=tuple(self.tight.values()), grips=grips)
+        tight, limits = tuple(self.tight.values()), self.limits.content()
+        parts = (tuple(self.edits), limits, tuple(self.missed), tight, tuple(map(grip_content, self.grips)))
+        known = Checkpoint(tuple(self.done), self.last, *parts, edited=tuple(self.edited))
         self.settled = self.model, known
 
     def _bone_inside(self, model: ContactModel, times: Sequence[float]) -> str | None:
@@ -339,8 +348,3 @@ class _Run:
     def _note(self, solved: SolvedFrame) -> None:
         time = solved.frame - self.model.start
         self.history = self.model.after(self.history, time, solved.displacement, solved.reactions, solved.nodal)
-
-
-def _bare(solution: ContactSolution) -> ContactSolution:
-    """The last equilibrium, without the tables of what touches: those are large, and found again."""
-    return replace(solution, instants=(replace(solution.last, touches=()),))

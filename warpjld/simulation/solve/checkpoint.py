@@ -47,6 +47,7 @@ class Checkpoint:
         missed: Touches between frames.
         tight: Bones that came near to objects, and at which frame.
         grips: Grips that were found, as plain values (``grip_content``).
+        edited: How many of the edits there were when each frame was solved.
         identity: What it belongs to: hashes by name (see ``identity_of``).
     """
 
@@ -57,6 +58,7 @@ class Checkpoint:
     missed: tuple[MissedContact, ...] = ()
     tight: tuple[tuple[float, TightBone], ...] = ()
     grips: tuple[dict[str, Any], ...] = ()
+    edited: tuple[int, ...] = ()
     identity: Mapping[str, str] = field(default_factory=dict)
 
 
@@ -119,6 +121,7 @@ def save_checkpoint(path: Path, state: Checkpoint, identity: Mapping[str, str]) 
         "missed": json.dumps([asdict(one) for one in state.missed]),
         "tight": json.dumps([[frame, asdict(bone)] for frame, bone in state.tight]),
         "grips": json.dumps(state.grips, default=lambda number: number.item()),
+        "edited": np.array(state.edited, np.int64),
         "memories": len(solution.states),
     }
     # one array a field, over all frames: a long run has no more members than a short one
@@ -186,6 +189,7 @@ def _read(file: Any) -> Checkpoint:
         tuple(plain_record(MissedContact, one) for one in _json(file, "missed")),
         tuple((float(frame), plain_record(TightBone, bone)) for frame, bone in _json(file, "tight")),
         tuple(dict(one) for one in _json(file, "grips")),
+        tuple(int(count) for count in file["edited"]),
         {str(name): str(value) for name, value in dict(_json(file, "identity")).items()},
     )
 
