@@ -16,8 +16,8 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
 import warpjld as wj
-from warpjld.quiet import silence_warp
-from warpjld.surface import weld_surface
+from warpjld.geometry.surface import weld_surface
+from warpjld.runtime.quiet import silence_warp
 
 PICTURES = Path(__file__).resolve().parent / "pictures"
 RADIUS, LENGTH = 0.009, 0.08  # of the tube [m]

@@ -13,7 +13,7 @@ from pathlib import Path
 
 from PIL import Image
 
-from warpjld.quiet import silence_warp
+from warpjld.runtime.quiet import silence_warp
 from warpjld.script import Interpreter, Scene
 from warpjld.script.outputs import ContactSheet, Picture
 from warpjld.script.plugin import load_commands

@@ -13,8 +13,8 @@ import numpy as np
 import trimesh
 
 from warpjld.covering import bind_rig
+from warpjld.geometry.rotations import rotate
 from warpjld.hand import build_hand
-from warpjld.rotations import rotate
 from warpjld.script import Interpreter, Scene
 from warpjld.script.runner import run_scene
 from warpjld.skeleton import CHANNELS, poses_from_angles

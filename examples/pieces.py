@@ -11,9 +11,9 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from warpjld.geometry.normals import vertex_normals
 from warpjld.hand import build_hand
 from warpjld.io.skeleton_file import write_skeleton_file
-from warpjld.normals import vertex_normals
 from warpjld.script import Interpreter, Scene
 from warpjld.script.runner import run_scene
 

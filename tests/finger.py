@@ -2,9 +2,9 @@
 
 import numpy as np
 
+from warpjld.geometry.surface import weld_surface
 from warpjld.rig import Rig
 from warpjld.skeleton import Skeleton, default_limits
-from warpjld.surface import weld_surface
 
 
 def finger() -> Rig:

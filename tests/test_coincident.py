@@ -10,7 +10,7 @@ from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
-from warpjld.coincident import close_pairs, connected_parts
+from warpjld.geometry.coincident import close_pairs, connected_parts
 
 _seeds = st.integers(0, 2**32 - 1)
 

@@ -133,8 +133,8 @@ def statuses() -> dict[str, tuple[type[Enum], str]]:
     from warpjld.simulation.grip.search import GripStatus, TrialOutcome
 
     return {
-        "Flexion searches": (grasp.Status, "##"),
-        "Solves": (fem.Status, "##"),
+        "Flexion searches": (grasp.SearchStatus, "##"),
+        "Solves": (fem.SolveStatus, "##"),
         "Grips": (GripStatus, "##"),
         "Trials of a grip": (TrialOutcome, "###"),
         "Forces asked for": (ForceStatus, "##"),

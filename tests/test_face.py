@@ -112,7 +112,7 @@ def _built(make: Any, *given: Any) -> Any:
 @pytest.mark.parametrize("name", NAMES)
 def test_examples(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
     """Every name has an example that runs. Hands are built and bound once: that is what takes long."""
-    from warpjld.quiet import silence_warp
+    from warpjld.runtime.quiet import silence_warp
 
     tests = examples_of(name)
     assert tests, f"{name} has no example"

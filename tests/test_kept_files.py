@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from warpjld.kept_files import CACHE_VARIABLE, keep, kept_folder
+from warpjld.files.kept_files import CACHE_VARIABLE, keep, kept_folder
 
 
 def test_it_moves_and_is_switched_off(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
@@ -29,7 +29,7 @@ def test_it_does_not_grow_for_ever(monkeypatch: pytest.MonkeyPatch, tmp_path: Pa
         old = tmp_path / f"{age}.npz"
         old.write_bytes(b"x" * 10)
         os.utime(old, (1e9 - age, 1e9 - age))
-    monkeypatch.setattr("warpjld.kept_files._MOST_BYTES", 30)
+    monkeypatch.setattr("warpjld.files.kept_files._MOST_BYTES", 30)
     keep(tmp_path / "new.npz", lambda place: _written(place, 10))
     assert sorted(file.name for file in tmp_path.iterdir()) == ["1.npz", "2.npz", "new.npz"]
     keep(tmp_path / "large.npz", lambda place: _written(place, 100))

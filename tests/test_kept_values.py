@@ -11,8 +11,8 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from warpjld.kept_files import CACHE_VARIABLE
-from warpjld.kept_values import hash_of, kept_sources, kept_value
+from warpjld.files.kept_files import CACHE_VARIABLE
+from warpjld.files.kept_values import hash_of, kept_sources, kept_value
 
 
 @dataclass(frozen=True, eq=False)

@@ -12,8 +12,8 @@ from pathlib import Path
 
 import pytest
 
-from warpjld import quiet
 from warpjld.kernel_cache import remove_damaged_kernels
+from warpjld.runtime import quiet
 
 LINUX = pytest.mark.skipif(not sys.platform.startswith("linux"), reason="what objects look like is known on Linux only")
 

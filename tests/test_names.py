@@ -9,8 +9,8 @@ import pytest
 from tests.finger import finger
 from warpjld.errors import InputError
 from warpjld.fem.study.study_file import load_study
-from warpjld.names import check_name, clash, expanded
-from warpjld.overwriting import check_outputs
+from warpjld.files.names import check_name, clash, expanded
+from warpjld.files.overwriting import check_outputs
 from warpjld.script import Interpreter, Scene
 from warpjld.script.runner import run_scene
 

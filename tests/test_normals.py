@@ -5,7 +5,7 @@ import trimesh
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from warpjld.normals import vertex_normals
+from warpjld.geometry.normals import vertex_normals
 
 # float32 results
 TOLERANCE = 1e-6

@@ -9,7 +9,7 @@ import pytest
 from tests.fuzz.sound import sound
 from warpjld.cli import main
 from warpjld.errors import InputError
-from warpjld.overwriting import check_outputs
+from warpjld.files.overwriting import check_outputs
 
 
 def test_inputs_by_any_name_and_outputs_named_twice_are_refused(tmp_path: Path) -> None:

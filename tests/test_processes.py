@@ -12,8 +12,8 @@ from pathlib import Path
 
 import pytest
 
-from warpjld.processes import run_jobs
-from warpjld.whole_file import whole_file
+from warpjld.files.whole_file import whole_file
+from warpjld.runtime.processes import run_jobs
 
 
 @dataclass(frozen=True)

@@ -5,7 +5,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation, Slerp
 
-from warpjld.rotations import axis_turns, conjugate, matrices, minimal_rotation, multiply, rotate, slerp, unit
+from warpjld.geometry.rotations import axis_turns, conjugate, matrices, minimal_rotation, multiply, rotate, slerp, unit
 
 EXACT = 1e-12
 

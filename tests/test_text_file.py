@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from warpjld.errors import InputError
-from warpjld.text_file import read_json, read_text
+from warpjld.files.text_file import read_json, read_text
 
 
 def test_a_byte_order_mark_is_no_text(tmp_path: Path) -> None:

@@ -4,7 +4,7 @@ import threading
 
 import pytest
 
-from warpjld.threads import cores, in_threads, one_blas_thread, threads_for
+from warpjld.runtime.threads import cores, in_threads, one_blas_thread, threads_for
 
 
 @pytest.mark.parametrize("threads", [-1, 1, 2, 3, 16])

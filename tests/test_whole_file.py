@@ -7,8 +7,8 @@ from pathlib import Path
 
 import pytest
 
-from warpjld import whole_file as whole_file_module
-from warpjld.whole_file import part_of, whole_file
+from warpjld.files import whole_file as whole_file_module
+from warpjld.files.whole_file import part_of, whole_file
 
 
 def test_it_becomes_the_file_when_all_is_written(tmp_path: Path) -> None:

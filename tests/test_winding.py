@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 import trimesh
 
-from warpjld.winding import winding_numbers
+from warpjld.geometry.winding import winding_numbers
 
 
 def test_closed_open_and_nested_surfaces() -> None:

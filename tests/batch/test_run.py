@@ -13,11 +13,11 @@ import numpy as np
 import pytest
 
 from tests.finger import finger
-from warpjld import whole_file
 from warpjld.batch import BatchResult, Deforming, clip_jobs, deform_clip, run_batch
 from warpjld.errors import InputError
-from warpjld.folder_lock import locked_folder
-from warpjld.whole_file import part_of
+from warpjld.files import whole_file
+from warpjld.files.folder_lock import locked_folder
+from warpjld.files.whole_file import part_of
 
 SETTINGS = {"rig": "finger", "rate": None}
 

@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 from warpjld.fem import Body, HexMesh, LinearElastic, Prescribed, ball_hexes, prescribe
 from warpjld.fem.contact import Pair, press
 from warpjld.fem.contact.obstacles.solids import Plane
-from warpjld.quiet import silence_warp
+from warpjld.runtime.quiet import silence_warp
 
 TRAVEL, POISSON = 0.2, 0.3
 CALCULIX, REFERENCE = 9.6, (0.0544, 0.1706)

@@ -19,7 +19,7 @@ from rich.console import Console
 from rich.table import Table
 
 from warpjld.covering import bind
-from warpjld.grasp import NEAREST, FlexionSearch, GraspObject, ObjectSet, Searches, Status
+from warpjld.grasp import NEAREST, FlexionSearch, GraspObject, ObjectSet, Searches, SearchStatus
 from warpjld.grasp.close import Closer
 from warpjld.grasp.judge import Judge
 from warpjld.grasp.shapes import ball, cylinder
@@ -148,7 +148,7 @@ def searches(repeats: int) -> Table:
         wanted = Searches(vertex=vertex, joint=joint, facet=facet)
         found = search.run(poses, angles, wanted, threads=1)
         taken = in_turn({name: lambda w=wanted: search.run(poses, angles, w, threads=1)}, repeats)[name]
-        share = np.mean(found.status == Status.CONVERGED)
+        share = np.mean(found.status == SearchStatus.CONVERGED)
         table.add_row(name, f"{count / np.median(taken):,.0f}", f"{found.evaluations.mean():.1f}", f"{share:.0%}")
     return table
 

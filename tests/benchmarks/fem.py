@@ -23,7 +23,7 @@ import numpy as np
 from warpjld.fem import Body, HexMesh, LinearElastic, box_hexes, finger_hexes, prescribe
 from warpjld.fem.load.prescribed import rigid_modes
 from warpjld.fem.solver.linear import LinearSolver
-from warpjld.quiet import silence_warp
+from warpjld.runtime.quiet import silence_warp
 
 CASES: dict[str, tuple[Callable[[], HexMesh], float, str]] = {
     "cube45": (lambda: box_hexes(counts=(24, 24, 24)), 0.3, "x-"),

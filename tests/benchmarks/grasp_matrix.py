@@ -124,7 +124,7 @@ def lines(hand: str, thing: str, task: str, arguments: argparse.Namespace) -> st
 
 def case(hand: str, thing: str, task: str, arguments: argparse.Namespace) -> dict[str, Any]:
     """Run one, in this process."""
-    from warpjld.quiet import silence_warp
+    from warpjld.runtime.quiet import silence_warp
     from warpjld.script import Interpreter, Scene
     from warpjld.script.contact import run_contact
 
@@ -251,7 +251,7 @@ def draw(scene: Any, found: Any, path: Path) -> None:
     """Hand and object at the last frame that was solved, and the pressure on the hand, from two sides."""
     from dataclasses import replace
 
-    from warpjld.script.outputs import Camera, Picture
+    from warpjld.script.outputs import CameraSetting, Picture
     from warpjld.script.pictures import draw_picture
     from warpjld.script.runner import cast
     from warpjld.script.staging import frame_numbers
@@ -263,7 +263,7 @@ def draw(scene: Any, found: Any, path: Path) -> None:
     scene.size = (640, 480)
     hand = found.model.hands[0].name
     for view in ("FRONT", "BACK"):
-        camera = Camera(view.lower(), zoom=1.0)
+        camera = CameraSetting(view.lower(), zoom=1.0)
         for style, only in (("shaded", None), ("pressure", hand)):
             place = path.with_name(f"{path.stem}-{view.lower()}-{style}.png")
             draw_picture(scene, crowd, Picture(place.name, frame, style, camera, only), place)

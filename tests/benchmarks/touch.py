@@ -18,7 +18,7 @@ from tests.benchmarks.skin.rigs import RIGS, load
 from warpjld.covering import Covering
 from warpjld.covering.intersections import crossing_faces
 from warpjld.covering.pose_sets import CURL
-from warpjld.quiet import silence_warp
+from warpjld.runtime.quiet import silence_warp
 from warpjld.skeleton import CHANNELS, Skeleton, poses_from_angles
 from warpjld.touch import Touch
 

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from warpjld.covering import Covering
+from warpjld.geometry.surface import Surface, weld_surface
 from warpjld.skeleton import Poses
-from warpjld.surface import Surface, weld_surface
 
 
 def edges(faces: np.ndarray) -> np.ndarray:

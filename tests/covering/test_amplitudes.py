@@ -13,8 +13,8 @@ from warpjld.covering.amplitudes import LinearDeformation, amplitudes_of, with_a
 from warpjld.covering.pose_sets import calibration_poses, guard_poses
 from warpjld.covering.quality import enclosed_volume
 from warpjld.covering.volume_form import ClosedSurface, VolumeForm, any_of
+from warpjld.geometry.surface import Surface
 from warpjld.rig import Rig
-from warpjld.surface import Surface
 
 
 @pytest.fixture(scope="module")

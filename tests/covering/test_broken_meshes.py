@@ -17,10 +17,10 @@ from warpjld.covering.corners import corner_conductivity
 from warpjld.covering.operators import fans
 from warpjld.covering.parameters import default_parameters
 from warpjld.errors import InputError
+from warpjld.geometry.spread import spread
+from warpjld.geometry.surface import Surface
 from warpjld.rig import Skin
 from warpjld.skeleton import CHANNELS, Skeleton
-from warpjld.spread import spread
-from warpjld.surface import Surface
 
 Mesh = tuple[np.ndarray, np.ndarray]
 Fault = Callable[[np.ndarray, np.ndarray, np.random.Generator], Mesh]
@@ -142,7 +142,7 @@ def test_multigrid_that_fails_is_followed_by_another(monkeypatch: pytest.MonkeyP
     monkeypatch.setattr(heat, "_DIRECT_LIMIT", 100)
     matrix = sp.diags_array([2.0 * np.ones(200), -np.ones(199), -np.ones(199)], offsets=[0, 1, -1])
     wanted = np.random.default_rng(0).normal(size=(200, 2))
-    found = heat.solve(matrix, matrix @ wanted)
+    found = heat.solve_diffusion(matrix, matrix @ wanted)
     assert found is not None
     assert np.abs(found - wanted).max() < 1e-3
 

@@ -9,7 +9,7 @@ import pytest
 from numpy.typing import NDArray
 from scipy.optimize import minimize
 
-from warpjld.covering.constrained_least_squares import Linearised, minimise
+from warpjld.covering.constrained_least_squares import Linearised, minimise_constrained
 
 
 @dataclass
@@ -51,7 +51,7 @@ def test_beside_another_minimiser(seed: int, bend: float) -> None:
     wanted = minimize(
         loss, np.zeros(6), method="SLSQP", bounds=list(zip(low, high, strict=True)), constraints=constraints
     )
-    found = minimise(some, np.zeros(6), (low, high), np.full(6, pull), evaluations=60)
+    found = minimise_constrained(some, np.zeros(6), (low, high), np.full(6, pull), evaluations=60)
     assert found.converged
     assert loss(found.x) == pytest.approx(wanted.fun, rel=3e-3)
     assert max(p.linearised(found.x).constraints.max() for p in some) < 2e-3
@@ -60,16 +60,16 @@ def test_beside_another_minimiser(seed: int, bend: float) -> None:
 
 
 def test_what_no_part_moves_stays() -> None:
-    found = minimise([], np.array([0.3, 0.4]), (np.zeros(2), np.ones(2)), np.ones(2))
+    found = minimise_constrained([], np.array([0.3, 0.4]), (np.zeros(2), np.ones(2)), np.ones(2))
     np.testing.assert_array_equal(found.x, [0.3, 0.4])
     one = Curved(np.array([1]), np.ones((1, 1)), np.array([0.6]), 0.0, 9.0)
-    found = minimise([one], np.array([0.3, 0.4]), (np.zeros(2), np.ones(2)), np.full(2, 1e-9))
+    found = minimise_constrained([one], np.array([0.3, 0.4]), (np.zeros(2), np.ones(2)), np.full(2, 1e-9))
     assert found.x == pytest.approx([0.3, 0.6])
 
 
 def test_it_says_when_evaluations_run_out() -> None:
     calls: list[tuple[int, int]] = []
-    found = minimise(
+    found = minimise_constrained(
         parts(0, 0.2),
         np.zeros(6),
         (np.full(6, -0.4), np.full(6, 0.7)),

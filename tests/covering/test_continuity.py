@@ -11,9 +11,9 @@ from tests.covering.poses import random_angles
 from tests.covering.subdivision import edges, stretches, subdivided
 from warpjld.covering import bind
 from warpjld.covering.corners import corner_conductivity
+from warpjld.geometry.surface import weld_surface
 from warpjld.rig import Rig
 from warpjld.skeleton import poses_from_angles
-from warpjld.surface import weld_surface
 
 GROWTH = 1.05  # per halving of the edges: a discontinuity doubles the stretch, a corner's spike adds a tenth or more
 

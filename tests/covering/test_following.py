@@ -14,8 +14,8 @@ from tests.covering.tube import bend, tube_skeleton
 from warpjld.covering import Covering, bind, default_parameters
 from warpjld.covering.gradient import Differentiable
 from warpjld.covering.shells import shells
+from warpjld.geometry.surface import weld_surface
 from warpjld.skeleton import CHANNELS, poses_from_angles
-from warpjld.surface import weld_surface
 
 NAIL = ball([0, 0.0075, -0.052], 0.005, (0.7, 0.25, 1.0))
 SLEEVE = pipe(0.0095, -0.004, -0.057, rings=30)

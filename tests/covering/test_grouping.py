@@ -13,9 +13,9 @@ from hypothesis import strategies as st
 from warpjld.covering import bind
 from warpjld.covering.grouping import FIXED, group, work
 from warpjld.covering.runs import Columns, pack
+from warpjld.geometry.surface import Surface
 from warpjld.hand import build_hand
 from warpjld.skeleton import CHANNELS, poses_from_angles
-from warpjld.surface import Surface
 
 
 def _strip(vertices: int, columns: int, seed: int) -> sp.csr_array:

@@ -13,8 +13,8 @@ from warpjld.covering.calibrate import calibrate
 from warpjld.covering.intersections import Crossings, crossing_faces, surface_parts
 from warpjld.covering.pose_sets import calibration_poses, curled
 from warpjld.covering.quality import Stretch, edge_stretch, enclosed_volume, unique_edges
+from warpjld.geometry.surface import Surface
 from warpjld.rig import Rig
-from warpjld.surface import Surface
 
 CURLS = (0.3, 0.6, 0.9)
 

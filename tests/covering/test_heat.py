@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 import scipy.sparse as sp
 
-from warpjld.covering.heat import Factor, conducting_laplacian, solve
+from warpjld.covering.heat import DiffusionFactor, conducting_laplacian, solve_diffusion
 from warpjld.hand import build_hand
 
 
@@ -29,7 +29,7 @@ def test_solutions_are_those_of_a_dense_solver(count: int, columns: int, pieces:
     scale = np.sqrt(np.diag(matrix))
     right = scale[:, None] * np.random.default_rng(count).normal(size=(count, columns))
     expected = scale[:, None] * np.linalg.solve(matrix, right)
-    found = Factor(sp.csr_array(matrix)).solve(right)
+    found = DiffusionFactor(sp.csr_array(matrix)).solve(right)
     assert found.shape == (count, columns)
     np.testing.assert_allclose(scale[:, None] * found, expected, rtol=1e-9, atol=1e-9 * np.abs(expected).max())
 
@@ -38,7 +38,7 @@ def test_several_steps_at_once_are_one_after_another() -> None:
     hand = build_hand("left", resolution=1500).surface
     conductivity = np.random.default_rng(0).uniform(0.5, 2.0, len(hand.vertices)) * 1e-5
     laplacian, area = conducting_laplacian(hand.vertices, hand.faces, np.full(len(hand.vertices), 0.01), conductivity)
-    factor = Factor(sp.csr_array(sp.diags_array(area) + laplacian))
+    factor = DiffusionFactor(sp.csr_array(sp.diags_array(area) + laplacian))
     right = np.random.default_rng(1).uniform(size=(len(area), 11))
     steps = right
     for _ in range(3):
@@ -52,8 +52,8 @@ def test_what_has_no_dominant_diagonal_is_not_solved_wrongly() -> None:
     matrix = np.array([[1.0, 4.0, 0.0], [4.0, 1.0, 0.5], [0.0, 0.5, 1.0]])
     right = np.ones((3, 2))
     try:
-        found = Factor(sp.csr_array(matrix)).solve(right)
+        found = DiffusionFactor(sp.csr_array(matrix)).solve(right)
     except ArithmeticError:
         return
     np.testing.assert_allclose(matrix @ found, right, atol=1e-12)
-    assert solve(sp.csr_array(np.diag([1.0, -1.0])), right[:2]) is None
+    assert solve_diffusion(sp.csr_array(np.diag([1.0, -1.0])), right[:2]) is None

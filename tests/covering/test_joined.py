@@ -12,11 +12,11 @@ from scipy.spatial import cKDTree
 
 from warpjld.covering import Covering, bind
 from warpjld.covering.pose_sets import curled
+from warpjld.geometry.normals import vertex_normals
+from warpjld.geometry.surface import Part, Surface, weld_surface
 from warpjld.io import load_rig
-from warpjld.normals import vertex_normals
 from warpjld.rig import Rig
 from warpjld.skeleton import poses_from_angles
-from warpjld.surface import Part, Surface, weld_surface
 
 METHODS = ("smooth", "paper")
 Piece = tuple[NDArray[np.float64], NDArray[np.int64]]

@@ -18,11 +18,11 @@ from warpjld.covering import bind_rig
 from warpjld.covering.kept import bind_kept, load_binding, save_binding
 from warpjld.covering.parameters import default_parameters
 from warpjld.errors import InputError
+from warpjld.files.kept_files import CACHE_VARIABLE
+from warpjld.files.whole_file import whole_file
 from warpjld.hand import build_hand
-from warpjld.kept_files import CACHE_VARIABLE
 from warpjld.rig import Rig
 from warpjld.skeleton import CHANNELS, Poses, poses_from_angles
-from warpjld.whole_file import whole_file
 
 
 @pytest.fixture(scope="module")
@@ -93,7 +93,7 @@ def test_two_processes_may_keep_the_same_binding(hand: Rig, tmp_path: Path) -> N
     with whole_file(place) as half:  # another process has begun
         half.write_bytes(b"half")
         script = (
-            "import sys; from pathlib import Path; from warpjld.whole_file import whole_file\n"
+            "import sys; from pathlib import Path; from warpjld.files.whole_file import whole_file\n"
             "with whole_file(Path(sys.argv[1])) as part: part.write_bytes(b'other')"
         )
         subprocess.run([sys.executable, "-c", script, place], check=True)

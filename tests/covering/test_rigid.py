@@ -18,9 +18,9 @@ from warpjld.covering.pose_losses import PoseLosses
 from warpjld.covering.pose_sets import calibration_poses
 from warpjld.covering.quality import unique_edges
 from warpjld.errors import InputError
+from warpjld.geometry.surface import Surface, weld_surface
 from warpjld.rig import Rig
 from warpjld.skeleton import Poses
-from warpjld.surface import Surface, weld_surface
 
 
 def with_balls(rig: Rig, joints: list[int]) -> tuple[Surface, np.ndarray]:

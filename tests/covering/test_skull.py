@@ -10,9 +10,9 @@ from scipy.spatial import cKDTree
 
 from warpjld.covering import Covering, bind_rig
 from warpjld.covering.skull import skull_lines
+from warpjld.geometry.rotations import rotate
 from warpjld.io import load_rig
 from warpjld.rig import Rig
-from warpjld.rotations import rotate
 from warpjld.skeleton import CHANNELS, poses_from_angles
 
 BODIES = (

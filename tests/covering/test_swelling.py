@@ -13,9 +13,9 @@ from tests.covering.tube import RADIUS, bend, tube, tube_skeleton
 from warpjld.covering import Covering, bind, bind_rig
 from warpjld.covering.pose_sets import curled
 from warpjld.covering.quality import enclosed_volume
+from warpjld.geometry.surface import Surface
 from warpjld.io import load_rig
 from warpjld.skeleton import CHANNELS, Poses, Skeleton, poses_from_angles
-from warpjld.surface import Surface
 
 ANGLES = [20.0, 45.0, 70.0, 90.0]
 

@@ -15,10 +15,10 @@ from warpjld.covering.operators import fans
 from warpjld.covering.paper_places import PaperPlaces, paper_places
 from warpjld.covering.parameters import default_parameters
 from warpjld.covering.segment_table import SegmentTable
+from warpjld.geometry.surface import Surface
 from warpjld.hand import build_hand
 from warpjld.rig import Rig
 from warpjld.skeleton import Skeleton
-from warpjld.surface import Surface
 
 ROUNDING = 1e-13  # relative to the size: more than sums in another order or fused operations differ by
 
@@ -127,7 +127,7 @@ def test_heat_does_not_depend_on_the_order_its_equations_are_solved_in() -> None
     order = heat.spatial_order(hand.vertices)
     np.testing.assert_array_equal(np.sort(order), np.arange(len(area)))
     matrix = laplacian + sp.diags_array(area * 100.0)
-    found, plain = heat.solve(matrix, right, order), heat.solve(matrix, right)
+    found, plain = heat.solve_diffusion(matrix, right, order), heat.solve_diffusion(matrix, right)
     assert found is not None
     assert plain is not None
     np.testing.assert_allclose(found, plain, rtol=1e-9, atol=1e-12)

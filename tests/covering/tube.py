@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
+from warpjld.geometry.surface import Surface, weld_surface
 from warpjld.skeleton import CHANNELS, Poses, Skeleton, poses_from_angles
-from warpjld.surface import Surface, weld_surface
 
 SEGMENT = 0.03
 RADIUS = 0.008

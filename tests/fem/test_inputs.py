@@ -16,7 +16,7 @@ from warpjld.fem import (
     MaterialWarning,
     NeoHooke,
     SolveError,
-    Status,
+    SolveStatus,
     box_hexes,
     merge,
     prescribe,
@@ -138,10 +138,10 @@ def test_too_few_iterations_are_a_status() -> None:
     solver = LinearSolver(stiffness, known.free(body.degrees), mesh, method="jacobi")
     right = np.ones(body.degrees)
     found = solver.solve(right, iterations=5)
-    assert found.status is Status.MAX_ITERATIONS
+    assert found.status is SolveStatus.MAX_ITERATIONS
     assert found.residual > 1e-8
     right[-1] = np.nan
-    assert solver.solve(right).status is Status.NOT_FINITE
+    assert solver.solve(right).status is SolveStatus.NOT_FINITE
 
 
 def test_indefinite_matrix_is_named() -> None:
@@ -149,7 +149,7 @@ def test_indefinite_matrix_is_named() -> None:
 
     matrix = np.diag(np.linspace(-1.0, 5.0, 40))
     found = conjugate_gradients(lambda x: matrix @ x, lambda r: r, np.ones(40))
-    assert found.status is Status.INDEFINITE
+    assert found.status is SolveStatus.INDEFINITE
 
 
 def test_stagnation_is_named() -> None:
@@ -159,7 +159,7 @@ def test_stagnation_is_named() -> None:
     found = conjugate_gradients(
         lambda x: matrix @ x, lambda r: r, np.ones(60), tolerance=1e-30, iterations=100_000, patience=50
     )
-    assert found.status is Status.STAGNATED
+    assert found.status is SolveStatus.STAGNATED
     assert found.residual > 0
 
 

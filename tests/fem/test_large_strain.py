@@ -15,7 +15,7 @@ from warpjld.fem import (
     Material,
     MooneyRivlin,
     NeoHooke,
-    Status,
+    SolveStatus,
     ball_hexes,
     box_hexes,
     prescribe,
@@ -202,6 +202,6 @@ def test_too_much_pressure_says_so() -> None:
     mesh = ball_hexes(1.0, inner=0.8, n=2, layers=2, octant=True)
     held = prescribe(mesh, "x0", x=0) + prescribe(mesh, "y0", y=0) + prescribe(mesh, "z0", z=0)
     found = solve(Body(mesh, NeoHooke(2.9, 0.45)), held, Loads(pressure={"inner": 0.6}), instants=4, check=False)
-    assert found.status is Status.LIMIT_LOAD
+    assert found.status is SolveStatus.LIMIT_LOAD
     assert "limit load: above" in found.message
     assert 0.2 < found.last.factor < 0.6

@@ -15,7 +15,7 @@ from warpjld.fem import (
     Prescribed,
     Solution,
     SolveError,
-    Status,
+    SolveStatus,
     ball_hexes,
     box_hexes,
     prescribe,
@@ -52,7 +52,7 @@ def least_eigenvalue(body: Body, held: Prescribed, pressure: float, u: np.ndarra
 def test_below_the_limit_pressure_nothing_is_said() -> None:
     body, held = shell(4)
     found = squeezed(body, held, 1.0)
-    assert found.status is Status.CONVERGED
+    assert found.status is SolveStatus.CONVERGED
     assert least_eigenvalue(body, held, CLASSICAL, found.displacement) > 0.0
 
 
@@ -62,7 +62,7 @@ def test_one_limit_pressure_and_one_text_whatever_the_load() -> None:
     limits = []
     for times in (6.0, 24.0):
         found = squeezed(body, held, times)
-        assert found.status is Status.LIMIT_LOAD
+        assert found.status is SolveStatus.LIMIT_LOAD
         assert found.message.startswith("limit load: above ")
         limits.append(times * found.last.factor)
         assert least_eigenvalue(body, held, limits[-1] * CLASSICAL, found.displacement) > 0.0
@@ -89,13 +89,13 @@ def arch(**options: object) -> Solution:
 def test_arc_length_follows_a_snap_through() -> None:
     """By load alone the strip jumps, or its limit is named; along the path the load falls, then rises to the full."""
     jumped, followed = arch(instants=20), arch(instants=20, arc_length=True)
-    assert followed.status is Status.CONVERGED, followed.message
+    assert followed.status is SolveStatus.CONVERGED, followed.message
     factors = np.array([instant.factor for instant in followed.instants])
     fallen = np.flatnonzero(np.diff(factors) < 0.0)
     assert len(fallen) > 1
     assert followed.message == f"converged, beyond a limit load of {factors[fallen[0]]:.4g} of the load"
     assert all(instant.residual < 1e-8 for instant in followed.instants)
-    if jumped.status is Status.CONVERGED:
+    if jumped.status is SolveStatus.CONVERGED:
         np.testing.assert_allclose(followed.displacement, jumped.displacement, atol=1e-6)
     else:
         assert jumped.last.factor == pytest.approx(factors[fallen[0]], rel=0.05)

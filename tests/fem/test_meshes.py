@@ -174,20 +174,20 @@ def test_embedded_points_follow_a_linear_field_exactly() -> None:
 @pytest.mark.parametrize("suffix", [".vtu", ".inp", ".msh"])
 def test_exchange(tmp_path: Path, suffix: str) -> None:
     meshio = pytest.importorskip("meshio")
-    from warpjld.fem.mesh.exchange import read_mesh
+    from warpjld.fem.mesh.exchange import read_volume_mesh
 
     mesh = ball_hexes(1.0, n=2)
     meshio.write(tmp_path / f"ball{suffix}", meshio.Mesh(mesh.nodes, [("hexahedron", mesh.elements)]))
-    again = read_mesh(tmp_path / f"ball{suffix}")
+    again = read_volume_mesh(tmp_path / f"ball{suffix}")
     np.testing.assert_allclose(again.nodes[again.elements], mesh.nodes[mesh.elements], atol=1e-12)
 
 
 def test_tetrahedra_are_read_as_degenerate_hexahedra(data: Path) -> None:
     pytest.importorskip("meshio")
-    from warpjld.fem.mesh.exchange import read_mesh
+    from warpjld.fem.mesh.exchange import read_volume_mesh
 
     path = next((data / "bell_pepper").glob("*.vtk"))
-    mesh = read_mesh(path)
+    mesh = read_volume_mesh(path)
     assert len(mesh.elements) == 2519
     low = np.flatnonzero(mesh.nodes[:, 2] < np.percentile(mesh.nodes[:, 2], 20))
     held = prescribe(mesh, low, x=0, y=0, z=0)

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from warpjld.geometry.winding import winding_numbers
 from warpjld.grasp.objects import GraspObject
-from warpjld.winding import winding_numbers
 
 
 def signed_distance(points: NDArray, thing: GraspObject) -> NDArray[np.float64]:

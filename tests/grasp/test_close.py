@@ -5,7 +5,7 @@ import pytest
 
 from warpjld.covering.intersections import crossing_faces, surface_parts
 from warpjld.errors import InputError
-from warpjld.grasp import Places, Status
+from warpjld.grasp import Places, SearchStatus
 from warpjld.grasp.both_ways import BothWays
 from warpjld.grasp.close import Closer
 from warpjld.grasp.digits import digit_chains, pad_vertex
@@ -96,7 +96,7 @@ def test_nothing_to_touch_closes_to_the_limits(covering, open_hand) -> None:
     poses, angles = open_hand
     far = ball(0.05).placed((0, 5, 0))
     closed = Closer(covering, far).close(poses, angles, digits=["index"], apart=False)
-    assert (closed.status == Status.NO_CONTACT).all()
+    assert (closed.status == SearchStatus.NO_CONTACT).all()
     joints = list(digit_chains(covering.skeleton, ["index"])["left.index"])
     np.testing.assert_allclose(closed.angles[0, joints, 0], covering.skeleton.limits[joints, 0, 1])
 
@@ -105,7 +105,7 @@ def test_a_digit_that_begins_inside_is_told(covering, open_hand) -> None:
     poses, angles = open_hand
     tip = poses.positions[0, covering.skeleton.index("ring.tip")]
     closed = Closer(covering, ball(0.03).placed(tip)).close(poses, angles, digits=["ring"], apart=False)
-    assert closed.status[0, 0, 0] == Status.INSIDE
+    assert closed.status[0, 0, 0] == SearchStatus.INSIDE
     assert closed.penetration[0] > 5e-3
 
 

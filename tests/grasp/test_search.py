@@ -10,7 +10,7 @@ from scipy.spatial.transform import Rotation
 from tests.covering.tube import SEGMENT, tube, tube_skeleton
 from warpjld.covering import Covering, bind, default_parameters
 from warpjld.errors import InputError
-from warpjld.grasp import NEAREST, FlexionSearch, ObjectSet, Places, Searches, Status, make_object
+from warpjld.grasp import NEAREST, FlexionSearch, ObjectSet, Places, Searches, SearchStatus, make_object
 from warpjld.grasp.shapes import ball, box
 from warpjld.skeleton import CHANNELS, Poses, poses_from_angles
 
@@ -61,9 +61,9 @@ def test_bent_segment_touches_a_plane_at_the_analytic_angle(stiff, ratio: float,
     search = FlexionSearch(stiff, ObjectSet(floor))
     found = search.run(*straight(stiff), Searches(vertex=vertex, joint=1, facet=[above, NEAREST]))
     if exact is None:
-        assert (found.status == Status.NO_CONTACT).all()
+        assert (found.status == SearchStatus.NO_CONTACT).all()
         return
-    assert (found.status == Status.CONVERGED).all()
+    assert (found.status == SearchStatus.CONVERGED).all()
     np.testing.assert_allclose(found.angles[:, 0], exact, atol=ANGLE)
     assert (np.abs(found.distance) < 1e-6).all()
     assert x == pytest.approx(0, abs=1e-12)
@@ -77,7 +77,7 @@ def test_bent_segment_touches_a_sphere_at_the_analytic_angle(stiff, centre, dist
     exact = brentq(gap, 0, next(a for a in np.linspace(0, 2, 200) if gap(a) < 0), xtol=1e-12)
     search = FlexionSearch(stiff, ObjectSet(BALL.placed(centre)))
     found = search.run(*straight(stiff), Searches(vertex=vertex, joint=1, distance=distance))
-    assert found.status[0] == Status.CONVERGED
+    assert found.status[0] == SearchStatus.CONVERGED
     np.testing.assert_allclose(found.angles[0, 0], exact, atol=ANGLE)
 
 
@@ -90,7 +90,7 @@ def test_what_is_rigid_touches_as_its_bone_turns() -> None:
     gap = lambda a: np.linalg.norm(turned(hard, vertex, a) - centre) - 0.02  # noqa: E731
     exact = brentq(gap, 0, next(a for a in np.linspace(0, 2, 200) if gap(a) < 0), xtol=1e-12)
     found = FlexionSearch(hard, ObjectSet(BALL.placed(centre))).run(*straight(hard), Searches(vertex=vertex, joint=1))
-    assert found.status[0] == Status.CONVERGED
+    assert found.status[0] == SearchStatus.CONVERGED
     np.testing.assert_allclose(found.angles[0, 0], exact, atol=ANGLE)
 
 
@@ -102,12 +102,12 @@ def test_every_status_with_its_message(stiff) -> None:
     search = FlexionSearch(stiff, ObjectSet(BALL))
     stop = [0.5, np.nan, np.nan, np.nan]
     found = search.run(poses, angles, Searches(vertex=vertex, joint=1, place=[0, 1, 2, 3], stop=stop), places=places)
-    assert found.status.tolist() == [Status.INSIDE, *[Status.NO_CONTACT] * 3]
+    assert found.status.tolist() == [SearchStatus.INSIDE, *[SearchStatus.NO_CONTACT] * 3]
     assert "not out of it within the joint's limits; least deep" in found.message(0)
     assert found.angles[0, 0] == pytest.approx(0.5)
     assert (
         search.run(poses, angles, Searches(vertex=vertex, joint=1, stop=0.0), places=places[0]).status[0]
-        == Status.INSIDE
+        == SearchStatus.INSIDE
     )
     assert "closest approach 5.00 mm at 0.00°" in found.message(2)  # it only moves away
     assert 0 < found.angles[3, 0] < np.radians(120)  # somewhere on the way down
@@ -117,10 +117,10 @@ def test_every_status_with_its_message(stiff) -> None:
     )
     assert found.distance[3] == pytest.approx(closest, abs=1e-6)
     at_limit = search.run(poses, angles, Searches(vertex=vertex, joint=1, stop=0.0), places=places[1])
-    assert at_limit.status[0] == Status.AT_LIMIT
+    assert at_limit.status[0] == SearchStatus.AT_LIMIT
     assert "at its limit" in at_limit.message(0)
     stretched = search.run(poses, angles, Searches(vertex=vertex, joint=1, rate=-1.0), places=places[2])
-    assert stretched.status[0] == Status.CONVERGED
+    assert stretched.status[0] == SearchStatus.CONVERGED
     assert stretched.angles[0, 0] < 0
 
 
@@ -130,7 +130,7 @@ def test_a_short_contact_is_not_stepped_over(stiff) -> None:
     outward = (middle - stiff.skeleton.rest[1]) / np.linalg.norm(middle - stiff.skeleton.rest[1])
     grazing = ObjectSet(BALL.placed(middle + outward * (0.02 - 2e-5)))
     found = FlexionSearch(stiff, grazing).run(*straight(stiff), Searches(vertex=vertex, joint=1))
-    assert found.status[0] == Status.CONVERGED
+    assert found.status[0] == SearchStatus.CONVERGED
     assert found.angles[0, 0] < 0.9
 
 
@@ -140,7 +140,7 @@ def test_an_opening_is_not_a_contact(stiff) -> None:
     vertex = top(stiff, 0.75)
     objects = ObjectSet(bowl.placed(turned(stiff, vertex, 1.0)))
     found = FlexionSearch(stiff, objects).run(*straight(stiff), Searches(vertex=vertex, joint=1, stop=1.1))
-    assert found.status[0] == Status.OPENING
+    assert found.status[0] == SearchStatus.OPENING
 
 
 def test_beside_the_facet_is_told(stiff) -> None:
@@ -196,7 +196,7 @@ def test_what_is_searched_is_what_the_covering_gives(covering, bench) -> None:
     search, poses, angles, places = bench
     searches = many(covering, 400, 4)
     found = search.run(poses, angles, searches, places=places)
-    assert set(found.status) >= {Status.CONVERGED, Status.NO_CONTACT, Status.INSIDE}
+    assert set(found.status) >= {SearchStatus.CONVERGED, SearchStatus.NO_CONTACT, SearchStatus.INSIDE}
     again = angles[searches.frame]
     again[np.arange(400), searches.joint, 0] = found.angles[:, 0]
     base = poses_from_angles(covering.skeleton, angles)
@@ -249,7 +249,7 @@ def test_joints_may_bend_together(covering) -> None:
     found = FlexionSearch(covering, things).run(
         poses, angles, Searches(vertex=tip, joint=[joints], rate=[[1.0, 1.0, 0.7]])
     )
-    assert found.status[0] == Status.CONVERGED
+    assert found.status[0] == SearchStatus.CONVERGED
     np.testing.assert_allclose(found.angles[0, :3], found.closing[0] * np.array([1, 1, 0.7]), rtol=1e-5)
     angles[0, joints, 0] = found.angles[0, :3]
     point = covering.points(poses_from_angles(covering.skeleton, angles), [tip])[0]
@@ -308,7 +308,7 @@ def test_facets_of_an_open_surface_are_met_like_those_of_a_closed_one(stiff) -> 
     ]
     closed, opened = results
     assert not sheet.report.solid
-    assert (opened.status == Status.CONVERGED).all()
+    assert (opened.status == SearchStatus.CONVERGED).all()
     np.testing.assert_allclose(opened.angles, closed.angles, atol=1e-7)
 
 
@@ -322,7 +322,7 @@ def test_a_joint_bent_at_rest_is_searched_from_straight(stiff) -> None:
     floor = PLANE.placed((0, -0.02, 0))
     poses = poses_from_angles(skeleton, initial[None])
     found = FlexionSearch(bent, ObjectSet(floor)).run(poses, initial[None], Searches(vertex=vertex, joint=1))
-    assert found.status[0] == Status.CONVERGED
+    assert found.status[0] == SearchStatus.CONVERGED
     assert found.angles[0, 0] > initial[1, 0]
     touching = initial[None].copy()
     touching[0, 1, 0] = found.angles[0, 0]
@@ -350,7 +350,7 @@ def test_contact_is_found_on_either_side(either, degrees: float) -> None:
     found = FlexionSearch(either, ObjectSet(BALL.placed(centre))).nearest(
         *straight(either), Searches(vertex=vertex, joint=1)
     )
-    assert found.status[0] == Status.CONVERGED
+    assert found.status[0] == SearchStatus.CONVERGED
     # BALL's facets lie up to 10 micrometres inside the sphere
     assert np.degrees(found.angles[0, 0]) == pytest.approx(degrees, abs=0.05)
     assert np.sign(found.closing[0]) == np.sign(degrees)
@@ -370,7 +370,7 @@ def test_from_inside_the_shorter_way_out(either, out: float) -> None:
     gap = lambda a: np.linalg.norm(turned(either, vertex, a) - centre) - 0.02  # noqa: E731
     exact = brentq(gap, 0.0, out, xtol=1e-12)
     found = FlexionSearch(either, ball_).nearest(*straight(either), Searches(vertex=vertex, joint=1))
-    assert found.status[0] == Status.CONVERGED
+    assert found.status[0] == SearchStatus.CONVERGED
     np.testing.assert_allclose(found.angles[0, 0], exact, atol=1e-3)
     assert abs(found.distance[0]) < 1e-6
 
@@ -380,7 +380,7 @@ def test_within_is_how_exactly(either) -> None:
     search = FlexionSearch(either, ObjectSet(floor))
     wanted = Searches(vertex=vertex, joint=1)
     found = [search.nearest(*straight(either), wanted, tolerance=within) for within in (1e-3, 1e-6)]
-    assert all(f.status[0] == Status.CONVERGED for f in found)
+    assert all(f.status[0] == SearchStatus.CONVERGED for f in found)
     assert 1e-6 < abs(found[0].distance[0]) < 1e-3
     assert abs(found[1].distance[0]) < 1e-6
     assert found[0].evaluations[0] < found[1].evaluations[0]
@@ -393,6 +393,6 @@ def test_of_two_ways_without_contact_the_closer_approach(either) -> None:
     found = FlexionSearch(either, ObjectSet(BALL.placed(away + 0.025 * up))).nearest(
         *straight(either), Searches(vertex=vertex, joint=1)
     )
-    assert found.status[0] == Status.NO_CONTACT
+    assert found.status[0] == SearchStatus.NO_CONTACT
     assert found.angles[0, 0] < 0.0
     assert 0.0 < found.distance[0] < 0.006

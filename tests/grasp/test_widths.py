@@ -2,6 +2,7 @@
 
 import numpy as np
 
+from warpjld.geometry.rotations import unit
 from warpjld.grasp.digits import pad_vertex
 from warpjld.grasp.near_object import NearObject
 from warpjld.grasp.opening import closing_in_air
@@ -9,7 +10,6 @@ from warpjld.grasp.placements import across_widths, around
 from warpjld.grasp.postures import posture_angles
 from warpjld.grasp.shapes import ball, box
 from warpjld.grasp.widths import sample_widths
-from warpjld.rotations import unit
 from warpjld.skeleton import DIGITS
 
 

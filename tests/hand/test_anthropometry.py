@@ -5,7 +5,7 @@ import pytest
 from warpjld.errors import InputError
 from warpjld.hand import percentile
 from warpjld.hand.fit import fit_plan, measure
-from warpjld.hand.flesh import Flesh
+from warpjld.hand.flesh import PlannedFlesh
 
 
 def test_the_median_is_the_mean_and_sizes_grow() -> None:
@@ -21,7 +21,7 @@ def test_the_median_is_the_mean_and_sizes_grow() -> None:
 def test_a_size_makes_a_hand(sex: str) -> None:
     size = percentile(95, sex)
     length, breadth = 1000.0 * size["length"], 1000.0 * size["breadth"]
-    measured = measure(Flesh(fit_plan(length, breadth, {})), length)
+    measured = measure(PlannedFlesh(fit_plan(length, breadth, {})), length)
     assert measured == pytest.approx((length, breadth), rel=2e-3)
 
 

@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 
 from warpjld.errors import InputError
+from warpjld.files.kept_files import CACHE_VARIABLE
 from warpjld.hand import build_hand
 from warpjld.hand.kept import kept_hand
-from warpjld.kept_files import CACHE_VARIABLE
 from warpjld.rig import Rig
 
 

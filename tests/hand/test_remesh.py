@@ -5,7 +5,7 @@ import pytest
 import trimesh
 
 from warpjld.hand.contour import contour
-from warpjld.hand.mesh import Edges, subdivide
+from warpjld.hand.mesh import ManifoldEdges, subdivide
 from warpjld.hand.remesh import remesh
 
 
@@ -51,7 +51,7 @@ def test_a_graded_size_is_followed(raw: tuple[np.ndarray, np.ndarray]) -> None:
 
 def test_edges_know_their_faces(raw: tuple[np.ndarray, np.ndarray]) -> None:
     vertices, faces = raw
-    edges = Edges.of(faces, len(vertices))
+    edges = ManifoldEdges.of(faces, len(vertices))
     assert len(edges.ends) == 3 * len(faces) // 2
     for side in range(2):
         start = faces[edges.faces[:, side], edges.corners[:, side]]

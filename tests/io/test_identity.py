@@ -7,8 +7,8 @@ from pathlib import Path
 
 import pytest
 
+from warpjld.files.manifest import file_hash
 from warpjld.io.identity import content_hash, files_of
-from warpjld.manifest import file_hash
 
 
 def test_a_gltf_is_its_buffers_too(tmp_path: Path) -> None:

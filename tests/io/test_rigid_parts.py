@@ -11,11 +11,11 @@ import trimesh
 from tests.covering.tube import SEGMENT, tube, tube_skeleton
 from warpjld.covering import bind_rig
 from warpjld.covering.quality import unique_edges
+from warpjld.geometry.surface import Part, Surface, weld_surface
 from warpjld.io import load_rig
 from warpjld.io.rigid_parts import rigid_parts
 from warpjld.rig import Skin
 from warpjld.skeleton import CHANNELS, poses_from_angles
-from warpjld.surface import Part, Surface, weld_surface
 
 MIDDLE = 1.5 * SEGMENT  # half-way along the second of the tube's bones
 EYE = trimesh.creation.icosphere(subdivisions=1, radius=0.002)

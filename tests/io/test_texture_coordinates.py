@@ -14,12 +14,12 @@ import pytest
 import trimesh
 
 from warpjld.covering import bind
+from warpjld.geometry.surface import Surface, weld_surface
 from warpjld.io import load_rig
 from warpjld.io.caches import open_cache
 from warpjld.io.mesh_file import read_mesh
 from warpjld.io.usd.skin import read_usd_rig
 from warpjld.motion.load import load_motion
-from warpjld.surface import Surface, weld_surface
 
 CLOSE = 2e-7  # 1 - (1 - v) in float32
 

@@ -2,10 +2,10 @@
 
 import numpy as np
 
+from warpjld.geometry.surface import weld_surface
 from warpjld.rig import Rig
 from warpjld.skeleton import DIGITS, Skeleton, default_limits, hand_joint_names
 from warpjld.skeleton.hand import HAND_PARENTS
-from warpjld.surface import weld_surface
 
 
 def hand(side: str = "left") -> Skeleton:

@@ -9,11 +9,11 @@ from scipy.spatial.transform import Rotation
 
 from tests.motion.conventions import FRAMES, Convention, Recording, record
 from tests.motion.skeletons import body, rig
+from warpjld.geometry.rotations import unit
 from warpjld.motion import load_motion
 from warpjld.motion.bvh import read_bvh
 from warpjld.motion.landmarks import landmarks_of_clip
 from warpjld.motion.load import LoadedMotion
-from warpjld.rotations import unit
 from warpjld.skeleton.recognise.names import read_name
 
 DIRECTIONS = 1.0

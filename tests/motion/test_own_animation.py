@@ -247,7 +247,7 @@ def test_a_leaf_turns_whole(tmp_path: Path, leaf: str) -> None:
 
 
 def test_an_end_lies_in_the_flesh_that_its_joint_owns(tmp_path: Path) -> None:
-    from warpjld.winding import winding_numbers
+    from warpjld.geometry.winding import winding_numbers
 
     rig = load_rig(write(tmp_path / "a.glb", animal(), {}))
     ends = [j for j, name in enumerate(rig.skeleton.names) if name.endswith(".end")]

@@ -10,11 +10,11 @@ from scipy.spatial.transform import Rotation
 
 from tests.motion.skeletons import body, hand, with_forearm
 from warpjld.errors import InputError
+from warpjld.geometry.rotations import multiply, rotate, unit
 from warpjld.io import load_rig
 from warpjld.motion.bvh import read_bvh
 from warpjld.motion.clip import Clip
 from warpjld.motion.retarget import correspondence, retarget
-from warpjld.rotations import multiply, rotate, unit
 from warpjld.skeleton import Poses, Skeleton
 
 DIRECTIONS = 1e-6

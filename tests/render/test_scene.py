@@ -10,7 +10,7 @@ import pytest
 import trimesh
 
 from warpjld.errors import InputError
-from warpjld.render import Camera, ColorScale, Quality, Scene, Solid, Style, shaded, wireframe
+from warpjld.render import Camera, ColorScale, Quality, SceneRenderer, Solid, Style, shaded, wireframe
 
 SIZE = (120, 90)
 
@@ -68,7 +68,7 @@ def test_wireframe_shows_bones_through_the_skin(finger, camera: Camera) -> None:
 def test_frames_are_the_same_in_any_order(finger, camera: Camera) -> None:  # type: ignore[no-untyped-def]
     """A film's frame is the picture of that frame: nothing stays behind, and the framing does not move."""
     for look in ("shaded", "wireframe"):
-        with Scene(finger.faces, camera, look=look, size=SIZE, segments=finger.segments) as scene:
+        with SceneRenderer(finger.faces, camera, look=look, size=SIZE, segments=finger.segments) as scene:
             forth = [scene.draw(finger.frames[f], joints=finger.joints[f]) for f in range(6)]
             back = [scene.draw(finger.frames[f], joints=finger.joints[f]) for f in reversed(range(6))][::-1]
         for one, other in zip(forth, back, strict=True):
@@ -93,7 +93,7 @@ def test_solids_are_drawn_and_move(finger, camera: Camera) -> None:  # type: ign
     ball = trimesh.creation.icosphere(radius=0.015)
     at = np.array(ball.vertices) + np.array([0.03, 0.04, 0.01])
     solid = Solid(at, ball.faces, "#00a000")
-    with Scene(finger.faces, camera, size=SIZE, solids=[solid]) as scene:
+    with SceneRenderer(finger.faces, camera, size=SIZE, solids=[solid]) as scene:
         before = scene.draw(finger.frames[0])
         moved = scene.draw(finger.frames[0], solids=[at + np.array([0, 0.015, 0])])
         kept = scene.draw(finger.frames[0], solids=[None])
@@ -124,7 +124,7 @@ def test_sharp_edges_stay_sharp() -> None:
 )
 def test_refuses(finger, camera: Camera, change: dict, message: str) -> None:  # type: ignore[no-untyped-def]
     given = {"vertices": finger.frames[0], "joints": finger.joints[0], **change}
-    with Scene(finger.faces, camera, segments=finger.segments, size=SIZE) as scene:
+    with SceneRenderer(finger.faces, camera, segments=finger.segments, size=SIZE) as scene:
         with pytest.raises(InputError, match=message):
             scene.draw(given.pop("vertices"), **given)
         with pytest.raises(InputError, match="not finite"):
@@ -133,14 +133,17 @@ def test_refuses(finger, camera: Camera, change: dict, message: str) -> None:  #
 
 def test_refuses_scenes(finger, camera: Camera) -> None:  # type: ignore[no-untyped-def]
     with pytest.raises(InputError, match="look"):
-        Scene(finger.faces, camera, look="toon")  # type: ignore[arg-type]
+        SceneRenderer(finger.faces, camera, look="toon")  # type: ignore[arg-type]
     with pytest.raises(InputError, match="size"):
-        Scene(finger.faces, camera, size=(5, 5))
+        SceneRenderer(finger.faces, camera, size=(5, 5))
     with pytest.raises(InputError, match="faces"):
-        Scene(np.zeros((0, 3), int), camera)
+        SceneRenderer(np.zeros((0, 3), int), camera)
     with pytest.raises(InputError, match="supersampling"):
         Quality(supersampling=0)
-    with pytest.raises(InputError, match="values"), Scene(finger.faces, camera, scale=ColorScale(0, 1)) as scene:
+    with (
+        pytest.raises(InputError, match="values"),
+        SceneRenderer(finger.faces, camera, scale=ColorScale(0, 1)) as scene,
+    ):
         scene.draw(finger.frames[0])
 
 

@@ -6,13 +6,13 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
+from warpjld.geometry.surface import weld_surface
 from warpjld.motion.joint_animation import JointAnimation
 from warpjld.motion.own_joints import own_poses
 from warpjld.rig import Rig
 from warpjld.rig.centres import joint_centres, with_centred_joints
 from warpjld.skeleton import Skeleton, default_limits
 from warpjld.skeleton.recognise.tree import SourceTree
-from warpjld.surface import weld_surface
 
 NAMES = ("left.index.base", "left.index.knuckle2", "left.index.knuckle3", "left.index.tip")
 RADIUS, SEGMENT = 0.008, 0.03

@@ -8,7 +8,7 @@ import pytest
 from warpjld.covering import default_parameters, save_parameters
 from warpjld.errors import InputError
 from warpjld.script import Interpreter, Scene
-from warpjld.script.outputs import Camera, ContactSheet, Export, Film, Picture
+from warpjld.script.outputs import CameraSetting, ContactSheet, Export, FilmOutput, Picture
 from warpjld.script.staging import frame_numbers, stage
 
 pytestmark = pytest.mark.usefixtures("quick_hands")
@@ -112,10 +112,10 @@ def test_outputs_keep_the_camera_of_their_line(run) -> None:
         "CAMERA PALMAR FOLLOW ZOOM 1.5\nPICTURE 3 'a/one.png' wireframe\nCAMERA FROM 0 0 1 TO 0 0 0\n"
         "FILM 'a.mp4'\nCONTACT 'sheet.png' 1 2.5\nEXPORT 'a.usda' left\nSIZE 320 200"
     )
-    palmar, free = Camera("palmar", zoom=1.5, follow=True), Camera(None, (0, 0, 1), (0, 0, 0))
+    palmar, free = CameraSetting("palmar", zoom=1.5, follow=True), CameraSetting(None, (0, 0, 1), (0, 0, 0))
     assert scene.outputs == [
         Picture("a/one.png", 3, "wireframe", palmar),
-        Film("a.mp4", "shaded", free),
+        FilmOutput("a.mp4", "shaded", free),
         ContactSheet("sheet.png", (1, 2.5), free),
         Export("a.usda", "LEFT"),
     ]

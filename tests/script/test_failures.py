@@ -11,11 +11,11 @@ import pytest
 
 from tests.finger import finger
 from warpjld.errors import InputError, WarpjldError
+from warpjld.files.whole_file import machine
 from warpjld.io.caches.npz import NpzCache
 from warpjld.script import Interpreter, Scene
 from warpjld.script import making as module
 from warpjld.script.runner import run_scene
-from warpjld.whole_file import machine
 
 
 def scene_of(tmp_path: Path, *lines: str) -> Scene:

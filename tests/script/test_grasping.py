@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 
 from warpjld.errors import InputError
-from warpjld.grasp import ObjectSet, Status
+from warpjld.geometry.normals import vertex_normals
+from warpjld.grasp import ObjectSet, SearchStatus
 from warpjld.grasp.digits import pad_vertex
-from warpjld.normals import vertex_normals
 from warpjld.script.binding import cover
 from warpjld.script.grasping import placed_at, posture
 from warpjld.script.props import prop_places
@@ -96,7 +96,7 @@ def test_searches_set_a_key_where_the_skin_touches(run, line: str, joint: str, d
     x, y, z = covering.points(poses_from_angles(actor.skeleton, angles), [pad])[0, 0]
     run(f"OBJECT apple BALL 0.016 AT {x:.6f} {y:.6f} {z:.6f}\n{line}")
     (attempt,) = scene.attempts
-    assert attempt.status == Status.CONVERGED.name, attempt.message
+    assert attempt.status == SearchStatus.CONVERGED.name, attempt.message
     assert abs(attempt.values["distance_mm"]) < 1e-2
     assert flexion(scene, joint, 7) == pytest.approx(attempt.values["angle_degrees"], abs=1e-3)
     skin = actor.covering.points(stage(actor, np.array([7.0]), 30), [attempt.values["vertex"]])[0]

@@ -12,7 +12,7 @@ from PIL import Image
 from tests.io.test_numbers import CUBE
 from warpjld.errors import InputError
 from warpjld.io import load_rig
-from warpjld.render import Camera, Numbered, Quality, Scene, with_numbers
+from warpjld.render import Camera, Numbered, Quality, SceneRenderer, with_numbers
 from warpjld.script.binding import cover
 from warpjld.script.runner import run_scene
 from warpjld.script.staging import stage
@@ -97,7 +97,7 @@ def test_only_what_is_seen_has_a_number() -> None:
     faces = np.array([t for a, b, c, d in quads for t in ((a, b, c), (a, c, d))])
     facets = np.repeat(np.arange(6), 2)
     camera = Camera((0.5, 0.5, 8.0), (0.5, 0.5, 0.0))
-    with Scene(faces, camera, size=(300, 300), quality=Quality(occlusion=False)) as stage_:
+    with SceneRenderer(faces, camera, size=(300, 300), quality=Quality(occlusion=False)) as stage_:
         picture = stage_.draw(corners)
         places, seen = stage_.seen(corners)
         shown = Numbered(corners, faces, np.arange(8) + 100, facets)

@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 from warpjld.errors import InputError
-from warpjld.fem import Status
+from warpjld.fem import SolveStatus
 from warpjld.script import Interpreter, Scene
 from warpjld.script.contact import run_contact
 from warpjld.script.runner import run_scene
@@ -92,7 +92,7 @@ def test_the_pad_feels_what_the_plate_bears(pressed: tuple[Path, dict, Scene]) -
 
 def solved(scene: Scene, out: Path) -> Simulation:
     report = run_contact(scene, out)
-    assert report.solved.status is Status.CONVERGED, report.verdict.text
+    assert report.solved.status is SolveStatus.CONVERGED, report.verdict.text
     return report
 
 

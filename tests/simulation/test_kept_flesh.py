@@ -7,8 +7,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from warpjld.files.kept_files import CACHE_VARIABLE
 from warpjld.hand import build_hand
-from warpjld.kept_files import CACHE_VARIABLE
 from warpjld.simulation.bodies import kept_flesh
 from warpjld.skeleton.kinematics import rest_poses
 

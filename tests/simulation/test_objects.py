@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from warpjld.fem import Status
+from warpjld.fem import SolveStatus
 from warpjld.script import Scene
 from warpjld.script.contact import run_contact
 from warpjld.script.props import prop_places
@@ -33,7 +33,7 @@ def heights(report: Simulation, name: str) -> list[float]:
 def test_points_are_drawn_along_keys(run: Callable[[str], Scene], tmp_path: Path) -> None:
     scene = run(BLOCK + "VECTOR block head AT 0 0 0 0\nVECTOR block head AT 4 0 0.002 0\nPRESS 0 4")
     report = run_contact(scene, tmp_path)
-    assert report.solved.status is Status.CONVERGED
+    assert report.solved.status is SolveStatus.CONVERGED
     np.testing.assert_allclose(heights(report, "BLOCK"), 0.02 + 0.0005 * np.arange(1, 5), atol=1e-9)
     pull = [float(np.abs(f.reactions[:, 1]).sum()) / 2 for f in report.solved.frames]
     np.testing.assert_allclose(np.diff(pull), pull[0], rtol=1e-3)
@@ -46,7 +46,7 @@ def test_partial_points_stay_free_along_the_others(run: Callable[[str], Scene], 
     scene = run(lines + "PARTIAL block head Y AT 0 0\nPARTIAL block head Y AT 2 -0.002\nPRESS 0 2")
     # along y only: nothing pushes it sideways, and a corner is enough to hold it there
     report = run_contact(scene, tmp_path)
-    assert report.solved.status is Status.CONVERGED
+    assert report.solved.status is SolveStatus.CONVERGED
     shape = report.surfaces.object("BLOCK", 2.0)
     np.testing.assert_allclose(np.ptp(shape, axis=0), [0.02 * 1.03, 0.018, 0.02 * 1.03], rtol=2e-3)
     assert np.abs(shape[:, [0, 2]].mean(axis=0)).max() < 4e-4
@@ -57,7 +57,7 @@ def test_held_points_go_where_the_object_goes(run: Callable[[str], Scene], tmp_p
     scene = run(f"{BLOCK}{moved}GRAVITY 0 -9.81 0\nPRESS 0 2")
     scene.contact.physical["BLOCK"] = type(scene.contact.physical["BLOCK"])(young=1e5, poisson=0.3, element=0.005)
     report = run_contact(scene, tmp_path)
-    assert report.solved.status is Status.CONVERGED
+    assert report.solved.status is SolveStatus.CONVERGED
     place = prop_places(scene.actors, scene.rate, scene.prop("block"), np.array([2.0]))
     np.testing.assert_allclose(
         report.surfaces.object("BLOCK", 2.0), place.apply(scene.prop("block").thing.vertices)[0], atol=4e-5
@@ -72,7 +72,7 @@ def test_a_bond_holds_until_it_is_pulled_too_hard(run: Callable[[str], Scene], t
         "BOND block lid 3000\nPRESS 0 4"
     )
     report = run_contact(scene, tmp_path)
-    assert report.solved.status is Status.CONVERGED
+    assert report.solved.status is SolveStatus.CONVERGED
     grown = [h - 0.02 for h in heights(report, "BLOCK")]
     assert grown[0] > 1e-4  # pulled along: 0.5 mm over both
     assert grown[-1] < 1e-6  # let go
@@ -93,7 +93,7 @@ def test_a_bond_holds_until_it_is_pulled_too_hard(run: Callable[[str], Scene], t
 def test_obstacles_press(run: Callable[[str], Scene], tmp_path: Path, obstacle: str) -> None:
     scene = run(f"{BLOCK}{obstacle}\nPRESS 0 2")
     report = run_contact(scene, tmp_path)
-    assert report.solved.status is Status.CONVERGED
+    assert report.solved.status is SolveStatus.CONVERGED
     last = report.solved.frames[-1]
     assert last.nodal.sum(axis=(0, 1))[1] < -1e-3
     assert report.surfaces.pressure("BLOCK", 2.0).max() > 100.0

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from warpjld.errors import InputError
-from warpjld.fem import Status
+from warpjld.fem import SolveStatus
 from warpjld.grasp import Places
 from warpjld.script import Scene
 from warpjld.script.contact import SceneAnimation, run_contact
@@ -131,7 +131,7 @@ def test_bones_in_a_rigid_object_are_named(run: Callable[[str], Scene], tmp_path
         "FLESH LEFT INDEX\nPRESS 0 2 EVERY 2"
     )
     report = run_contact(scene, tmp_path)
-    assert report.solved.status is not Status.CONVERGED
+    assert report.solved.status is not SolveStatus.CONVERGED
     assert "mm inside PLATE, which cannot give way" in report.verdict.text
 
 

@@ -8,7 +8,7 @@ from types import SimpleNamespace
 
 import numpy as np
 
-from warpjld.fem import Status
+from warpjld.fem import SolveStatus
 from warpjld.script import Scene
 from warpjld.script.contact import run_contact
 from warpjld.simulation.display.overlap import Overlap, SurfacePart
@@ -34,7 +34,7 @@ def test_overlap_that_contact_left_is_a_status_of_its_own() -> None:
     )
     (found,) = remaining_overlaps(pressed)  # type: ignore[arg-type]
     assert found.text == "A and B overlap by 4.0 mm at frames 2 to 3"
-    solved = SolveResult(Status.CONVERGED, "", None)  # type: ignore[arg-type]
+    solved = SolveResult(SolveStatus.CONVERGED, "", None)  # type: ignore[arg-type]
     verdict = verdict_of(solved, [], [], [found])
     assert verdict.status == "OVERLAP"
     assert verdict.text == "not solved: A and B overlap by 4.0 mm at frames 2 to 3, and forces there are wrong"

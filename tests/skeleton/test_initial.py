@@ -11,8 +11,8 @@ from hypothesis import strategies as st
 
 from tests.skeleton.test_kinematics import chain
 from warpjld.errors import InputError
+from warpjld.geometry.rotations import rotate
 from warpjld.motion import Motion
-from warpjld.rotations import rotate
 from warpjld.skeleton import CHANNELS, Skeleton, poses_from_angles, rest_poses
 from warpjld.skeleton.initial import bent_as_before, bent_limbs, check_initial, with_initial
 

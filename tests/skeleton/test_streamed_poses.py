@@ -16,7 +16,7 @@ from warpjld.errors import InputError
 from warpjld.script import Interpreter, Scene
 from warpjld.script.crowd import Crowd, role_of
 from warpjld.script.outermost import outermost
-from warpjld.script.outputs import Camera
+from warpjld.script.outputs import CameraSetting
 from warpjld.script.staging import stage, staged
 from warpjld.skeleton import Poses
 from warpjld.skeleton.streamed_poses import BLOCK, StreamedPoses, blocks_of
@@ -79,7 +79,7 @@ def test_what_cannot_be_posed_is_refused_at_once(scene: Scene) -> None:
 
 def test_a_camera_shows_every_joint_of_a_long_scene(scene: Scene) -> None:
     crowd = Crowd([role_of(scene.actor(), _FRAMES, scene.rate)], _FRAMES)
-    points = crowd._framing(Camera())
+    points = crowd._framing(CameraSetting())
     joints = stage(scene.actor(), _FRAMES, scene.rate).positions.reshape(-1, 3)
     assert len(points) < len(joints)
     for direction in np.random.default_rng(3).normal(size=(40, 3)):

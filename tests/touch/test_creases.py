@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from tests.finger import finger
 from warpjld.covering import bind_rig
 from warpjld.covering.covering import Covering
-from warpjld.rotations import rotate
+from warpjld.geometry.rotations import rotate
 from warpjld.skeleton import CHANNELS, Poses, poses_from_angles
 from warpjld.touch import Touch
 

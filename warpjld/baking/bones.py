@@ -9,8 +9,8 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from warpjld.errors import InputError
+from warpjld.geometry.rotations import conjugate, multiply
 from warpjld.rig import Rig
-from warpjld.rotations import conjugate, multiply
 from warpjld.skeleton.kinematics import Poses
 
 __all__ = ["Bones", "bones_of"]

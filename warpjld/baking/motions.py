@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from warpjld.baking.poses import NamedPoses, joined, training_poses, unseen_poses
+from warpjld.baking.poses import NamedPoses, poses_in_a_row, training_poses, unseen_poses
 from warpjld.skeleton.kinematics import Poses
 from warpjld.skeleton.tree import Skeleton
 
@@ -26,7 +26,7 @@ def with_motions(skeleton: Skeleton, motions: list[Poses]) -> tuple[Poses, Named
         if first < count:
             judged.append(_some(motion[first:], _JUDGED))
             names += [f"motion {n + 1}"] * len(judged[-1])
-    return joined(fitted), NamedPoses(tuple(names), joined(judged))
+    return poses_in_a_row(fitted), NamedPoses(tuple(names), poses_in_a_row(judged))
 
 
 def _some(poses: Poses, most: int) -> Poses:

@@ -9,12 +9,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from warpjld.covering.pose_sets import curled
-from warpjld.rotations import about
+from warpjld.geometry.rotations import about
 from warpjld.skeleton.hand import DIGITS
 from warpjld.skeleton.kinematics import Poses, poses_beside_rest, poses_from_rotations
 from warpjld.skeleton.tree import CHANNELS, Skeleton
 
-__all__ = ["NamedPoses", "joined", "training_poses", "unseen_poses"]
+__all__ = ["NamedPoses", "poses_in_a_row", "training_poses", "unseen_poses"]
 
 _FLEXION, _PIVOT, _TWISTING, _ABDUCTION = range(len(CHANNELS))
 _WIDE = np.radians(150.0)  # no joint is trained further, whatever its limits allow
@@ -38,7 +38,7 @@ class NamedPoses:
     poses: Poses
 
 
-def joined(parts: list[Poses]) -> Poses:
+def poses_in_a_row(parts: list[Poses]) -> Poses:
     """All frames in a row."""
     return Poses(*(np.concatenate([getattr(p, n) for p in parts]) for n in ("positions", "rotations", "flexion")))
 
@@ -82,7 +82,7 @@ def training_poses(skeleton: Skeleton, *, seed: int = 0, random: int = _RANDOM) 
     parts = [poses_beside_rest(skeleton, many), _turned(skeleton, inner)]
     if alone:
         parts.append(poses_beside_rest(skeleton, np.array(alone)))
-    return joined(parts)
+    return poses_in_a_row(parts)
 
 
 def unseen_poses(skeleton: Skeleton) -> NamedPoses:
@@ -134,7 +134,7 @@ def unseen_poses(skeleton: Skeleton) -> NamedPoses:
     share = generator.uniform(0.0, 0.8, (8, *low.shape)) * (generator.uniform(size=(8, *low.shape)) < 0.5)
     share[..., 1:] *= 0.5
     add("random", poses_beside_rest(skeleton, share * np.where(generator.uniform(size=share.shape) < 0.7, high, low)))
-    return NamedPoses(tuple(names), joined(parts))
+    return NamedPoses(tuple(names), poses_in_a_row(parts))
 
 
 def ranges(skeleton: Skeleton) -> tuple[NDArray[np.float64], NDArray[np.float64]]:

@@ -15,7 +15,7 @@ from warpjld.baking.poses import NamedPoses
 from warpjld.covering.baselines import linear_blend_skinning
 from warpjld.covering.covering import Covering
 from warpjld.errors import InputError
-from warpjld.whole_file import whole_file
+from warpjld.files.whole_file import whole_file
 
 __all__ = ["REPORTS", "Accuracy", "accuracy", "check_report", "write_report"]
 

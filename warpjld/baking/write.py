@@ -12,12 +12,12 @@ from numpy.typing import NDArray
 
 from warpjld.baking.baked import Baked
 from warpjld.errors import InputError
-from warpjld.folders import make_folder
+from warpjld.files.folders import make_folder
+from warpjld.files.whole_file import whole_file
 from warpjld.motion.out.baked_skin import BakedSkin
 from warpjld.motion.out.source_motion import source_motion
 from warpjld.motion.out.write import Timing, WrittenMotion, check_motion_out
 from warpjld.skeleton.kinematics import Poses, rest_poses
-from warpjld.whole_file import whole_file
 
 __all__ = ["BAKED", "check_baked", "drivers_file", "write_baked"]
 

@@ -7,8 +7,8 @@ from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Any
 
+from warpjld.files.manifest import file_hash, write_json
 from warpjld.io.identity import content_hash
-from warpjld.manifest import file_hash, write_json
 
 __all__ = ["FOLDER", "ClipRecord", "read_record", "still_there", "write_record"]
 

@@ -14,11 +14,11 @@ from warpjld.batch.deform import Deforming
 from warpjld.batch.record import FOLDER, ClipRecord, read_record, still_there
 from warpjld.batch.work import BatchWork
 from warpjld.errors import InputError
-from warpjld.folder_lock import locked_folder
-from warpjld.folders import make_folder
-from warpjld.manifest import fingerprint, write_json
-from warpjld.processes import run_jobs
-from warpjld.threads import cores
+from warpjld.files.folder_lock import locked_folder
+from warpjld.files.folders import make_folder
+from warpjld.files.manifest import fingerprint, write_json
+from warpjld.runtime.processes import run_jobs
+from warpjld.runtime.threads import cores
 
 __all__ = ["BatchResult", "run_batch"]
 

@@ -10,8 +10,8 @@ from warpjld.batch.clips import ClipJob
 from warpjld.batch.deform import Deforming, deform_clip
 from warpjld.batch.record import ClipRecord, read_record, write_record
 from warpjld.errors import WarpjldError
+from warpjld.files.manifest import file_hash
 from warpjld.io.identity import content_hash
-from warpjld.manifest import file_hash
 
 __all__ = ["BatchWork"]
 
@@ -34,7 +34,7 @@ class BatchWork:
 
     def begin(self) -> None:
         """Keep Warp's remarks off the output of many workers."""
-        from warpjld.quiet import silence_warp
+        from warpjld.runtime.quiet import silence_warp
 
         silence_warp()
 

@@ -81,11 +81,11 @@ def command(
     from warpjld.cli.warn import warn
     from warpjld.covering import load_parameters
     from warpjld.covering.kept import bind_kept
-    from warpjld.folders import make_folder
+    from warpjld.files.folders import make_folder
+    from warpjld.files.overwriting import check_outputs
     from warpjld.io.identity import files_of
     from warpjld.motion import load_motion
-    from warpjld.overwriting import check_outputs
-    from warpjld.quiet import silence_warp
+    from warpjld.runtime.quiet import silence_warp
 
     silence_warp()
     check_baked(out)

@@ -38,8 +38,8 @@ def command(
     from warpjld.covering import bind_rig, load_parameters
     from warpjld.covering.kept import save_binding
     from warpjld.errors import InputError
-    from warpjld.overwriting import check_outputs
-    from warpjld.quiet import silence_warp
+    from warpjld.files.overwriting import check_outputs
+    from warpjld.runtime.quiet import silence_warp
 
     began = time.perf_counter()
     silence_warp()

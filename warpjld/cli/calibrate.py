@@ -87,9 +87,9 @@ def command(
     from warpjld.covering.kept import bind_kept
     from warpjld.covering.parameters import load_parameters, save_parameters
     from warpjld.errors import InputError
+    from warpjld.files.overwriting import check_outputs
     from warpjld.io.identity import files_of
-    from warpjld.overwriting import check_outputs
-    from warpjld.quiet import silence_warp
+    from warpjld.runtime.quiet import silence_warp
 
     silence_warp()
     if not out.absolute().parent.is_dir():

@@ -13,9 +13,9 @@ from warpjld.cli.answer import answer
 from warpjld.cli.deform_wanted import Wanted, count, tell_rig
 from warpjld.cli.warn import warn
 from warpjld.errors import InputError
+from warpjld.files.overwriting import check_outputs
 from warpjld.io.caches import FORMATS
 from warpjld.motion.out import MOTION_OUT
-from warpjld.overwriting import check_outputs
 
 if TYPE_CHECKING:
     from warpjld.batch import ClipJob
@@ -132,7 +132,7 @@ def command(rig: str, clips: tuple[Path, ...], motions: tuple[Path, ...], **give
 
 def _single(wanted: Wanted, job: ClipJob) -> None:
     from warpjld.batch.deform_file import deform_file
-    from warpjld.cli.deform_wanted import checked_parameters, opened
+    from warpjld.cli.deform_wanted import checked_parameters, opened_rig
     from warpjld.cli.progress import progress
     from warpjld.io.caches import check_cache
     from warpjld.motion.out import check_motion_out
@@ -142,7 +142,7 @@ def _single(wanted: Wanted, job: ClipJob) -> None:
         check_cache(wanted.out)
     for path in wanted.motions_out:
         check_motion_out(path)
-    rig = opened(wanted)
+    rig = opened_rig(wanted)
     with progress(wanted.quiet) as report:
         made = deform_file(
             rig,

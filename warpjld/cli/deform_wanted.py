@@ -13,7 +13,7 @@ if TYPE_CHECKING:
     from warpjld.covering import Parameters
     from warpjld.rig import Rig
 
-__all__ = ["Wanted", "checked_parameters", "count", "deforming", "opened", "tell_rig"]
+__all__ = ["Wanted", "checked_parameters", "count", "deforming", "opened_rig", "tell_rig"]
 
 
 @dataclass(frozen=True)
@@ -76,8 +76,8 @@ class Wanted:
 
     def settings(self) -> dict[str, Any]:
         """All that determines a batch's files besides the motions."""
+        from warpjld.files.manifest import versions
         from warpjld.io.identity import content_hash
-        from warpjld.manifest import versions
 
         files = {"rig": Path(self.rig), "parameters": self.parameters} | {
             name: value for name, value in self.how.items() if isinstance(value, Path)
@@ -99,10 +99,10 @@ class Wanted:
         }
 
 
-def opened(wanted: Wanted) -> Rig:
+def opened_rig(wanted: Wanted) -> Rig:
     """The rig; what looks suspicious in it goes to stderr."""
     from warpjld.cli.rig_argument import open_rig
-    from warpjld.quiet import silence_warp
+    from warpjld.runtime.quiet import silence_warp
 
     silence_warp()
     return open_rig(wanted.rig, **wanted.how)
@@ -119,7 +119,7 @@ def deforming(wanted: Wanted) -> Deforming:
     """The rig and the settings that all clips of a batch share."""
     from warpjld.batch import Deforming
 
-    rig = opened(wanted)
+    rig = opened_rig(wanted)
     return Deforming(
         rig,
         checked_parameters(wanted, rig),

@@ -32,7 +32,7 @@ def command(no_picture: bool, as_json: bool) -> None:
     The exit code is 1 where something does not work that every installation has.
     """
     from warpjld.cli.answer import answer
-    from warpjld.quiet import silence_warp
+    from warpjld.runtime.quiet import silence_warp
 
     silence_warp()
     required, extras = _requirements()
@@ -100,7 +100,7 @@ def _caches() -> dict[str, dict[str, Any]]:
     """Folders where things are kept from one run to the next, and how much is in them."""
     import warp as wp
 
-    from warpjld.kept_files import kept_folder
+    from warpjld.files.kept_files import kept_folder
 
     kept = kept_folder()
     folders = {

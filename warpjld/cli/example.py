@@ -104,7 +104,7 @@ def _list(files: dict[str, Path], as_json: bool) -> None:
 
 
 def _copy(file: Path, out: Path, quiet: bool) -> None:
-    from warpjld.folders import make_folder
+    from warpjld.files.folders import make_folder
 
     make_folder(out)
     for name in (file.name, *_WITH.get(file.name, ())):
@@ -118,7 +118,7 @@ def _copy(file: Path, out: Path, quiet: bool) -> None:
 
 def _run_program(file: Path, arguments: tuple[str, ...], out: Path) -> None:
     """A program of its own process, in the output folder; arguments that name files are found from there."""
-    from warpjld.folders import make_folder
+    from warpjld.files.folders import make_folder
 
     make_folder(out)
     given = [os.path.abspath(one) if os.path.exists(one) else one for one in arguments]

@@ -41,7 +41,7 @@ def command(study: Path, out: Path | None, no_pictures: bool, as_json: bool, qui
     from warpjld.cli.answer import answer
     from warpjld.fem.study.study_file import load_study
     from warpjld.fem.study.study_results import StudyResults
-    from warpjld.quiet import silence_warp
+    from warpjld.runtime.quiet import silence_warp
     from warpjld.script.folder import OutputFolder
 
     silence_warp()

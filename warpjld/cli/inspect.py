@@ -44,8 +44,8 @@ def command(
     --no-picture.
     """
     from warpjld.cli.rig_argument import open_rig, rig_files
-    from warpjld.overwriting import check_outputs
-    from warpjld.quiet import silence_warp
+    from warpjld.files.overwriting import check_outputs
+    from warpjld.runtime.quiet import silence_warp
 
     silence_warp()
     listed = how["points"] == options.LISTED

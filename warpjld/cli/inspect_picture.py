@@ -10,8 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from warpjld.errors import InputError
+from warpjld.files.whole_file import whole_file
 from warpjld.rig import Rig
-from warpjld.whole_file import whole_file
 
 __all__ = ["draw_rig"]
 

@@ -26,10 +26,10 @@ def command(surface: Path, out: Path, side: str | None, picture: Path | None, as
     A body stands upright along an axis, its legs, arms and fingers apart. The file is in SURFACE's own unit and axes;
     correct it by hand, look at it with `inspect SURFACE --points FILE`, use it with MODEL … POINTS.
     """
+    from warpjld.files.overwriting import check_outputs
     from warpjld.io.mesh_file import read_mesh
     from warpjld.io.points_file import write_points_file
-    from warpjld.overwriting import check_outputs
-    from warpjld.quiet import silence_warp
+    from warpjld.runtime.quiet import silence_warp
     from warpjld.skeleton.place.place import propose_points
 
     silence_warp()

@@ -34,7 +34,7 @@ def command(
     """Run SCRIPT and make the pictures, films and exports it asks for; if it asks for none, an animated surface (NPZ),
     a film and a contact sheet. A summary goes to summary.json in the output folder."""
     from warpjld.cli.progress import progress
-    from warpjld.quiet import silence_warp
+    from warpjld.runtime.quiet import silence_warp
     from warpjld.script.run_script import run_script
     from warpjld.script.summary import table
 

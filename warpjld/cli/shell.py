@@ -40,7 +40,7 @@ class _EndedError(BaseException):
 def command(script: Path | None, out: Path, device: str, threads: int | None, commands: tuple[Path, ...]) -> None:
     """Type commands of the language, after running SCRIPT if one is given. Commands may also be piped in; then the
     first error ends the shell."""
-    from warpjld.quiet import silence_warp
+    from warpjld.runtime.quiet import silence_warp
     from warpjld.script.plugin import load_commands
     from warpjld.script.session import Session
 

@@ -51,7 +51,7 @@ def command(
     whatever the number of processes and however often the study was stopped."""
     from warpjld.cli.progress import progress
     from warpjld.errors import InputError
-    from warpjld.quiet import silence_warp
+    from warpjld.runtime.quiet import silence_warp
     from warpjld.study.grasping import Study
 
     silence_warp()

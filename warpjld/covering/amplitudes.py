@@ -21,7 +21,7 @@ from warpjld.covering.drivers import drive, initial_ratio
 from warpjld.covering.parameters import Parameters
 from warpjld.covering.rows import scalar_inputs
 from warpjld.covering.segment_table import SegmentTable
-from warpjld.rotations import rotate, unit
+from warpjld.geometry.rotations import rotate, unit
 from warpjld.skeleton.kinematics import Poses
 
 __all__ = ["Frame", "LinearDeformation", "amplitudes_of", "with_amplitudes"]

@@ -19,7 +19,7 @@ from warpjld.covering.amplitudes import amplitudes_of, with_amplitudes
 from warpjld.covering.calibration_guard import Guard, PoseMeasures
 from warpjld.covering.calibration_loss import LossWeights
 from warpjld.covering.calibration_retreat import retreat
-from warpjld.covering.constrained_least_squares import minimise
+from warpjld.covering.constrained_least_squares import minimise_constrained
 from warpjld.covering.covering import Covering
 from warpjld.covering.parameters import Parameters
 from warpjld.covering.pose_losses import PoseLosses
@@ -131,7 +131,7 @@ def calibrate(
     )
     guard = Guard(covering, every, losses, tolerances, lambda done, total: tell("measuring", done, total))
     start = amplitudes_of(covering.parameters)
-    fit = minimise(
+    fit = minimise_constrained(
         losses.parts,
         start,
         (np.zeros_like(start), np.maximum(start, _HIGHEST)),

@@ -19,7 +19,7 @@ from warpjld.covering.dihedral import dihedral_angles, dihedral_slopes, hinges
 from warpjld.covering.quality import unique_edges
 from warpjld.covering.tolerances import TOLERANCES, Tolerances
 from warpjld.covering.volume_form import ClosedSurface, VolumeForm, any_of
-from warpjld.surface import Surface
+from warpjld.geometry.surface import Surface
 
 __all__ = ["LossTerms", "LossWeights", "PoseLoss", "SurfaceLoss"]
 

@@ -13,8 +13,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from warpjld.covering.baselines import linear_blend_skinning
+from warpjld.geometry.rotations import rotate, unit
 from warpjld.rig import Skin
-from warpjld.rotations import rotate, unit
 from warpjld.skeleton.kinematics import Poses
 from warpjld.skeleton.tree import Skeleton
 

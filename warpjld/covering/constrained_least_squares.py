@@ -19,7 +19,7 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["Fit", "Linearised", "Part", "minimise"]
+__all__ = ["ConstrainedFit", "Linearised", "ResidualBlock", "minimise_constrained"]
 
 _SETTLED = 1e-3  # relative gain of a step below which the next is not taken
 _VIOLATED = 1e-3  # by all constraints together, above which one more step is taken all the same
@@ -50,7 +50,7 @@ class Linearised:
     slopes: NDArray[np.float64]
 
 
-class Part(Protocol):
+class ResidualBlock(Protocol):
     """Residuals and constraints that some parameters determine."""
 
     parameters: NDArray[np.int64]
@@ -60,7 +60,7 @@ class Part(Protocol):
 
 
 @dataclass(frozen=True, eq=False)
-class Fit:
+class ConstrainedFit:
     """What :func:`minimise` found.
 
     Attributes:
@@ -95,15 +95,15 @@ class _Sum:
         return float(np.maximum(self.constraints, 0.0).sum())
 
 
-def minimise(
-    parts: Sequence[Part],
+def minimise_constrained(
+    parts: Sequence[ResidualBlock],
     start: NDArray[np.float64],
     bounds: tuple[NDArray[np.float64], NDArray[np.float64]],
     pull: NDArray[np.float64],
     *,
     evaluations: int = 12,
     progress: Callable[[int, int], None] | None = None,
-) -> Fit:
+) -> ConstrainedFit:
     """Minimise ½ Σ |r(x)|² + ½ Σ pull (x − start)² under c(x) ≤ 0 and within bounds.
 
     Args:
@@ -138,7 +138,7 @@ def minimise(
 
     x = start.copy()
     if not moved.size:
-        return Fit(x, 0, 0, True)
+        return ConstrainedFit(x, 0, 0, True)
     here = summed(x)
     done, taken, weight, damping, part = 1, 0, 0.0, 0.0, 1.0
     while done < evaluations:
@@ -146,7 +146,7 @@ def minimise(
         weight = max(weight, _MULTIPLIED * largest)
         merit = here.loss + weight * here.violated
         if _predicted(here, step) + weight * here.violated < _SETTLED * merit and here.violated < _VIOLATED:
-            return Fit(x, taken, done, True)
+            return ConstrainedFit(x, taken, done, True)
         candidate = x.copy()
         candidate[moved] = np.clip(x[moved] + part * step, low, high)
         there = summed(candidate)
@@ -158,14 +158,14 @@ def minimise(
             x, here, taken, part = candidate, there, taken + 1, 1.0
             damping = damping / _DAMPED if damping > _LEAST else 0.0
             if gain < _SETTLED * merit and here.violated < _VIOLATED:
-                return Fit(x, taken, done, True)
+                return ConstrainedFit(x, taken, done, True)
         elif part == 1.0:
             part = _SHORTER
         else:
             damping, part = max(_DAMPED * damping, _LEAST), 1.0
             if damping > _MOST:
-                return Fit(x, taken, done, True)
-    return Fit(x, taken, done, False)
+                return ConstrainedFit(x, taken, done, True)
+    return ConstrainedFit(x, taken, done, False)
 
 
 def _predicted(here: _Sum, step: NDArray[np.float64]) -> float:

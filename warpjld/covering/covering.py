@@ -18,17 +18,17 @@ from warpjld.covering.following import Following, following
 from warpjld.covering.launch import lane_of, launch_gathered, launch_runs
 from warpjld.covering.operators import Fan
 from warpjld.covering.parameters import Parameters
-from warpjld.covering.rigid import flesh_of, part_of_surface
+from warpjld.covering.rigid import part_of_surface, without_rigid
 from warpjld.covering.rows import Rows, pose_on, rows_of, rows_on
 from warpjld.covering.runs import Columns, Runs, pack_runs, palette
 from warpjld.covering.swelling import volume_keeping
 from warpjld.covering.thickness import thickness
 from warpjld.covering.thinning import thinned
 from warpjld.errors import InputError
+from warpjld.geometry.surface import Surface
+from warpjld.runtime.threads import threads_for
 from warpjld.skeleton.kinematics import Poses
 from warpjld.skeleton.tree import Skeleton
-from warpjld.surface import Surface
-from warpjld.threads import threads_for
 
 __all__ = ["Covering"]
 
@@ -149,7 +149,7 @@ class Covering:
     @cached_property
     def flesh(self) -> Surface:
         """The rest surface without what is rigid: what keeps its volume or not. Vertices keep their numbers."""
-        return flesh_of(self.surface, self.anchors.rigid)
+        return without_rigid(self.surface, self.anchors.rigid)
 
     @cached_property
     def runs(self) -> Runs:

@@ -22,8 +22,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from warpjld.covering.heat import Factor, conducting_laplacian, spatial_order, uniform_laplacian
-from warpjld.lazily import lazy_module
+from warpjld.covering.heat import DiffusionFactor, conducting_laplacian, spatial_order, uniform_laplacian
+from warpjld.runtime.lazily import lazy_module
 
 if TYPE_CHECKING:
     import scipy.sparse as sp
@@ -104,7 +104,7 @@ class Diffusion:
         out = sp.csc_array((ordered.data, ordered.indices, starts), shape=coefficients.shape).tocsr()
         return out + kept if hard.any() else out
 
-    def _spread(self, columns: sp.csc_array, where: NDArray[np.int64], factor: Factor) -> sp.csc_array:
+    def _spread(self, columns: sp.csc_array, where: NDArray[np.int64], factor: DiffusionFactor) -> sp.csc_array:
         """Some columns after diffusion on these vertices of the flesh."""
         place = np.full(columns.shape[0], -1)
         place[self.flesh[where]] = np.arange(len(where))
@@ -137,7 +137,7 @@ class Diffusion:
 
     def _clusters(
         self, columns: sp.csc_array, present: NDArray[np.int64], owner: NDArray[np.int64]
-    ) -> list[tuple[NDArray[np.int64], NDArray[np.int64], Factor]]:
+    ) -> list[tuple[NDArray[np.int64], NDArray[np.int64], DiffusionFactor]]:
         """Columns, the vertices (of the flesh) they are followed on, and the system there."""
         key = present.tobytes()
         if key not in self._cache:
@@ -145,19 +145,19 @@ class Diffusion:
         return self._cache[key]
 
     @cached_property
-    def _cache(self) -> dict[bytes, list[tuple[NDArray[np.int64], NDArray[np.int64], Factor]]]:
+    def _cache(self) -> dict[bytes, list[tuple[NDArray[np.int64], NDArray[np.int64], DiffusionFactor]]]:
         return {}
 
     def _find_clusters(
         self, columns: sp.csc_array, present: NDArray[np.int64], owner: NDArray[np.int64]
-    ) -> list[tuple[NDArray[np.int64], NDArray[np.int64], Factor]]:
+    ) -> list[tuple[NDArray[np.int64], NDArray[np.int64], DiffusionFactor]]:
         count = len(self.flesh)
         if not count:
             return []
         matrix, _, graph = self._system
         order = spatial_order(self.vertices)
         if count <= _ALL:
-            return [(present, order, Factor(matrix[order][:, order]))]
+            return [(present, order, DiffusionFactor(matrix[order][:, order]))]
         number = np.full(columns.shape[0], -1)
         number[self.flesh] = np.arange(count)
         groups: list[tuple[list[int], NDArray[np.bool_], int]] = []
@@ -183,5 +183,5 @@ class Diffusion:
         out = []
         for members, mask, _ in groups:
             where = order[mask[order]]
-            out.append((np.sort(np.array(members)), where, Factor(matrix[where][:, where])))
+            out.append((np.sort(np.array(members)), where, DiffusionFactor(matrix[where][:, where])))
         return out

@@ -11,16 +11,16 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from warpjld.covering.heat import cotangent_laplacian, solve, spatial_order, uniform_laplacian
+from warpjld.covering.heat import cotangent_laplacian, solve_diffusion, spatial_order, uniform_laplacian
 from warpjld.covering.operators import Fan, segment_ends
 from warpjld.covering.skull import skull_lines
 from warpjld.errors import InputError
-from warpjld.lazily import lazy_module
-from warpjld.normals import vertex_normals
+from warpjld.geometry.normals import vertex_normals
+from warpjld.geometry.spread import spread
 from warpjld.rig import Skin
+from warpjld.runtime.lazily import lazy_module
+from warpjld.runtime.threads import in_threads, threads_for
 from warpjld.skeleton.tree import Skeleton
-from warpjld.spread import spread
-from warpjld.threads import in_threads, threads_for
 
 if TYPE_CHECKING:
     import scipy.sparse as sp
@@ -74,7 +74,7 @@ def domains_from_geometry(
     ):
         heat = cover * demand
         weights = np.zeros_like(source)
-        found = solve(conducting() + sp.diags_array(heat), heat[:, None] * source[:, present], order)
+        found = solve_diffusion(conducting() + sp.diags_array(heat), heat[:, None] * source[:, present], order)
         if found is not None and (total := np.maximum(found, 0.0).sum(axis=1)).min() > 0.5:
             weights[:, present] = np.maximum(found, 0.0) / total[:, None]
             return weights

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from warpjld.covering.binding import STATIONS, Anchors
-from warpjld.rotations import unit
+from warpjld.geometry.rotations import unit
 from warpjld.skeleton.kinematics import Poses, vertical_flexion
 from warpjld.skeleton.tree import CHANNELS, Skeleton
 

@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from warpjld.covering.binding import STATIONS, Anchors, smoothstep
 from warpjld.covering.device import array_on, checked_device
 from warpjld.covering.parameters import Parameters
-from warpjld.lazily import lazy_module
+from warpjld.runtime.lazily import lazy_module
 
 if TYPE_CHECKING:
     import scipy.sparse as sp

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from warpjld.covering.fields import Fields
-from warpjld.lazily import lazy_module
+from warpjld.runtime.lazily import lazy_module
 
 if TYPE_CHECKING:
     import scipy.sparse as sp
@@ -59,11 +59,11 @@ def following(
     vertices: NDArray[np.float64], faces: NDArray[np.int32], lines: NDArray[np.float64], rigid: NDArray[np.int32]
 ) -> Following | None:
     """What shells of a surface follow; None where its flesh is a single shell. Arguments as of ``shells``."""
-    from warpjld.covering.shells import components, shells
+    from warpjld.covering.shells import shell_numbers, shells
 
     used = np.zeros(len(rigid), dtype=bool)
     used[faces.ravel()] = True
-    if len(np.unique(components(faces, len(rigid))[used & (rigid < 0)])) <= 1:
+    if len(np.unique(shell_numbers(faces, len(rigid))[used & (rigid < 0)])) <= 1:
         return None
     found = shells(vertices, faces, lines, rigid)
     bends = ~found.whole[found.label] | (rigid >= 0)

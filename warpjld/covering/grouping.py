@@ -12,8 +12,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from warpjld.lazily import lazy_module
-from warpjld.threads import one_blas_thread
+from warpjld.runtime.lazily import lazy_module
+from warpjld.runtime.threads import one_blas_thread
 
 if TYPE_CHECKING:
     import scipy.sparse as sp

@@ -11,8 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from warpjld.covering.corners import corner_conductivity
-from warpjld.lazily import lazy_module
-from warpjld.threads import in_threads, one_blas_thread, threads_for
+from warpjld.runtime.lazily import lazy_module
+from warpjld.runtime.threads import in_threads, one_blas_thread, threads_for
 
 if TYPE_CHECKING:
     import scipy.sparse as sp
@@ -21,7 +21,14 @@ else:
     sp = lazy_module("scipy.sparse")
     linalg = lazy_module("scipy.sparse.linalg")
 
-__all__ = ["Factor", "conducting_laplacian", "cotangent_laplacian", "solve", "spatial_order", "uniform_laplacian"]
+__all__ = [
+    "DiffusionFactor",
+    "conducting_laplacian",
+    "cotangent_laplacian",
+    "solve_diffusion",
+    "spatial_order",
+    "uniform_laplacian",
+]
 
 # vertices up to which a sparse factorisation is taken: with 60 right-hand sides it is far quicker than multigrid, and
 # beyond its memory counts (1.5 kB a vertex)
@@ -107,7 +114,7 @@ def spatial_order(vertices: NDArray[np.float64]) -> NDArray[np.int64]:
     return np.argsort(code, kind="stable")
 
 
-def solve(
+def solve_diffusion(
     matrix: sp.sparray, right: NDArray[np.float64], order: NDArray[np.int64] | None = None
 ) -> NDArray[np.float64] | None:
     """X of A X = B for a symmetric, diagonally dominant A with a positive diagonal, shape (V, n).
@@ -126,7 +133,7 @@ def solve(
     if order is not None:
         back = np.empty_like(order)
         back[order] = np.arange(len(order))
-        found = solve(sp.csr_array(matrix)[order][:, order], right[order])
+        found = solve_diffusion(sp.csr_array(matrix)[order][:, order], right[order])
         return None if found is None else found[back]
     diagonal = matrix.diagonal()
     if not (np.isfinite(matrix.data).all() and (diagonal > 0.0).all()):
@@ -149,7 +156,7 @@ def solve(
     return None
 
 
-class Factor:
+class DiffusionFactor:
     """A symmetric, diagonally dominant matrix, factorised once for many right-hand sides.
 
     SuperLU factorises; its factors are solved with here, which takes a third of the time for many right-hand sides,

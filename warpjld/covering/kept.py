@@ -23,10 +23,10 @@ from warpjld.covering.parameters import Parameters
 from warpjld.covering.runs import Columns, Runs
 from warpjld.covering.surface_binding import bind_rig
 from warpjld.errors import InputError
-from warpjld.kept_files import keep, kept_folder, used
+from warpjld.files.kept_files import keep, kept_folder, used
+from warpjld.files.whole_file import whole_file
 from warpjld.rig import Rig
 from warpjld.skeleton.tree import Skeleton
-from warpjld.whole_file import whole_file
 
 __all__ = ["bind_kept", "load_binding", "save_binding"]
 

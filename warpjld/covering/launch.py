@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from warpjld.threads import in_threads
+from warpjld.runtime.threads import in_threads
 
 __all__ = ["lane_of", "launch_gathered", "launch_runs"]
 

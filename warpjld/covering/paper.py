@@ -16,11 +16,11 @@ from warpjld.covering.device import array_on, checked_device, parameters_on
 from warpjld.covering.drivers import flexion_ratio, initial_ratio
 from warpjld.covering.paper_places import PaperPlaces, paper_places
 from warpjld.covering.segment_table import SegmentTable
-from warpjld.rotations import unit
+from warpjld.geometry.rotations import unit
+from warpjld.geometry.surface import Surface
+from warpjld.runtime.threads import in_threads
 from warpjld.skeleton.kinematics import Poses
 from warpjld.skeleton.tree import Skeleton
-from warpjld.surface import Surface
-from warpjld.threads import in_threads
 
 __all__ = ["Normals", "PaperCovering", "PaperPose", "paper_normals"]
 

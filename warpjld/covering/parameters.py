@@ -11,11 +11,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from warpjld.errors import InputError
-from warpjld.reading import reading
+from warpjld.files.reading import reading
+from warpjld.files.text_file import read_json
+from warpjld.files.whole_file import whole_file
 from warpjld.skeleton.tree import CHANNELS, Skeleton
 from warpjld.suggest import one_of
-from warpjld.text_file import read_json
-from warpjld.whole_file import whole_file
 
 __all__ = ["Parameters", "default_parameters", "load_parameters", "save_parameters"]
 

@@ -8,10 +8,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from warpjld.covering.operators import Fan
+from warpjld.geometry.surface import Surface
 from warpjld.skeleton.tree import Skeleton
-from warpjld.surface import Surface
 
-__all__ = ["domains_of_rigid", "flesh_of", "part_of_surface"]
+__all__ = ["domains_of_rigid", "part_of_surface", "without_rigid"]
 
 
 def domains_of_rigid(rigid: NDArray[np.int32], skeleton: Skeleton, groups: tuple[Fan, ...]) -> NDArray[np.float64]:
@@ -43,7 +43,7 @@ def part_of_surface(
     return vertices[chosen], numbered[(numbered >= 0).all(axis=1)]
 
 
-def flesh_of(surface: Surface, rigid: NDArray[np.int32]) -> Surface:
+def without_rigid(surface: Surface, rigid: NDArray[np.int32]) -> Surface:
     """The surface without its rigid faces; vertices keep their numbers."""
     if (rigid < 0).all():
         return surface

@@ -14,7 +14,7 @@ from warpjld.covering.drivers import Drivers, initial_ratio
 from warpjld.covering.fields import Fields
 from warpjld.covering.parameters import Parameters
 from warpjld.covering.segment_table import SegmentTable
-from warpjld.lazily import lazy_module
+from warpjld.runtime.lazily import lazy_module
 from warpjld.skeleton.tree import Skeleton
 
 if TYPE_CHECKING:

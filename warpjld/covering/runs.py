@@ -13,7 +13,7 @@ from warpjld.covering.drivers import Drivers
 from warpjld.covering.grouping import group
 from warpjld.covering.parameters import Parameters
 from warpjld.covering.rows import Rows, scalar_inputs
-from warpjld.lazily import lazy_module
+from warpjld.runtime.lazily import lazy_module
 
 if TYPE_CHECKING:
     import scipy.sparse as sp

@@ -15,10 +15,10 @@ from numpy.typing import NDArray
 from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
-from warpjld.normals import vertex_normals
-from warpjld.rotations import unit
+from warpjld.geometry.normals import vertex_normals
+from warpjld.geometry.rotations import unit
 
-__all__ = ["Shells", "components", "shells"]
+__all__ = ["Shells", "shell_numbers", "shells"]
 
 _SAMPLES = 16  # places on a segment, and
 _RAYS = 8  # rays from each of them around it, that ask which shell its flesh is
@@ -78,7 +78,7 @@ def shells(
     used = np.zeros(count, dtype=bool)
     used[faces.ravel()] = True
     seams = _seams(vertices, faces, flesh)
-    label = components(faces, count, seams)
+    label = shell_numbers(faces, count, seams)
     number = int(label.max()) + 1
     soft = np.bincount(label, flesh & used, number) > 0
     host, lies = soft, np.zeros(number, dtype=bool)
@@ -97,7 +97,7 @@ def shells(
     return Shells(label, host, lies, whole, follow, distance)
 
 
-def components(faces: NDArray[np.int32], count: int, seams: NDArray[np.int64] | None = None) -> NDArray[np.int32]:
+def shell_numbers(faces: NDArray[np.int32], count: int, seams: NDArray[np.int64] | None = None) -> NDArray[np.int32]:
     """Number of the connected shell of every vertex, shape (V,); ``seams`` join pairs of vertices, shape (n, 2)."""
     links = np.concatenate([faces[:, :2], faces[:, 1:], *([] if seams is None else [seams])])
     graph = sp.coo_array((np.ones(len(links)), (links[:, 0], links[:, 1])), shape=(count, count))

@@ -11,7 +11,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from warpjld.rotations import unit
+from warpjld.geometry.rotations import unit
 from warpjld.skeleton.actor import body_facing, face_points
 from warpjld.skeleton.recognise.section import first_hits, nearby
 from warpjld.skeleton.tree import Skeleton

@@ -14,9 +14,9 @@ from warpjld.covering.operators import fans
 from warpjld.covering.parameters import Parameters, default_parameters
 from warpjld.covering.rigid import domains_of_rigid, part_of_surface
 from warpjld.errors import InputError
+from warpjld.geometry.surface import Surface
 from warpjld.rig import Rig, Skin
 from warpjld.skeleton.tree import Skeleton
-from warpjld.surface import Surface
 
 __all__ = ["bind", "bind_rig"]
 

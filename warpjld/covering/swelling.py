@@ -23,8 +23,8 @@ from warpjld.covering.drivers import drive, initial_ratio
 from warpjld.covering.parameters import default_parameters
 from warpjld.covering.quality import closing_fans
 from warpjld.covering.rows import Rows, rows_of, scalar_inputs
-from warpjld.lazily import lazy_module
-from warpjld.rotations import rotate, unit
+from warpjld.geometry.rotations import rotate, unit
+from warpjld.runtime.lazily import lazy_module
 from warpjld.skeleton.kinematics import poses_from_angles
 from warpjld.skeleton.tree import CHANNELS
 

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from warpjld.covering.fields import Fields
-from warpjld.lazily import lazy_module
+from warpjld.runtime.lazily import lazy_module
 
 if TYPE_CHECKING:
     import scipy.sparse as sp

@@ -13,7 +13,7 @@ import scipy.sparse as sp
 from numpy.typing import NDArray
 
 from warpjld.covering.quality import closing_fans, enclosed_volume
-from warpjld.surface import Surface
+from warpjld.geometry.surface import Surface
 
 __all__ = ["ClosedSurface", "VolumeForm", "any_of"]
 

@@ -15,7 +15,7 @@ from warpjld.fem.load.prescribed import FreeBodyError, Prescribed, prescribe
 from warpjld.fem.material.materials import Fung, LinearElastic, Material, MaterialWarning, MooneyRivlin, NeoHooke
 from warpjld.fem.mesh.generated import ball_hexes, box_hexes, cylinder_hexes, finger_hexes
 from warpjld.fem.mesh.hexmesh import HexMesh, merge
-from warpjld.fem.solver.krylov import Status
+from warpjld.fem.solver.krylov import SolveStatus
 from warpjld.fem.solver.solution import Instant, Solution, SolveError
 from warpjld.fem.solver.static import solve
 
@@ -35,7 +35,7 @@ __all__ = [
     "Prescribed",
     "Solution",
     "SolveError",
-    "Status",
+    "SolveStatus",
     "ball_hexes",
     "box_hexes",
     "cylinder_hexes",

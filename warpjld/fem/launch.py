@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from warpjld.threads import cores, helpers
+from warpjld.runtime.threads import cores, helpers
 
 __all__ = ["Launch", "grouped", "on_rows", "shared", "threads_of"]
 

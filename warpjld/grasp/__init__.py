@@ -2,7 +2,7 @@
 
 from warpjld.grasp.distance import Distances, ObjectSet
 from warpjld.grasp.facet import FacetDistances, facet_distance
-from warpjld.grasp.found import Found, Status
+from warpjld.grasp.found import Found, SearchStatus
 from warpjld.grasp.object_file import load_object
 from warpjld.grasp.objects import GraspObject, Places, make_object
 from warpjld.grasp.search import FlexionSearch
@@ -19,8 +19,8 @@ __all__ = [
     "MeshReport",
     "ObjectSet",
     "Places",
+    "SearchStatus",
     "Searches",
-    "Status",
     "facet_distance",
     "load_object",
     "make_object",

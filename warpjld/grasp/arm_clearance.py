@@ -7,8 +7,8 @@ from numpy.typing import NDArray
 
 from warpjld.covering import Covering
 from warpjld.covering.intersections import crossing_faces
+from warpjld.geometry.rotations import rotate
 from warpjld.grasp.palm import palm_of
-from warpjld.rotations import rotate
 from warpjld.skeleton import Poses
 from warpjld.skeleton.arm import Arm
 

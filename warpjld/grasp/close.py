@@ -12,7 +12,7 @@ from warpjld.covering import Covering
 from warpjld.grasp.both_ways import BothWays
 from warpjld.grasp.closing import ClosingHands, MovedSkin
 from warpjld.grasp.digits import digit_chains
-from warpjld.grasp.found import Status
+from warpjld.grasp.found import SearchStatus
 from warpjld.grasp.give_way import give_way
 from warpjld.grasp.kept import kept_with
 from warpjld.grasp.objects import GraspObject, Places
@@ -159,7 +159,7 @@ class Closer:
         places: Places,
     ) -> Closed:
         angles, gone = keep_apart(self._posed, hands.skins_of, start, given, chains)
-        status[gone < 1.0] = int(Status.BLOCKED)
+        status[gone < 1.0] = int(SearchStatus.BLOCKED)
         return self._closed(hands, angles, status, chains, places)
 
     def _closed(
@@ -181,14 +181,14 @@ def _bend_in_turn(hands: ClosingHands, joints: NDArray[np.int64], rounds: int) -
     Returns:
         How the joints' searches ended, shape (G, D, 3).
     """
-    status = np.full((len(hands), *joints.shape), int(Status.NO_CONTACT), dtype=np.int32)
+    status = np.full((len(hands), *joints.shape), int(SearchStatus.NO_CONTACT), dtype=np.int32)
     going = np.arange(len(hands))
     for again in range(rounds):
         for k in range(1 if again else 0, 3):
             # a joint with a touch at or beyond its segment finds it at once and stays
             ended = hands.bend(going, joints[:, k:], np.array([1.0, 0.0, 0.0])[: 3 - k])
             # skin left inside by less than twice the tolerance is a touch
-            ended = np.where(ended == int(Status.INSIDE), int(Status.CONVERGED), ended) if again else ended
+            ended = np.where(ended == int(SearchStatus.INSIDE), int(SearchStatus.CONVERGED), ended) if again else ended
             status[going, :, k] = ended
         if rounds == 1:
             break

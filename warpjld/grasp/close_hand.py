@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 from warpjld.covering import Covering
 from warpjld.errors import InputError
 from warpjld.grasp.close import Closer
-from warpjld.grasp.found import Status
+from warpjld.grasp.found import SearchStatus
 from warpjld.grasp.objects import GraspObject
 from warpjld.skeleton import CHANNELS, Poses, poses_from_angles
 
@@ -35,7 +35,7 @@ class ClosedHand:
     poses: Poses
     angles: NDArray[np.float64]
     gap: dict[str, float]
-    status: dict[str, tuple[Status, ...]]
+    status: dict[str, tuple[SearchStatus, ...]]
     touching: tuple[str, ...]
     penetration: float
 
@@ -103,7 +103,7 @@ def close_hand(
         closed.angles[0],
         dict(zip(closed.digits, closed.gap[0].tolist(), strict=True)),
         {
-            name: tuple(Status(int(code)) for code in codes)
+            name: tuple(SearchStatus(int(code)) for code in codes)
             for name, codes in zip(closed.digits, closed.status[0], strict=True)
         },
         tuple(name for name, touches in zip(closed.digits, touching, strict=True) if touches),

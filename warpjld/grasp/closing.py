@@ -11,7 +11,7 @@ from scipy.spatial.transform import Rotation
 
 from warpjld.covering import Covering
 from warpjld.covering.device import array_on
-from warpjld.grasp.found import Status
+from warpjld.grasp.found import SearchStatus
 from warpjld.grasp.moved import skin_beyond, skin_that_moves
 from warpjld.grasp.near_object import NearObject
 from warpjld.grasp.objects import Places
@@ -160,7 +160,7 @@ class ClosingHands:
             for a, kind in ((status, wp.int32), (closing, float))
         ]
         wp.launch(first_touch, status.size, inputs=[packed, *inputs], outputs=outs, device="cpu")
-        touched = status != int(Status.NO_CONTACT)
+        touched = status != int(SearchStatus.NO_CONTACT)
         by = closing.astype(np.float64)
         for d, chain in enumerate(joints):
             for joint, rate in zip(chain[moving], rates[moving], strict=True):

@@ -14,7 +14,7 @@ from warpjld.errors import InputError
 from warpjld.grasp.feature_normals import face_normals, feature_normals
 from warpjld.grasp.objects import GraspObject, Places
 from warpjld.grasp.triangle_tree import build_tree, join_trees
-from warpjld.threads import in_threads, threads_for
+from warpjld.runtime.threads import in_threads, threads_for
 
 __all__ = ["Distances", "ObjectSet", "finite_points"]
 

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from warpjld.covering import Covering
+from warpjld.geometry.rotations import unit
 from warpjld.grasp.digits import digit_chains
 from warpjld.grasp.near_object import NearObject
 from warpjld.grasp.objects import GraspObject
@@ -19,7 +20,6 @@ from warpjld.grasp.placements import Candidates, across_widths, around, sample_w
 from warpjld.grasp.postures import AHEAD, CLOSING, POSTURES, posture_angles
 from warpjld.grasp.ways import free_ways
 from warpjld.grasp.widths import Widths, sample_widths
-from warpjld.rotations import unit
 from warpjld.skeleton import CHANNELS, DIGITS
 
 __all__ = ["WAY", "Draws"]

@@ -8,10 +8,10 @@ from enum import IntEnum
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["Found", "Status"]
+__all__ = ["Found", "SearchStatus"]
 
 
-class Status(IntEnum):
+class SearchStatus(IntEnum):
     """How a search ended; ``message`` is for people."""
 
     CONVERGED = 0
@@ -70,15 +70,15 @@ class Found:
 
     def message(self, n: int = 0) -> str:
         """What became of a search, for people."""
-        status = Status(int(self.status[n]))
+        status = SearchStatus(int(self.status[n]))
         angle, distance = np.degrees(self.angles[n, 0]), 1e3 * float(self.distance[n])
-        if status is Status.CONVERGED:
+        if status is SearchStatus.CONVERGED:
             aside = "" if self.inside[n] else ", beside the facet: its plane is touched, not the facet itself"
             return f"{status.message} at {angle:.2f}°{aside}"
-        if status is Status.NO_CONTACT:
+        if status is SearchStatus.NO_CONTACT:
             return f"{status.message}; closest approach {distance:.2f} mm at {angle:.2f}°"
-        if status is Status.INSIDE:
+        if status is SearchStatus.INSIDE:
             return f"{status.message}; least deep, {-distance:.2f} mm, at {angle:.2f}°"
-        if status is Status.OPENING:
+        if status is SearchStatus.OPENING:
             return f"{status.message} at {angle:.2f}°"
         return f"{status.message}, {angle:.2f}°; {distance:.2f} mm away"

@@ -17,7 +17,7 @@ from warpjld.grasp.kept import kept_with
 from warpjld.grasp.objects import GraspObject
 from warpjld.grasp.quality.closure import force_closure
 from warpjld.grasp.quality.contacts import Contacts
-from warpjld.grasp.quality.touch import Patches
+from warpjld.grasp.quality.touch import ContactPatches
 from warpjld.grasp.quality.wrench_space import least_resistance
 from warpjld.grasp.segments import SEGMENTS, vertex_segments
 from warpjld.grasp.touching import touching_patches
@@ -119,14 +119,16 @@ class Judge:
 
     def _patches(
         self, finer: FinerSkin, vertices: NDArray[np.floating], tolerance: float
-    ) -> Iterator[tuple[Patches, float]]:
+    ) -> Iterator[tuple[ContactPatches, float]]:
         """Patches of contact in the object's frame, and depth of the skin's points, of every hand."""
         place, parts = self.both.thing.place, self._segments[finer.parents]
         local = place.to_local(vertices.reshape(-1, 3))[0].reshape(vertices.shape)
         for skin in local:
             yield touching_patches(finer, parts, self.both.near, skin, tolerance)
 
-    def _pressing(self, patches: Patches, rotations: NDArray[np.float64]) -> tuple[Contacts, tuple[str, ...], bool]:
+    def _pressing(
+        self, patches: ContactPatches, rotations: NDArray[np.float64]
+    ) -> tuple[Contacts, tuple[str, ...], bool]:
         rows = [SEGMENTS.index(name) for name in patches.names]
         own = Rotation.from_quat(self.both.thing.place.rotation[0]).inv()
         turns = own * Rotation.from_quat(rotations[self._joints[rows]]) if rows else None

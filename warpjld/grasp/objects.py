@@ -11,9 +11,9 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.spatial.transform import Rotation
 
 from warpjld.errors import InputError
+from warpjld.geometry.surface import Part, weld_surface
 from warpjld.grasp.feature_normals import face_normals
 from warpjld.grasp.validation import MeshReport, mend
-from warpjld.surface import Part, weld_surface
 
 __all__ = ["GraspObject", "Places", "make_object"]
 

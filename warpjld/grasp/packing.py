@@ -16,7 +16,7 @@ from warpjld.covering.device import array_on
 from warpjld.covering.drivers import flexion_ratio, virtual_lengths
 from warpjld.covering.rows import Padded
 from warpjld.errors import InputError
-from warpjld.rotations import conjugate, multiply
+from warpjld.geometry.rotations import conjugate, multiply
 from warpjld.skeleton import CHANNELS, Poses, Skeleton
 
 __all__ = ["Chains", "drives_on", "posture_on", "skin_on"]

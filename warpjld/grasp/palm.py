@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from warpjld.errors import InputError
-from warpjld.rotations import unit
+from warpjld.geometry.rotations import unit
 from warpjld.skeleton import Skeleton
 
 __all__ = ["Palm", "palm_of"]

@@ -9,11 +9,11 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from warpjld.covering import Covering
+from warpjld.geometry.rotations import unit
 from warpjld.grasp.near_object import NearObject
 from warpjld.grasp.opening import Opening
 from warpjld.grasp.palm import palm_of
 from warpjld.grasp.widths import Widths
-from warpjld.rotations import unit
 from warpjld.skeleton import Poses, Skeleton, poses_from_angles
 
 __all__ = ["Candidates", "across_widths", "around", "sample_wrists"]

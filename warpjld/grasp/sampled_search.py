@@ -15,13 +15,13 @@ from numpy.typing import NDArray
 from warpjld.covering import Covering
 from warpjld.covering.paper import PaperCovering
 from warpjld.errors import InputError
+from warpjld.geometry.rotations import conjugate, multiply
 from warpjld.grasp.distance import ObjectSet
 from warpjld.grasp.facet import facet_distance
-from warpjld.grasp.found import Found, Status
+from warpjld.grasp.found import Found, SearchStatus
 from warpjld.grasp.objects import Places
 from warpjld.grasp.packing import Chains
-from warpjld.grasp.searches import Rows
-from warpjld.rotations import conjugate, multiply
+from warpjld.grasp.searches import SearchRows
 from warpjld.skeleton import CHANNELS, Poses, poses_from_angles
 
 __all__ = ["is_sampled", "sampled_search"]
@@ -53,7 +53,7 @@ def sampled_search(
     objects: ObjectSet,
     poses: Poses,
     angles: NDArray[np.float64],
-    rows: Rows,
+    rows: SearchRows,
     places: Places,
     tolerance: float,
 ) -> Found:
@@ -77,7 +77,7 @@ def sampled_search(
 
 @dataclass(frozen=True, eq=False)
 class _End:
-    status: Status
+    status: SearchStatus
     closing: float
     distance: float
     facet: int
@@ -94,7 +94,7 @@ class _Search:
         objects: ObjectSet,
         poses: Poses,
         angles: NDArray[np.float64],
-        rows: Rows,
+        rows: SearchRows,
         places: Places,
         number: int,
     ) -> None:
@@ -115,9 +115,9 @@ class _Search:
         (start,) = self._gaps(np.zeros(1))
         side = -1.0 if start < 0.0 else 1.0
         if abs(start) < tolerance:
-            return self._end(Status.CONVERGED, 0.0)
+            return self._end(SearchStatus.CONVERGED, 0.0)
         if reach < 1e-6:
-            return self._end(Status.AT_LIMIT if side > 0.0 else Status.INSIDE, 0.0)
+            return self._end(SearchStatus.AT_LIMIT if side > 0.0 else SearchStatus.INSIDE, 0.0)
         at = np.linspace(0.0, reach, _STEPS + 1)
         gaps = side * self._gaps(at)
         closest = at[0]
@@ -127,16 +127,16 @@ class _Search:
             if past.any():
                 first = int(past.argmax())
                 if good[first]:
-                    return self._end(Status.CONVERGED, at[first])
+                    return self._end(SearchStatus.CONVERGED, at[first])
                 if at[first] - at[first - 1] < _NARROWEST:
-                    return self._end(Status.OPENING, at[first])
+                    return self._end(SearchStatus.OPENING, at[first])
                 span = at[first - 1], at[first]
             else:
                 least = int(gaps.argmin())
                 closest = at[least]
                 span = at[max(least - 1, 0)], at[min(least + 1, len(at) - 1)]
                 if span[1] - span[0] < _CLOSEST:
-                    return self._end(Status.NO_CONTACT if side > 0.0 else Status.INSIDE, closest)
+                    return self._end(SearchStatus.NO_CONTACT if side > 0.0 else SearchStatus.INSIDE, closest)
             at = np.linspace(*span, _PARTS + 1)
             gaps = side * self._gaps(at)
 
@@ -172,7 +172,7 @@ class _Search:
         own = self._place.to_local(found.point[0])[0]
         return [(float(d), int(f), p) for d, f, p in zip(found.distance[0], found.face[0], own, strict=True)]
 
-    def _end(self, status: Status, closing: float) -> _End:
+    def _end(self, status: SearchStatus, closing: float) -> _End:
         # as single precision, in which it is told, has it
         ((distance, facet, point),) = self._hits(np.array([float(np.float32(closing))]))
         return _End(status, float(closing), distance, facet, point, self._seen)

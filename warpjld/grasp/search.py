@@ -14,13 +14,13 @@ from warpjld.covering.device import array_on
 from warpjld.errors import InputError
 from warpjld.grasp.distance import ObjectSet
 from warpjld.grasp.facet import inside_facets
-from warpjld.grasp.found import Found, Status
+from warpjld.grasp.found import Found, SearchStatus
 from warpjld.grasp.objects import Places
 from warpjld.grasp.packing import drives_on, posture_on, skin_on
 from warpjld.grasp.sampled_search import is_sampled, sampled_search
-from warpjld.grasp.searches import Rows, Searches, search_rows
+from warpjld.grasp.searches import Searches, SearchRows, search_rows
+from warpjld.runtime.threads import in_threads, threads_for
 from warpjld.skeleton import CHANNELS, Poses
-from warpjld.threads import in_threads, threads_for
 
 __all__ = ["FINEST", "FlexionSearch"]
 
@@ -97,7 +97,7 @@ class FlexionSearch:
 
     def _launched(
         self,
-        rows: Rows,
+        rows: SearchRows,
         poses: Poses,
         angles: NDArray[np.float64],
         places: Places,
@@ -150,7 +150,7 @@ class FlexionSearch:
             for rate in (np.asarray(searches.rate, dtype=np.float64), -np.asarray(searches.rate, dtype=np.float64))
         )
         wanted = np.broadcast_to(np.asarray(searches.distance, dtype=np.float64), with_rate.distance.shape)
-        hits = [found.status == int(Status.CONVERGED) for found in (with_rate, against)]
+        hits = [found.status == int(SearchStatus.CONVERGED) for found in (with_rate, against)]
         off = [np.abs(found.distance - wanted) for found in (with_rate, against)]
         nearer = with_rate.closing <= against.closing
         first = np.where(hits[0] & hits[1], nearer, np.where(hits[0] | hits[1], hits[0], off[0] <= off[1]))
@@ -166,7 +166,7 @@ class FlexionSearch:
         if not (np.isfinite(tolerance) and tolerance >= FINEST):
             raise InputError(f"tolerance: want {FINEST:g} m or more, which float32 can tell, got {tolerance:g}")
 
-    def _tasks(self, rows: Rows, places: Places, origin: NDArray[np.float64]) -> list[Any]:
+    def _tasks(self, rows: SearchRows, places: Places, origin: NDArray[np.float64]) -> list[Any]:
         """What each search looks for, on the device; places relative to the frames' origins (F, 3)."""
         import warp as wp
 
@@ -181,7 +181,7 @@ class FlexionSearch:
             array_on(device, places.rotation[rows.place], wp.quat),
         ]
 
-    def _inside(self, rows: Rows, point: NDArray[np.float32]) -> NDArray[np.bool_]:
+    def _inside(self, rows: SearchRows, point: NDArray[np.float32]) -> NDArray[np.bool_]:
         """Whether the foot of the perpendicular lies in the facet that was asked for, shape (N,)."""
         inside = np.ones(len(rows), dtype=bool)
         for k, thing in enumerate(self.objects.objects):

@@ -13,7 +13,7 @@ from warpjld.grasp.objects import GraspObject
 from warpjld.grasp.packing import Chains
 from warpjld.skeleton import CHANNELS, Skeleton
 
-__all__ = ["NEAREST", "Rows", "Searches", "search_rows"]
+__all__ = ["NEAREST", "SearchRows", "Searches", "search_rows"]
 
 NEAREST = -1
 """In place of a facet's number: whatever facet is nearest."""
@@ -53,7 +53,7 @@ class Searches:
 
 
 @dataclass(frozen=True, eq=False)
-class Rows:
+class SearchRows:
     """N searches, one a row: the fields of ``Searches`` with shape (N,), checked.
 
     ``drive`` is the row of ``chains``, joints that close together in some frame, which a search moves.
@@ -82,7 +82,7 @@ def search_rows(
     vertices: int,
     coverings: int,
     places: int,
-) -> Rows:
+) -> SearchRows:
     """Lay out searches one a row.
 
     Args:
@@ -130,7 +130,7 @@ def search_rows(
     joints, rates, stops = (np.broadcast_to(a, (count, _MOST_JOINTS)) for a in (joints, rates, stops))
     first, drive = _distinct([columns["frame"], *joints.T, *rates.T, *np.nan_to_num(stops, nan=1e9).T])
     chains = _chains(skeleton, angles, columns["frame"][first], joints[first], rates[first], stops[first])
-    return Rows(**columns, distance=distance, drive=drive, chains=chains)
+    return SearchRows(**columns, distance=distance, drive=drive, chains=chains)
 
 
 def _chain_columns(searches: Searches, joint_count: int) -> tuple[NDArray, NDArray, NDArray]:

@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from warpjld.grasp.finer import FinerSkin
 from warpjld.grasp.near_object import NearObject
-from warpjld.grasp.quality.touch import Patches, contact_patches
+from warpjld.grasp.quality.touch import ContactPatches, contact_patches
 from warpjld.grasp.segments import SEGMENTS
 
 __all__ = ["touching_patches"]
@@ -19,7 +19,7 @@ def touching_patches(
     near: NearObject,
     local: NDArray[np.floating],
     tolerance: float,
-) -> tuple[Patches, float]:
+) -> tuple[ContactPatches, float]:
     """``contact_patches`` by segment of the hand, and the depth of the skin's deepest point in the object [m].
 
     Args:

@@ -12,7 +12,7 @@ from scipy.sparse.csgraph import connected_components
 from warpjld.covering.intersections import crossing_faces
 from warpjld.covering.quality import enclosed_volume
 from warpjld.errors import InputError
-from warpjld.winding import winding_numbers
+from warpjld.geometry.winding import winding_numbers
 
 __all__ = ["Mended", "MeshReport", "mend"]
 

@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from warpjld.geometry.rotations import unit
 from warpjld.grasp.near_object import NearObject
 from warpjld.grasp.widths import Widths
-from warpjld.rotations import unit
 
 __all__ = ["free_ways"]
 

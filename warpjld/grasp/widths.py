@@ -7,8 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from warpjld.geometry.rotations import unit
 from warpjld.grasp.near_object import NearObject
-from warpjld.rotations import unit
 
 __all__ = ["Widths", "sample_widths"]
 

@@ -9,13 +9,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from warpjld.errors import InputError
+from warpjld.geometry.rotations import unit
+from warpjld.geometry.surface import Part, Surface
 from warpjld.rig import Rig
-from warpjld.rotations import unit
 from warpjld.skeleton import DIGITS, PALM_SEGMENTS, Skeleton, default_limits, hand_joint_names
 from warpjld.skeleton.hand import FINGER_JOINTS, HAND_PARENTS
 from warpjld.skeleton.recognise.tree import SourceTree
 from warpjld.suggest import one_of
-from warpjld.surface import Part, Surface
 
 if TYPE_CHECKING:
     from warpjld.hand.plan import Plan
@@ -60,11 +60,11 @@ def build_hand(
     """
     # SciPy's splines, which shape it, take as long to import as a whole hand takes to be read
     from warpjld.hand.fit import fit_plan
-    from warpjld.hand.flesh import Flesh
+    from warpjld.hand.flesh import PlannedFlesh
     from warpjld.hand.triangulate import triangulate
 
     _check(side, length, breadth, resolution)
-    flesh = Flesh(fit_plan(length / _MILLIMETRE, breadth / _MILLIMETRE, _scales(proportions)))
+    flesh = PlannedFlesh(fit_plan(length / _MILLIMETRE, breadth / _MILLIMETRE, _scales(proportions)))
     vertices, faces = triangulate(flesh, resolution)
     skeleton = _skeleton(flesh.plan)
     if side == "right":

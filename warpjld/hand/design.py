@@ -8,9 +8,25 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 __all__ = [
-    "BREADTH", "CARPOMETACARPAL", "CURL", "FINGERS", "FINGER_PROFILE", "FOREARM", "LENGTH", "MUSCLES",
-    "THUMB_ABDUCTION", "THUMB_BASE", "THUMB_DEPTH", "THUMB_HALF_WIDTH", "THUMB_LENGTHS", "THUMB_PROFILE",
-    "THUMB_ROLL", "WRIST", "Finger", "Muscle", "Point",
+    "BREADTH",
+    "CARPOMETACARPAL",
+    "FINGER_DESIGNS",
+    "FINGER_PROFILE",
+    "FOREARM",
+    "LENGTH",
+    "MUSCLES",
+    "REST_FLEXION",
+    "THUMB_ABDUCTION",
+    "THUMB_BASE",
+    "THUMB_DEPTH",
+    "THUMB_HALF_WIDTH",
+    "THUMB_LENGTHS",
+    "THUMB_PROFILE",
+    "THUMB_ROLL",
+    "WRIST",
+    "Finger",
+    "Muscle",
+    "Point",
 ]  # fmt: skip
 
 Point = tuple[float, float, float]
@@ -47,13 +63,13 @@ class Muscle:
     profile: tuple[tuple[float, float, float, float], ...]
 
 
-FINGERS = {
+FINGER_DESIGNS = {
     "index": Finger((26.3, 0.0, 85.0), (43.0, 25.5, 24.0), 9.4, 6.0, 6.0),
     "middle": Finger((4.0, 1.5, 87.0), (46.5, 30.0, 26.5), 9.5, 0.5, 0.0),
     "ring": Finger((-17.3, 0.0, 80.5), (43.5, 28.5, 25.0), 8.9, -5.5, -6.0),
     "pinky": Finger((-36.3, -3.5, 71.5), (35.0, 21.5, 22.0), 7.8, -13.0, -13.0),
 }
-CURL = (5.0, 8.0, 5.0)  # degrees of flexion at base, knuckle 2, knuckle 3
+REST_FLEXION = (5.0, 8.0, 5.0)  # degrees of flexion at base, knuckle 2, knuckle 3
 
 # axial place as (joint it counts from, fraction of the segment that follows): half-width, dorsal, palmar half-height,
 # in units of the half-width at knuckle 2

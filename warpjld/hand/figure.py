@@ -11,13 +11,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from warpjld.errors import InputError
+from warpjld.geometry.rotations import unit
+from warpjld.geometry.surface import Part, weld_surface
 from warpjld.rig import Rig
-from warpjld.rotations import unit
 from warpjld.skeleton.actor_points import ACTOR_PARENTS, ACTOR_POINTS, CANONICAL
 from warpjld.skeleton.recognise.canonical import canonical_skeleton
 from warpjld.skeleton.recognise.recognise import recognise
 from warpjld.skeleton.recognise.tree import SourceTree
-from warpjld.surface import Part, weld_surface
 
 __all__ = ["actor_template", "build_body", "figure_surface"]
 

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from warpjld.hand.design import BREADTH, LENGTH
-from warpjld.hand.flesh import Flesh
+from warpjld.hand.flesh import PlannedFlesh
 from warpjld.hand.plan import Plan, plan_hand
 
 __all__ = ["fit_plan", "measure"]
@@ -24,12 +24,12 @@ def fit_plan(length: float, breadth: float, proportions: Mapping[str, tuple[floa
     along, across = length / LENGTH, breadth / BREADTH
     for _ in range(_ROUNDS):
         plan = plan_hand(along, across, proportions)
-        long, broad = measure(Flesh(plan), length)
+        long, broad = measure(PlannedFlesh(plan), length)
         along, across = along * length / long, across * breadth / broad
     return plan_hand(along, across, proportions)
 
 
-def measure(flesh: Flesh, length: float) -> tuple[float, float]:
+def measure(flesh: PlannedFlesh, length: float) -> tuple[float, float]:
     """Length from the wrist's crease to the tip of the middle finger, and breadth across the palm [mm]."""
     plan = flesh.plan
     tip = plan.digits["middle"].joints[3]
@@ -47,7 +47,7 @@ def measure(flesh: Flesh, length: float) -> tuple[float, float]:
     return float((far - inside[:, 2]).max()), float(radial + ulnar)
 
 
-def _cross(flesh: Flesh, start: Array, direction: Array, reach: float) -> Array:
+def _cross(flesh: PlannedFlesh, start: Array, direction: Array, reach: float) -> Array:
     """Distance from points inside along a direction to the first crossing of the surface, shape (n,)."""
     steps = np.arange(1.0, reach, 1.5)
     marched = start[:, None, :] + steps[:, None] * direction

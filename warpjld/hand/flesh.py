@@ -7,10 +7,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from warpjld.hand.palm import Palm
+from warpjld.hand.palm import PalmSlab
 from warpjld.hand.plan import Plan
 
-__all__ = ["Flesh"]
+__all__ = ["PlannedFlesh"]
 
 Array = NDArray[np.float64]
 
@@ -21,7 +21,7 @@ _THUMB_ROOT = 16.0
 
 
 @dataclass(frozen=True, eq=False)
-class Flesh:
+class PlannedFlesh:
     """Signed distance [mm], exact to first order at the surface, of a planned hand.
 
     Attributes:
@@ -43,7 +43,7 @@ class Flesh:
             one = self.plan.digits[name].flesh(points, self.detail)
             fingers = one if fingers is None else _join(fingers, one, _BETWEEN_FINGERS * scale)
         assert fingers is not None
-        hand = _join(Palm(self.plan.stretch)(points), fingers, _FINGER_ROOT * scale)
+        hand = _join(PalmSlab(self.plan.stretch)(points), fingers, _FINGER_ROOT * scale)
         thumb = self.plan.digits["thumb"].flesh(points, self.detail)
         for part in (thumb, *(muscle(points) for muscle in self.plan.muscles)):
             hand = _join(hand, part, _THUMB_ROOT * scale)
@@ -52,7 +52,7 @@ class Flesh:
     @property
     def bounds(self) -> tuple[Array, Array]:
         """Corners of a box that holds the surface [mm]."""
-        corners = [*Palm(self.plan.stretch).corners]
+        corners = [*PalmSlab(self.plan.stretch).corners]
         for digit in self.plan.digits.values():
             flesh = digit.flesh
             reach = float(flesh.table[:, 2:].max())

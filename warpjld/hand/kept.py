@@ -12,8 +12,8 @@ from typing import Any
 import numpy as np
 
 from warpjld import __version__
+from warpjld.files.kept_files import keep, kept_folder, used
 from warpjld.hand.build import build_hand, hand_rig
-from warpjld.kept_files import keep, kept_folder, used
 from warpjld.rig import Rig
 from warpjld.skeleton.tree import Skeleton
 

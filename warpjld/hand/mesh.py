@@ -9,14 +9,14 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse import csr_array
 
-__all__ = ["Array", "Edges", "Faces", "dots", "face_normals", "mean_over_neighbours", "subdivide"]
+__all__ = ["Array", "Faces", "ManifoldEdges", "area_normals", "dots", "mean_over_neighbours", "subdivide"]
 
 Array = NDArray[np.float64]
 Faces = NDArray[np.int64]
 
 
 @dataclass(frozen=True, eq=False)
-class Edges:
+class ManifoldEdges:
     """Edges of a closed manifold: each has exactly two faces.
 
     Attributes:
@@ -34,7 +34,7 @@ class Edges:
     count: int
 
     @classmethod
-    def of(cls, faces: Faces, count: int) -> Edges:
+    def of(cls, faces: Faces, count: int) -> ManifoldEdges:
         """Edges of triangles (T, 3) over ``count`` vertices."""
         start, end = faces.T.ravel(), np.roll(faces, -1, axis=1).T.ravel()
         key = np.minimum(start, end) * count + np.maximum(start, end)
@@ -75,13 +75,13 @@ def dots(a: Array, b: Array) -> Array:
     return a[:, 0] * b[:, 0] + a[:, 1] * b[:, 1] + a[:, 2] * b[:, 2]
 
 
-def face_normals(vertices: Array, faces: Faces) -> Array:
+def area_normals(vertices: Array, faces: Faces) -> Array:
     """Normals of length twice the area, shape (T, 3)."""
     a, b, c = vertices[faces[:, 0]], vertices[faces[:, 1]], vertices[faces[:, 2]]
     return np.cross(b - a, c - a)
 
 
-def mean_over_neighbours(edges: Edges, values: Array) -> Array:
+def mean_over_neighbours(edges: ManifoldEdges, values: Array) -> Array:
     """Mean of per-vertex values over each vertex's neighbours, the shape of ``values``."""
     total = edges.adjacency @ values
     valence = edges.valence()
@@ -90,7 +90,7 @@ def mean_over_neighbours(edges: Edges, values: Array) -> Array:
 
 def subdivide(vertices: Array, faces: Faces) -> tuple[Array, Faces]:
     """Every triangle into four at its edges' midpoints."""
-    edges = Edges.of(faces, len(vertices))
+    edges = ManifoldEdges.of(faces, len(vertices))
     middle = vertices[edges.ends].mean(axis=1)
     ab, bc, ca = (edges.of_face + len(vertices)).T
     a, b, c = faces.T

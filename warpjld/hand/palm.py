@@ -10,7 +10,7 @@ from scipy.interpolate import CubicSpline
 
 from warpjld.hand.sweep import section_distance
 
-__all__ = ["Palm"]
+__all__ = ["PalmSlab"]
 
 Array = NDArray[np.float64]
 
@@ -52,7 +52,7 @@ _ARCH = (0.006, 0.0045)  # curvature to the radial and to the ulnar side
 
 
 @dataclass(frozen=True, eq=False)
-class Palm:
+class PalmSlab:
     """Signed distance of the slab; ``stretch`` scales the design's axes."""
 
     stretch: Array

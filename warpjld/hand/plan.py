@@ -8,11 +8,11 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from warpjld.geometry.rotations import unit
 from warpjld.hand import design
 from warpjld.hand.sweep import Sweep
-from warpjld.rotations import unit
 
-__all__ = ["Digit", "Plan", "plan_hand"]
+__all__ = ["Plan", "PlannedDigit", "plan_hand"]
 
 Array = NDArray[np.float64]
 
@@ -24,7 +24,7 @@ _NAIL = (0.61, 0.26, 0.58)  # middle and half-length in last phalanges, half-wid
 
 
 @dataclass(frozen=True, eq=False)
-class Digit:
+class PlannedDigit:
     """Joints of a digit (base, knuckle 2, knuckle 3, tip; shape (4, 3)), its dorsal direction at each, its flesh."""
 
     joints: Array
@@ -39,7 +39,7 @@ class Plan:
     forearm: Array
     wrist: Array
     carpometacarpal: dict[str, Array]
-    digits: dict[str, Digit]
+    digits: dict[str, PlannedDigit]
     muscles: tuple[Sweep, ...]
     stretch: Array
 
@@ -58,13 +58,13 @@ def plan_hand(along: float, across: float, proportions: Mapping[str, tuple[float
         return np.array(point) * stretch * (1.0, 1.0, -1.0)
 
     digits = {}
-    for name, finger in design.FINGERS.items():
+    for name, finger in design.FINGER_DESIGNS.items():
         long, thick = proportions.get(name, (1.0, 1.0))
         turn = np.radians(finger.splay)
         heading = np.array([np.sin(turn), 0.0, -np.cos(turn)])
         lean = np.radians(finger.roll)
         up = _square(np.array([np.sin(lean), np.cos(lean), 0.0]), heading)
-        bend = np.radians(np.cumsum(design.CURL))
+        bend = np.radians(np.cumsum(design.REST_FLEXION))
         steps = np.cos(bend)[:, None] * heading - np.sin(bend)[:, None] * up
         digits[name] = _digit(
             place(finger.base), steps, np.array(finger.lengths) * along * long, up,
@@ -94,7 +94,7 @@ def plan_hand(along: float, across: float, proportions: Mapping[str, tuple[float
 def _digit(
     base: Array, steps: Array, lengths: Array, up: Array, half: float,
     profile: tuple[tuple[float, ...], ...], root: float, squareness: float,
-) -> Digit:  # fmt: skip
+) -> PlannedDigit:  # fmt: skip
     joints = base + np.vstack([np.zeros(3), np.cumsum(steps * lengths[:, None], axis=0)])
     skin = joints[3].copy()
     joints[3] = skin - steps[2] * _TIP * half  # the extremity's centre lies inside the skin
@@ -121,7 +121,7 @@ def _digit(
         (stops[3] + _NAIL[0] * last, _NAIL[1] * last, _NAIL[2] * half),
     )
     per_joint = np.vstack([_square(dorsal, d) for d in (*steps, steps[2])])
-    return Digit(joints, per_joint, flesh)
+    return PlannedDigit(joints, per_joint, flesh)
 
 
 def _spindle(start: Array, end: Array, profile: tuple[tuple[float, ...], ...], across: float) -> Sweep:

@@ -11,7 +11,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from warpjld.hand.mesh import Array, Edges, Faces, dots, face_normals, mean_over_neighbours
+from warpjld.hand.mesh import Array, Faces, ManifoldEdges, area_normals, dots, mean_over_neighbours
 
 __all__ = ["remesh", "settle"]
 
@@ -47,8 +47,8 @@ def remesh(
 
 def settle(vertices: Array, faces: Faces, size: Array, field: Callable[[Array], Array], amount: float = 0.7) -> Array:
     """Vertices moved along the surface towards the mean of their neighbours, smaller triangles weighing more."""
-    edges = Edges.of(faces, len(vertices))
-    normals = face_normals(vertices, faces)
+    edges = ManifoldEdges.of(faces, len(vertices))
+    normals = area_normals(vertices, faces)
     ring = np.zeros((len(vertices), 3))
     for k in range(3):
         for c in range(3):
@@ -63,7 +63,7 @@ def settle(vertices: Array, faces: Faces, size: Array, field: Callable[[Array], 
 
 
 def _split(vertices: Array, faces: Faces, size: Array) -> tuple[Array, Faces, Array]:
-    edges = Edges.of(faces, len(vertices))
+    edges = ManifoldEdges.of(faces, len(vertices))
     ratio = _ratios(vertices, size, edges)
     longest = edges.of_face[np.arange(len(faces)), np.argmax(ratio[edges.of_face], axis=1)]
     chosen = np.flatnonzero((ratio > _LONG) & (longest[edges.faces] == np.arange(len(ratio))[:, None]).all(axis=1))
@@ -84,7 +84,7 @@ def _split(vertices: Array, faces: Faces, size: Array) -> tuple[Array, Faces, Ar
 
 def _collapse(vertices: Array, faces: Faces, size: Array) -> tuple[Array, Faces, Array]:
     count = len(vertices)
-    edges = Edges.of(faces, count)
+    edges = ManifoldEdges.of(faces, count)
     ratio = _ratios(vertices, size, edges)
     valence, across = edges.valence(), edges.opposite(faces)
     merged = valence[edges.ends].sum(axis=1) - 4
@@ -110,7 +110,7 @@ def _collapse(vertices: Array, faces: Faces, size: Array) -> tuple[Array, Faces,
     touched = np.flatnonzero((owner[faces[:, 0]] & owner[faces[:, 1]] & owner[faces[:, 2]]) != -1)
     touched = touched[~dead[touched]]
     around = faces[touched]
-    old, new = face_normals(vertices, around), face_normals(moved, around)
+    old, new = area_normals(vertices, around), area_normals(moved, around)
     turned = dots(old, new) < 0.5 * np.sqrt(dots(old, old) * dots(new, new))
     limit = (1.25 * _LONG * size) ** 2
     for k in range(3):
@@ -132,7 +132,7 @@ def _collapse(vertices: Array, faces: Faces, size: Array) -> tuple[Array, Faces,
     return out[kept], number[to[faces[~dead]]], wished[kept]
 
 
-def _apart(edges: Edges, rank: Faces) -> Faces:
+def _apart(edges: ManifoldEdges, rank: Faces) -> Faces:
     """Edges whose rank is the lowest around either end and around the neighbours of either end."""
     lowest = np.full(edges.count, rank.max() + 1)
     for k in range(2):
@@ -144,10 +144,10 @@ def _apart(edges: Edges, rank: Faces) -> Faces:
 
 
 def _flip(vertices: Array, faces: Faces) -> Faces:
-    edges = Edges.of(faces, len(vertices))
+    edges = ManifoldEdges.of(faces, len(vertices))
     (a, b), (c, d) = edges.ends.T, edges.opposite(faces).T
     surplus = -(_cosine(vertices, c, a, b) + _cosine(vertices, d, a, b))
-    normals = face_normals(vertices, faces)
+    normals = area_normals(vertices, faces)
     normals /= np.maximum(np.sqrt(dots(normals, normals)), 1e-12)[:, None]
     flat = dots(normals[edges.faces[:, 0]], normals[edges.faces[:, 1]]) > 0.6
     valence = edges.valence()
@@ -164,7 +164,7 @@ def _flip(vertices: Array, faces: Faces) -> Faces:
     facing = normals[first] + normals[second]
     fine = np.ones(len(chosen), dtype=bool)
     for new in (one, two):
-        turned = face_normals(vertices, new)
+        turned = area_normals(vertices, new)
         fine &= dots(turned, facing) > 0.5 * np.sqrt(dots(turned, turned) * dots(facing, facing))
     pair = np.minimum(up, down) * edges.count + np.maximum(up, down)
     only = np.zeros(len(chosen), dtype=bool)
@@ -178,7 +178,7 @@ def _flip(vertices: Array, faces: Faces) -> Faces:
     return out
 
 
-def _ratios(vertices: Array, size: Array, edges: Edges) -> Array:
+def _ratios(vertices: Array, size: Array, edges: ManifoldEdges) -> Array:
     a, b = edges.ends.T
     along = vertices[a] - vertices[b]
     return np.sqrt(dots(along, along)) / (0.5 * (size[a] + size[b]))

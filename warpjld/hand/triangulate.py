@@ -7,11 +7,11 @@ from dataclasses import replace
 import numpy as np
 
 from warpjld.errors import InputError
+from warpjld.geometry.rotations import unit
 from warpjld.hand.contour import contour
-from warpjld.hand.flesh import Flesh
-from warpjld.hand.mesh import Array, Edges, Faces, face_normals, mean_over_neighbours, subdivide
+from warpjld.hand.flesh import PlannedFlesh
+from warpjld.hand.mesh import Array, Faces, ManifoldEdges, area_normals, mean_over_neighbours, subdivide
 from warpjld.hand.remesh import remesh, settle
-from warpjld.rotations import unit
 
 __all__ = ["triangulate"]
 
@@ -20,7 +20,7 @@ _COARSEST, _FINEST = 2.0, 1.0  # grid spacing [mm]: two millimetres still tell n
 _PACKING = 0.96  # wanted length squared times vertices per area, in a remeshed surface (equilateral: 2 / √3 = 1.15)
 
 
-def triangulate(flesh: Flesh, resolution: int) -> tuple[Array, Faces]:
+def triangulate(flesh: PlannedFlesh, resolution: int) -> tuple[Array, Faces]:
     """Vertices [mm] on the surface and its triangles, about ``resolution`` vertices; closed, of genus 0."""
     base, halvings = resolution, 0
     while base > _LARGEST_REMESHED:
@@ -28,7 +28,7 @@ def triangulate(flesh: Flesh, resolution: int) -> tuple[Array, Faces]:
     vertices, faces = _closed_contour(flesh, base)
     vertices = flesh.project(vertices, steps=1)
     shape = _relative_size(flesh, vertices, faces)
-    areas = 0.5 * np.linalg.norm(face_normals(vertices, faces), axis=1)
+    areas = 0.5 * np.linalg.norm(area_normals(vertices, faces), axis=1)
     density = (areas / (shape[faces] ** 2).mean(axis=1)).sum()
     size = shape * np.sqrt(_PACKING * density / base)
     for rounds in (6, 2, 2, 2):
@@ -48,7 +48,7 @@ def triangulate(flesh: Flesh, resolution: int) -> tuple[Array, Faces]:
     return vertices, faces
 
 
-def _closed_contour(flesh: Flesh, base: int) -> tuple[Array, Faces]:
+def _closed_contour(flesh: PlannedFlesh, base: int) -> tuple[Array, Faces]:
     spacing = float(np.clip(np.sqrt(40_000.0 / base), _FINEST, _COARSEST) * flesh.plan.stretch.min())
     for _ in range(3):
         vertices, faces = contour(flesh, *flesh.bounds, spacing)
@@ -58,10 +58,10 @@ def _closed_contour(flesh: Flesh, base: int) -> tuple[Array, Faces]:
     raise InputError("proportions: with these the fingers touch one another, or the hand falls to pieces")
 
 
-def _relative_size(flesh: Flesh, vertices: Array, faces: Faces) -> Array:
+def _relative_size(flesh: PlannedFlesh, vertices: Array, faces: Faces) -> Array:
     """Wanted edge lengths up to a factor: shorter where the surface bends more, shape (V,)."""
     normal = unit(flesh.slope(vertices)[1])
-    edges = Edges.of(faces, len(vertices))
+    edges = ManifoldEdges.of(faces, len(vertices))
     a, b = edges.ends.T
     lengths = np.linalg.norm(vertices[a] - vertices[b], axis=1)
     turns = np.linalg.norm(normal[a] - normal[b], axis=1)

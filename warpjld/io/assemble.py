@@ -9,10 +9,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from warpjld.errors import InputError
+from warpjld.geometry.lengths import check_reach, check_size
+from warpjld.geometry.spread import spread
+from warpjld.geometry.surface import Surface, weld_surface
 from warpjld.io.placement import place
 from warpjld.io.rigid_parts import rigid_parts
 from warpjld.io.source import SourceRig
-from warpjld.lengths import check_reach, check_size
 from warpjld.limits import check_limit
 from warpjld.rig import Rig, Skin
 from warpjld.skeleton.initial import with_initial
@@ -20,8 +22,6 @@ from warpjld.skeleton.recognise.canonical import Canonical, canonical_skeleton
 from warpjld.skeleton.recognise.flesh import flesh_shares
 from warpjld.skeleton.recognise.painted import Painted
 from warpjld.skeleton.recognise.recognise import recognise
-from warpjld.spread import spread
-from warpjld.surface import Surface, weld_surface
 
 __all__ = ["assemble_rig"]
 

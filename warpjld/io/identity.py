@@ -7,7 +7,7 @@ import json
 from pathlib import Path
 from urllib.parse import unquote
 
-from warpjld.manifest import file_hash
+from warpjld.files.manifest import file_hash
 
 __all__ = ["content_hash", "files_of"]
 

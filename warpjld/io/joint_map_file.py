@@ -22,10 +22,10 @@ from pathlib import Path
 from typing import Any
 
 from warpjld.errors import InputError
+from warpjld.files.text_file import read_json
+from warpjld.files.whole_file import whole_file
 from warpjld.rig import Rig
 from warpjld.skeleton.recognise.joint_map import check_stated, is_canonical
-from warpjld.text_file import read_json
-from warpjld.whole_file import whole_file
 
 __all__ = ["read_joint_map", "write_joint_map"]
 

@@ -9,17 +9,17 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from warpjld.archive import check_archive
 from warpjld.errors import InputError
-from warpjld.input_file import check_input
+from warpjld.files.archive import check_archive
+from warpjld.files.input_file import check_input
+from warpjld.files.reading import reading
+from warpjld.geometry.surface import Part, one_uv_a_vertex
 from warpjld.io.obj_file import read_obj
 from warpjld.io.off_file import read_off
 from warpjld.io.ply_file import PlyFile, read_ply
 from warpjld.io.polygons import triangulate_polygons
 from warpjld.io.rig_meshes import joined
 from warpjld.limits import check_limit
-from warpjld.reading import reading
-from warpjld.surface import Part, one_uv_a_vertex
 
 __all__ = ["MeshFile", "read_mesh"]
 

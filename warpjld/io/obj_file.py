@@ -15,9 +15,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from warpjld.errors import InputError
+from warpjld.files.text_file import read_text
+from warpjld.geometry.surface import Part
 from warpjld.io.polygons import triangulate_polygons
-from warpjld.surface import Part
-from warpjld.text_file import read_text
 
 __all__ = ["ObjFile", "read_obj"]
 

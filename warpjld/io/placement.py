@@ -7,8 +7,8 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
+from warpjld.geometry.rotations import upright
 from warpjld.io.source import SourceRig
-from warpjld.rotations import upright
 from warpjld.skeleton.recognise.roles import Roles
 from warpjld.skeleton.recognise.tree import SourceTree
 

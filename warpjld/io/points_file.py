@@ -26,14 +26,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from warpjld.errors import InputError
+from warpjld.files.text_file import read_json
+from warpjld.files.whole_file import whole_file
 from warpjld.io.mesh_file import MeshFile
 from warpjld.io.source import SourceRig
 from warpjld.skeleton.actor_points import ACTOR_PARENTS, ACTOR_POINTS, CANONICAL, point_set
 from warpjld.skeleton.recognise.placing import outside_surface
 from warpjld.skeleton.recognise.tree import SourceTree
 from warpjld.suggest import did_you_mean
-from warpjld.text_file import read_json
-from warpjld.whole_file import whole_file
 
 __all__ = ["read_points_file", "write_points_file"]
 

@@ -7,12 +7,12 @@ from pathlib import Path
 from typing import Any
 
 from warpjld.errors import InputError
-from warpjld.input_file import check_input
+from warpjld.files.input_file import check_input
+from warpjld.files.reading import reading
 from warpjld.io.placement import METRES
 from warpjld.io.source import SourceRig
-from warpjld.lazily import imported
-from warpjld.reading import reading
 from warpjld.rig import Rig
+from warpjld.runtime.lazily import imported
 
 __all__ = ["load_rig"]
 

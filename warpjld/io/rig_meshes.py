@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from warpjld.surface import Part, one_uv_a_vertex
+from warpjld.geometry.surface import Part, one_uv_a_vertex
 
 __all__ = ["RigMesh", "joined"]
 

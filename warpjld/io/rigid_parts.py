@@ -14,12 +14,12 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from warpjld.coincident import close_pairs, connected_parts
+from warpjld.geometry.coincident import close_pairs, connected_parts
+from warpjld.geometry.surface import Surface
+from warpjld.geometry.winding import winding_numbers
 from warpjld.listed import first_few
 from warpjld.rig import Skin
 from warpjld.skeleton.tree import Skeleton
-from warpjld.surface import Surface
-from warpjld.winding import winding_numbers
 
 __all__ = ["rigid_parts"]
 

@@ -26,6 +26,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from warpjld.errors import InputError
+from warpjld.files.text_file import read_json
+from warpjld.files.whole_file import whole_file
 from warpjld.io.mesh_file import MeshFile
 from warpjld.io.source import SourceRig
 from warpjld.limits import check_limit
@@ -33,8 +35,6 @@ from warpjld.skeleton.actor_points import CANONICAL
 from warpjld.skeleton.recognise.tree import SourceTree
 from warpjld.skeleton.tree import CHANNELS, Skeleton
 from warpjld.suggest import did_you_mean
-from warpjld.text_file import read_json
-from warpjld.whole_file import whole_file
 
 __all__ = ["read_skeleton_file", "write_skeleton_file"]
 

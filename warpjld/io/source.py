@@ -8,8 +8,8 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from warpjld.geometry.surface import Part
 from warpjld.skeleton.recognise.tree import SourceTree
-from warpjld.surface import Part
 
 __all__ = ["SourceRig"]
 

@@ -6,9 +6,9 @@ from collections.abc import Callable
 from pathlib import Path
 
 from warpjld.errors import InputError
-from warpjld.input_file import check_input
-from warpjld.lazily import imported
-from warpjld.reading import reading
+from warpjld.files.input_file import check_input
+from warpjld.files.reading import reading
+from warpjld.runtime.lazily import imported
 from warpjld.suggest import one_of
 
 __all__ = ["animation_names", "choose_animation"]

@@ -9,11 +9,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from warpjld.archive import check_archive
 from warpjld.errors import InputError
-from warpjld.input_file import check_input
+from warpjld.files.archive import check_archive
+from warpjld.files.input_file import check_input
+from warpjld.files.reading import reading
 from warpjld.limits import check_limit
-from warpjld.reading import reading
 
 __all__ = ["read_arrays"]
 

@@ -9,10 +9,10 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from warpjld.geometry.rotations import multiply, rotate
 from warpjld.limits import check_limit
 from warpjld.motion.bvh_lines import NAMED, BvhLines
 from warpjld.motion.clip import Clip
-from warpjld.rotations import multiply, rotate
 
 __all__ = ["read_bvh"]
 

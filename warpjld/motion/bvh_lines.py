@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from warpjld.errors import InputError
-from warpjld.text_file import read_text
+from warpjld.files.text_file import read_text
 
 __all__ = ["NAMED", "BvhLines"]
 

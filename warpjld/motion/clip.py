@@ -7,9 +7,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from warpjld.geometry.rotations import conjugate, multiply, rotate, slerp
 from warpjld.limits import check_limit
 from warpjld.motion.frame_times import frame_times
-from warpjld.rotations import conjugate, multiply, rotate, slerp
 
 __all__ = ["Clip"]
 

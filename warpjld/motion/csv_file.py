@@ -17,11 +17,11 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from warpjld.errors import InputError
+from warpjld.files.text_file import read_text
+from warpjld.files.whole_file import whole_file
 from warpjld.motion.channels import ROOT_CHANNELS, canonical_channels, resolve_channel
 from warpjld.motion.tracks import Motion
 from warpjld.skeleton import Skeleton
-from warpjld.text_file import read_text
-from warpjld.whole_file import whole_file
 
 if TYPE_CHECKING:
     import _csv

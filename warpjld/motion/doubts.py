@@ -9,8 +9,8 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
+from warpjld.geometry.rotations import conjugate, multiply, rotate
 from warpjld.motion.clip import Clip
-from warpjld.rotations import conjugate, multiply, rotate
 from warpjld.skeleton.recognise.names import read_name
 
 __all__ = ["doubts_of_clip", "doubts_of_own_joints", "jumps"]

@@ -12,11 +12,11 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
-from warpjld.rotations import minimal_rotation, rotate, unit
+from warpjld.geometry.rotations import minimal_rotation, rotate, unit
 from warpjld.skeleton.hand import FINGER_JOINTS
 from warpjld.skeleton.limits import default_limits
 
-__all__ = ["BENDING", "FINGERS", "bending_side", "beyond", "finger_bends", "leaning"]
+__all__ = ["BENDING", "FINGERS", "bending_side", "bent_beyond_limits", "finger_bends", "leaning"]
 
 FINGERS = ("index", "middle", "ring", "pinky")
 BENDING = ("base", "knuckle2", "knuckle3")
@@ -67,7 +67,7 @@ def finger_bends(points: Mapping[str, NDArray[np.float64]]) -> NDArray[np.float6
     return bends
 
 
-def beyond(bends: NDArray[np.float64], side: str) -> NDArray[np.float64]:
+def bent_beyond_limits(bends: NDArray[np.float64], side: str) -> NDArray[np.float64]:
     """How far [rad] joints of a ``left`` or ``right`` hand bend back beyond limit and tolerance, 0 or more."""
     flexion = bends if side == "right" else -bends
     return np.asarray(np.maximum(_LEAST - _TOLERANCE - flexion, 0.0))
@@ -78,7 +78,7 @@ def bending_side(bends: NDArray[np.float64]) -> str | None:
 
     As the other one, at least two joints must bend beyond their limits: a single one may be a tracker's slip.
     """
-    left, right = beyond(bends, "left"), beyond(bends, "right")
+    left, right = bent_beyond_limits(bends, "left"), bent_beyond_limits(bends, "right")
     worse = left if left.sum() > right.sum() else right
     if abs(left.sum() - right.sum()) < _TELLING or np.count_nonzero(worse.any(axis=0)) < 2:
         return None

@@ -9,13 +9,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from warpjld.errors import InputError
-from warpjld.lazily import lazy_module
+from warpjld.geometry.rotations import slerp, unit
+from warpjld.geometry.scales import TINY, never_zero
 from warpjld.limits import check_limit
 from warpjld.motion.animations import choose_animation
 from warpjld.motion.frame_times import frame_rate, frame_times, merged_times
 from warpjld.motion.joint_animation import JointAnimation
-from warpjld.rotations import slerp, unit
-from warpjld.scales import TINY, never_zero
+from warpjld.runtime.lazily import lazy_module
 
 if TYPE_CHECKING:
     from warpjld.io.gltf.document import Document

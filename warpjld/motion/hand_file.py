@@ -5,14 +5,14 @@ from __future__ import annotations
 from pathlib import Path
 
 from warpjld.errors import InputError
+from warpjld.files.reading import reading
+from warpjld.files.text_file import read_json
 from warpjld.motion.array_file import read_arrays
 from warpjld.motion.hand_motion import HandRecording
 from warpjld.motion.leap import is_leap, leap_hands
 from warpjld.motion.mano import is_mano, mano_hands
 from warpjld.motion.mediapipe import is_mediapipe, mediapipe_arrays, mediapipe_hands
 from warpjld.motion.webxr import is_webxr, webxr_hands
-from warpjld.reading import reading
-from warpjld.text_file import read_json
 
 __all__ = ["read_hands"]
 

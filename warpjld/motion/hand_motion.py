@@ -8,10 +8,10 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from warpjld.rotations import rotate
+from warpjld.geometry.rotations import rotate
 from warpjld.skeleton import Skeleton
 
-__all__ = ["IDENTITY", "HandMotion", "HandRecording", "HandTurns", "carried", "hand_joints"]
+__all__ = ["IDENTITY", "HandMotion", "HandRecording", "HandTurns", "hand_joints", "root_carried"]
 
 IDENTITY = np.array([0.0, 0.0, 0.0, 1.0])
 
@@ -94,7 +94,7 @@ def hand_joints(skeleton: Skeleton, side: str | None) -> dict[str, int]:
     return {name.partition(".")[2]: j for j, name in enumerate(skeleton.names) if name.startswith(f"{side}.")}
 
 
-def carried(
+def root_carried(
     skeleton: Skeleton, turn: NDArray[np.float64], centre: NDArray[np.float64], moved: NDArray[np.float64]
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Rotation of the root, and its displacement [m], that turn a rig about a point and move that point.

@@ -11,10 +11,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from warpjld.errors import InputError
-from warpjld.lazily import lazy_module
+from warpjld.geometry.rotations import conjugate, minimal_rotation, multiply, rotate
 from warpjld.motion.finger_bends import finger_bends, leaning
-from warpjld.motion.hand_motion import IDENTITY, HandTurns, carried, hand_joints
-from warpjld.rotations import conjugate, minimal_rotation, multiply, rotate
+from warpjld.motion.hand_motion import IDENTITY, HandTurns, hand_joints, root_carried
+from warpjld.runtime.lazily import lazy_module
 from warpjld.skeleton import DIGITS, Skeleton
 from warpjld.skeleton.hand import FINGER_JOINTS
 
@@ -113,7 +113,7 @@ class HandTrack:
         back = conjugate(palm_turn[0])
         moved = rotate(back, places.mean(axis=1) - places[0].mean(axis=0)) / scale
         centre = rest.mean(axis=0)
-        root, displacement = carried(skeleton, multiply(back, palm_turn), centre, moved)
+        root, displacement = root_carried(skeleton, multiply(back, palm_turn), centre, moved)
         return HandTurns(tuple(own.values()), local, root, displacement, self.moves)
 
 

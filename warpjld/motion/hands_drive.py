@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 
 from warpjld.errors import InputError
-from warpjld.motion.finger_bends import BENDING, FINGERS, bending_side, beyond
+from warpjld.geometry.rotations import slerp
+from warpjld.motion.finger_bends import BENDING, FINGERS, bending_side, bent_beyond_limits
 from warpjld.motion.frame_times import frame_times
 from warpjld.motion.hand_motion import IDENTITY, HandMotion, hand_joints
-from warpjld.rotations import slerp
 from warpjld.skeleton import Poses, Skeleton, poses_from_rotations
 
 __all__ = ["poses_of_hands"]
@@ -143,7 +143,7 @@ def _check_bends(hand: HandMotion, *, given: bool) -> tuple[str, ...]:
         InputError: Such a recording: names the joint that is worst, its frame and angle.
     """
     side = hand.side or ""
-    excess = beyond(hand.bends, side)
+    excess = bent_beyond_limits(hand.bends, side)
     if not excess.any():
         return ()
     frame, f, k = np.unravel_index(int(excess.argmax()), excess.shape)

@@ -8,10 +8,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from warpjld.lazily import lazy_module
+from warpjld.geometry.rotations import upright
+from warpjld.geometry.scales import polar
 from warpjld.motion.clip import Clip
-from warpjld.rotations import upright
-from warpjld.scales import polar
+from warpjld.runtime.lazily import lazy_module
 from warpjld.skeleton.recognise.tree import SourceTree
 
 if TYPE_CHECKING:
@@ -30,7 +30,7 @@ class JointAnimation:
         tree: The joints and their rest; of a file that also holds a rig, the same joints in the same order as that
             rig's ``source``.
         worlds: Joint-to-world transforms, shape (F, N, 4, 4). Zero scale is replaced by a tiny one, and axes are not
-            mirrored where they were not at rest (see ``warpjld.scales``), so that every frame has a rotation.
+            mirrored where they were not at rest (see ``warpjld.geometry.scales``), so that every frame has a rotation.
         rate: Frames a second.
         title: The animation's name; "" where the file gives none.
         notes: What a reader of the result should know.

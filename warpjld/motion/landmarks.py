@@ -7,8 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from warpjld.geometry.rotations import unit
 from warpjld.motion.clip import Clip
-from warpjld.rotations import unit
 from warpjld.skeleton import DIGITS, Skeleton
 
 __all__ = ["Landmarks", "landmarks_of_clip", "landmarks_of_skeleton"]

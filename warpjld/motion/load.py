@@ -9,14 +9,14 @@ from pathlib import Path
 import numpy as np
 
 from warpjld.errors import InputError
-from warpjld.input_file import check_input
-from warpjld.lazily import imported
-from warpjld.lengths import check_size
+from warpjld.files.input_file import check_input
+from warpjld.files.reading import reading
+from warpjld.geometry.lengths import check_size
 from warpjld.motion.clip import Clip
 from warpjld.motion.joint_animation import JointAnimation
 from warpjld.motion.tracks import Limits
-from warpjld.reading import reading
 from warpjld.rig import Rig
+from warpjld.runtime.lazily import imported
 from warpjld.skeleton import Poses
 from warpjld.skeleton.streamed_poses import blocks_of, streamed
 

@@ -16,8 +16,8 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from warpjld.errors import InputError
+from warpjld.geometry.rotations import minimal_rotation, multiply, rotate, unit
 from warpjld.motion.hand_motion import IDENTITY, hand_joints
-from warpjld.rotations import minimal_rotation, multiply, rotate, unit
 from warpjld.skeleton import Skeleton
 from warpjld.skeleton.hand import FINGER_JOINTS
 from warpjld.skeleton.recognise.hand_frame import hand_frame

@@ -8,10 +8,10 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
+from warpjld.geometry.rotations import about, conjugate, multiply, rotate
 from warpjld.motion.finger_bends import finger_bends
-from warpjld.motion.hand_motion import IDENTITY, HandTurns, carried, hand_joints
+from warpjld.motion.hand_motion import IDENTITY, HandTurns, hand_joints, root_carried
 from warpjld.motion.mano_rest import MANO_DIGITS, mano_rest
-from warpjld.rotations import about, conjugate, multiply, rotate
 from warpjld.skeleton import Skeleton
 from warpjld.skeleton.hand import FINGER_JOINTS
 
@@ -120,6 +120,6 @@ class ManoTrack:
         else:
             turn = multiply(conjugate(palm[0]), palm)
             moved = rotate(conjugate(palm[0]), place - place[0])
-        root, displacement = carried(skeleton, turn, wrist, moved)
+        root, displacement = root_carried(skeleton, turn, wrist, moved)
         moves = self.orient is not None or self.place is not None
         return HandTurns(tuple(own.values()), local, root, displacement, moves)

@@ -15,13 +15,13 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from warpjld.lazily import lazy_module
+from warpjld.geometry.rotations import unit
+from warpjld.geometry.scales import polar
 from warpjld.listed import first_few
 from warpjld.motion.joint_animation import JointAnimation
 from warpjld.motion.same_skeleton import match_joints, same_bones, same_rest
 from warpjld.rig import Rig
-from warpjld.rotations import unit
-from warpjld.scales import polar
+from warpjld.runtime.lazily import lazy_module
 from warpjld.skeleton import Poses, poses_from_world
 from warpjld.skeleton.recognise.names import read_name
 from warpjld.skeleton.recognise.tree import SourceTree

@@ -20,14 +20,14 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from warpjld.lazily import lazy_module
+from warpjld.geometry.scales import polar
 from warpjld.motion.clip import Clip
 from warpjld.motion.joint_animation import JointAnimation
 from warpjld.motion.landmarks import Landmarks
 from warpjld.motion.rest_pose import turn_of_rest
 from warpjld.motion.same_skeleton import match_joints
 from warpjld.rig import Rig
-from warpjld.scales import polar
+from warpjld.runtime.lazily import lazy_module
 from warpjld.skeleton.recognise.tree import SourceTree
 
 if TYPE_CHECKING:

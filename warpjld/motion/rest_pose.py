@@ -15,10 +15,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from warpjld.lazily import lazy_module
+from warpjld.geometry.rotations import minimal_rotation, rotate, slerp, unit
 from warpjld.motion.clip import Clip
 from warpjld.motion.landmarks import Landmarks, landmarks_of_clip
-from warpjld.rotations import minimal_rotation, rotate, slerp, unit
+from warpjld.runtime.lazily import lazy_module
 
 if TYPE_CHECKING:
     import scipy.spatial.transform as transform

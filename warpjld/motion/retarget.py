@@ -30,10 +30,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from warpjld.errors import InputError
+from warpjld.geometry.rotations import axis_turns, conjugate, matrices, minimal_rotation, multiply, rotate, slerp, unit
 from warpjld.motion.clip import Clip
 from warpjld.motion.landmarks import Landmarks
 from warpjld.motion.pairs import limb_names, pair_joints
-from warpjld.rotations import axis_turns, conjugate, matrices, minimal_rotation, multiply, rotate, slerp, unit
 from warpjld.skeleton import Poses, Skeleton, poses_from_rotations
 
 __all__ = ["Retargeted", "correspondence", "retarget", "retarget_and_tell"]

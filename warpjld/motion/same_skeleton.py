@@ -9,7 +9,7 @@ from itertools import product
 import numpy as np
 from numpy.typing import NDArray
 
-from warpjld.scales import polar
+from warpjld.geometry.scales import polar
 from warpjld.skeleton.recognise.tree import SourceTree
 
 __all__ = ["match_joints", "same_bones", "same_rest"]

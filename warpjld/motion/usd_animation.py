@@ -193,10 +193,12 @@ def _worlds(
     from pxr import UsdGeom
 
     from warpjld.io.usd.skeletons import concatenated
-    from warpjld.io.usd.stage import matrices
+    from warpjld.io.usd.stage import usd_matrices
 
     at = codes if len(_moves_at(skeleton.prim)) > 1 else codes[:1]
-    places = np.stack([matrices(UsdGeom.XformCache(t).GetLocalToWorldTransform(skeleton.prim)) for t in at.tolist()])
+    places = np.stack(
+        [usd_matrices(UsdGeom.XformCache(t).GetLocalToWorldTransform(skeleton.prim)) for t in at.tolist()]
+    )
     local, unmirrored = _locals(file, skeleton, animation, codes)
     worlds = places[:, None] @ concatenated(local, skeleton.parents)
     changed = (unmirrored != local).any(axis=(2, 3))

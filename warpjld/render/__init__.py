@@ -17,7 +17,7 @@ from warpjld.render.files import save_picture
 from warpjld.render.film import Film
 from warpjld.render.numbers import Numbered, with_numbers
 from warpjld.render.pictures import shaded, wireframe
-from warpjld.render.scene import Image, Scene, Solid
+from warpjld.render.scene import Image, SceneRenderer, Solid
 from warpjld.render.sheet import contact_sheet, grid
 from warpjld.render.style import Quality, Style
 
@@ -29,7 +29,7 @@ __all__ = [
     "Image",
     "Numbered",
     "Quality",
-    "Scene",
+    "SceneRenderer",
     "Solid",
     "Style",
     "contact_sheet",

@@ -9,14 +9,14 @@ from numpy.typing import NDArray
 
 from warpjld.render.creases import Shading
 
-__all__ = ["MATTE", "SKIN", "Body"]
+__all__ = ["MATTE", "SKIN", "RenderedBody"]
 
 #: Materials for `Body.show`.
 SKIN: dict[str, float] = {"ambient": 0.3, "diffuse": 0.8, "specular": 0.16, "specular_power": 14.0}
 MATTE: dict[str, float] = {"ambient": 0.45, "diffuse": 0.75, "specular": 0.0}
 
 
-class Body:
+class RenderedBody:
     """Split along creases once; then placed and painted frame by frame.
 
     Args:

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from warpjld.errors import InputError
-from warpjld.rotations import unit
+from warpjld.geometry.rotations import unit
 from warpjld.suggest import one_of
 
 __all__ = ["VIEWS", "Camera"]

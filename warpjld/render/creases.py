@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
-from warpjld.normals import vertex_normals
+from warpjld.geometry.normals import vertex_normals
 
 __all__ = ["Shading"]
 

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from warpjld.errors import InputError
-from warpjld.whole_file import whole_file
+from warpjld.files.whole_file import whole_file
 
 __all__ = ["save_picture"]
 

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from warpjld.errors import InputError, MissingExtraError, WarpjldError
-from warpjld.whole_file import part_of
+from warpjld.files.whole_file import part_of
 
 __all__ = ["Film"]
 

@@ -13,7 +13,7 @@ from warpjld.render.text import font
 if TYPE_CHECKING:
     from PIL.ImageDraw import ImageDraw
 
-    from warpjld.render.scene import Image, Scene
+    from warpjld.render.scene import Image, SceneRenderer
 
 __all__ = ["Numbered", "with_numbers"]
 
@@ -59,7 +59,7 @@ class Numbered:
         return np.asarray(once[(low != high) | (count == 1)])
 
 
-def with_numbers(picture: Image, scene: Scene, surfaces: list[Numbered]) -> Image:
+def with_numbers(picture: Image, scene: SceneRenderer, surfaces: list[Numbered]) -> Image:
     """The picture that a scene drew last, with edges and numbers of what is seen of surfaces in it.
 
     Where numbers would lie on one another some are left out; a line at the foot says how many.

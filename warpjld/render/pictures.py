@@ -8,7 +8,7 @@ from numpy.typing import ArrayLike
 
 from warpjld.render.camera import Camera
 from warpjld.render.colors import ColorScale
-from warpjld.render.scene import Image, Scene, Solid
+from warpjld.render.scene import Image, SceneRenderer, Solid
 from warpjld.render.style import Quality, Style
 
 __all__ = ["shaded", "wireframe"]
@@ -45,7 +45,7 @@ def shaded(
     style = style or Style()
     if values is not None and scale is None:
         scale = ColorScale.spanning(values, colormap=style.colormap)
-    with Scene(
+    with SceneRenderer(
         faces, camera, size=size, solids=solids, scale=scale, style=style, quality=quality or Quality()
     ) as scene:
         return scene.draw(vertices, values=values)
@@ -79,7 +79,7 @@ def wireframe(
     Returns:
         Picture, uint8 (height, width, 3).
     """
-    with Scene(
+    with SceneRenderer(
         faces,
         camera,
         look="wireframe",

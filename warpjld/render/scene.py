@@ -11,7 +11,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from warpjld.errors import InputError
-from warpjld.render.body import MATTE, SKIN, Body
+from warpjld.geometry.rotations import unit
+from warpjld.render.body import MATTE, SKIN, RenderedBody
 from warpjld.render.camera import Camera
 from warpjld.render.colors import ColorScale, as_hex
 from warpjld.render.lights import add_lights
@@ -19,9 +20,8 @@ from warpjld.render.occlusion import occlusion, shade
 from warpjld.render.skeleton import bone_faces, bone_vertices, joint_faces, joint_vertices
 from warpjld.render.style import Quality, Style
 from warpjld.render.wires import Wires
-from warpjld.rotations import unit
 
-__all__ = ["Image", "Look", "Scene", "Solid"]
+__all__ = ["Image", "Look", "SceneRenderer", "Solid"]
 
 #: Picture, uint8 (height, width, 3).
 Image = NDArray[np.uint8]
@@ -56,7 +56,7 @@ class Solid:
         as_hex(self.color)
 
 
-class Scene:
+class SceneRenderer:
     """Draws frames of one surface; use it in a ``with`` statement, or `close` it.
 
     Args:
@@ -209,7 +209,7 @@ class Scene:
         self._plotter.set_background(style.background[0], top=style.background[1])
         add_lights(self._plotter)
 
-        self._skin = Body(points, self._faces, _SKIN_CREASE)
+        self._skin = RenderedBody(points, self._faces, _SKIN_CREASE)
         opacity = style.veil if self._wire else style.opacity
         if opacity > 0:
             # of translucent skin only the front layer is drawn: then nothing needs sorting by depth
@@ -231,11 +231,15 @@ class Scene:
             self._thickness = 0.016 * extent
             self._jointed = np.unique(self._pairs)
             bones = bone_vertices(joints, self._pairs, self._thickness)
-            self._bones = Body(bones, bone_faces(len(self._pairs)), _BONE_CREASE)
+            self._bones = RenderedBody(bones, bone_faces(len(self._pairs)), _BONE_CREASE)
             self._bones.show(self._plotter, style.bone, **SKIN)
-            self._balls = Body(joint_vertices(joints[self._jointed], 1.0), joint_faces(len(self._jointed)), np.pi)
+            self._balls = RenderedBody(
+                joint_vertices(joints[self._jointed], 1.0), joint_faces(len(self._jointed)), np.pi
+            )
             self._balls.show(self._plotter, style.joint, **SKIN)
-        self._bodies = [Body(np.asarray(s.vertices, float), np.asarray(s.faces), _SOLID_CREASE) for s in self._solids]
+        self._bodies = [
+            RenderedBody(np.asarray(s.vertices, float), np.asarray(s.faces), _SOLID_CREASE) for s in self._solids
+        ]
         for solid, body in zip(self._solids, self._bodies, strict=True):
             body.show(self._plotter, solid.color, opacity=solid.opacity, **SKIN)
         self._extent, self._occluded = extent, self._quality.occlusion and not self._wire and opacity == 1

@@ -9,7 +9,7 @@ from numpy.typing import ArrayLike
 
 from warpjld.errors import InputError
 from warpjld.render.camera import Camera
-from warpjld.render.scene import Image, Look, Scene, Solid
+from warpjld.render.scene import Image, Look, SceneRenderer, Solid
 from warpjld.render.style import Quality, Style
 from warpjld.render.text import font, write
 
@@ -133,7 +133,7 @@ def contact_sheet(
     for look in looks:
         boned = bones is not None and segments is not None and look == "wireframe"
         drawn = segments if boned else None
-        with Scene(
+        with SceneRenderer(
             faces, camera, look=look, size=size, segments=drawn, solids=solids, style=style, quality=quality
         ) as scene:
             strip = [

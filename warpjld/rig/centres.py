@@ -11,8 +11,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from warpjld.geometry.rotations import unit
 from warpjld.rig import Rig
-from warpjld.rotations import unit
 from warpjld.skeleton.initial import bent_as_before
 from warpjld.skeleton.recognise.placing import in_trunk
 from warpjld.skeleton.recognise.section import cross_section, nearby

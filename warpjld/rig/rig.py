@@ -8,9 +8,9 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from warpjld.geometry.surface import Surface
 from warpjld.skeleton.recognise.tree import SourceTree
 from warpjld.skeleton.tree import Skeleton
-from warpjld.surface import Surface
 
 __all__ = ["Rig", "Skin"]
 

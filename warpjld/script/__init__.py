@@ -2,7 +2,7 @@
 
 from warpjld.script.arguments import Arguments
 from warpjld.script.interpreter import Interpreter
-from warpjld.script.outputs import Camera
+from warpjld.script.outputs import CameraSetting
 from warpjld.script.parser import parse, parse_file
 from warpjld.script.registry import Command, Registry, all_commands, command, commands_table
 from warpjld.script.scene import Actor, Scene
@@ -10,7 +10,7 @@ from warpjld.script.scene import Actor, Scene
 __all__ = [
     "Actor",
     "Arguments",
-    "Camera",
+    "CameraSetting",
     "Command",
     "Interpreter",
     "Registry",

@@ -8,8 +8,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from warpjld.errors import InputError
-from warpjld.lengths import LARGEST
-from warpjld.names import check_name, expanded
+from warpjld.files.names import check_name, expanded
+from warpjld.geometry.lengths import LARGEST
 from warpjld.script.statements import Number, Position, Text, Value, Word
 from warpjld.suggest import did_you_mean
 

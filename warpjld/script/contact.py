@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from warpjld.errors import InputError
 from warpjld.script.binding import cover
 from warpjld.script.folder import OutputFolder
-from warpjld.script.outputs import Film, Grips, Output, Picture, Table, Touch, Volume
+from warpjld.script.outputs import FilmOutput, Grips, Output, Picture, Table, TactileOutput, Volume
 from warpjld.script.props import prop_places
 from warpjld.script.scene import SplineConstants
 from warpjld.script.staging import stage
@@ -210,15 +210,15 @@ def check_contact(scene: Scene, outputs: Sequence[Output], frames: NDArray[np.fl
     span = "" if pressing is None else f"PRESS solves frames {pressing.first} to {pressing.last}"
     for output in outputs:
         problem = ""
-        colored = isinstance(output, Film | Picture) and output.style == "pressure"
+        colored = isinstance(output, FilmOutput | Picture) and output.style == "pressure"
         if pressing is None:
-            if colored or isinstance(output, Table | Touch | Volume):
+            if colored or isinstance(output, Table | TactileOutput | Volume):
                 problem = "shows contact, but none is solved: PRESS <first> <last> asks for it"
         elif isinstance(output, Picture) and colored and not pressing.first <= output.frame <= pressing.last:
             problem = f"shows pressure at frame {output.frame:g}, but {span}"
-        elif isinstance(output, Touch) and (output.actor or "") not in ("", *scene.contact.flesh):
+        elif isinstance(output, TactileOutput) and (output.actor or "") not in ("", *scene.contact.flesh):
             problem = f"shows what {output.actor} feels, but it has no flesh: FLESH {output.actor} makes it so"
-        elif isinstance(output, Touch) and not scene.contact.flesh:
+        elif isinstance(output, TactileOutput) and not scene.contact.flesh:
             problem = "shows what skin feels, but no actor has flesh: FLESH <actor> makes it so"
         if problem:
             raise located(InputError(f"'{output.name}' {problem}"), scene.asked.get(output.name))
@@ -241,13 +241,13 @@ def write_contact(found: Simulation, outputs: Sequence[Output], out: OutputFolde
             write_table(out.place(output.name), found.rows)
         elif isinstance(output, Grips):
             write_grips(out.place(output.name), found.grips)
-        elif isinstance(output, Touch):
+        elif isinstance(output, TactileOutput):
             _write_touch(found, output, out.place(output.name))
         elif isinstance(output, Volume):
             write_volumes(out.place(output.name), found.model, found.solved.frames)
 
 
-def _write_touch(found: Simulation, output: Touch, path: Path) -> None:
+def _write_touch(found: Simulation, output: TactileOutput, path: Path) -> None:
     from warpjld.simulation.report.tactile_files import draw_tactile, write_tactile
 
     actor = output.actor or next((hand.name for hand in found.model.hands), "nobody")

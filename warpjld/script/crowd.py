@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from warpjld.script.outermost import outermost
-from warpjld.script.outputs import Camera
+from warpjld.script.outputs import CameraSetting
 from warpjld.script.props import Prop
 from warpjld.script.scene import Actor
 from warpjld.script.staging import stage, staged
@@ -179,14 +179,14 @@ class Crowd:
                 out[k] = found
         return out
 
-    def shift(self, camera: Camera, frame: int) -> NDArray[np.float64]:
+    def shift(self, camera: CameraSetting, frame: int) -> NDArray[np.float64]:
         """What to take off all positions at the frame of that place so that the camera goes along [m], shape (3,)."""
         if not camera.follow:
             return np.zeros(3)
         first = self.roles[0]
         return np.asarray(first.poses[frame : frame + 1].positions[0, 0] - first.covering.skeleton.rest[0])
 
-    def camera(self, camera: Camera, size: tuple[int, int]) -> RenderCamera:
+    def camera(self, camera: CameraSetting, size: tuple[int, int]) -> RenderCamera:
         """A camera for all frames; a named view is framed so that nothing leaves the picture."""
         from warpjld.render import Camera as RenderCamera
 
@@ -206,14 +206,14 @@ class Crowd:
         """Where to look from where no CAMERA was chosen."""
         return "three-quarter" if self._facing[2] else "front"
 
-    def _framing(self, camera: Camera) -> NDArray[np.float64]:
+    def _framing(self, camera: CameraSetting) -> NDArray[np.float64]:
         """Points that must be in every picture [m], shape (n, 3)."""
         surfaces = [points - self.shift(camera, frame) for frame, points in self._samples.items()]
         spans = [(start, min(start + _TOGETHER, len(self.frames))) for start in range(0, len(self.frames), _TOGETHER)]
         shown = [self._shown(camera, *span) for span in spans]
         return np.concatenate([*surfaces, *(shown if len(shown) < 2 else map(outermost, shown))])
 
-    def _shown(self, camera: Camera, first: int, stop: int) -> NDArray[np.float64]:
+    def _shown(self, camera: CameraSetting, first: int, stop: int) -> NDArray[np.float64]:
         """Joints and vertices of objects at some frames, less what the camera goes along [m], shape (n, 3)."""
         shifts = np.stack([self.shift(camera, frame) for frame in range(first, stop)])
         joints = [(role.poses[first:stop].positions - shifts[:, None]).reshape(-1, 3) for role in self.roles]

@@ -11,9 +11,9 @@ from types import TracebackType
 from typing import Self
 
 from warpjld.errors import InputError
-from warpjld.folders import make_folder
-from warpjld.sequences import remove_former
-from warpjld.whole_file import machine, process_runs
+from warpjld.files.folders import make_folder
+from warpjld.files.sequences import remove_former
+from warpjld.files.whole_file import machine, process_runs
 
 __all__ = ["OutputFolder"]
 

@@ -17,7 +17,7 @@ __all__ = [
     "MOTIONS",
     "PICTURES",
     "TABLES",
-    "VIEWS",
+    "VIEW_WORDS",
     "VOLUMES",
     "check_available",
     "video_is_available",
@@ -30,7 +30,7 @@ FILMS = (".mp4", ".mov", ".mkv", ".gif", ".webp")
 _VIDEO = FILMS[:3]
 EXPORTS = tuple(FORMATS)
 MOTIONS = tuple(MOTION_OUT)
-VIEWS = tuple(name.upper() for name in _VIEWS)
+VIEW_WORDS = tuple(name.upper() for name in _VIEWS)
 
 
 def video_is_available() -> bool:

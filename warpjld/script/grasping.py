@@ -119,7 +119,7 @@ def close_digits(
     coupling: tuple[float, float] | None,
 ) -> Attempt:
     """Close digits on an object: keys of the open hand at ``first``, of the closed one at ``last``."""
-    from warpjld.grasp import Status
+    from warpjld.grasp import SearchStatus
     from warpjld.grasp.close import Closer
     from warpjld.grasp.digits import digit_chains
     from warpjld.grasp.intersection import intersection
@@ -142,7 +142,7 @@ def close_digits(
     poses, _ = posture(scene, actor, last)
     inside = intersection(covering, covering.deform(poses)[0], thing)
     touching = closed.touching()[0]
-    rows = {name: [Status(int(s)).name for s in closed.status[0, d]] for d, name in enumerate(closed.digits)}
+    rows = {name: [SearchStatus(int(s)).name for s in closed.status[0, d]] for d, name in enumerate(closed.digits)}
     message = f"{int(touching.sum())} of {len(touching)} digits touch"
     blocked = [name for name, statuses in rows.items() if "BLOCKED" in statuses]
     begun = [name for name, statuses in rows.items() if "INSIDE" in statuses]

@@ -9,8 +9,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from warpjld.errors import InputError, WarpjldError
+from warpjld.files.names import expanded
 from warpjld.limits import check_limit, limit
-from warpjld.names import expanded
 from warpjld.script.arguments import Arguments
 from warpjld.script.parser import parse, parse_file
 from warpjld.script.registry import RESERVED, Command, Registry, all_commands

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from warpjld.errors import WarpjldError
-from warpjld.folders import make_folder
+from warpjld.files.folders import make_folder
 
 if TYPE_CHECKING:
     from warpjld.script.scene import Scene

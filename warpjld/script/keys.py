@@ -13,10 +13,10 @@ from warpjld.script.scene import Actor, Scene, SplineConstants
 from warpjld.skeleton import CHANNELS, PAPER_NUMBERS, Skeleton
 from warpjld.suggest import did_you_mean
 
-__all__ = ["FINGERS", "SIDES", "joint_numbers", "named_joint", "read_joint", "set_keys"]
+__all__ = ["DIGIT_WORDS", "SIDES", "joint_numbers", "named_joint", "read_joint", "set_keys"]
 
 SIDES = ("LEFT", "RIGHT")
-FINGERS = ("THUMB", "INDEX", "MIDDLE", "RING", "PINKY")
+DIGIT_WORDS = ("THUMB", "INDEX", "MIDDLE", "RING", "PINKY")
 _SLACK = 1e-6  # degrees: limits come out of radians
 
 

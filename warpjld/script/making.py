@@ -19,7 +19,7 @@ from warpjld.script.failures import Failures, Writer
 from warpjld.script.folder import OutputFolder
 from warpjld.script.grasping import contact_reports
 from warpjld.script.motion_files import write_motions
-from warpjld.script.outputs import ContactSheet, Export, Film, Output, Picture
+from warpjld.script.outputs import ContactSheet, Export, FilmOutput, Output, Picture
 from warpjld.script.per_actor import file_of
 from warpjld.script.pictures import FilmStudio, PressureStudio, draw_contact_sheet, draw_picture, film_studio
 from warpjld.script.props import Prop, prop_places, prop_surface
@@ -28,9 +28,9 @@ from warpjld.script.summary import Summary
 from warpjld.simulation.specification import located
 
 if TYPE_CHECKING:
+    from warpjld.geometry.surface import Surface
     from warpjld.io.caches import Cache
     from warpjld.simulation.simulate import Keep, Simulation
-    from warpjld.surface import Surface
 
 __all__ = ["Making", "Report", "cast", "exported_props", "prop_export_name"]
 
@@ -157,12 +157,12 @@ def _make_sequences(
         timing: dict[str, Any] = {"frames": len(frames), "rate": scene.rate, "start_frame": int(frames[0])}
         return Writer(name, place, lambda: open_cache(place, surface, name=label.lower(), **timing), failures)
 
-    def studio_of(film: Film) -> Writer[FilmStudio | PressureStudio]:
+    def studio_of(film: FilmOutput) -> Writer[FilmStudio | PressureStudio]:
         place = out.place(film.name)
         return Writer(film.name, place, lambda: film_studio(scene, crowd, film, place), failures)
 
     exports = [output for output in outputs if isinstance(output, Export)]
-    films = [output for output in outputs if isinstance(output, Film)]
+    films = [output for output in outputs if isinstance(output, FilmOutput)]
     if not exports and not films:
         return
     with ExitStack() as stack:

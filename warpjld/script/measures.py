@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from warpjld.script.props import Prop
     from warpjld.script.scene import Actor, Scene
 
-__all__ = ["distance", "intersection"]
+__all__ = ["distance", "intersection_text"]
 
 
 def distance(scene: Scene, actor: Actor, frame: float, vertex: int, prop: Prop, facet: Facet) -> str:
@@ -32,7 +32,7 @@ def distance(scene: Scene, actor: Actor, frame: float, vertex: int, prop: Prop, 
     )
 
 
-def intersection(scene: Scene, actor: Actor, frame: float, part: str, prop: Prop) -> str:
+def intersection_text(scene: Scene, actor: Actor, frame: float, part: str, prop: Prop) -> str:
     """Vertices of a segment that lie in an object at a frame, deepest first, with their depths.
 
     Raises:

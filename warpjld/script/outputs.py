@@ -6,25 +6,25 @@ from dataclasses import dataclass
 from typing import Literal
 
 __all__ = [
-    "Camera",
+    "CameraSetting",
     "ContactSheet",
     "Export",
-    "Film",
+    "FilmOutput",
     "Grips",
     "MotionFile",
     "Output",
     "Picture",
-    "Style",
+    "PictureStyle",
     "Table",
-    "Touch",
+    "TactileOutput",
     "Volume",
 ]
 
-Style = Literal["shaded", "wireframe", "pressure"]
+PictureStyle = Literal["shaded", "wireframe", "pressure"]
 
 
 @dataclass(frozen=True)
-class Camera:
+class CameraSetting:
     """Where pictures are taken from: a named view, or a position and a target [m].
 
     With ``follow`` it goes along with the root of the first actor.
@@ -44,20 +44,20 @@ class Picture:
 
     name: str
     frame: float
-    style: Style
-    camera: Camera
+    style: PictureStyle
+    camera: CameraSetting
     only: str | None = None
     digits: tuple[str, ...] = ()
     numbers: bool = False
 
 
 @dataclass(frozen=True)
-class Film:
+class FilmOutput:
     """All frames as a film; coloured by pressure perhaps of one actor or object ``only``, or of its ``digits``."""
 
     name: str
-    style: Style
-    camera: Camera
+    style: PictureStyle
+    camera: CameraSetting
     only: str | None = None
     digits: tuple[str, ...] = ()
 
@@ -68,7 +68,7 @@ class ContactSheet:
 
     name: str
     frames: tuple[float, ...]
-    camera: Camera
+    camera: CameraSetting
 
 
 @dataclass(frozen=True)
@@ -95,7 +95,7 @@ class Table:
 
 
 @dataclass(frozen=True)
-class Touch:
+class TactileOutput:
     """What the skin of an actor, or of the first whose flesh deforms, feels over time: CSV, Parquet or a plot."""
 
     name: str
@@ -116,4 +116,4 @@ class Volume:
     name: str
 
 
-Output = Picture | Film | ContactSheet | Export | MotionFile | Table | Touch | Grips | Volume
+Output = Picture | FilmOutput | ContactSheet | Export | MotionFile | Table | TactileOutput | Grips | Volume

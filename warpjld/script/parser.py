@@ -26,7 +26,7 @@ from warpjld.script.statements import (
 if TYPE_CHECKING:
     from lark import Lark
     from lark.exceptions import UnexpectedInput
-from warpjld.text_file import read_text
+from warpjld.files.text_file import read_text
 
 __all__ = ["UnfinishedError", "parse", "parse_file"]
 

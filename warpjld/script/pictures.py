@@ -14,7 +14,7 @@ from warpjld import render
 from warpjld.errors import InputError
 from warpjld.script.crowd import Crowd, role_of
 from warpjld.script.folder import OutputFolder
-from warpjld.script.outputs import Camera, ContactSheet, Film, Picture, Style
+from warpjld.script.outputs import CameraSetting, ContactSheet, FilmOutput, Picture, PictureStyle
 from warpjld.script.pressure import PressureView
 from warpjld.script.props import prop_places
 from warpjld.script.scene import Scene
@@ -36,7 +36,7 @@ _CELLS = 6  # on a contact sheet whose frames nobody listed
 class FilmStudio:
     """Takes frame after frame of a film."""
 
-    def __init__(self, crowd: Crowd, camera: Camera, stage: render.Scene, film: render.Film) -> None:
+    def __init__(self, crowd: Crowd, camera: CameraSetting, stage: render.SceneRenderer, film: render.Film) -> None:
         self._crowd, self._camera = crowd, camera
         self._stage, self._film = stage, film
 
@@ -50,7 +50,9 @@ class FilmStudio:
 class PressureStudio:
     """Takes frame after frame of a film in the colours of contact pressure."""
 
-    def __init__(self, view: PressureView, camera: Camera, stage: render.Scene, film: render.Film) -> None:
+    def __init__(
+        self, view: PressureView, camera: CameraSetting, stage: render.SceneRenderer, film: render.Film
+    ) -> None:
         self._view, self._camera = view, camera
         self._stage, self._film = stage, film
 
@@ -64,7 +66,7 @@ class PressureStudio:
 
 
 @contextmanager
-def film_studio(scene: Scene, crowd: Crowd, film: Film, path: Path) -> Iterator[FilmStudio | PressureStudio]:
+def film_studio(scene: Scene, crowd: Crowd, film: FilmOutput, path: Path) -> Iterator[FilmStudio | PressureStudio]:
     """A ``FILM`` being taken."""
     camera = crowd.camera(film.camera, scene.size)
     quality = render.Quality.film()
@@ -74,7 +76,7 @@ def film_studio(scene: Scene, crowd: Crowd, film: Film, path: Path) -> Iterator[
             with view.stage(camera, scene.size, quality, 0) as stage_:
                 yield PressureStudio(view, film.camera, stage_, writer)
             return
-        with render.Scene(
+        with render.SceneRenderer(
             crowd.faces,
             camera,
             look=film.style,
@@ -101,7 +103,7 @@ def draw_picture(scene: Scene, crowd: Crowd, picture: Picture, path: Path) -> No
         with view.stage(camera, scene.size, render.Quality(), shift) as stage_:
             render.save_picture(path, stage_.draw(points - shift, values=values))
         return
-    with render.Scene(
+    with render.SceneRenderer(
         crowd.faces,
         camera,
         look=picture.style,
@@ -162,7 +164,7 @@ def sheet_frames(scene: Scene, frames: NDArray[np.float64]) -> tuple[float, ...]
     return tuple(float(frame) for frame in frames[np.unique(chosen)])
 
 
-def preview(scene: Scene, frame: float, style: Style) -> Path:
+def preview(scene: Scene, frame: float, style: PictureStyle) -> Path:
     """A picture of any frame of the scene as it is, in the output folder (R5)."""
     roles = [role_of(a, np.array([frame]), scene.rate) for a in scene.actors.values()]
     crowd = Crowd(
@@ -177,5 +179,5 @@ def preview(scene: Scene, frame: float, style: Style) -> Path:
     return scene.folder / name
 
 
-def _bones(crowd: Crowd, style: Style) -> NDArray[np.int32] | None:
+def _bones(crowd: Crowd, style: PictureStyle) -> NDArray[np.int32] | None:
     return crowd.segments if style == "wireframe" else None

@@ -67,14 +67,14 @@ class PressureView:
         size: tuple[int, int],
         quality: render.Quality,
         shift: NDArray[np.float64] | float,
-    ) -> render.Scene:
+    ) -> render.SceneRenderer:
         """A window to draw in."""
         props = [self.crowd.props[k] for k in self._plain]
         solids = [
             render.Solid(vertices - shift, prop.thing.faces, color=prop.color)
             for prop, vertices in zip(props, self.others(0), strict=True)
         ]
-        return render.Scene(self._faces, camera, size=size, solids=solids, scale=self._scale, quality=quality)
+        return render.SceneRenderer(self._faces, camera, size=size, solids=solids, scale=self._scale, quality=quality)
 
     def at(self, frame: int, vertices: NDArray[np.float32]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """Vertices [m] and pressures [Pa] at the frame of that place, of actors' vertices (V, 3)."""

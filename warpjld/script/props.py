@@ -17,11 +17,11 @@ from warpjld.skeleton.streamed_poses import BLOCK
 
 if TYPE_CHECKING:
     from warpjld.fem.contact.obstacles.barr import Barr
-    from warpjld.fem.contact.obstacles.obstacle import Motion
+    from warpjld.fem.contact.obstacles.obstacle import RigidMotion
+    from warpjld.geometry.surface import Surface
     from warpjld.grasp.keyframes import KeyframedShape
     from warpjld.script.scene import Actor
     from warpjld.simulation.state_variables import BarrKeys
-    from warpjld.surface import Surface
 
 __all__ = ["COLORS", "Prop", "prop_places", "prop_surface"]
 
@@ -66,7 +66,7 @@ class Prop:
             return self.barr().mesh(frame)[0]
         return self.thing.vertices
 
-    def barr(self, start: float = 0.0, motion: Motion | None = None) -> Barr:
+    def barr(self, start: float = 0.0, motion: RigidMotion | None = None) -> Barr:
         """Its deformed shape, in its own frame unless it has a motion; time is in frames from ``start``."""
         from warpjld.fem.contact.obstacles.barr import Barr
 
@@ -104,6 +104,6 @@ def prop_places(actors: Mapping[str, Actor], rate: float, prop: Prop, frames: ND
 
 def prop_surface(prop: Prop) -> Surface:
     """The object's surface for exports."""
-    from warpjld.surface import weld_surface
+    from warpjld.geometry.surface import weld_surface
 
     return weld_surface(prop.thing.vertices, prop.thing.faces, tolerance=0.0)

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from warpjld.rotations import unit
+from warpjld.geometry.rotations import unit
 from warpjld.script.binding import cover
 from warpjld.script.grasping import Attempt, placed_at, posture
 from warpjld.script.staging import stage
@@ -117,8 +117,8 @@ def arm_to_hand(
 ) -> tuple[Reached, int]:
     """The arm's posture at a frame that brings the hand where another pose of the same skeleton has it (one frame), and
     how many faces of the body it passes through."""
+    from warpjld.geometry.rotations import matrices
     from warpjld.grasp.arm_clearance import pierced_faces
-    from warpjld.rotations import matrices
     from warpjld.skeleton.reach import Target, reach
 
     wrist = arm.joints[-1]

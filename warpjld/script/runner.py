@@ -9,15 +9,15 @@ from typing import TYPE_CHECKING, Any
 from warpjld import render
 from warpjld.covering.device import checked_device
 from warpjld.errors import InputError, WarpjldError
+from warpjld.files.names import folded
+from warpjld.files.overwriting import check_outputs
 from warpjld.motion.out import check_motion_out
-from warpjld.names import folded
-from warpjld.overwriting import check_outputs
 from warpjld.script.contact import check_contact
 from warpjld.script.destinations import check_destinations
 from warpjld.script.formats import check_available, video_is_available
 from warpjld.script.kept_contact import contact_kept
 from warpjld.script.making import Making, Report, cast, exported_props, prop_export_name
-from warpjld.script.outputs import ContactSheet, Export, Film, Grips, MotionFile, Output, Picture, Table
+from warpjld.script.outputs import ContactSheet, Export, FilmOutput, Grips, MotionFile, Output, Picture, Table
 from warpjld.script.per_actor import actors_of, file_of
 from warpjld.script.scene import Scene
 from warpjld.script.staging import frame_numbers, held, notes, stage
@@ -66,7 +66,7 @@ def run_scene(
     if not outputs:
         outputs = [Export("surface.npz", None), ContactSheet("contact.png", (), scene.camera)]
         video = video_is_available()
-        outputs.insert(1, Film("film.mp4" if video else "film.gif", "shaded", scene.camera))
+        outputs.insert(1, FilmOutput("film.mp4" if video else "film.gif", "shaded", scene.camera))
         if not video:
             summary.notes.append("the film is a GIF; for MP4: pip install 'warpjld[film]'")
     if scene.contact.pressing is not None and not any(isinstance(output, Table) for output in outputs):
@@ -124,7 +124,7 @@ def _check_lengths(scene: Scene, outputs: Sequence[Output], frames: int) -> None
 
     for output in outputs:
         try:
-            if isinstance(output, Film):
+            if isinstance(output, FilmOutput):
                 render.Film(output.name, rate=scene.rate)
             for actor in actors_of(output, scene) if isinstance(output, Export) else ():
                 open_cache(output.name, actor.rig.surface, frames=frames, rate=scene.rate)

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Literal
 
 from warpjld.errors import InputError
-from warpjld.script.outputs import Camera, Output
+from warpjld.script.outputs import CameraSetting, Output
 from warpjld.script.placement import Placement
 from warpjld.simulation.specification import ContactSpecification, SourceLocation
 from warpjld.skeleton.channels import CHANNELS
@@ -149,7 +149,7 @@ class Scene:
     last: int | None = None
     rate: float = 30.0
     spline: SplineConstants = SplineConstants()
-    camera: Camera = field(default_factory=Camera)
+    camera: CameraSetting = field(default_factory=CameraSetting)
     size: tuple[int, int] = (960, 720)
     outputs: list[Output] = field(default_factory=list)
     asked: dict[str, SourceLocation] = field(default_factory=dict)

@@ -10,13 +10,13 @@ from itertools import count
 from pathlib import Path
 
 from warpjld.errors import InputError
-from warpjld.names import expanded
+from warpjld.files.names import expanded
+from warpjld.files.whole_file import whole_file
 from warpjld.script.interpreter import Interpreter
 from warpjld.script.parser import UnfinishedError, parse, parse_file
 from warpjld.script.scene import Scene
 from warpjld.script.statements import MacroDefinition, Node, Statement, Text
 from warpjld.skeleton import CHANNELS, DIGITS
-from warpjld.whole_file import whole_file
 
 __all__ = ["AUTOSAVED", "Session"]
 

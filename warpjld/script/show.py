@@ -12,7 +12,7 @@ from warpjld.script.registry import Command
 from warpjld.script.scene import Actor, Scene
 from warpjld.skeleton import CHANNELS
 
-__all__ = ["actors", "commands", "joints", "parameters", "values"]
+__all__ = ["actors", "command_listing", "joints", "parameter_listing", "values"]
 
 
 def values(actor: Actor, frame: float, rate: float) -> str:
@@ -66,7 +66,7 @@ def joints(actor: Actor) -> str:
     return "\n".join(lines)
 
 
-def parameters(actor: Actor) -> str:
+def parameter_listing(actor: Actor) -> str:
     """An actor's parameters, one joint a line."""
     names = [field.name for field in fields(actor.parameters)]
     lines = [f"{'':<36} " + " ".join(f"{name:>12}" for name in names)]
@@ -79,7 +79,7 @@ def parameters(actor: Actor) -> str:
     return "\n".join(lines)
 
 
-def commands(chosen: Iterable[Command]) -> str:
+def command_listing(chosen: Iterable[Command]) -> str:
     """One line per command."""
     listed = sorted(chosen, key=lambda c: c.name)
     return "\n".join(f"{c.name:<12} {c.help}" for c in listed) + (

@@ -27,6 +27,7 @@ from numpy.typing import NDArray
 
 from warpjld.errors import InputError
 from warpjld.fem.hand.suggestions import DigitSlopes
+from warpjld.runtime.threads import one_blas_thread
 from warpjld.simulation.animation import Animation
 from warpjld.simulation.bodies.flesh_body import build_flesh_body
 from warpjld.simulation.bodies.model import ContactModel, assemble_model
@@ -48,7 +49,6 @@ from warpjld.simulation.solve.solved_frame import SolvedFrame
 from warpjld.simulation.solve.start_frame import StartFrame, find_start
 from warpjld.simulation.solve_frames import Progress, SolveResult, solve_frames
 from warpjld.simulation.specification import ContactSpecification, SolveSpecification
-from warpjld.threads import one_blas_thread
 
 __all__ = ["KEPT", "Keep", "Simulation", "VisiblePressure", "simulate"]
 

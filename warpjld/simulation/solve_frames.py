@@ -7,9 +7,9 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from warpjld.fem import Status
+from warpjld.fem import SolveStatus
 from warpjld.fem.contact import ContactSolution
-from warpjld.reading import reading
+from warpjld.files.reading import reading
 from warpjld.simulation.animation import AngleEdit
 from warpjld.simulation.bodies.deformable_body import History
 from warpjld.simulation.bodies.model import ContactModel
@@ -74,7 +74,7 @@ class SolveResult:
         interrupted: Whether Ctrl-C ended it.
     """
 
-    status: Status
+    status: SolveStatus
     message: str
     model: ContactModel
     frames: tuple[SolvedFrame, ...] = ()
@@ -126,7 +126,7 @@ def solve_frames(
         with reading(checkpoint.path, "a state of a contact solve"):
             reasons = run.resume(found, watch)
         if reasons:
-            return run.ended(Status.STOPPED, reasons[0])
+            return run.ended(SolveStatus.STOPPED, reasons[0])
     if not model.pairs:
         return _untouched(model, frames, watch, progress)
     try:
@@ -146,7 +146,7 @@ def _untouched(model: ContactModel, frames: Sequence[float], watch: Watch, progr
         if not done:
             raise
         message = f"interrupted after frame {done[-1].frame:g}"
-        return SolveResult(Status.STOPPED, message, model, tuple(done), interrupted=True)
+        return SolveResult(SolveStatus.STOPPED, message, model, tuple(done), interrupted=True)
     return SolveResult(status, message, model, tuple(done))
 
 
@@ -164,14 +164,14 @@ def _solve_on(
         if checkpoint is not None and grip is None:
             run.save(checkpoint)
         if reason := watch(run.model, run.done[-1]):
-            return run.ended(Status.STOPPED, reason)
+            return run.ended(SolveStatus.STOPPED, reason)
         if grip is not None:
             searched = run.find(grip, progress, len(frames))
             if searched.interrupted:
-                return replace(run.ended(Status.STOPPED, f"at frame {frame:g}: {searched.text}"), interrupted=True)
+                return replace(run.ended(SolveStatus.STOPPED, f"at frame {frame:g}: {searched.text}"), interrupted=True)
             if checkpoint is not None:
                 run.save(checkpoint)
-    return run.ended(Status.CONVERGED, Status.CONVERGED.value)
+    return run.ended(SolveStatus.CONVERGED, SolveStatus.CONVERGED.value)
 
 
 @dataclass(eq=False)
@@ -235,12 +235,12 @@ class _Run:
             try:
                 solution = self.limits.solve(model, self.history, before, steps)
             except BoneInsideError as error:
-                return self.ended(Status.BLOCKED, str(error))
+                return self.ended(SolveStatus.BLOCKED, str(error))
             driven = self.limits.driven(model)
         else:
             driven = model
             if (inside := self._bone_inside(model, steps)) is not None:
-                return self.ended(Status.BLOCKED, inside)
+                return self.ended(SolveStatus.BLOCKED, inside)
             solution = solve_onward(
                 model, self.history, before, steps, method=self.request.method, aitken=self.request.aitken
             )
@@ -278,7 +278,7 @@ class _Run:
             self.done, self.edits, self.missed = list(known.frames), list(known.edits), list(known.missed)
             self.grips, self.edited = self.grips[: len(known.grips)], list(known.edited)
         after = self.done[-1].frame
-        return replace(self.ended(Status.STOPPED, f"interrupted after frame {after:g}"), interrupted=True)
+        return replace(self.ended(SolveStatus.STOPPED, f"interrupted after frame {after:g}"), interrupted=True)
 
     def _settle(self) -> None:
         """Remember how things are between two frames: an interrupt falls anywhere within one."""
@@ -324,7 +324,7 @@ class _Run:
             objects = [found.release.applied(one) for one in self.model.objects]
             self.model = replace(self.model, objects=tuple(objects))
 
-    def ended(self, status: Status, message: str) -> SolveResult:
+    def ended(self, status: SolveStatus, message: str) -> SolveResult:
         """All of it."""
         return SolveResult(
             status,

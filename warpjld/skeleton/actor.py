@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from warpjld.errors import InputError
-from warpjld.rotations import unit
+from warpjld.geometry.rotations import unit
 from warpjld.skeleton.actor_points import ACTOR_POINTS, CANONICAL
 from warpjld.skeleton.hand import hand_joint_names
 from warpjld.skeleton.recognise.axes import perpendicular

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from warpjld.errors import InputError
-from warpjld.rotations import conjugate, multiply, rotate
+from warpjld.geometry.rotations import conjugate, multiply, rotate
 from warpjld.skeleton.kinematics import Poses, joint_rotations
 from warpjld.skeleton.tree import CHANNELS, Skeleton
 

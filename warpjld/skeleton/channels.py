@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from warpjld.rotations import about, multiply, rotate
+from warpjld.geometry.rotations import about, multiply, rotate
 
 __all__ = ["CHANNELS", "channel_rotations"]
 

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from warpjld.errors import InputError
-from warpjld.rotations import unit
+from warpjld.geometry.rotations import unit
 from warpjld.skeleton.channels import CHANNELS
 from warpjld.skeleton.tree import Skeleton
 

@@ -16,7 +16,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from warpjld.rotations import rotate, unit
+from warpjld.geometry.rotations import rotate, unit
 from warpjld.skeleton.arm import Arm
 from warpjld.skeleton.kinematics import Poses
 from warpjld.skeleton.tree import CHANNELS

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from warpjld.errors import InputError
-from warpjld.rotations import conjugate, rotate, unit
+from warpjld.geometry.rotations import conjugate, rotate, unit
 from warpjld.skeleton.channels import CHANNELS, channel_rotations
 from warpjld.suggest import did_you_mean
 

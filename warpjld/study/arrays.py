@@ -10,8 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from warpjld.errors import WarpjldError
+from warpjld.files.whole_file import whole_file
 from warpjld.study.shards import Shard
-from warpjld.whole_file import whole_file
 
 __all__ = ["gathered", "write_arrays"]
 

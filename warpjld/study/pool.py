@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from warpjld.errors import WarpjldError
-from warpjld.processes import run_jobs
+from warpjld.runtime.processes import run_jobs
 from warpjld.study.columns import COMMON_COLUMNS
 from warpjld.study.experiment import Experiment, Outcome, generator
 from warpjld.study.shards import Shard, Shards

@@ -11,8 +11,8 @@ from typing import Any
 import numpy as np
 
 from warpjld.errors import InputError, WarpjldError
-from warpjld.manifest import write_json
-from warpjld.processes import one_thread, worker_pool
+from warpjld.files.manifest import write_json
+from warpjld.runtime.processes import one_thread, worker_pool
 from warpjld.study.experiment import Experiment, Outcome
 from warpjld.study.pool import TrialWork, perform
 from warpjld.study.run import opened

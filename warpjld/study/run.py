@@ -13,8 +13,9 @@ from pathlib import Path
 from typing import Any, Literal
 
 from warpjld.errors import InputError
-from warpjld.folders import make_folder
-from warpjld.manifest import file_hash, fingerprint, versions, write_json
+from warpjld.files.folders import make_folder
+from warpjld.files.manifest import file_hash, fingerprint, versions, write_json
+from warpjld.runtime.threads import cores
 from warpjld.study.arrays import gathered, write_arrays
 from warpjld.study.columns import COMMON_COLUMNS
 from warpjld.study.experiment import Experiment
@@ -23,8 +24,7 @@ from warpjld.study.rates import Rate, success_rates
 from warpjld.study.shards import Shards
 from warpjld.study.summary import write_summary
 from warpjld.tables.columns import Column
-from warpjld.tables.files import require_parquet, write_csv, write_parquet
-from warpjld.threads import cores
+from warpjld.tables.files import require_parquet, write_parquet, write_table_csv
 
 __all__ = ["StudyResult", "TableFormat", "opened", "run_study", "table_columns"]
 
@@ -214,7 +214,7 @@ def _write_results(experiment: Experiment, folder: Path, shards: Shards, table: 
         write_parquet(folder / "table.parquet", rows, columns)
         files.append(folder / "table.parquet")
     if table != "parquet":
-        write_csv(folder / "table.csv", rows, columns)
+        write_table_csv(folder / "table.csv", rows, columns)
         files += [folder / "table.csv", folder / "columns.json"]
     write_arrays(folder / "poses.npz", arrays)
     return [*files, folder / "poses.npz"]

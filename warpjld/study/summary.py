@@ -10,9 +10,9 @@ from typing import Any
 
 import numpy as np
 
+from warpjld.files.whole_file import whole_file
 from warpjld.study.rates import Rate
 from warpjld.tables.columns import Column
-from warpjld.whole_file import whole_file
 
 __all__ = ["write_summary"]
 

@@ -9,10 +9,10 @@ from pathlib import Path
 from typing import Any
 
 from warpjld.errors import MissingExtraError
+from warpjld.files.whole_file import whole_file
 from warpjld.tables.columns import Column
-from warpjld.whole_file import whole_file
 
-__all__ = ["read_table", "require_parquet", "write_csv", "write_parquet"]
+__all__ = ["read_table", "require_parquet", "write_parquet", "write_table_csv"]
 
 _PURPOSE = "a Parquet table"
 
@@ -42,7 +42,7 @@ def write_parquet(path: Path, rows: Sequence[dict[str, Any]], columns: Sequence[
         pq.write_table(pa.Table.from_arrays(arrays, schema=pa.schema(fields)), part, compression="zstd")
 
 
-def write_csv(
+def write_table_csv(
     path: Path, rows: Sequence[dict[str, Any]], columns: Sequence[Column], *, described: str = "columns.json"
 ) -> None:
     """Write a CSV file (UTF-8, one header line, missing values empty), and a JSON file beside it that describes it."""

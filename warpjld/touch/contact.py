@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from warpjld.covering.covering import Covering
     from warpjld.grasp.distance import ObjectSet
     from warpjld.grasp.objects import GraspObject, Places
-    from warpjld.touch.limit import Closed
+    from warpjld.touch.limit import LimitedDigit
     from warpjld.touch.touch import Touch, Touched
 
 __all__ = ["SkinContact"]
@@ -33,7 +33,7 @@ class SkinContact:
     def __init__(self, covering: Covering, *, limits: bool) -> None:
         self._covering = covering
         self._limits = limits
-        self._closed: dict[tuple[str, int], Closed] = {}
+        self._closed: dict[tuple[str, int], LimitedDigit] = {}
         self._deep: set[tuple[str, int]] = set()
         self._deepest: dict[str, tuple[Touched, Poses]] = {}
         self._objects: dict[int, ObjectSet] = {}

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from scipy.sparse import csr_array
 from scipy.spatial import cKDTree
 
-from warpjld.rotations import rotate, unit
+from warpjld.geometry.rotations import rotate, unit
 from warpjld.skeleton.kinematics import Poses
 from warpjld.touch.frame import FULL, NONE, SHARE
 from warpjld.touch.patches import Patches, segment_distance

@@ -11,10 +11,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from warpjld.errors import InputError
+from warpjld.geometry.normals import vertex_normals
+from warpjld.geometry.rotations import unit
 from warpjld.grasp.distance import ObjectSet
 from warpjld.grasp.objects import Places
-from warpjld.normals import vertex_normals
-from warpjld.rotations import unit
 from warpjld.touch.frame import SHARE, fade
 from warpjld.touch.touch import Touch, Touched
 

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from warpjld.covering.intersections import crossing_faces
-from warpjld.rotations import conjugate, multiply, rotate
+from warpjld.geometry.rotations import conjugate, multiply, rotate
 from warpjld.skeleton.digits import digit_joints
 from warpjld.skeleton.kinematics import Poses, vertical_flexion
 from warpjld.touch.frame import Overlaps
@@ -20,7 +20,7 @@ from warpjld.touch.touch import Touch
 if TYPE_CHECKING:
     from warpjld.covering.covering import Covering
 
-__all__ = ["Closed", "close_until_touch"]
+__all__ = ["LimitedDigit", "close_until_touch"]
 
 _ALLOWED = 0.5  # of what skin can give way to: what is left after parting then bulges little
 _BESIDE = 0.4  # how much overlaps of two digits count: beside one another they overlap however far they open
@@ -32,7 +32,7 @@ _STILL = 1e-6  # rad: a digit that is bent less cannot be opened
 
 
 @dataclass(frozen=True)
-class Closed:
+class LimitedDigit:
     """A digit that was closed less than its pose says.
 
     Attributes:
@@ -54,7 +54,9 @@ class Closed:
     crosses: bool
 
 
-def close_until_touch(covering: Covering, poses: Poses, touch: Touch, *, first: int = 0) -> tuple[Poses, list[Closed]]:
+def close_until_touch(
+    covering: Covering, poses: Poses, touch: Touch, *, first: int = 0
+) -> tuple[Poses, list[LimitedDigit]]:
     """Poses whose digits are bent only as far as they touch.
 
     The joints of a digit turn back together, by one share of their rotation from rest: as little as makes its deepest
@@ -70,7 +72,7 @@ def close_until_touch(covering: Covering, poses: Poses, touch: Touch, *, first: 
         first: Number of the first frame, for what is told.
     """
     digits = _digits(covering)
-    told: list[Closed] = []
+    told: list[LimitedDigit] = []
     if not digits:
         return poses, told
     searched = [_block(covering, poses[k : k + _BLOCK], touch, digits) for k in range(0, len(poses), _BLOCK)]
@@ -83,7 +85,9 @@ def close_until_touch(covering: Covering, poses: Poses, touch: Touch, *, first: 
         for f in np.flatnonzero((share < 1.0) | stuck).tolist():
             flexion = float(np.degrees(limited.flexion[f, digit.joints].sum()))
             name = covering.fans[int(other[f])].name if other[f] >= 0 else ""
-            told.append(Closed(digit.name, first + f, float(depth[f]), float(share[f]), flexion, name, bool(stuck[f])))
+            told.append(
+                LimitedDigit(digit.name, first + f, float(depth[f]), float(share[f]), flexion, name, bool(stuck[f]))
+            )
     return limited, told
 
 

@@ -12,7 +12,7 @@ from scipy.sparse import csr_array
 from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
-from warpjld.normals import vertex_normals
+from warpjld.geometry.normals import vertex_normals
 
 if TYPE_CHECKING:
     from warpjld.covering.covering import Covering

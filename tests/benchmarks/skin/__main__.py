@@ -26,7 +26,7 @@ from tests.benchmarks.skin.poses import POSES, pose
 from tests.benchmarks.skin.rigs import RIGS, load
 from tests.benchmarks.skin.sheet import draw_sheet
 from tests.benchmarks.skin.summary import summary
-from warpjld.quiet import silence_warp
+from warpjld.runtime.quiet import silence_warp
 
 _COLUMNS = ("rig", "pose", "method", *(f.name for f in fields(Measured)), "ms")
 

@@ -39,7 +39,7 @@ def worse(before: Measured, after: Measured) -> list[str]:
 def main(rigs: str) -> None:
     """Print a line of every rig and pose in Markdown: each measure before and after."""
     from warpjld.covering.calibrate import calibrate
-    from warpjld.quiet import silence_warp
+    from warpjld.runtime.quiet import silence_warp
 
     silence_warp()
     print("| rig | pose | volume % | limb % | folded | contact | roughness | least | largest | worse |")

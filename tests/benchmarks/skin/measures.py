@@ -11,7 +11,7 @@ from tests.benchmarks.skin.poses import Posed
 from tests.benchmarks.skin.rigs import BenchRig
 from warpjld.covering.intersections import Parts, crossing_faces
 from warpjld.covering.quality import edge_stretch, enclosed_volume, unique_edges
-from warpjld.rotations import rotate, unit
+from warpjld.geometry.rotations import rotate, unit
 from warpjld.skeleton import Skeleton
 from warpjld.skeleton.hand import DIGITS
 from warpjld.skeleton.kinematics import Poses

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from warpjld.covering.pose_sets import CURL
-from warpjld.rotations import about, conjugate, multiply
+from warpjld.geometry.rotations import about, conjugate, multiply
 from warpjld.skeleton import CHANNELS, Poses, Skeleton, poses_from_angles
 from warpjld.skeleton.actor import body_facing
 from warpjld.skeleton.hand import DIGITS

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from tests.benchmarks.skin.poses import pose
 from tests.benchmarks.skin.rigs import BenchRig
 from warpjld.render.camera import Camera
-from warpjld.render.scene import Image, Scene
+from warpjld.render.scene import Image, SceneRenderer
 from warpjld.render.sheet import grid
 from warpjld.skeleton import Skeleton
 from warpjld.skeleton.actor import body_facing
@@ -60,7 +60,7 @@ def _row(bench: BenchRig, name: str, surfaces: list[NDArray[np.floating]]) -> li
         # from the front and the moved side, a little above
         camera = Camera.view("three-quarter", shown, forward=forward, up=up, side="right")
     camera = camera.closer(0.8)
-    with Scene(faces, camera, size=_SIZE) as scene:
+    with SceneRenderer(faces, camera, size=_SIZE) as scene:
         return [scene.draw(points) for points in surfaces]
 
 

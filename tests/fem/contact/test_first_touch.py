@@ -6,15 +6,15 @@ import numpy as np
 import pytest
 
 from tests.fem.contact.bodies import named, together
-from warpjld.fem import LinearElastic, Loads, Status, box_hexes, prescribe
-from warpjld.fem.contact import Pair, Touch, press
+from warpjld.fem import LinearElastic, Loads, SolveStatus, box_hexes, prescribe
+from warpjld.fem.contact import Pair, PairContact, press
 from warpjld.fem.contact.obstacles.solids import Plane
 
 RUBBER = LinearElastic(1e6, 0.3)
 FRICTION = 0.3
 
 
-def dragged(drag: float, steps: int, *, mesh: bool = False, load: float = 0.0, along: int = 3) -> Touch:
+def dragged(drag: float, steps: int, *, mesh: bool = False, load: float = 0.0, along: int = 3) -> PairContact:
     """A block .01 m above a floor, brought down by .02 m, or by a load, while its top is dragged along."""
     floor = 0.1 if mesh else 0.0
     parts = {"up": (named(box_hexes((0.1, 0.1, 0.05), (along, along, 2)), "up", (0.1, 0.1, floor + 0.01)), RUBBER)}
@@ -27,7 +27,7 @@ def dragged(drag: float, steps: int, *, mesh: bool = False, load: float = 0.0, a
     pair = Pair("up.z-", "low.z+" if mesh else Plane((0, 0, 0), (0, 0, 1)), friction=FRICTION)
     loads = Loads(traction={"up.z+": (0, 0, -load / 0.01)}) if load else None
     found = press(body, held, [pair], loads, times=np.arange(1, steps + 1) / steps)
-    assert found.status is Status.CONVERGED
+    assert found.status is SolveStatus.CONVERGED
     return found.last.touches[0]
 
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from tests.fem.contact.bodies import FREE
-from warpjld.fem import Body, LinearElastic, Loads, Status, box_hexes
+from warpjld.fem import Body, LinearElastic, Loads, SolveStatus, box_hexes
 from warpjld.fem.contact import Pair, press
 from warpjld.fem.contact.obstacles.solids import Plane
 
@@ -30,7 +30,7 @@ def test_friction_of_the_slope_and_a_hundredth_more_holds(block: Body) -> None:
 def test_a_hundredth_less_slides(block: Body) -> None:
     pair = Pair("z-", Plane((0, 0, 0), (0, 0, 1)), friction=0.99 * np.tan(SLOPE), name="slope")
     found = press(block, FREE, [pair], Loads(gravity=tuple(GRAVITY)), times=(0.5, 1.0), check=False)
-    assert found.status is Status.SLIDING
+    assert found.status is SolveStatus.SLIDING
     assert "slope" in found.message
 
 
@@ -41,7 +41,7 @@ def test_steps_are_halved_as_often_as_asked(block: Body, halvings: int | None, t
     found = press(
         block, FREE, [pair], Loads(gravity=tuple(GRAVITY)), halvings=halvings, check=False, progress=lines.append
     )
-    assert found.status is Status.SLIDING
+    assert found.status is SolveStatus.SLIDING
     assert sum("halving" in line for line in lines) == told
 
 
@@ -88,7 +88,7 @@ def test_a_sliding_block_is_pulled_by_mu_times_its_weight(block: Body) -> None:
 def test_a_body_that_nothing_touches_is_named(block: Body) -> None:
     away = Pair("z-", Plane((0, 0, -1.0), (0, 0, 1)), friction=0.5)
     found = press(block, FREE, [away], Loads(gravity=(9.81, 0.0, 0.0)), check=False)
-    assert found.status is Status.UNHELD
+    assert found.status is SolveStatus.UNHELD
     assert found.message.endswith("nothing holds 'body'")
 
 
@@ -98,5 +98,5 @@ def test_a_body_that_swings_on_one_held_point_is_told_so(block: Body) -> None:
     away = Pair("z-", Plane((0, 0, -9.0), (0, 0, 1)), friction=0.5)
     corner = prescribe(block.mesh, np.array([0]), x=0.0, y=0.0, z=0.0)
     found = press(block, corner, [away], Loads(gravity=(9.81, 0.0, 0.0)), check=False)
-    assert found.status is Status.UNHELD
+    assert found.status is SolveStatus.UNHELD
     assert found.message.endswith("the one prescribed point of 'body' cannot hold it")

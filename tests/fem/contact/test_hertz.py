@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from tests.fem.contact.bodies import lid, named, together
 from warpjld.fem import Body, HexMesh, LinearElastic, Prescribed, box_hexes, prescribe
-from warpjld.fem.contact import ContactInstant, Pair, Touch, press
+from warpjld.fem.contact import ContactInstant, Pair, PairContact, press
 from warpjld.fem.contact.interface.contact_area import beyond, held_beyond
 
 YOUNG, POISSON = 1.0, 0.3
@@ -108,7 +108,7 @@ def test_the_border_of_what_sticks_is_found_from_inside() -> None:
     assert held_beyond(np.array([1.0]), np.array([0.0]))[0] == 0.0
 
 
-def spheres() -> Iterator[tuple[float, Touch]]:
+def spheres() -> Iterator[tuple[float, PairContact]]:
     """Two spheres whose meshes do not match, pressed together by 0.0012 to 0.006 radii: approaches and touches."""
     below, above = graded(14), graded(16)
     above = replace(above, nodes=above.nodes[:, [1, 0, 2]] * [1.0, 1.0, -1.0])  # turned over about x = y

@@ -7,7 +7,17 @@ import pytest
 
 from tests.fem.contact.bodies import FREE, lid, named, symmetric, together
 from warpjld.errors import InputError
-from warpjld.fem import Body, LinearElastic, Loads, NeoHooke, Status, ball_hexes, box_hexes, cylinder_hexes, prescribe
+from warpjld.fem import (
+    Body,
+    LinearElastic,
+    Loads,
+    NeoHooke,
+    SolveStatus,
+    ball_hexes,
+    box_hexes,
+    cylinder_hexes,
+    prescribe,
+)
 from warpjld.fem.assembly.block_matrix import BlockMatrix, IndefiniteError
 from warpjld.fem.contact import Bond, ContactError, Exclusion, Pair, press
 from warpjld.fem.contact.obstacles.solids import Plane, Sphere
@@ -107,7 +117,7 @@ def test_a_body_squeezed_to_nothing_says_so(travel: float, message: str) -> None
     with pytest.raises(ContactError, match=message) as caught:
         press(Body(mesh, NeoHooke(1.0, 0.3)), symmetric(mesh), [Pair("outer", lid(travel))], times=(0.2, 1.0))
     solution = caught.value.solution
-    assert solution.status is not Status.CONVERGED
+    assert solution.status is not SolveStatus.CONVERGED
     assert solution.last.time == 0.2
 
 
@@ -115,7 +125,7 @@ def test_stops_as_asked(body: Body) -> None:
     pair = Pair("outer", lid(0.1))
     enough = lambda instant: "enough" if instant.touches[0].normal_force > 0.003 else None  # noqa: E731
     found = press(body, symmetric(body.mesh), [pair], times=np.arange(1, 11) / 10, watch=enough)
-    assert found.status is Status.STOPPED
+    assert found.status is SolveStatus.STOPPED
     assert found.message == "enough"
     assert [i.touches[0].normal_force > 0.003 for i in found.instants].index(True) == len(found.instants) - 1
 
@@ -148,7 +158,7 @@ def test_overlap_of_sides_that_are_both_prescribed(beside: float) -> None:
     held = prescribe(mesh, "z-", x=0.0, y=0.0, z=0.0) + prescribe(mesh, above, x=0.0, y=0.0, z=0.0)
     pair = Pair("z+", lid(0.1, height=0.5), name="lid")
     found = press(Body(mesh, NeoHooke(1.0, 0.3)), held, [pair], check=False)
-    assert found.status is Status.BLOCKED
+    assert found.status is SolveStatus.BLOCKED
     assert "contact 'lid': both sides are prescribed and overlap by 0.1 m" in found.message
     assert len(found.steps) == 0
 
@@ -164,7 +174,7 @@ def test_what_starts_inside_an_object_that_does_not_give_way() -> None:
     assert parted.last.touches[0].normal_force > 0.0
     bone = outside + prescribe(mesh, "inner", x=0.0, y=0.0, z=0.0)
     found = press(body, bone, [Pair("inner", Sphere((0, 0, 0.25), 0.6))], check=False)
-    assert found.status is Status.BLOCKED
+    assert found.status is SolveStatus.BLOCKED
     assert "both sides are prescribed" in found.message
 
 
@@ -182,7 +192,7 @@ def test_a_load_that_makes_a_block_give_way_is_named() -> None:
         times=(0.4, 1.0),
         check=False,
     )
-    assert found.status in {Status.INDEFINITE, Status.SLIDING}
+    assert found.status in {SolveStatus.INDEFINITE, SolveStatus.SLIDING}
     assert "unstable" in found.message or "slides" in found.message
     assert found.last.time == 0.4
     assert found.last.touches[0].force[2] == pytest.approx(0.16, rel=1e-3)
@@ -207,7 +217,7 @@ def test_a_stiffness_that_is_not_positive_definite_is_damped_for_a_step() -> Non
             except IndefiniteError:
                 if not damping.more():
                     break
-        assert (done is not None and done.status is Status.CONVERGED and done.x @ right > 0.0) == solvable
+        assert (done is not None and done.status is SolveStatus.CONVERGED and done.x @ right > 0.0) == solvable
         assert (damping.share > max(0.0, less - 1.0)) == (less > 1.0)
     damping.begin()
     assert damping.lend(given) is given

@@ -15,7 +15,7 @@ import pytest
 from numpy.typing import NDArray
 
 from warpjld.fem import Body, HexMesh, LinearElastic, Prescribed, box_hexes, prescribe
-from warpjld.fem.contact import Pair, Touch, press
+from warpjld.fem.contact import Pair, PairContact, press
 from warpjld.fem.contact.obstacles.solids import Plane
 
 YOUNG, POISSON, FRICTION = 1.0, 0.49, 0.3
@@ -61,7 +61,7 @@ def aside(time: float) -> float:
 
 
 @cache
-def pushed(n: int = 10, grading: float = 3.0) -> list[Touch]:
+def pushed(n: int = 10, grading: float = 3.0) -> list[PairContact]:
     mesh = graded(n, grading)
     held = prescribe(mesh, "y-", y=0.0)
     far = np.unique(np.concatenate([mesh.node_set(name) for name in ("x-", "x+", "y+", "z-")]))

@@ -13,7 +13,7 @@ from warpjld.fem import (
     LinearElastic,
     NeoHooke,
     Prescribed,
-    Status,
+    SolveStatus,
     box_hexes,
     finger_hexes,
     merge,
@@ -46,7 +46,7 @@ def _press(ratio: float, **options: bool) -> ContactSolution:
 @pytest.mark.parametrize("ratio", [0.1, 0.5, 1.0])
 def test_it_never_settles_for_an_object_as_stiff_as_the_flesh(ratio):
     solution = _press(ratio)
-    assert solution.status in (Status.MAX_ITERATIONS, Status.STAGNATED)
+    assert solution.status in (SolveStatus.MAX_ITERATIONS, SolveStatus.STAGNATED)
     assert "did not settle" in solution.message
 
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from tests.fem.contact.bodies import named, together
-from warpjld.fem import LinearElastic, Loads, NeoHooke, Prescribed, Status, box_hexes, prescribe
+from warpjld.fem import LinearElastic, Loads, NeoHooke, Prescribed, SolveStatus, box_hexes, prescribe
 from warpjld.fem.contact import ContactSolution, Pair, press
 from warpjld.fem.contact.obstacles.solids import Box
 
@@ -29,7 +29,7 @@ def pressed(
 
 
 def one(found: ContactSolution) -> float:
-    assert found.status is Status.CONVERGED, found.message
+    assert found.status is SolveStatus.CONVERGED, found.message
     return found.last.touches[0].normal_force
 
 
@@ -66,7 +66,7 @@ def test_overlap_that_the_pair_s_faces_do_not_see_is_named() -> None:
     body = together({"low": (lower, RUBBER), "up": (upper, RUBBER)})
     held = prescribe(body.mesh, "low.z-", x=0, y=0, z=0) + prescribe(body.mesh, "up.z+", x=-0.8, y=0, z=0)
     found = press(body, held, [Pair("up.z-", "low.z+", name="blocks")], check=False)
-    assert found.status is Status.PASSED
+    assert found.status is SolveStatus.PASSED
     assert "contact 'blocks'" in found.message
 
 
@@ -81,7 +81,7 @@ def test_a_block_thrown_through_another_in_one_step_meets_it() -> None:
         return low + prescribe(body.mesh, "up.z+", x=0, y=0, z=-2.0 * time)
 
     found = press(body, known, [Pair("up.z-", "low.z+", name="blocks")], times=(1.0,), check=False)
-    assert found.status is not Status.CONVERGED or found.last.touches[0].normal_force > 0.0
+    assert found.status is not SolveStatus.CONVERGED or found.last.touches[0].normal_force > 0.0
 
 
 def test_a_thin_obstacle_is_not_jumped_over() -> None:
@@ -91,7 +91,7 @@ def test_a_thin_obstacle_is_not_jumped_over() -> None:
     held = prescribe(block.mesh, "up.z+", x=0, y=0, z=-0.05)
     found = press(block, held, [Pair("up.z-", plate)], check=False)
     expected = press(block, held, [Pair("up.z-", plate)], times=np.linspace(0.05, 1.0, 20)).last
-    assert found.status is Status.CONVERGED
+    assert found.status is SolveStatus.CONVERGED
     assert found.last.touches[0].normal_force == pytest.approx(expected.touches[0].normal_force, rel=1e-3)
 
 
@@ -102,5 +102,5 @@ def test_bodies_that_go_along_together_are_not_slowed_down() -> None:
     body = together({"low": (lower, RUBBER), "up": (upper, RUBBER)})
     held = prescribe(body.mesh, "low.z-", x=10, y=0, z=0) + prescribe(body.mesh, "up.z+", x=10, y=0, z=0)
     found = press(body, held, [Pair("up.z-", "low.z+")], loads=Loads(), check=False)
-    assert found.status is Status.CONVERGED
+    assert found.status is SolveStatus.CONVERGED
     assert len(found.steps) == 1

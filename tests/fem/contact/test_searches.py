@@ -17,7 +17,7 @@ from warpjld.fem.contact.solver.contact_newton import ContactNewton
 from warpjld.fem.contact.solver.contact_system import LoadStep
 from warpjld.fem.contact.solver.newton_state import NewtonState
 from warpjld.fem.load.loads import Loads
-from warpjld.fem.solver.krylov import Status
+from warpjld.fem.solver.krylov import SolveStatus
 
 
 class Pressed:
@@ -42,7 +42,7 @@ class Pressed:
 def test_a_search_begins_where_the_least_force_is_left_over(monkeypatch: pytest.MonkeyPatch) -> None:
     case = Pressed()
     status, known = case.find()
-    assert status is Status.CONVERGED
+    assert status is SolveStatus.CONVERGED
     begun: list[np.ndarray] = []
     usual = ContactNewton._search
 
@@ -54,7 +54,7 @@ def test_a_search_begins_where_the_least_force_is_left_over(monkeypatch: pytest.
     wild = known.displacement + 0.05 * np.sin(7.0 * np.arange(case.body.degrees))
     near = 0.98 * known.displacement
     status, found = case.find(wild, near)
-    assert status is Status.CONVERGED
+    assert status is SolveStatus.CONVERGED
     assert len(begun) == 1
     np.testing.assert_array_equal(begun[0], near)
     np.testing.assert_allclose(found.displacement, known.displacement, atol=1e-5)
@@ -67,10 +67,10 @@ def test_where_guesses_are_in_vain_it_begins_at_the_last_equilibrium(monkeypatch
 
     def search(self: ContactNewton, state: NewtonState, step: LoadStep) -> Any:
         begun.append(state.u.copy())
-        return usual(self, state, step) if len(begun) > 1 else (Status.MAX_ITERATIONS, None)
+        return usual(self, state, step) if len(begun) > 1 else (SolveStatus.MAX_ITERATIONS, None)
 
     monkeypatch.setattr(ContactNewton, "_search", search)
-    assert case.find(case.start + 1e-3)[0] is Status.CONVERGED
+    assert case.find(case.start + 1e-3)[0] is SolveStatus.CONVERGED
     np.testing.assert_array_equal(begun[1], case.start)
 
 
@@ -88,7 +88,7 @@ def test_a_search_that_never_comes_near_is_ended(monkeypatch: pytest.MonkeyPatch
     monkeypatch.setattr(NewtonState, "assemble", assemble)
     status, found = case.find()
     assert found is None
-    assert status is Status.MAX_ITERATIONS
+    assert status is SolveStatus.MAX_ITERATIONS
     assert looked == list(range(11))
 
 

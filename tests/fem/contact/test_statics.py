@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from tests.fem.contact.bodies import FREE
-from warpjld.fem import Body, LinearElastic, Loads, Status, box_hexes
+from warpjld.fem import Body, LinearElastic, Loads, SolveStatus, box_hexes
 from warpjld.fem.contact import ContactSolution, Pair, press
 from warpjld.fem.contact.interface.contact_interface import interfaces_of
 from warpjld.fem.contact.obstacles.solids import Plane
@@ -31,7 +31,7 @@ def on_incline(friction: float, share: float) -> ContactSolution:
 @pytest.mark.parametrize("friction", [0.1, 0.3, 0.6, 0.9, 1.2])
 def test_below_the_limit_of_the_slope_it_stays(friction: float, share: float) -> None:
     found = on_incline(friction, share)
-    assert found.status is Status.CONVERGED, found.message
+    assert found.status is SolveStatus.CONVERGED, found.message
     touch = found.last.touches[0]
     pulled = np.linalg.norm(touch.force[:2]) / touch.normal_force
     assert pulled == pytest.approx(share * friction, rel=2e-3)

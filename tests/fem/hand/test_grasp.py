@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from warpjld.covering import bind
-from warpjld.fem import Body, NeoHooke, Status, ball_hexes, merge, prescribe
+from warpjld.fem import Body, NeoHooke, SolveStatus, ball_hexes, merge, prescribe
 from warpjld.fem.contact import ContactInstant, Pair, press
 from warpjld.fem.contact.obstacles.solids import Sphere
 from warpjld.fem.hand import FleshHand, FleshMotion, build_flesh_hand, hand_laws, motion_of
@@ -87,7 +87,7 @@ def test_rigid_ball(closing: FleshMotion) -> None:
         watch=watch,
         check=False,
     )
-    assert found.status in (Status.CONVERGED, Status.STOPPED)
+    assert found.status in (SolveStatus.CONVERGED, SolveStatus.STOPPED)
     assert found.last.time >= 3.2
     for instant in found.instants:
         assert instant.touches[0].penetration < 1e-3 * 0.003
@@ -131,7 +131,7 @@ def test_deformable_ball(closing: FleshMotion) -> None:
         guess=closing.guess,
         check=False,
     )
-    assert found.status is Status.CONVERGED
+    assert found.status is SolveStatus.CONVERGED
     balanced(hand, found.last)
     touch = found.last.touches[0]
     both = touch.nodal.sum(axis=0)

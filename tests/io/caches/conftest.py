@@ -8,8 +8,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from warpjld.geometry.surface import Surface, weld_surface
 from warpjld.io.caches import Cache, open_cache
-from warpjld.surface import Surface, weld_surface
 
 FRAMES, RATE, START = 7, 24.0, 3
 

@@ -12,9 +12,9 @@ import numpy as np
 import pytest
 
 from warpjld.errors import InputError, MissingExtraError
+from warpjld.files.whole_file import part_of
+from warpjld.geometry.surface import Surface
 from warpjld.io.caches import Cache, open_cache
-from warpjld.surface import Surface
-from warpjld.whole_file import part_of
 
 pytest.importorskip("alembic3d")
 

@@ -13,8 +13,8 @@ import numpy as np
 import pytest
 
 from warpjld.errors import InputError, WarpjldError
+from warpjld.geometry.surface import Surface
 from warpjld.io.caches import FORMATS, Cache, open_cache
-from warpjld.surface import Surface
 
 every_format = pytest.mark.parametrize("suffix", FORMATS)
 

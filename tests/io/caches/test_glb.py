@@ -11,9 +11,9 @@ import pytest
 import trimesh
 
 from warpjld.errors import InputError
+from warpjld.geometry.surface import Surface
 from warpjld.io.caches import Cache, open_cache
 from warpjld.io.caches.glb import MAX_FRAMES
-from warpjld.surface import Surface
 
 _COMPONENTS = {"SCALAR": 1, "VEC2": 2, "VEC3": 3}
 

@@ -4,8 +4,8 @@ from collections.abc import Callable
 
 import numpy as np
 
+from warpjld.geometry.surface import Surface
 from warpjld.io.caches import Cache
-from warpjld.surface import Surface
 
 
 def test_holds_the_source_mesh(export: Callable[[str], Cache], surface: Surface, clip: np.ndarray) -> None:

@@ -6,8 +6,8 @@ from pathlib import Path
 import numpy as np
 import trimesh
 
+from warpjld.geometry.surface import Surface
 from warpjld.io.caches import Cache, open_cache
-from warpjld.surface import Surface
 
 
 def test_one_numbered_file_a_frame(export: Callable[[str], Cache], surface: Surface, clip: np.ndarray) -> None:

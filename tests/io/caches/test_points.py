@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 import trimesh
 
+from warpjld.geometry.surface import Surface
 from warpjld.io.caches import Cache
-from warpjld.surface import Surface
 
 
 def test_pc2_layout(export: Callable[[str], Cache], surface: Surface, clip: np.ndarray) -> None:

@@ -8,8 +8,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from warpjld.geometry.surface import Surface
 from warpjld.io.caches import Cache, open_cache
-from warpjld.surface import Surface
 
 pytest.importorskip("pxr")
 
@@ -94,7 +94,7 @@ import sys, numpy as np
 sys.modules["pxr"] = None
 from warpjld.errors import MissingExtraError
 from warpjld.io.caches import open_cache
-from warpjld.surface import weld_surface
+from warpjld.geometry.surface import weld_surface
 surface = weld_surface([[0, 0, 0], [1, 0, 0], [0, 1, 0]], [[0, 1, 2]])
 try:
     open_cache("never.usdc", surface, frames=1, rate=25).__enter__()

@@ -251,8 +251,8 @@ def test_ticks_are_not_frames(tmp_path: Path) -> None:
 
 
 def vertex_cache(path: Path) -> Path:
+    from warpjld.geometry.surface import weld_surface
     from warpjld.io.caches import open_cache
-    from warpjld.surface import weld_surface
 
     surface = weld_surface(np.eye(3), [[0, 1, 2]])
     with open_cache(path, surface, frames=3, rate=24) as cache:

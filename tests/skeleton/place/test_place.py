@@ -11,8 +11,8 @@ from click.testing import CliRunner
 
 from warpjld.cli.place import command
 from warpjld.errors import InputError
+from warpjld.geometry.rotations import unit
 from warpjld.io import load_rig
-from warpjld.rotations import unit
 from warpjld.skeleton.actor import actor_skeleton
 from warpjld.skeleton.actor_points import ACTOR_POINTS
 from warpjld.skeleton.hand import hand_joint_names

@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from warpjld.skeleton.recognise.flesh import Flesh
+from warpjld.skeleton.recognise.flesh import JointFlesh
 from warpjld.skeleton.recognise.recognise import recognise
 from warpjld.skeleton.recognise.tree import SourceTree
 
@@ -131,4 +131,4 @@ def test_ends_of_a_thumb_are_no_knuckles():
 def test_bare_joints_of_a_flat_tree_are_not_dead():
     made = hand("tips", [1.0] * 40, "numbers")
     flat = SourceTree(made.tree.names, np.full(len(made.tree), -1), made.tree.frames)
-    assert not Flesh(flat, made.shares).dead.any()
+    assert not JointFlesh(flat, made.shares).dead.any()

@@ -7,8 +7,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from warpjld.geometry.rotations import unit
 from warpjld.io import load_rig
-from warpjld.rotations import unit
 from warpjld.skeleton.recognise.placing import check_placing
 
 

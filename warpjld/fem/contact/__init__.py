@@ -3,7 +3,7 @@
 from warpjld.fem.contact.interface.pairs import Bond, Exclusion, Pair
 from warpjld.fem.contact.obstacles.obstacle import ClosestPoints, Obstacle
 from warpjld.fem.contact.press import press
-from warpjld.fem.contact.results.contact_solution import ContactError, ContactInstant, ContactSolution, Touch
+from warpjld.fem.contact.results.contact_solution import ContactError, ContactInstant, ContactSolution, PairContact
 
 __all__ = [
     "Bond",
@@ -14,6 +14,6 @@ __all__ = [
     "Exclusion",
     "Obstacle",
     "Pair",
-    "Touch",
+    "PairContact",
     "press",
 ]

@@ -15,8 +15,8 @@ from warpjld.fem.contact.solver.load_steps import Guess, LoadSteps
 from warpjld.fem.load.loads import Loads
 from warpjld.fem.load.prescribed import Prescribed
 from warpjld.fem.rotation import warn_of_rotation
-from warpjld.fem.solver.krylov import Status
-from warpjld.threads import one_blas_thread
+from warpjld.fem.solver.krylov import SolveStatus
+from warpjld.runtime.threads import one_blas_thread
 
 __all__ = ["press"]
 
@@ -82,7 +82,7 @@ def press(
         way = LoadSteps(body, prescribed, list(pairs), loads, wanted, after, tolerance, penetration, guess, halvings)
         solution = way.run(watch, progress)
     warn_of_rotation(body, solution.last.displacement)
-    if check and not solution.converged and solution.status is not Status.STOPPED:
+    if check and not solution.converged and solution.status is not SolveStatus.STOPPED:
         raise ContactError(solution)
     return solution
 

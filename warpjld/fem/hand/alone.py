@@ -28,7 +28,7 @@ from warpjld.fem.hand.flesh_hand import FleshHand
 from warpjld.fem.hand.motion import halfway
 from warpjld.fem.load.loads import Loads
 from warpjld.fem.load.prescribed import Prescribed
-from warpjld.fem.solver.krylov import Status
+from warpjld.fem.solver.krylov import SolveStatus
 from warpjld.skeleton.kinematics import Poses
 
 __all__ = ["FleshAlone", "Untouched"]
@@ -190,9 +190,9 @@ class FleshAlone:
         while True:
             try:
                 done = self._solver.solve(self._damping.lend(tangent.stiffness), self._free, residual)
-                if done.status is Status.CONVERGED:
+                if done.status is SolveStatus.CONVERGED:
                     return done.x
-                if done.status is not Status.INDEFINITE:
+                if done.status is not SolveStatus.INDEFINITE:
                     return None
             except IndefiniteError:
                 pass

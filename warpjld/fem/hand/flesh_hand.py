@@ -17,10 +17,10 @@ from warpjld.fem.hand.regions import hand_regions
 from warpjld.fem.hand.weights import bone_weights
 from warpjld.fem.load.prescribed import Prescribed
 from warpjld.fem.mesh.hexmesh import HexMesh
+from warpjld.geometry.surface import Surface
 from warpjld.rig import Rig
 from warpjld.skeleton.kinematics import Poses, rest_poses
 from warpjld.skeleton.tree import Skeleton
-from warpjld.surface import Surface
 
 __all__ = ["FleshHand", "build_flesh_hand"]
 

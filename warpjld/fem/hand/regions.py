@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 from warpjld.fem.hand.labels import segment_name
 from warpjld.fem.mesh.envelope import Envelope
 from warpjld.fem.mesh.hexmesh import HexMesh
+from warpjld.geometry.surface import Surface
 from warpjld.skeleton.hand import DIGITS
-from warpjld.surface import Surface
 
 __all__ = ["hand_regions", "shares_of_skin"]
 

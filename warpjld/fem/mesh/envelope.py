@@ -10,8 +10,8 @@ from numpy.typing import ArrayLike
 from warpjld.errors import InputError
 from warpjld.fem.arrays import Array, Ints, Ints32
 from warpjld.fem.launch import shared
-from warpjld.rotations import unit
-from warpjld.threads import in_threads, threads_for
+from warpjld.geometry.rotations import unit
+from warpjld.runtime.threads import in_threads, threads_for
 
 __all__ = ["Envelope", "checked_surface"]
 

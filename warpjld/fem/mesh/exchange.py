@@ -9,7 +9,7 @@ import numpy as np
 from warpjld.errors import InputError, MissingExtraError
 from warpjld.fem.mesh.hexmesh import HexMesh
 
-__all__ = ["read_mesh"]
+__all__ = ["read_volume_mesh"]
 
 _CORNERS = {  # corners of our element, by the corners of theirs
     "hexahedron": [0, 1, 2, 3, 4, 5, 6, 7],
@@ -18,7 +18,7 @@ _CORNERS = {  # corners of our element, by the corners of theirs
 }
 
 
-def read_mesh(path: Path, *, scale: float = 1.0) -> HexMesh:
+def read_volume_mesh(path: Path, *, scale: float = 1.0) -> HexMesh:
     """Read hexahedra, prisms and tetrahedra (the last two as degenerate hexahedra, R96); other cells are left out.
 
     Regions come from ``region``, ``gmsh:physical`` or ``medit:ref`` cell data, where there is one.

@@ -15,7 +15,7 @@ from warpjld.fem.mesh.core import core_of
 from warpjld.fem.mesh.envelope import Envelope
 from warpjld.fem.mesh.hexmesh import HexMesh, elements_of
 from warpjld.fem.mesh.untangle import improve
-from warpjld.rotations import unit
+from warpjld.geometry.rotations import unit
 
 __all__ = ["Fit", "fit_mesh", "mesh_surface_file"]
 

@@ -16,7 +16,7 @@ from warpjld.fem.arrays import Array, Ints, Ints32, Mask, dot, norm
 from warpjld.fem.launch import Launch, shared, threads_of
 from warpjld.fem.mesh.hexmesh import HexMesh
 
-__all__ = ["as_far", "improve", "minimise"]
+__all__ = ["as_far", "improve", "lbfgs"]
 
 
 def improve(
@@ -64,7 +64,7 @@ def improve(
 
     targets = targets / spacing
     start = (nodes / spacing).reshape(-1)
-    improved: Array = minimise(cost, start, rounds=rounds, first_step=0.05).reshape(-1, 3) * spacing
+    improved: Array = lbfgs(cost, start, rounds=rounds, first_step=0.05).reshape(-1, 3) * spacing
     return improved
 
 
@@ -121,7 +121,7 @@ _MEMORY = 10
 _SHORTEST = 1e-10
 
 
-def minimise(cost: Callable[[Array], tuple[float, Array]], start: Array, *, rounds: int, first_step: float) -> Array:
+def lbfgs(cost: Callable[[Array], tuple[float, Array]], start: Array, *, rounds: int, first_step: float) -> Array:
     """A lower point of ``cost``, after at most so many rounds (Nocedal & Wright, algorithm 7.5, Armijo steps).
 
     SciPy's does the same through BLAS, whose threads wait for one another at every dot product of these sizes.

@@ -13,8 +13,8 @@ from warpjld.fem.body import Body
 from warpjld.fem.output.stress import at_nodes, cauchy, mises
 from warpjld.fem.output.vtk import grid_of
 from warpjld.fem.solver.solution import Instant
-from warpjld.rotations import unit
-from warpjld.whole_file import whole_file
+from warpjld.files.whole_file import whole_file
+from warpjld.geometry.rotations import unit
 
 __all__ = ["QUANTITIES", "draw"]
 

@@ -12,7 +12,7 @@ from warpjld.fem.body import Body
 from warpjld.fem.mesh.hexmesh import HexMesh
 from warpjld.fem.output.stress import at_nodes, cauchy, mises
 from warpjld.fem.solver.solution import Instant
-from warpjld.whole_file import whole_file
+from warpjld.files.whole_file import whole_file
 
 __all__ = ["Series", "grid_of", "write_vtu"]
 

@@ -15,7 +15,7 @@ import numpy as np
 from warpjld.errors import InputError
 from warpjld.fem.arrays import Array, Ints, dot, norm
 from warpjld.fem.body import Tangent
-from warpjld.fem.solver.krylov import Status
+from warpjld.fem.solver.krylov import SolveStatus
 from warpjld.fem.solver.problem import Problem
 from warpjld.fem.solver.solution import Instant, Solution
 
@@ -77,9 +77,9 @@ def follow(
             progress(f"load {factor:.4g}: {instant.newton} Newton steps, residual {instant.residual:.1e}")
         if full:
             text = "" if len(reached) < 2 else _turned([i.factor for i in reached])
-            return Solution(Status.CONVERGED, tuple(reached[1:]), text or "converged", held, problem.loads)
+            return Solution(SolveStatus.CONVERGED, tuple(reached[1:]), text or "converged", held, problem.loads)
     message = f"the path could not be followed to the full load: it got to {factor:.4g}, at most to {limit:.4g} of it"
-    return Solution(Status.MAX_ITERATIONS, tuple(reached[1:] or reached), message, held, problem.loads)
+    return Solution(SolveStatus.MAX_ITERATIONS, tuple(reached[1:] or reached), message, held, problem.loads)
 
 
 def _turned(factors: list[float]) -> str:

@@ -12,12 +12,12 @@ from numpy.typing import NDArray
 
 from warpjld.fem.arrays import Array, dot, norm
 
-__all__ = ["Iteration", "Status", "conjugate_gradients", "minimal_residuals"]
+__all__ = ["Iteration", "SolveStatus", "conjugate_gradients", "minimal_residuals"]
 
 _Operator = Callable[[NDArray[Any]], NDArray[Any]]
 
 
-class Status(Enum):
+class SolveStatus(Enum):
     """How a solve ended; the value is the message for people."""
 
     CONVERGED = "converged"
@@ -47,7 +47,7 @@ class Iteration:
     """
 
     x: NDArray[Any]
-    status: Status
+    status: SolveStatus
     iterations: int
     residual: float
     history: Array
@@ -80,9 +80,9 @@ def conjugate_gradients(
     size = norm(b)
     x = np.zeros_like(b) if start is None else start.copy()
     if not np.isfinite(size):
-        return Iteration(x, Status.NOT_FINITE, 0, float("nan"), np.empty(0))
+        return Iteration(x, SolveStatus.NOT_FINITE, 0, float("nan"), np.empty(0))
     if size == 0.0:
-        return Iteration(np.zeros_like(b), Status.CONVERGED, 0, 0.0, np.empty(0))
+        return Iteration(np.zeros_like(b), SolveStatus.CONVERGED, 0, 0.0, np.empty(0))
     r = b - product(x) if start is not None else b.copy()
     history: list[float] = []
     status = _cg(product, precondition, b, x, r, size, history, tolerance, iterations, patience)
@@ -101,7 +101,7 @@ def _cg(
     tolerance: float,
     iterations: int,
     patience: int,
-) -> Status:
+) -> SolveStatus:
     """Iterations from x with the residual r, both written over; the history grows by one each."""
     best, since, last_true, fresh = np.inf, 0, np.inf, True
     p = q = r
@@ -109,24 +109,24 @@ def _cg(
     now = norm(r) / size
     while True:
         if not np.isfinite(now):
-            return Status.NOT_FINITE
+            return SolveStatus.NOT_FINITE
         if now <= tolerance:
             r = b - product(x)
             now = norm(r) / size
             if now <= tolerance * 1.0000001:
-                return Status.CONVERGED
+                return SolveStatus.CONVERGED
             if now > 0.5 * last_true:
-                return Status.STAGNATED
+                return SolveStatus.STAGNATED
             last_true, fresh = now, True
         if len(history) >= iterations:
-            return Status.MAX_ITERATIONS
+            return SolveStatus.MAX_ITERATIONS
         best, since = (now, 0) if now < 0.999 * best else (best, since + 1)
         if since > patience:
-            return Status.STAGNATED
+            return SolveStatus.STAGNATED
         z = precondition(r)
         before, rz = rz, dot(r, z)
         if not rz > 0.0:
-            return Status.INDEFINITE if np.isfinite(rz) else Status.NOT_FINITE
+            return SolveStatus.INDEFINITE if np.isfinite(rz) else SolveStatus.NOT_FINITE
         if fresh:
             p, fresh = z.copy(), False
         else:
@@ -135,7 +135,7 @@ def _cg(
         q = product(p)
         curvature = dot(p, q)
         if not curvature > 0.0:
-            return Status.INDEFINITE if np.isfinite(curvature) else Status.NOT_FINITE
+            return SolveStatus.INDEFINITE if np.isfinite(curvature) else SolveStatus.NOT_FINITE
         alpha = dot(r, p) / curvature
         x += x.dtype.type(alpha) * p
         r -= r.dtype.type(alpha) * q
@@ -167,7 +167,7 @@ def minimal_residuals(
     x, size = np.zeros_like(b), norm(b)
     history: list[float] = []
     if not np.isfinite(size):
-        return Iteration(x, Status.NOT_FINITE, 0, float("nan"), np.array(history))
+        return Iteration(x, SolveStatus.NOT_FINITE, 0, float("nan"), np.array(history))
     residual, now = b, 1.0
     while size > 0.0 and len(history) < iterations:
         steps = min(_RESTART, iterations - len(history))
@@ -188,7 +188,7 @@ def minimal_residuals(
             left = float(np.linalg.norm(right[: k + 2] - table[: k + 2, : k + 1] @ weights))
             history.append(left)
             if not np.isfinite(left):
-                return Iteration(x, Status.NOT_FINITE, len(history), left, np.array(history))
+                return Iteration(x, SolveStatus.NOT_FINITE, len(history), left, np.array(history))
             if left <= tolerance or table[k + 1, k] <= 1e-14 * table[0, 0]:
                 break
             basis.append(new / table[k + 1, k])
@@ -197,8 +197,8 @@ def minimal_residuals(
         residual = b - product(x)
         before, now = now, norm(residual) / size
         if now <= 2.0 * tolerance:
-            return Iteration(x, Status.CONVERGED, len(history), now, np.array(history))
+            return Iteration(x, SolveStatus.CONVERGED, len(history), now, np.array(history))
         if now > 0.9 * before:
-            return Iteration(x, Status.STAGNATED, len(history), now, np.array(history))
-    status = Status.CONVERGED if now <= tolerance or size == 0.0 else Status.MAX_ITERATIONS
+            return Iteration(x, SolveStatus.STAGNATED, len(history), now, np.array(history))
+    status = SolveStatus.CONVERGED if now <= tolerance or size == 0.0 else SolveStatus.MAX_ITERATIONS
     return Iteration(x, status, len(history), 0.0 if size == 0.0 else now, np.array(history))

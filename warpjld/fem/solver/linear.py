@@ -17,7 +17,7 @@ from warpjld.fem.launch import Launch, shared, threads_of
 from warpjld.fem.mesh.hexmesh import HexMesh
 from warpjld.fem.solver.factor import Factor
 from warpjld.fem.solver.hierarchy import hierarchy_of
-from warpjld.fem.solver.krylov import Iteration, Status, conjugate_gradients, minimal_residuals
+from warpjld.fem.solver.krylov import Iteration, SolveStatus, conjugate_gradients, minimal_residuals
 from warpjld.fem.solver.multigrid import Multigrid
 from warpjld.fem.solver.smoother import block_inverse
 
@@ -165,9 +165,9 @@ class LinearSolver:
         done = 0
         history: list[float] = []
         if size == 0.0:
-            return Iteration(x, Status.CONVERGED, 0, 0.0, np.array(history))
+            return Iteration(x, SolveStatus.CONVERGED, 0, 0.0, np.array(history))
         r, now = b, 1.0
-        status = Status.MAX_ITERATIONS
+        status = SolveStatus.MAX_ITERATIONS
         while done < iterations:
             inner = conjugate_gradients(
                 product,
@@ -181,14 +181,14 @@ class LinearSolver:
             r = b - self.masked_product(x)
             before, now = now, norm(r) / size
             history.append(now)
-            if inner.status in (Status.INDEFINITE, Status.NOT_FINITE) or not np.isfinite(now):
+            if inner.status in (SolveStatus.INDEFINITE, SolveStatus.NOT_FINITE) or not np.isfinite(now):
                 status = inner.status
                 break
             if now <= tolerance:
-                status = Status.CONVERGED
+                status = SolveStatus.CONVERGED
                 break
             if now > 0.9 * before:
-                status = Status.STAGNATED
+                status = SolveStatus.STAGNATED
                 break
         return Iteration(x, status, done, now, np.array(history))
 
@@ -196,15 +196,17 @@ class LinearSolver:
         size = norm(b)
         x = np.zeros_like(b)
         if not np.isfinite(size):
-            return Iteration(x, Status.NOT_FINITE, 0, float("nan"), np.empty(0))
+            return Iteration(x, SolveStatus.NOT_FINITE, 0, float("nan"), np.empty(0))
         if size == 0.0:
-            return Iteration(x, Status.CONVERGED, 0, 0.0, np.empty(0))
+            return Iteration(x, SolveStatus.CONVERGED, 0, 0.0, np.empty(0))
         x = self._factor.solve(b)
         x = x + self._factor.solve(b - self.masked_product(x))
         residual = norm(b - self.masked_product(x)) / size
         if not np.isfinite(residual):
-            return Iteration(x, Status.NOT_FINITE, 0, residual, np.empty(0))
-        return Iteration(x, Status.CONVERGED if residual < 1e-6 else Status.INDEFINITE, 0, residual, np.empty(0))
+            return Iteration(x, SolveStatus.NOT_FINITE, 0, residual, np.empty(0))
+        return Iteration(
+            x, SolveStatus.CONVERGED if residual < 1e-6 else SolveStatus.INDEFINITE, 0, residual, np.empty(0)
+        )
 
 
 class _Product:

@@ -9,7 +9,7 @@ import numpy as np
 from warpjld.fem.arrays import Array, Ints, norm
 from warpjld.fem.assembly.block_matrix import BlockMatrix, IndefiniteError
 from warpjld.fem.body import Tangent
-from warpjld.fem.solver.krylov import Iteration, Status
+from warpjld.fem.solver.krylov import Iteration, SolveStatus
 from warpjld.fem.solver.problem import Problem
 from warpjld.fem.solver.solution import Instant, Solution
 
@@ -57,15 +57,15 @@ class Newton:
             target = todo[0]
             self._indefinite = False
             status, found = self._from_guess(target)
-            if status is not Status.CONVERGED:
+            if status is not SolveStatus.CONVERGED:
                 status, found = self._equilibrium(u, target, cautious=False)
-            if status is not Status.CONVERGED and beyond == np.inf:
+            if status is not SolveStatus.CONVERGED and beyond == np.inf:
                 status, found = self._equilibrium(u, target, cautious=True)
-            if found is not None and status is Status.CONVERGED and not self._stable(found, target):
-                status, found = Status.LIMIT_LOAD, None
-            if found is None and (self._indefinite or status is Status.LIMIT_LOAD):
+            if found is not None and status is SolveStatus.CONVERGED and not self._stable(found, target):
+                status, found = SolveStatus.LIMIT_LOAD, None
+            if found is None and (self._indefinite or status is SolveStatus.LIMIT_LOAD):
                 beyond = min(beyond, target)
-            if found is not None and status is Status.CONVERGED:
+            if found is not None and status is SolveStatus.CONVERGED:
                 u, factor = found.displacement.reshape(-1), target
                 beyond = beyond if factor < beyond else np.inf
                 reached.append(found)
@@ -81,13 +81,13 @@ class Newton:
             if halvings > _HALVINGS or beyond - factor < _BRACKET * factor:
                 message = f"no equilibrium found above load {factor:.4g} (tried {target:.4g}): {status.value}"
                 if beyond < np.inf:
-                    status, message = Status.LIMIT_LOAD, _limit(factor, beyond)
+                    status, message = SolveStatus.LIMIT_LOAD, _limit(factor, beyond)
                 some = tuple(reached) or (self._problem.beginning(),)
                 return Solution(status, some, message, held, self._problem.loads)
             if progress:
                 progress(f"load {target:.3g}: {status.value}; halving the step")
             todo.insert(0, 0.5 * (factor + target))
-        return Solution(Status.CONVERGED, tuple(reached), Status.CONVERGED.value, held, self._problem.loads)
+        return Solution(SolveStatus.CONVERGED, tuple(reached), SolveStatus.CONVERGED.value, held, self._problem.loads)
 
     def _stable(self, found: Instant, target: float) -> bool:
         """Whether the tangent of an equilibrium is positive definite: a shell beyond its limit pressure balances as
@@ -102,16 +102,16 @@ class Newton:
             done = problem.solver(stiffness).solve(np.where(problem.free, load, 0.0), tolerance=_TESTED)
         except IndefiniteError:
             return False
-        return done.status is not Status.INDEFINITE
+        return done.status is not SolveStatus.INDEFINITE
 
-    def _from_guess(self, target: float) -> tuple[Status, Instant | None]:
+    def _from_guess(self, target: float) -> tuple[SolveStatus, Instant | None]:
         """The full load's equilibrium from a first guess of it, where there is one."""
         if self._guess is None or target != 1.0:
-            return Status.STAGNATED, None
+            return SolveStatus.STAGNATED, None
         u = self._guess.astype(np.float64).reshape(-1)
         u[self._problem.prescribed.degrees] = self._problem.known(target)
         if not (self._problem.body.at(u, stiffness=False).lowest > 0).all():
-            return Status.INVERTED, None
+            return SolveStatus.INVERTED, None
         # a guess squeezes elements here and there: their false pressures would make K indefinite, those of the
         # equilibrium before do not
         pressures = self._problem.body.at(self._problem.start, stiffness=False).pressures
@@ -119,7 +119,7 @@ class Newton:
 
     def _equilibrium(
         self, u: Array, target: float, *, cautious: bool, guessed: Array | None = None
-    ) -> tuple[Status, Instant | None]:
+    ) -> tuple[SolveStatus, Instant | None]:
         """Newton's method at one load.
 
         Full steps first: in slender and nearly incompressible bodies the residual rises before it falls, and a search
@@ -151,11 +151,13 @@ class Newton:
             noise = _ROUNDING * (norm(np.repeat(stiff, 3) * u) + _PLACES * norm(stiff) * body.mesh.size)
             if moved and now <= max(self._tolerance * scale, noise):
                 reactions = self._problem.reactions(tangent.forces - external)
-                return Status.CONVERGED, Instant(target, u.reshape(-1, 3), reactions, step, iterations, now / scale)
+                return SolveStatus.CONVERGED, Instant(
+                    target, u.reshape(-1, 3), reactions, step, iterations, now / scale
+                )
             right = residual - stiffness.product(jump, threads=body.threads)
             inner = self._step(stiffness, right, 1e-3 if not moved else 1e-5)
             iterations += inner.iterations
-            if inner.status in (Status.INDEFINITE, Status.NOT_FINITE):
+            if inner.status in (SolveStatus.INDEFINITE, SolveStatus.NOT_FINITE):
                 return inner.status, None
             direction = inner.x + jump
             length, status = self._line_search(u, direction, target, now if moved and cautious else None)
@@ -167,9 +169,11 @@ class Newton:
             if length == 1.0:
                 jump[:] = 0.0
                 u[known] = self._problem.known(target)
-        return Status.MAX_ITERATIONS, None
+        return SolveStatus.MAX_ITERATIONS, None
 
-    def _line_search(self, u: Array, direction: Array, target: float, before: float | None) -> tuple[float, Status]:
+    def _line_search(
+        self, u: Array, direction: Array, target: float, before: float | None
+    ) -> tuple[float, SolveStatus]:
         """Longest of 1, ½, ¼ … that keeps elements upright and, where ``before`` is given, lowers the residual."""
         length, best = 1.0, (np.inf, 0.0)
         upright = False
@@ -179,20 +183,20 @@ class Newton:
             if (trial.lowest > 0).all():
                 upright = True
                 if before is None:
-                    return length, Status.CONVERGED
+                    return length, SolveStatus.CONVERGED
                 external = self._problem.external(target, there)
                 size = norm(np.where(self._problem.free, external - trial.forces, 0.0))
                 if size < best[0]:
                     best = (size, length)
                 if size < (1.0 - 1e-4 * length) * before:
-                    return length, Status.CONVERGED
+                    return length, SolveStatus.CONVERGED
             length *= 0.5
         if not upright:
-            return 0.0, Status.INVERTED
+            return 0.0, SolveStatus.INVERTED
         assert before is not None
         if best[0] < 4.0 * before:
-            return best[1], Status.CONVERGED
-        return 0.0, Status.STAGNATED
+            return best[1], SolveStatus.CONVERGED
+        return 0.0, SolveStatus.STAGNATED
 
     def _step(self, stiffness: BlockMatrix, right: Array, tolerance: float) -> Iteration:
         """One Newton step. On the way to a stable equilibrium K may be indefinite for a while (a slender body pushed
@@ -201,9 +205,9 @@ class Newton:
         try:
             done = self._problem.solver(stiffness).solve(right, tolerance=tolerance)
         except IndefiniteError:
-            done = Iteration(np.zeros_like(right), Status.INDEFINITE, 0, 1.0, np.empty(0))
-        self._indefinite |= done.status is Status.INDEFINITE
-        if done.status is Status.INDEFINITE and int(self._problem.free.sum()) <= _DIRECT:
+            done = Iteration(np.zeros_like(right), SolveStatus.INDEFINITE, 0, 1.0, np.empty(0))
+        self._indefinite |= done.status is SolveStatus.INDEFINITE
+        if done.status is SolveStatus.INDEFINITE and int(self._problem.free.sum()) <= _DIRECT:
             return self._problem.direct_solver(stiffness).solve(right)
         return done
 

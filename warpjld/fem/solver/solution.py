@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from warpjld.errors import WarpjldError
 from warpjld.fem.arrays import Array, Ints
 from warpjld.fem.load.loads import Loads
-from warpjld.fem.solver.krylov import Status
+from warpjld.fem.solver.krylov import SolveStatus
 
 __all__ = ["Instant", "Solution", "SolveError"]
 
@@ -49,7 +49,7 @@ class Solution:
         loads: The loads, at full strength.
     """
 
-    status: Status
+    status: SolveStatus
     instants: tuple[Instant, ...]
     message: str
     held: Ints
@@ -61,7 +61,7 @@ class Solution:
     @property
     def converged(self) -> bool:
         """Whether the full load was reached."""
-        return self.status is Status.CONVERGED
+        return self.status is SolveStatus.CONVERGED
 
     @property
     def last(self) -> Instant:

@@ -14,11 +14,11 @@ from warpjld.fem.load.loads import Loads
 from warpjld.fem.load.prescribed import Prescribed, held_in_place, refuse_free
 from warpjld.fem.rotation import warn_of_rotation
 from warpjld.fem.solver.arc_length import follow
-from warpjld.fem.solver.krylov import Status
+from warpjld.fem.solver.krylov import SolveStatus
 from warpjld.fem.solver.newton import Newton
 from warpjld.fem.solver.problem import Problem
 from warpjld.fem.solver.solution import Instant, Solution, SolveError
-from warpjld.threads import one_blas_thread
+from warpjld.runtime.threads import one_blas_thread
 
 __all__ = ["solve"]
 
@@ -118,9 +118,9 @@ def _linear(
     try:
         solver = problem.solver(stiffness)
     except IndefiniteError as error:
-        return Solution(Status.INDEFINITE, (problem.beginning(),), str(error), held, problem.loads)
+        return Solution(SolveStatus.INDEFINITE, (problem.beginning(),), str(error), held, problem.loads)
     reached = []
-    status, message = Status.CONVERGED, Status.CONVERGED.value
+    status, message = SolveStatus.CONVERGED, SolveStatus.CONVERGED.value
     for factor in steps:
         u = np.zeros(body.degrees)
         u[problem.prescribed.degrees] = problem.known(factor)
@@ -133,7 +133,7 @@ def _linear(
         reached.append(Instant(factor, u.reshape(-1, 3), reactions, 1, done.iterations, done.residual))
         if progress:
             progress(f"load {factor:.3g}: {done.iterations} iterations, residual {done.residual:.1e}")
-        if done.status is not Status.CONVERGED:
+        if done.status is not SolveStatus.CONVERGED:
             status, message = done.status, f"at load {factor:g}: {done.status.value} (residual {done.residual:.1e})"
             break
     return Solution(status, tuple(reached), message, held, problem.loads)

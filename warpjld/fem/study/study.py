@@ -15,7 +15,7 @@ from warpjld.fem.mesh.hexmesh import HexMesh
 from warpjld.fem.solver.solution import Instant, Solution
 from warpjld.fem.solver.static import solve
 
-__all__ = ["Step", "Study", "StudyInstant", "Support"]
+__all__ = ["FemStudy", "Step", "StudyInstant", "Support"]
 
 
 @dataclass(frozen=True)
@@ -86,7 +86,7 @@ class StudyInstant:
 
 
 @dataclass(frozen=True, eq=False)
-class Study:
+class FemStudy:
     """A body and what is done to it (see ``load_study``).
 
     Attributes:

@@ -19,10 +19,10 @@ from warpjld.fem.mesh.generated import ball_hexes, box_hexes, cylinder_hexes, fi
 from warpjld.fem.mesh.hexmesh import HexMesh
 from warpjld.fem.solver.linear import METHODS, PRECISIONS
 from warpjld.fem.solver.static import FREE
-from warpjld.fem.study.study import Step, Study, Support
+from warpjld.fem.study.study import FemStudy, Step, Support
+from warpjld.files.names import check_name, clash
+from warpjld.files.toml_table import TomlTable, read_toml
 from warpjld.limits import check_limit
-from warpjld.names import check_name, clash
-from warpjld.toml_table import TomlTable, read_toml
 
 __all__ = ["load_study"]
 
@@ -43,7 +43,7 @@ _LAWS: dict[str, tuple[Callable[..., Material], tuple[str, ...]]] = {
 _AXES = ("x", "y", "z")
 
 
-def load_study(path: str | Path) -> Study:
+def load_study(path: str | Path) -> FemStudy:
     """Read and check a study file.
 
     Raises:
@@ -75,7 +75,7 @@ def load_study(path: str | Path) -> Study:
         if error.path is None:
             raise InputError(error.message, path=path) from error
         raise
-    return Study(title, body, steps, method, precision, notes)
+    return FemStudy(title, body, steps, method, precision, notes)
 
 
 def _mesh(table: TomlTable) -> tuple[HexMesh, tuple[str, ...]]:
@@ -92,10 +92,10 @@ def _mesh(table: TomlTable) -> tuple[HexMesh, tuple[str, ...]]:
     file = table.folder / (table.text("path") or "")
     scale = table.number("scale", 1.0, above=0.0) or 1.0
     if kind == "file":
-        from warpjld.fem.mesh.exchange import read_mesh
+        from warpjld.fem.mesh.exchange import read_volume_mesh
 
         table.finish()
-        return read_mesh(file, scale=scale), ()
+        return read_volume_mesh(file, scale=scale), ()
     from warpjld.fem.mesh.fit import mesh_surface_file
     from warpjld.io.mesh_file import read_mesh as read_surface
 

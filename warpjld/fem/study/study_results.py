@@ -11,8 +11,8 @@ import numpy as np
 
 from warpjld.fem.arrays import Array
 from warpjld.fem.output.vtk import Series
-from warpjld.fem.study.study import Study, StudyInstant
-from warpjld.whole_file import whole_file
+from warpjld.fem.study.study import FemStudy, StudyInstant
+from warpjld.files.whole_file import whole_file
 
 __all__ = ["Reaction", "StudyResults"]
 
@@ -44,7 +44,7 @@ class StudyResults:
         pictures: Draw displacement and stress after each step.
     """
 
-    def __init__(self, study: Study, folder: Path, name: str, *, pictures: bool = True) -> None:
+    def __init__(self, study: FemStudy, folder: Path, name: str, *, pictures: bool = True) -> None:
         self.study = study
         self.folder = folder
         self.reactions: list[Reaction] = []

@@ -9,16 +9,16 @@ from warpjld.grasp.quality.contacts import Contacts, patch_spin
 from warpjld.grasp.quality.gravity import SIX_DIRECTIONS, GravityResponse, gravity_displacement
 from warpjld.grasp.quality.penetration import Penetration, penetration
 from warpjld.grasp.quality.resistance import resisted_wrench
-from warpjld.grasp.quality.touch import Patches, contact_patches, vertex_areas
+from warpjld.grasp.quality.touch import ContactPatches, contact_patches, vertex_areas
 from warpjld.grasp.quality.wrench_space import WrenchSpace, least_resistance, wrench_space
 from warpjld.grasp.quality.wrenches import contact_wrenches, grasp_matrix
 
 __all__ = [
     "SIX_DIRECTIONS",
     "Closure",
+    "ContactPatches",
     "Contacts",
     "GravityResponse",
-    "Patches",
     "Penetration",
     "WrenchSpace",
     "contact_patches",

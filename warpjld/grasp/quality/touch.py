@@ -9,16 +9,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from warpjld.errors import InputError
+from warpjld.geometry.normals import vertex_normals
 from warpjld.grasp.quality.contacts import Contacts, patch_spin
-from warpjld.normals import vertex_normals
 
-__all__ = ["Patches", "contact_patches", "vertex_areas"]
+__all__ = ["ContactPatches", "contact_patches", "vertex_areas"]
 
 Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)
-class Patches:
+class ContactPatches:
     """P patches of skin in contact, one for each part of the hand that touches.
 
     Attributes:
@@ -62,7 +62,7 @@ def contact_patches(
     outward: NDArray[np.floating],
     *,
     tolerance: float,
-) -> Patches:
+) -> ContactPatches:
     """Patches of skin nearer to the object than a tolerance, one a part.
 
     A vertex i in contact (signed distance d_i ≤ tolerance) stands for a third of the triangles around it, A_i (Meyer,
@@ -111,7 +111,7 @@ def contact_patches(
         place = weight @ np.asarray(nearest[own], dtype=np.float64)
         rows.append((names[part], place, inward / lengths[0], facing / lengths[1], share[own].sum(), len(own)))
     columns = list(zip(*rows, strict=True)) or [()] * 6
-    return Patches(
+    return ContactPatches(
         tuple(columns[0]),
         np.array(columns[1], dtype=np.float64).reshape(-1, 3),
         np.array(columns[2], dtype=np.float64).reshape(-1, 3),

@@ -10,8 +10,8 @@ from importlib import import_module
 from pathlib import Path
 
 from warpjld.errors import InputError
-from warpjld.io.caches.cache import Cache, Clip
-from warpjld.surface import Surface
+from warpjld.geometry.surface import Surface
+from warpjld.io.caches.cache import Cache, CacheTiming
 
 __all__ = ["FORMATS", "Cache", "check_cache", "open_cache"]
 
@@ -84,7 +84,7 @@ def open_cache(
         'hand.npz'
     """
     path = Path(path)
-    cache: Cache = _kind(path)(path, surface, Clip(frames=frames, rate=rate, start=start_frame, name=name))
+    cache: Cache = _kind(path)(path, surface, CacheTiming(frames=frames, rate=rate, start=start_frame, name=name))
     return cache
 
 

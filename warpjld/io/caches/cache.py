@@ -16,14 +16,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from warpjld.errors import InputError, WarpjldError
-from warpjld.surface import Surface
-from warpjld.whole_file import part_of, sweep
+from warpjld.files.whole_file import part_of, sweep
+from warpjld.geometry.surface import Surface
 
-__all__ = ["Cache", "Clip"]
+__all__ = ["Cache", "CacheTiming"]
 
 
 @dataclass(frozen=True)
-class Clip:
+class CacheTiming:
     """Timing and name of what is cached: ``frames`` frames from ``start`` on at ``rate`` frames per second."""
 
     frames: int
@@ -54,7 +54,7 @@ class Cache(ABC):
 
     note: str = ""
 
-    def __init__(self, path: Path, surface: Surface, clip: Clip) -> None:
+    def __init__(self, path: Path, surface: Surface, clip: CacheTiming) -> None:
         self.path = path
         self.written = 0
         self.files: tuple[Path, ...] = ()

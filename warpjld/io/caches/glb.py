@@ -10,9 +10,9 @@ from numpy.typing import NDArray
 
 from warpjld import __version__
 from warpjld.errors import InputError
-from warpjld.io.caches.cache import Cache, Clip
-from warpjld.normals import vertex_normals
-from warpjld.surface import Surface
+from warpjld.geometry.normals import vertex_normals
+from warpjld.geometry.surface import Surface
+from warpjld.io.caches.cache import Cache, CacheTiming
 
 __all__ = ["MAX_BYTES", "MAX_FRAMES", "GlbCache"]
 
@@ -32,7 +32,7 @@ class GlbCache(Cache):
 
     note = "rest mesh with a morph target a frame; time starts at 0"
 
-    def __init__(self, path: Path, surface: Surface, clip: Clip) -> None:
+    def __init__(self, path: Path, surface: Surface, clip: CacheTiming) -> None:
         super().__init__(path, surface, clip)
         self._origin, self._faces, self._uv = surface.split_at_seams()
         copies = len(self._origin) - len(surface.weld)

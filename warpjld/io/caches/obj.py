@@ -7,9 +7,9 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from warpjld.files.sequences import remove_former
+from warpjld.geometry.surface import Surface
 from warpjld.io.caches.cache import Cache
-from warpjld.sequences import remove_former
-from warpjld.surface import Surface
 
 __all__ = ["ObjCache", "ObjText"]
 

@@ -9,8 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from warpjld.errors import MissingExtraError
+from warpjld.geometry.surface import Surface
 from warpjld.io.caches.cache import Cache
-from warpjld.surface import Surface
 
 __all__ = ["UsdCache", "extent_of", "write_texture_coordinates"]
 

@@ -7,8 +7,8 @@ from pathlib import Path
 from typing import Any
 
 from warpjld.errors import InputError
-from warpjld.input_file import read_bytes
-from warpjld.text_file import parse_json
+from warpjld.files.input_file import read_bytes
+from warpjld.files.text_file import parse_json
 
 __all__ = ["read_container"]
 

@@ -15,15 +15,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from warpjld.errors import InputError
-from warpjld.input_file import read_bytes
+from warpjld.files.input_file import read_bytes
+from warpjld.files.reading import reading
+from warpjld.geometry.rotations import matrices
+from warpjld.geometry.scales import never_zero, regular_linear
 from warpjld.io.gltf.accessor import read_accessor
 from warpjld.io.gltf.container import read_container
 from warpjld.io.gltf.extensions import check_extensions, packed_view
 from warpjld.io.gltf.schema import check_schema, inside_folder
-from warpjld.lazily import lazy_module
-from warpjld.reading import reading
-from warpjld.rotations import matrices
-from warpjld.scales import never_zero, regular_linear
+from warpjld.runtime.lazily import lazy_module
 
 if TYPE_CHECKING:
     import scipy.spatial.transform as transform

@@ -7,10 +7,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from warpjld.coincident import close_pairs
 from warpjld.errors import InputError
+from warpjld.geometry.coincident import close_pairs
 from warpjld.io.gltf.document import Document
-from warpjld.lazily import lazy_module
+from warpjld.runtime.lazily import lazy_module
 
 if TYPE_CHECKING:
     import scipy.sparse as sp
@@ -21,12 +21,12 @@ else:
     csgraph = lazy_module("scipy.sparse.csgraph")
     spatial = lazy_module("scipy.spatial")
 
-__all__ = ["read_influences"]
+__all__ = ["read_gltf_influences"]
 
 _MOST_SETS = 64  # of four influences: more is no file that anyone made
 
 
-def read_influences(
+def read_gltf_influences(
     document: Document,
     attributes: dict[str, Any],
     points: NDArray[np.float64],

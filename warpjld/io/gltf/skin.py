@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from warpjld.errors import InputError
 from warpjld.io.gltf.document import Document, open_document
-from warpjld.io.gltf.influences import read_influences
+from warpjld.io.gltf.influences import read_gltf_influences
 from warpjld.io.gltf.texture import texture_coordinates
 from warpjld.io.gltf.triangles import is_surface, primitive_points, primitive_triangles
 from warpjld.io.rig_meshes import RigMesh, joined
@@ -171,7 +171,7 @@ def _primitive(
     faces = primitive_triangles(document, primitive, len(points), name)
     skinned = document.gltf.nodes[node].skin is not None
     if skinned:
-        indices, weights = read_influences(
+        indices, weights = read_gltf_influences(
             document, vars(primitive.attributes), points, faces, len(joints), name, notes
         )
     else:

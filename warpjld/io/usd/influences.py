@@ -13,14 +13,14 @@ from warpjld.io.usd.mesh import default_or_first
 from warpjld.io.usd.skeletons import UsdSkeleton
 from warpjld.io.usd.stage import UsdFile
 
-__all__ = ["Influences", "blended_points", "read_influences"]
+__all__ = ["Influences", "blended_points", "read_usd_influences"]
 
 Influences = tuple[NDArray[np.int64], NDArray[np.float64], int]
 """Joints of the whole tree and weights per vertex, shape (V, K), unused slots with weight 0 and rows summing to one;
 and the joint that the whole mesh follows rigidly, -1 for none."""
 
 
-def read_influences(
+def read_usd_influences(
     file: UsdFile, skeleton: UsdSkeleton, query: Any, points: NDArray[np.float64], where: str
 ) -> Influences:
     """``primvars:skel:jointIndices`` and ``jointWeights`` of a mesh, in whatever joint order it has them.

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from warpjld.errors import InputError
-from warpjld.io.usd.stage import UsdFile, matrices
+from warpjld.io.usd.stage import UsdFile, usd_matrices
 from warpjld.skeleton.recognise.tree import SourceTree
 
 __all__ = ["UsdSkeleton", "UsdSkeletons", "concatenated", "read_skeletons"]
@@ -132,8 +132,8 @@ def _skeleton(file: UsdFile, prim: Any, meshes: tuple[Any, ...], first: int) -> 
         twice = next(token for token, count in Counter(tokens).items() if count > 1)
         raise InputError(f"skeleton '{path}' has two joints '{twice}'", path=file.path)
     parents = _parents(tokens)
-    bind = matrices(skeleton.GetBindTransformsAttr().Get() or np.zeros((0, 4, 4)))
-    local = matrices(skeleton.GetRestTransformsAttr().Get() or np.zeros((0, 4, 4)))
+    bind = usd_matrices(skeleton.GetBindTransformsAttr().Get() or np.zeros((0, 4, 4)))
+    local = usd_matrices(skeleton.GetRestTransformsAttr().Get() or np.zeros((0, 4, 4)))
     rest = None
     if len(local) == len(tokens) and _regular(local).all():
         rest = concatenated(local, parents)
@@ -146,7 +146,7 @@ def _skeleton(file: UsdFile, prim: Any, meshes: tuple[Any, ...], first: int) -> 
             )
         file.notes.append(f"skeleton '{path}' has no bindTransforms for its joints: restTransforms are taken")
         bind = rest
-    to_world = matrices(UsdGeom.XformCache(Usd.TimeCode.EarliestTime()).GetLocalToWorldTransform(prim))
+    to_world = usd_matrices(UsdGeom.XformCache(Usd.TimeCode.EarliestTime()).GetLocalToWorldTransform(prim))
     if rest is not None and _is_placed(bind, rest, to_world):  # bound in the world, as USD's documentation words it
         to_world = np.eye(4)
     with np.errstate(invalid="ignore"):

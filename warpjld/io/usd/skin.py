@@ -10,10 +10,10 @@ import numpy as np
 from warpjld.errors import InputError
 from warpjld.io.rig_meshes import RigMesh, joined
 from warpjld.io.source import SourceRig
-from warpjld.io.usd.influences import blended_points, read_influences
+from warpjld.io.usd.influences import blended_points, read_usd_influences
 from warpjld.io.usd.mesh import read_usd_mesh
 from warpjld.io.usd.skeletons import UsdSkeleton, UsdSkeletons, read_skeletons
-from warpjld.io.usd.stage import UsdFile, matrices, open_usd
+from warpjld.io.usd.stage import UsdFile, open_usd, usd_matrices
 
 __all__ = ["read_usd_rig"]
 
@@ -90,8 +90,8 @@ def _skinned(file: UsdFile, skeleton: UsdSkeleton, query: Any) -> RigMesh | None
         file.notes.append(f"{where} has no faces: left out")
         return None
     with np.errstate(invalid="ignore"):
-        place = skeleton.to_world @ matrices(query.GetGeomBindTransform())
-    joints, weights, rigid = read_influences(file, skeleton, query, mesh.points, where)
+        place = skeleton.to_world @ usd_matrices(query.GetGeomBindTransform())
+    joints, weights, rigid = read_usd_influences(file, skeleton, query, mesh.points, where)
     points = blended_points(file, skeleton, query, mesh.points)
     with np.errstate(invalid="ignore", over="ignore"):
         vertices = points @ place[:3, :3].T + place[:3, 3]

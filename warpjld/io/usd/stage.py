@@ -12,13 +12,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from warpjld.archive import check_archive
 from warpjld.errors import InputError, MissingExtraError
-from warpjld.input_file import read_bytes
+from warpjld.files.archive import check_archive
+from warpjld.files.input_file import read_bytes
+from warpjld.files.nesting import nesting
 from warpjld.limits import check_limit
-from warpjld.nesting import nesting
 
-__all__ = ["UsdFile", "matrices", "open_usd"]
+__all__ = ["UsdFile", "open_usd", "usd_matrices"]
 
 _MOST_WARNINGS = 5
 _PLACE = re.compile(r"^Error in '[^']*' at line \d+ in file \S+ : '(.*?)'?$")
@@ -100,7 +100,7 @@ def open_usd(path: str | Path) -> Iterator[UsdFile]:
         told.TakeUncoalescedDiagnostics()
 
 
-def matrices(values: Any) -> NDArray[np.float64]:
+def usd_matrices(values: Any) -> NDArray[np.float64]:
     """One Gf.Matrix4d or an array of them, vectors as columns (USD: rows), shape (4, 4) or (N, 4, 4)."""
     return np.array(values, dtype=np.float64).swapaxes(-1, -2)
 

@@ -16,12 +16,12 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
+from warpjld.geometry.rotations import conjugate, multiply, rotate
 from warpjld.listed import first_few
 from warpjld.motion.out.euler import ContinuousEuler
 from warpjld.motion.out.source_motion import SourceMotion, source_motion
 from warpjld.motion.out.write import Timing, WrittenMotion
 from warpjld.rig import Rig
-from warpjld.rotations import conjugate, multiply, rotate
 from warpjld.skeleton import Poses
 
 __all__ = ["write_bvh"]

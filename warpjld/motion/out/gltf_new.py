@@ -9,13 +9,13 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from warpjld import __version__
+from warpjld.geometry.normals import vertex_normals
 from warpjld.motion.out.baked_skin import BakedSkin
 from warpjld.motion.out.glb_file import ARRAY_BUFFER, ELEMENT_ARRAY_BUFFER, GlbFile
 from warpjld.motion.out.local_motion import nearest_rotations
 from warpjld.motion.out.node_tree import NodeTree
 from warpjld.motion.out.skin_weights import joint_weights
 from warpjld.motion.out.source_motion import SourceMotion
-from warpjld.normals import vertex_normals
 from warpjld.rig import Rig
 
 __all__ = ["new_document"]

@@ -10,11 +10,11 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from warpjld.errors import InputError
+from warpjld.geometry.rotations import conjugate, multiply
 from warpjld.motion.hand_motion import IDENTITY
 from warpjld.motion.mano_rest import MANO_DIGITS, MANO_JOINTS, mano_rest
 from warpjld.motion.out.write import Timing, WrittenMotion
 from warpjld.rig import Rig
-from warpjld.rotations import conjugate, multiply
 from warpjld.skeleton import Poses, Skeleton
 
 __all__ = ["hand_parameters", "write_mano"]

@@ -21,10 +21,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from warpjld.errors import InputError
-from warpjld.lazily import lazy_module
+from warpjld.geometry.rotations import rotate
 from warpjld.listed import first_few
 from warpjld.rig import Rig
-from warpjld.rotations import rotate
+from warpjld.runtime.lazily import lazy_module
 from warpjld.skeleton import Poses
 from warpjld.skeleton.recognise.tree import SourceTree
 

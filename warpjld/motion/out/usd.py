@@ -20,6 +20,7 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from warpjld.errors import MissingExtraError
+from warpjld.geometry.rotations import upright
 from warpjld.io.caches.usd import write_texture_coordinates
 from warpjld.io.usd.skeletons import concatenated
 from warpjld.motion.out.baked_skin import BakedSkin
@@ -28,7 +29,6 @@ from warpjld.motion.out.skin_weights import joint_weights
 from warpjld.motion.out.source_motion import SourceMotion, source_motion
 from warpjld.motion.out.write import Timing, WrittenMotion
 from warpjld.rig import Rig
-from warpjld.rotations import upright
 from warpjld.skeleton import Poses
 
 __all__ = ["write_usd"]

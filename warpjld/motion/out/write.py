@@ -9,12 +9,12 @@ from pathlib import Path
 from typing import Protocol
 
 from warpjld.errors import InputError
-from warpjld.folders import make_folder
+from warpjld.files.folders import make_folder
+from warpjld.files.whole_file import whole_file
 from warpjld.rig import Rig
 from warpjld.skeleton import Poses
-from warpjld.whole_file import whole_file
 
-__all__ = ["MOTION_OUT", "Timing", "Writer", "WrittenMotion", "check_motion_out", "write_motion"]
+__all__ = ["MOTION_OUT", "MotionWriter", "Timing", "WrittenMotion", "check_motion_out", "write_motion"]
 
 MOTION_OUT = {
     ".bvh": "BVH: the rig's own joints, metres, Y up",
@@ -69,7 +69,7 @@ class WrittenMotion:
     warnings: tuple[str, ...] = ()
 
 
-class Writer(Protocol):
+class MotionWriter(Protocol):
     """Writes one kind of file to a place whose suffix is right but whose name is not the last."""
 
     def __call__(self, path: Path, rig: Rig, poses: Poses, timing: Timing) -> WrittenMotion:
@@ -117,7 +117,7 @@ def write_motion(
     check_motion_out(path)
     timing = Timing(rate, start_frame, path.stem if name is None else name)
     module, function = _WRITERS[path.suffix.lower()]
-    write: Writer = getattr(import_module(f"warpjld.motion.out.{module}"), function)
+    write: MotionWriter = getattr(import_module(f"warpjld.motion.out.{module}"), function)
     make_folder(path.parent)
     try:
         with whole_file(path) as part:

@@ -8,7 +8,7 @@ from dataclasses import asdict
 
 from warpjld.motion import Key
 from warpjld.script.arguments import Arguments
-from warpjld.script.keys import FINGERS, SIDES, read_joint, set_keys
+from warpjld.script.keys import DIGIT_WORDS, SIDES, read_joint, set_keys
 from warpjld.script.registry import command
 from warpjld.script.scene import Scene, SplineConstants
 from warpjld.skeleton import CHANNELS
@@ -75,7 +75,7 @@ def metacarpus(scene: Scene, arguments: Arguments) -> None:
 )
 def finger1(scene: Scene, arguments: Arguments) -> None:
     """Angle at the base of a finger. PIVOT turns the axis of flexion; ABDUCTION spreads the finger (R83)."""
-    side, finger, channel = arguments.choices(SIDES, FINGERS, ("FLEXION", "PIVOT", "ABDUCTION"))
+    side, finger, channel = arguments.choices(SIDES, DIGIT_WORDS, ("FLEXION", "PIVOT", "ABDUCTION"))
     set_keys(scene.actor_with(side), [f"{side}.{finger}.base"], channel, scene.spline, arguments)
 
 
@@ -87,7 +87,7 @@ def finger1(scene: Scene, arguments: Arguments) -> None:
 )
 def finger23(scene: Scene, arguments: Arguments) -> None:
     """Flexion of a finger's second or third joint (R84)."""
-    side, finger, knuckle = arguments.choices(SIDES, FINGERS, ("KNUCKLES2", "KNUCKLES3"))
+    side, finger, knuckle = arguments.choices(SIDES, DIGIT_WORDS, ("KNUCKLES2", "KNUCKLES3"))
     joint = f"{side}.{finger}.{knuckle.replace('KNUCKLES', 'knuckle')}"
     set_keys(scene.actor_with(side), [joint], "FLEXION", scene.spline, arguments)
 

@@ -77,7 +77,7 @@ def show_(scene: Scene, arguments: Arguments) -> None:
         case "JOINTS":
             scene.say(show.joints(scene.actor()))
         case "PARAMETERS":
-            scene.say(show.parameters(scene.actor()))
+            scene.say(show.parameter_listing(scene.actor()))
         case "OUTPUTS":
             scene.say("\n".join(output.name for output in scene.outputs) or "nothing asked for yet")
 
@@ -100,7 +100,7 @@ def _measure(scene: Scene, arguments: Arguments, topic: str) -> None:
     if scene.dry:
         return
     try:
-        scene.say(measures.intersection(scene, actor, frame, segment, prop))
+        scene.say(measures.intersection_text(scene, actor, frame, segment, prop))
     except InputError as error:
         raise arguments.error(error.message, where) from None
 
@@ -109,7 +109,7 @@ def _measure(scene: Scene, arguments: Arguments, topic: str) -> None:
 def help_(scene: Scene, arguments: Arguments) -> None:
     """All commands, or one (R88)."""
     if not arguments:
-        scene.say(show.commands(all_commands()))
+        scene.say(show.command_listing(all_commands()))
         return
     value = arguments.anything()
     if not isinstance(value, Word):

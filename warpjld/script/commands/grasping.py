@@ -10,7 +10,7 @@ from warpjld.script.arguments import Arguments
 from warpjld.script.commands.physical import read_object
 from warpjld.script.facets import read_facet, read_vertex
 from warpjld.script.grips import read_frames, read_side
-from warpjld.script.keys import FINGERS, named_joint
+from warpjld.script.keys import DIGIT_WORDS, named_joint
 from warpjld.script.registry import command
 from warpjld.script.scene import Scene
 from warpjld.skeleton import CHANNELS
@@ -45,7 +45,7 @@ def auto_f_1(scene: Scene, arguments: Arguments) -> None:
     """Flexion at the base of a finger with which a vertex touches an object (R87)."""
     key = arguments.number("the key (a frame)")
     side = read_side(scene, arguments)
-    finger = arguments.choice("the finger", FINGERS).lower()
+    finger = arguments.choice("the finger", DIGIT_WORDS).lower()
     _search(scene, arguments, "AUTO_F_1", key, side, f"{finger}.base", finger)
 
 
@@ -59,7 +59,7 @@ def auto_f_2_3(scene: Scene, arguments: Arguments) -> None:
     """Flexion of a finger's second or third joint with which a vertex touches an object (R87)."""
     key = arguments.number("the key (a frame)")
     side = read_side(scene, arguments)
-    finger, knuckle = arguments.choices(FINGERS, ("KNUCKLES2", "KNUCKLES3"))
+    finger, knuckle = arguments.choices(DIGIT_WORDS, ("KNUCKLES2", "KNUCKLES3"))
     joint = f"{finger}.{knuckle.replace('KNUCKLES', 'knuckle')}".lower()
     _search(scene, arguments, "AUTO_F_2_3", key, side, joint, finger.lower())
 
@@ -86,7 +86,7 @@ def grasp(scene: Scene, arguments: Arguments) -> None:
         _grasp_auto(scene, arguments, side, prop, first, last)
         return
     digits = []
-    while digit := arguments.keyword(*FINGERS):
+    while digit := arguments.keyword(*DIGIT_WORDS):
         digits.append(f"{side}.{digit.lower()}")
     options = arguments.options(
         coupling=lambda: (
@@ -171,7 +171,7 @@ def release(scene: Scene, arguments: Arguments) -> None:
 
 
 def _search(scene: Scene, arguments: Arguments, name: str, key: float, side: str, joint_name: str, finger: str) -> None:
-    from warpjld.grasp import Status
+    from warpjld.grasp import SearchStatus
     from warpjld.grasp.digits import pad_vertex
     from warpjld.grasp.search import FINEST
     from warpjld.script.binding import cover
@@ -198,9 +198,9 @@ def _search(scene: Scene, arguments: Arguments, name: str, key: float, side: str
         actor.set_keys(f"{actor.skeleton.names[joint]}.{CHANNELS[0]}", [key], 0.0, scene.spline)
         return
     found, inside = search_flexion(scene, actor, prop, key, joint, vertex, facet, distance, within)
-    status = Status(int(found.status[0]))
+    status = SearchStatus(int(found.status[0]))
     message = found.message()
-    if status is Status.CONVERGED:
+    if status is SearchStatus.CONVERGED:
         channel = f"{actor.skeleton.names[joint]}.{CHANNELS[0]}"
         actor.set_keys(channel, [key], float(found.angles[0, 0]), scene.spline)
         if inside != "no vertex inside":

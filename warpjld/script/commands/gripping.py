@@ -10,7 +10,7 @@ from warpjld.script.arguments import Arguments
 from warpjld.script.commands.physical import place, read_object
 from warpjld.script.contact import REST
 from warpjld.script.grips import flexions_of_grip, gripping_actor, read_actor, read_frames
-from warpjld.script.keys import FINGERS
+from warpjld.script.keys import DIGIT_WORDS
 from warpjld.script.registry import command
 from warpjld.script.scene import Scene
 from warpjld.simulation.specification import GripSpecification
@@ -43,7 +43,7 @@ def squeeze(scene: Scene, arguments: Arguments) -> None:
         return
     force = arguments.number("the force in newtons", above=0.0)
     digits = []
-    while digit := arguments.keyword(*FINGERS):
+    while digit := arguments.keyword(*DIGIT_WORDS):
         digits.append(digit.lower())
     most = _most(arguments)
     channels = _held_keys(scene, actor, arguments, first, last)
@@ -95,7 +95,7 @@ def lift(scene: Scene, arguments: Arguments) -> None:
 def strength(scene: Scene, arguments: Arguments) -> None:
     """How hard a digit can press at most; thumb 69, index and ring 59, middle 82, pinky 33 at first (R118)."""
     actor = read_actor(scene, arguments)
-    digit = arguments.choice("the digit", FINGERS).lower()
+    digit = arguments.choice("the digit", DIGIT_WORDS).lower()
     newtons = arguments.number("the force in newtons", above=0.0)
     scene.contact.strength.setdefault(actor.name, {})[digit] = newtons
 

@@ -7,10 +7,10 @@ from typing import TYPE_CHECKING, Literal, cast
 import numpy as np
 
 from warpjld.errors import InputError
-from warpjld.lengths import check_size
+from warpjld.geometry.lengths import check_size
 from warpjld.script.arguments import Arguments
 from warpjld.script.commands.physical import read_object
-from warpjld.script.keys import FINGERS, SIDES, named_joint, read_joint
+from warpjld.script.keys import DIGIT_WORDS, SIDES, named_joint, read_joint
 from warpjld.script.registry import command
 from warpjld.script.scene import Scene
 
@@ -107,7 +107,7 @@ def objects(scene: Scene, arguments: Arguments) -> None:
     if arguments.keyword("JOINT"):
         actor, joint = read_joint(scene, arguments)
     else:
-        finger, side, knuckle = arguments.choices(FINGERS, SIDES, ("KNUCKLES2", "KNUCKLES3"))
+        finger, side, knuckle = arguments.choices(DIGIT_WORDS, SIDES, ("KNUCKLES2", "KNUCKLES3"))
         actor = scene.actor_with(side)
         joint = named_joint(actor, f"{side}.{finger}.{knuckle.replace('KNUCKLES', 'knuckle')}", arguments)
     start = arguments.number("the starting time (a frame)")

@@ -5,9 +5,18 @@ from __future__ import annotations
 from typing import cast
 
 from warpjld.script.arguments import Arguments
-from warpjld.script.formats import EXPORTS, FILMS, MOTIONS, PICTURES, VIEWS
-from warpjld.script.keys import FINGERS
-from warpjld.script.outputs import Camera, ContactSheet, Export, Film, MotionFile, Output, Picture, Style
+from warpjld.script.formats import EXPORTS, FILMS, MOTIONS, PICTURES, VIEW_WORDS
+from warpjld.script.keys import DIGIT_WORDS
+from warpjld.script.outputs import (
+    CameraSetting,
+    ContactSheet,
+    Export,
+    FilmOutput,
+    MotionFile,
+    Output,
+    Picture,
+    PictureStyle,
+)
 from warpjld.script.registry import command
 from warpjld.script.scene import Scene
 from warpjld.suggest import did_you_mean
@@ -18,7 +27,7 @@ _SHOWN = "[SHADED/WIREFRAME/PRESSURE [<actor or object> [THUMB/INDEX/MIDDLE/RING
 
 @command(
     "CAMERA",
-    syntax=f"CAMERA <{'/'.join(VIEWS)}> [ZOOM <factor>] [FOLLOW] or CAMERA FROM <x> <y> <z> TO <x> <y> <z> …",
+    syntax=f"CAMERA <{'/'.join(VIEW_WORDS)}> [ZOOM <factor>] [FOLLOW] or CAMERA FROM <x> <y> <z> TO <x> <y> <z> …",
     help="Where the pictures and films after this line are taken from [m]; FOLLOW goes along with the first actor.",
     group="Output",
 )
@@ -32,12 +41,12 @@ def camera(scene: Scene, arguments: Arguments) -> None:
         if position == target:
             raise arguments.error("the camera cannot look at its own place")
     else:
-        view = arguments.choice("a view or FROM", VIEWS).lower()
+        view = arguments.choice("a view or FROM", VIEW_WORDS).lower()
     options = arguments.options(
         zoom=lambda: arguments.number("the zoom factor", minimum=0.01, maximum=100), follow=lambda: True
     )
     zoom = cast(float, options.get("zoom", 1.0))
-    scene.camera = Camera(view, position, target, zoom, follow="follow" in options)
+    scene.camera = CameraSetting(view, position, target, zoom, follow="follow" in options)
 
 
 @command(
@@ -80,7 +89,7 @@ def film(scene: Scene, arguments: Arguments) -> None:
     """A film of all frames (R67)."""
     name = arguments.output_name("the film's name", FILMS)
     style = _style(arguments)
-    ask_for(scene, arguments, Film(name, style, scene.camera, *_only(scene, arguments, style)))
+    ask_for(scene, arguments, FilmOutput(name, style, scene.camera, *_only(scene, arguments, style)))
 
 
 @command(
@@ -124,18 +133,18 @@ def export_motion(scene: Scene, arguments: Arguments) -> None:
     ask_for(scene, arguments, MotionFile(name, actor))
 
 
-def _style(arguments: Arguments, *beside: str) -> Style:
-    return cast(Style, arguments.choice("the style", _STYLES, beside).lower()) if arguments else "shaded"
+def _style(arguments: Arguments, *beside: str) -> PictureStyle:
+    return cast(PictureStyle, arguments.choice("the style", _STYLES, beside).lower()) if arguments else "shaded"
 
 
-def _only(scene: Scene, arguments: Arguments, style: Style) -> tuple[str | None, tuple[str, ...]]:
+def _only(scene: Scene, arguments: Arguments, style: PictureStyle) -> tuple[str | None, tuple[str, ...]]:
     """What is shown alone, and which digits of it."""
     if style != "pressure" or not arguments:
         return None, ()
     name = _shown_alone(scene, arguments)
     digits: list[str] = []
     while name in scene.actors and arguments:
-        digits.append(arguments.choice("a digit", (*FINGERS, "PALM")).lower())
+        digits.append(arguments.choice("a digit", (*DIGIT_WORDS, "PALM")).lower())
     if digits and name not in scene.contact.flesh:
         raise arguments.error(f"{name} has no flesh whose digits can be shown: FLESH {name} makes it so")
     return name, tuple(dict.fromkeys(digits))

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, cast
 
 from warpjld.errors import InputError
 from warpjld.script.arguments import Arguments
-from warpjld.script.keys import FINGERS
+from warpjld.script.keys import DIGIT_WORDS
 from warpjld.script.registry import command
 from warpjld.script.scene import Scene
 from warpjld.simulation.specification import (
@@ -78,10 +78,10 @@ def flesh(scene: Scene, arguments: Arguments) -> None:
     except InputError as error:
         raise arguments.error(error.message) from None
     digits = []
-    while (digit := arguments.keyword(*FINGERS, "PALM")) is not None:
+    while (digit := arguments.keyword(*DIGIT_WORDS, "PALM")) is not None:
         digits.append(digit.lower())
     options = arguments.options(
-        *FINGERS,
+        *DIGIT_WORDS,
         "PALM",
         element=lambda: arguments.number("the elements' size in metres", above=0.0),
         young=lambda: arguments.number("the flesh's modulus in Pa", above=0.0),

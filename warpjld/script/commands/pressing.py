@@ -6,7 +6,7 @@ from warpjld.script.arguments import Arguments
 from warpjld.script.commands.output import ask_for
 from warpjld.script.commands.physical import place
 from warpjld.script.formats import PICTURES, TABLES, VOLUMES
-from warpjld.script.outputs import Table, Touch, Volume
+from warpjld.script.outputs import Table, TactileOutput, Volume
 from warpjld.script.registry import command
 from warpjld.script.scene import Scene
 from warpjld.simulation.specification import SolveSpecification
@@ -79,7 +79,7 @@ def tactile(scene: Scene, arguments: Arguments) -> None:
     """What an actor's skin feels over time, pad by pad (R95, R125)."""
     name = arguments.output_name("the name of the table or the plot", (*TABLES, *PICTURES))
     actor = scene.actor(arguments.name("an actor's name")).name if arguments else None
-    ask_for(scene, arguments, Touch(name, actor))
+    ask_for(scene, arguments, TactileOutput(name, actor))
 
 
 @command(

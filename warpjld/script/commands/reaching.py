@@ -9,11 +9,11 @@ import numpy as np
 from warpjld.script.arguments import Arguments
 from warpjld.script.commands.physical import read_object
 from warpjld.script.grips import read_frames, read_side
-from warpjld.script.keys import FINGERS
+from warpjld.script.keys import DIGIT_WORDS
 from warpjld.script.registry import command
 from warpjld.script.scene import Scene
 
-_PARTS = ("PALM", "WRIST", *FINGERS)
+_PARTS = ("PALM", "WRIST", *DIGIT_WORDS)
 
 
 @command(

@@ -15,7 +15,7 @@ from warpjld.fem.mesh.bones import Bone
 from warpjld.fem.mesh.embedding import Embedding
 from warpjld.fem.mesh.fit import Fit
 from warpjld.fem.mesh.hexmesh import HexMesh
-from warpjld.kept_values import hash_of, kept_value
+from warpjld.files.kept_values import hash_of, kept_value
 from warpjld.rig import Rig
 from warpjld.simulation.bodies.rest_shape import rest_in_pose
 from warpjld.skeleton import Poses

@@ -13,9 +13,9 @@ from warpjld.fem.mesh.embedding import Embedding, embed
 from warpjld.fem.mesh.envelope import Envelope
 from warpjld.fem.mesh.fit import fit_mesh
 from warpjld.fem.output.stress import cauchy
+from warpjld.files.kept_values import hash_of, kept_value
+from warpjld.geometry.rotations import unit
 from warpjld.grasp.objects import GraspObject, Places
-from warpjld.kept_values import hash_of, kept_value
-from warpjld.rotations import unit
 from warpjld.simulation.specification import ObjectMaterial
 
 __all__ = ["ObjectMesh", "mesh_object"]

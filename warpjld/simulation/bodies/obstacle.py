@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from warpjld.fem.contact import Obstacle
 from warpjld.fem.contact.obstacles.meshes import RigidMesh
-from warpjld.fem.contact.obstacles.obstacle import Motion
+from warpjld.fem.contact.obstacles.obstacle import RigidMotion
 from warpjld.fem.contact.obstacles.solids import Box, Cylinder, Sphere
 from warpjld.grasp import GraspObject
 
@@ -14,7 +14,7 @@ _ROUNDED = 1e-3
 """Radius of the edges of boxes and cylinders as contact feels them [m]: skin has no corner to lie around."""
 
 
-def rigid_obstacle(thing: GraspObject, motion: Motion) -> Obstacle:
+def rigid_obstacle(thing: GraspObject, motion: RigidMotion) -> Obstacle:
     """An object that does not give way and moves as a whole."""
     middle = 0.5 * (thing.vertices.min(axis=0) + thing.vertices.max(axis=0))
     edge = min(_ROUNDED, 0.2 * float(thing.size.min()))

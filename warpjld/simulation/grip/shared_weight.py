@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from warpjld.errors import InputError
 from warpjld.fem.body import Body
 from warpjld.fem.contact import ContactInstant, Pair
-from warpjld.fem.contact.results.contact_solution import Touch
+from warpjld.fem.contact.results.contact_solution import PairContact
 from warpjld.fem.contact.sensitivity.equilibrium_tangent import EquilibriumTangent
 from warpjld.fem.contact.sensitivity.perturbation import Perturbation
 from warpjld.fem.load.loads import volumes
@@ -152,5 +152,5 @@ class SharedWeight:
             allowed += friction * touch.normal_force
         return min(acts / allowed, 1.0) if allowed > 0.0 else 1.0
 
-    def _touches(self, instant: ContactInstant) -> list[Touch]:
+    def _touches(self, instant: ContactInstant) -> list[PairContact]:
         return [instant.touches[k] for k in self._holding]

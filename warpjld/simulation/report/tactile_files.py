@@ -5,9 +5,9 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
+from warpjld.files.whole_file import whole_file
 from warpjld.simulation.report.tactile import Tactile
 from warpjld.tables.columns import Column, checked_values
-from warpjld.whole_file import whole_file
 
 __all__ = ["TACTILE_COLUMNS", "draw_tactile", "tactile_rows", "write_tactile"]
 
@@ -58,12 +58,12 @@ def write_tactile(path: Path, tactile: Tactile) -> None:
     Raises:
         MissingExtraError: Parquet without pyarrow.
     """
-    from warpjld.tables.files import write_csv, write_parquet
+    from warpjld.tables.files import write_parquet, write_table_csv
 
     if path.suffix == ".parquet":
         write_parquet(path, tactile_rows(tactile), TACTILE_COLUMNS)
     else:
-        write_csv(path, tactile_rows(tactile), TACTILE_COLUMNS, described=f"{path.stem}.columns.json")
+        write_table_csv(path, tactile_rows(tactile), TACTILE_COLUMNS, described=f"{path.stem}.columns.json")
 
 
 def draw_tactile(path: Path, tactile: Tactile, title: str = "", axis: str = "time") -> None:

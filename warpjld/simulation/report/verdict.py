@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from warpjld.fem import Status
+from warpjld.fem import SolveStatus
 from warpjld.simulation.report.balance import ObjectBalance, balances
 from warpjld.simulation.report.table import ContactRow
 from warpjld.simulation.report.visible_overlap import RemainingOverlap
@@ -57,7 +57,7 @@ class ContactVerdict:
     @property
     def failed(self) -> bool:
         """Whether frames that were asked for are missing, or are wrong."""
-        return self.status not in (Status.CONVERGED.name, Status.STOPPED.name, CRUSHED)
+        return self.status not in (SolveStatus.CONVERGED.name, SolveStatus.STOPPED.name, CRUSHED)
 
     def content(self) -> dict[str, Any]:
         """As plain values."""
@@ -110,7 +110,7 @@ def verdict_of(
     last = balances(solved.model, solved.frames[-1]) if solved.frames else []
     touched = any(row.force_n > 0.0 for row in rows)
     status = solved.status.name
-    if solved.status not in (Status.CONVERGED, Status.STOPPED):
+    if solved.status not in (SolveStatus.CONVERGED, SolveStatus.STOPPED):
         text = f"no equilibrium: {solved.message}"
     elif overlaps:
         status = "OVERLAP"
@@ -125,7 +125,7 @@ def verdict_of(
         worst = max(over, key=lambda row: row.share)
         need = f"{100 * worst.share:.0f} % of what muscles can do"
         text = f"not realistic: at frame {worst.frame:g} {worst.digit} needs {need}"
-    elif solved.status is Status.STOPPED:
+    elif solved.status is SolveStatus.STOPPED:
         text = solved.message
     elif not rows:
         text = "solved"

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from warpjld.fem import Loads, Status
+from warpjld.fem import Loads, SolveStatus
 from warpjld.fem.contact import ContactInstant, ContactSolution
 from warpjld.fem.contact.results.contact_solution import LastStep
 from warpjld.fem.contact.sensitivity.equilibrium_tangent import EquilibriumTangent, Response
@@ -149,5 +149,5 @@ def _untouched(hand: FleshBody, alone: Untouched, loads: Loads) -> EquilibriumTa
     """Linear system of the flesh that nothing touches."""
     instant = ContactInstant(0.0, alone.displacement, alone.reactions, (), 0, 0, 0.0)
     last = LastStep(0.0, alone.displacement, (), ())
-    found = ContactSolution(Status.CONVERGED, (instant,), "", (), (), loads, None, last)
+    found = ContactSolution(SolveStatus.CONVERGED, (instant,), "", (), (), loads, None, last)
     return EquilibriumTangent(hand.alone.body, [], found, hand.alone.degrees)

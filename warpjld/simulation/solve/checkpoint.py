@@ -12,13 +12,14 @@ from typing import Any
 import numpy as np
 
 from warpjld.errors import InputError
-from warpjld.fem import Loads, Status
+from warpjld.fem import Loads, SolveStatus
 from warpjld.fem.contact import ContactInstant, ContactSolution
 from warpjld.fem.contact.law.contact_state import ContactState
 from warpjld.fem.contact.results.contact_solution import LastStep
 from warpjld.fem.contact.results.nodal_contact import NodalContact
-from warpjld.input_file import check_input
-from warpjld.reading import reading
+from warpjld.files.input_file import check_input
+from warpjld.files.reading import reading
+from warpjld.files.whole_file import whole_file
 from warpjld.simulation.animation import AngleEdit
 from warpjld.simulation.bodies.model import ContactModel
 from warpjld.simulation.solve.bone_clearance import TightBone
@@ -26,7 +27,6 @@ from warpjld.simulation.solve.checked_checkpoint import check_checkpoint, plain_
 from warpjld.simulation.solve.identity import differences
 from warpjld.simulation.solve.missed_contacts import MissedContact
 from warpjld.simulation.solve.solved_frame import SolvedFrame
-from warpjld.whole_file import whole_file
 
 __all__ = ["Checkpoint", "CheckpointFile", "load_checkpoint", "save_checkpoint"]
 
@@ -183,7 +183,7 @@ def _read(file: Any) -> Checkpoint:
     rate = file.get("correction_rate")
     return Checkpoint(
         tuple(frames),
-        ContactSolution(Status.CONVERGED, (instant,), "", states, (), Loads(), rate, step),
+        ContactSolution(SolveStatus.CONVERGED, (instant,), "", states, (), Loads(), rate, step),
         tuple(plain_record(AngleEdit, one) for one in _json(file, "edits")),
         dict(_json(file, "limits")),
         tuple(plain_record(MissedContact, one) for one in _json(file, "missed")),

@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from warpjld.fem import Instant, Solution, Status, solve
+from warpjld.fem import Instant, Solution, SolveStatus, solve
 from warpjld.fem.contact import ContactInstant
 from warpjld.simulation.bodies.deformable_body import History
 from warpjld.simulation.bodies.model import ContactModel
@@ -22,11 +22,11 @@ def solve_untouched(
     done: list[SolvedFrame],
     watch: Callable[[ContactModel, SolvedFrame], str | None],
     progress: Callable[[str, int, int], None],
-) -> tuple[Status, str]:
+) -> tuple[SolveStatus, str]:
     """Solve frames, one after another, onto ``done``; how it ended, and in words (see ``solve_frames``)."""
     nothing, history = np.zeros_like(model.body.mesh.nodes), History()
     rest = Instant(1.0, nothing, nothing, 0, 0, 0.0)
-    after, before = Solution(Status.CONVERGED, (rest,), "", np.empty(0, np.int64), model.loads), 0.0
+    after, before = Solution(SolveStatus.CONVERGED, (rest,), "", np.empty(0, np.int64), model.loads), 0.0
     for frame in frames:
         progress(f"frame {frame:g}", len(done), len(frames))
         time = frame - model.start
@@ -42,5 +42,5 @@ def solve_untouched(
         )
         done.append(solved_frame(float(frame), [instant]))
         if reason := watch(model, done[-1]):
-            return Status.STOPPED, reason
-    return Status.CONVERGED, Status.CONVERGED.value
+            return SolveStatus.STOPPED, reason
+    return SolveStatus.CONVERGED, SolveStatus.CONVERGED.value

@@ -11,12 +11,12 @@ from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
 from warpjld.errors import InputError
-from warpjld.rotations import unit
+from warpjld.geometry.rotations import unit
 from warpjld.skeleton.actor import face_points
 from warpjld.skeleton.actor_points import ACTOR_POINTS
 from warpjld.skeleton.place.branches import centre_line, find_branches
 from warpjld.skeleton.place.hand import place_hand
-from warpjld.skeleton.place.solid import Solid, solid_of
+from warpjld.skeleton.place.solid import VoxelSolid, solid_of
 from warpjld.skeleton.place.stance import find_stance, pieces
 
 __all__ = ["place_body"]
@@ -58,7 +58,7 @@ def place_body(vertices: Array, faces: NDArray[np.integer], label: str = "the bo
     """
     solid = solid_of(vertices, faces, float(np.ptp(vertices, axis=0).max()) / _GRID).main_piece()
     stance = find_stance(solid, label)
-    solid = Solid(stance.inward(solid.points), solid.depth / stance.height, solid.size / stance.height, solid.ways)
+    solid = VoxelSolid(stance.inward(solid.points), solid.depth / stance.height, solid.size / stance.height, solid.ways)
     # distances of the ways scale, too
     solid.ways.data /= stance.height
     points: Points = {}
@@ -80,11 +80,11 @@ def place_body(vertices: Array, faces: NDArray[np.integer], label: str = "the bo
 _DIGITS = ("thumb", "index", "middle", "ring", "pinky")
 
 
-def _slab(solid: Solid, height: float) -> NDArray[np.bool_]:
+def _slab(solid: VoxelSolid, height: float) -> NDArray[np.bool_]:
     return np.asarray(np.abs(solid.points[:, 1] - height) < 1.2 * solid.size)
 
 
-def _beside(solid: Solid, height: float, sign: float, place: float | None = None) -> NDArray[np.int64]:
+def _beside(solid: VoxelSolid, height: float, sign: float, place: float | None = None) -> NDArray[np.int64]:
     """Voxels of the leg on one side at a height."""
     found = [p for p in pieces(solid, _slab(solid, height)) if sign * solid.points[p, 0].mean() > 0 and len(p) > 8]
     if not found:
@@ -94,7 +94,7 @@ def _beside(solid: Solid, height: float, sign: float, place: float | None = None
     return min(large, key=lambda p: abs(float(solid.points[p, 0].mean()) - (place or 0.0)))
 
 
-def _crotch(solid: Solid) -> float:
+def _crotch(solid: VoxelSolid) -> float:
     """Where the legs part: the lowest height at which what carries the middle is one."""
     for height in np.arange(*_CROTCH, 1.5 * solid.size):
         for piece in pieces(solid, _slab(solid, float(height)))[:3]:
@@ -104,7 +104,7 @@ def _crotch(solid: Solid) -> float:
     return _USUAL_CROTCH
 
 
-def _legs(solid: Solid, points: Points) -> NDArray[np.bool_]:
+def _legs(solid: VoxelSolid, points: Points) -> NDArray[np.bool_]:
     """Hips to toes; which voxels are the legs'."""
     crotch = _crotch(solid)
     high = crotch + _HIP
@@ -127,7 +127,7 @@ def _legs(solid: Solid, points: Points) -> NDArray[np.bool_]:
     return legs
 
 
-def _foot(solid: Solid, side: str, sign: float, points: Points) -> None:
+def _foot(solid: VoxelSolid, side: str, sign: float, points: Points) -> None:
     ankle = points[f"{side}.ankle"]
     foot = solid.points[(solid.points[:, 1] < _ANKLE + 0.01) & (sign * solid.points[:, 0] > 0)]
     foot = foot[np.linalg.norm((foot - ankle)[:, [0, 2]], axis=1) < 0.2]
@@ -154,7 +154,7 @@ def _foot(solid: Solid, side: str, sign: float, points: Points) -> None:
         points[f"{side}.{name}_toe_tip"] = foot[column].mean(axis=0)
 
 
-def _trunk(solid: Solid, points: Points) -> None:
+def _trunk(solid: VoxelSolid, points: Points) -> None:
     """Spine, neck and sternum."""
     pelvis = points["pelvis"]
     heights = np.arange(*_NECK, 1.5 * solid.size)
@@ -179,13 +179,13 @@ def _trunk(solid: Solid, points: Points) -> None:
         points[f"{side}.clavicle"] = points["sternum"] + np.array([sign * 0.014, 0.0, 0.0])
 
 
-def _depths(solid: Solid, height: float) -> tuple[float, float]:
+def _depths(solid: VoxelSolid, height: float) -> tuple[float, float]:
     """Back and front of the trunk on its midline."""
     z = solid.points[_slab(solid, height) & (np.abs(solid.points[:, 0]) < 0.02), 2]
     return (float(z.min()), float(z.max())) if len(z) else (0.0, 0.0)
 
 
-def _head(solid: Solid, surface: Array, points: Points) -> None:
+def _head(solid: VoxelSolid, surface: Array, points: Points) -> None:
     base = points["skull_base"]
     skull = (solid.points[:, 1] > base[1]) & (np.abs(solid.points[:, 0]) < 0.09)
     crown = float(solid.points[skull, 1].max())
@@ -203,7 +203,7 @@ def _head(solid: Solid, surface: Array, points: Points) -> None:
         points[name] = place * (0.0, 1.0, 1.0) - 0.012 * forward
 
 
-def _hands(solid: Solid, points: Points, legs: NDArray[np.bool_], label: str) -> list[int]:
+def _hands(solid: VoxelSolid, points: Points, legs: NDArray[np.bool_], label: str) -> list[int]:
     """The furthest voxels of both arms."""
     distance = solid.distances(solid.nearest(points["pelvis"]))
     ends = [b for b in find_branches(solid, distance, 0.12) if abs(solid.points[b.tip, 0]) > 0.06]
@@ -219,7 +219,7 @@ def _hands(solid: Solid, points: Points, legs: NDArray[np.bool_], label: str) ->
 
 
 def _arm(
-    solid: Solid, surface: Array, faces: NDArray[np.integer], side: str, tip: int, points: Points, label: str
+    solid: VoxelSolid, surface: Array, faces: NDArray[np.integer], side: str, tip: int, points: Points, label: str
 ) -> None:
     from_tip = solid.distances(tip)
     step = 2.0 * solid.size
@@ -244,8 +244,8 @@ def _arm(
 
 
 def _fine(
-    solid: Solid, surface: Array, faces: NDArray[np.integer], line: Array, from_tip: Array, wrist: float
-) -> tuple[Solid, Array]:
+    solid: VoxelSolid, surface: Array, faces: NDArray[np.integer], line: Array, from_tip: Array, wrist: float
+) -> tuple[VoxelSolid, Array]:
     """A hand with a piece of forearm in finer voxels, and a point at its arm's end."""
     own = solid.points[from_tip < _REACH * wrist]
     low, high = own.min(axis=0) - 2.0 * solid.size, own.max(axis=0) + 2.0 * solid.size

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from warpjld.skeleton.place.solid import Solid
+from warpjld.skeleton.place.solid import VoxelSolid
 
 __all__ = ["Branch", "centre_line", "find_branches", "point_at"]
 
@@ -29,7 +29,7 @@ class Branch:
     length: float
 
 
-def find_branches(solid: Solid, distance: NDArray[np.float64], least: float) -> list[Branch]:
+def find_branches(solid: VoxelSolid, distance: NDArray[np.float64], least: float) -> list[Branch]:
     """Branches at least so long, the longest first: peaks of the distance by their persistence.
 
     Voxels are added from the furthest inwards; a piece begins at a peak, and ends where it meets one with a higher
@@ -75,7 +75,7 @@ def find_branches(solid: Solid, distance: NDArray[np.float64], least: float) -> 
 
 
 def centre_line(
-    solid: Solid, voxels: NDArray[np.int64], from_tip: NDArray[np.float64], step: float
+    solid: VoxelSolid, voxels: NDArray[np.int64], from_tip: NDArray[np.float64], step: float
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Centres and cross-section areas of the slices of some voxels by their distance from a tip.
 

@@ -8,9 +8,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from warpjld.errors import InputError
-from warpjld.rotations import unit
+from warpjld.geometry.rotations import unit
 from warpjld.skeleton.place.branches import Branch, centre_line, find_branches, point_at
-from warpjld.skeleton.place.solid import Solid
+from warpjld.skeleton.place.solid import VoxelSolid
 
 __all__ = ["place_hand"]
 
@@ -44,7 +44,7 @@ class _Digit:
     length: float
 
 
-def place_hand(solid: Solid, arm: Array | None = None, label: str = "the hand") -> dict[str, Array]:
+def place_hand(solid: VoxelSolid, arm: Array | None = None, label: str = "the hand") -> dict[str, Array]:
     """Propose a hand's points.
 
     Args:
@@ -101,7 +101,7 @@ def _thumb_of(digits: list[_Digit]) -> int:
     return int(np.argmax(apart / np.median(apart) + 2.0 * np.array(astray)))
 
 
-def _arm_end(solid: Solid, label: str) -> Array:
+def _arm_end(solid: VoxelSolid, label: str) -> Array:
     """The middle of the thick one of a hand's six ends."""
     start = solid.nearest(solid.points.mean(axis=0))
     distance = solid.distances(start)
@@ -120,7 +120,7 @@ def _arm_end(solid: Solid, label: str) -> Array:
     return np.asarray(solid.points[outer[int(ranked[-1])]].mean(axis=0))
 
 
-def _follow(solid: Solid, distance: Array, branch: Branch, web: float) -> _Digit:
+def _follow(solid: VoxelSolid, distance: Array, branch: Branch, web: float) -> _Digit:
     own = branch.voxels[distance[branch.voxels] >= web]
     # from the tip through the digit alone
     mine = np.zeros(len(solid.points), dtype=bool)
@@ -142,7 +142,7 @@ def _long(line: Array) -> float:
     return float(np.linalg.norm(np.diff(line, axis=0), axis=1).sum())
 
 
-def _wrist(solid: Solid, distance: Array, web: float, free: float) -> tuple[Array, float]:
+def _wrist(solid: VoxelSolid, distance: Array, web: float, free: float) -> tuple[Array, float]:
     """The narrowest place between hand and forearm, where one is near where wrists are; and its distance."""
     expected = web - _TO_WEB * free
     near = np.flatnonzero(np.isfinite(distance) & (distance < web))
@@ -161,7 +161,7 @@ def _wrist(solid: Solid, distance: Array, web: float, free: float) -> tuple[Arra
     return centres[k], float(at[k])
 
 
-def _finger(solid: Solid, name: str, digit: _Digit, wrist: Array, palm: float, normal: Array) -> dict[str, Array]:
+def _finger(solid: VoxelSolid, name: str, digit: _Digit, wrist: Array, palm: float, normal: Array) -> dict[str, Array]:
     first, second, third = _PHALANGES[name]
     # the palm tells how far behind the web a knuckle lies, the finger's own free length how long its bones are
     behind = 0.5 * _WEB * first * (palm / 117.0 + digit.length / (first + second + third - _WEB * first))
@@ -182,7 +182,7 @@ def _finger(solid: Solid, name: str, digit: _Digit, wrist: Array, palm: float, n
 
 
 def _thumb(
-    solid: Solid, digit: _Digit, wrist: Array, palm: float, forward: Array, radial: Array, normal: Array
+    solid: VoxelSolid, digit: _Digit, wrist: Array, palm: float, forward: Array, radial: Array, normal: Array
 ) -> dict[str, Array]:
     first, second, third = _THUMB
     base = wrist + palm * (_CMC[0] * forward + _CMC[1] * radial)
@@ -197,7 +197,7 @@ def _thumb(
     }
 
 
-def _tip(solid: Solid, line: Array, last: float) -> Array:
+def _tip(solid: VoxelSolid, line: Array, last: float) -> Array:
     """The centre of the round end: as far from it as the flesh around is thick."""
     end = point_at(line, 0.35 * last)
     near = np.linalg.norm(solid.points - end, axis=1) < 0.35 * last
@@ -205,12 +205,12 @@ def _tip(solid: Solid, line: Array, last: float) -> Array:
     return point_at(line, min(radius, 0.5 * last))
 
 
-def _inside(solid: Solid, place: Array) -> Array:
+def _inside(solid: VoxelSolid, place: Array) -> Array:
     nearest = solid.points[solid.nearest(place)]
     return place if np.linalg.norm(nearest - place) < 2.0 * solid.size else nearest
 
 
-def _middle(solid: Solid, place: Array, normal: Array) -> Array:
+def _middle(solid: VoxelSolid, place: Array, normal: Array) -> Array:
     """The middle of the flesh above and below a place in the palm."""
     place = solid.points[solid.nearest(place)]
     away = solid.points - place

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from warpjld.errors import InputError
 from warpjld.skeleton.place.body import place_body
 from warpjld.skeleton.place.hand import place_hand
-from warpjld.skeleton.place.solid import Solid, solid_of
+from warpjld.skeleton.place.solid import VoxelSolid, solid_of
 from warpjld.skeleton.recognise.hand_frame import chirality
 from warpjld.skeleton.recognise.placing import outside_surface
 
@@ -81,7 +81,7 @@ def _order(points: dict[str, Array]) -> list[str]:
 
 
 def _moved_inside(
-    points: dict[str, Array], vertices: Array, faces: NDArray[np.integer], solid: Solid | None
+    points: dict[str, Array], vertices: Array, faces: NDArray[np.integer], solid: VoxelSolid | None
 ) -> dict[str, Array]:
     """Points in a hollow of the surface, as a mouth, at the nearest place in the flesh."""
     names = list(points)

@@ -11,7 +11,7 @@ from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import connected_components, dijkstra
 from scipy.spatial import cKDTree
 
-__all__ = ["Solid", "capped", "solid_of"]
+__all__ = ["VoxelSolid", "capped", "solid_of"]
 
 _FINE = 0.3  # of a voxel: nowhere are samples of the surface further apart, so that it has no gap
 _MOST_INSIDE = 200_000  # voxels of a solid
@@ -20,7 +20,7 @@ _STEPS = [s for s in np.ndindex(3, 3, 3) if s > (1, 1, 1)]  # half of the 26 nei
 
 
 @dataclass(frozen=True, eq=False)
-class Solid:
+class VoxelSolid:
     """The N voxels inside a surface and the ways between them.
 
     Attributes:
@@ -43,12 +43,12 @@ class Solid:
         """The voxel nearest to a place."""
         return int(((self.points - place) ** 2).sum(axis=1).argmin())
 
-    def part(self, chosen: NDArray[np.bool_]) -> Solid:
+    def part(self, chosen: NDArray[np.bool_]) -> VoxelSolid:
         """The solid of some of the voxels."""
         ways = self.ways.tocsr()[chosen][:, chosen].tocoo()
-        return Solid(self.points[chosen], self.depth[chosen], self.size, ways)
+        return VoxelSolid(self.points[chosen], self.depth[chosen], self.size, ways)
 
-    def main_piece(self) -> Solid:
+    def main_piece(self) -> VoxelSolid:
         """The largest connected piece."""
         _, label = connected_components(self.ways, directed=False)
         return self.part(label == np.bincount(label).argmax())
@@ -61,8 +61,8 @@ def solid_of(
     *,
     low: NDArray[np.float64] | None = None,
     high: NDArray[np.float64] | None = None,
-    within: Solid | None = None,
-) -> Solid:
+    within: VoxelSolid | None = None,
+) -> VoxelSolid:
     """Fill a surface: what cannot be reached from outside the voxels that it touches, less the outermost layer.
 
     Holes are capped first. Inner surfaces, as of pieces that overlap, part nothing.
@@ -109,7 +109,9 @@ def solid_of(
     return _connected(solid, depth, origin, size)
 
 
-def _connected(solid: NDArray[np.bool_], depth: NDArray[np.float64], origin: NDArray[np.float64], size: float) -> Solid:
+def _connected(
+    solid: NDArray[np.bool_], depth: NDArray[np.float64], origin: NDArray[np.float64], size: float
+) -> VoxelSolid:
     number = np.full(solid.shape, -1)
     count = int(solid.sum())
     number[solid] = np.arange(count)
@@ -123,7 +125,7 @@ def _connected(solid: NDArray[np.bool_], depth: NDArray[np.float64], origin: NDA
         columns.append(number[there][both])
         lengths.append(np.full(int(both.sum()), size * float(np.linalg.norm(d))))
     ways = coo_matrix((np.concatenate(lengths), (np.concatenate(rows), np.concatenate(columns))), shape=(count, count))
-    return Solid(origin + (np.argwhere(solid) + 0.5) * size, depth[solid], size, ways)
+    return VoxelSolid(origin + (np.argwhere(solid) + 0.5) * size, depth[solid], size, ways)
 
 
 def capped(

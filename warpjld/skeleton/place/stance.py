@@ -9,8 +9,8 @@ from numpy.typing import NDArray
 from scipy.sparse.csgraph import connected_components
 
 from warpjld.errors import InputError
-from warpjld.rotations import unit
-from warpjld.skeleton.place.solid import Solid
+from warpjld.geometry.rotations import unit
+from warpjld.skeleton.place.solid import VoxelSolid
 
 __all__ = ["Stance", "find_stance", "pieces"]
 
@@ -46,7 +46,7 @@ class Stance:
         return points * self.height @ self.frame + self.origin
 
 
-def pieces(solid: Solid, chosen: NDArray[np.bool_]) -> list[NDArray[np.int64]]:
+def pieces(solid: VoxelSolid, chosen: NDArray[np.bool_]) -> list[NDArray[np.int64]]:
     """Connected pieces of some voxels, the largest first."""
     numbers = np.flatnonzero(chosen)
     _, label = connected_components(solid.part(chosen).ways, directed=False)
@@ -54,7 +54,7 @@ def pieces(solid: Solid, chosen: NDArray[np.bool_]) -> list[NDArray[np.int64]]:
     return sorted(found, key=len, reverse=True)
 
 
-def find_stance(solid: Solid, label: str) -> Stance:
+def find_stance(solid: VoxelSolid, label: str) -> Stance:
     """The first axis along which two legs carry one trunk.
 
     Raises:
@@ -69,7 +69,7 @@ def find_stance(solid: Solid, label: str) -> Stance:
     raise InputError(f"{label}: no upright body with two legs apart from one another")
 
 
-def _stands(solid: Solid, up: Array) -> Stance | None:
+def _stands(solid: VoxelSolid, up: Array) -> Stance | None:
     high = solid.points @ up
     low, height = float(high.min()), float(np.ptp(high))
     share = (high - low) / height

@@ -11,7 +11,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from warpjld.rotations import unit
+from warpjld.geometry.rotations import unit
 from warpjld.skeleton.hand import FINGER_JOINTS
 from warpjld.skeleton.recognise.hand_frame import HandFrame, hand_frame
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from warpjld.rotations import unit
+from warpjld.geometry.rotations import unit
 from warpjld.skeleton.recognise.tree import SourceTree
 
 __all__ = ["bone_axis", "bone_directions"]

@@ -9,7 +9,7 @@ import numpy as np
 from warpjld.skeleton.hand import DIGITS, FINGER_JOINTS
 from warpjld.skeleton.recognise.digit_chain import digit_chain
 from warpjld.skeleton.recognise.digits import HandDigits, assign_hands
-from warpjld.skeleton.recognise.flesh import Flesh
+from warpjld.skeleton.recognise.flesh import JointFlesh
 from warpjld.skeleton.recognise.names import Meaning, read_name
 from warpjld.skeleton.recognise.roles import Roles
 from warpjld.skeleton.recognise.tree import SourceTree
@@ -27,12 +27,12 @@ _PALM = ("index", "middle", "ring", "pinky")
 _LEG = (("hip", ("thigh", "hip")), ("knee", ("shin",)), ("ankle", ("ankle", "foot")), ("ball", ("ball", "foot")))
 
 
-def roles_by_name(tree: SourceTree, flesh: Flesh | None = None) -> Roles:
+def roles_by_name(tree: SourceTree, flesh: JointFlesh | None = None) -> Roles:
     """Parts found by names; empty where the names say nothing.
 
     Joints that own skin come before others of the same name; what neither owns any nor ends a bone is no part.
     """
-    flesh = flesh or Flesh(tree, None)
+    flesh = flesh or JointFlesh(tree, None)
     meanings = [Meaning() if flesh.dead[j] else read_name(name) for j, name in enumerate(tree.names)]
     for j in map(int, np.flatnonzero(flesh.passing)):  # what goes on is no end
         if meanings[j].rank == 4 or (meanings[j].kind or "").endswith(" end"):
@@ -68,7 +68,7 @@ def _hand(
     meanings: list[Meaning],
     kinds: dict[tuple[str | None, str], list[int]],
     side: str | None,
-    flesh: Flesh,
+    flesh: JointFlesh,
 ) -> HandDigits | None:
     digits: dict[str, list[int]] = defaultdict(list)
     for j in kinds[side, "digit"]:
@@ -116,7 +116,7 @@ def _forearm_stub(tree: SourceTree, side: str, roles: Roles) -> None:
 
 
 def _toes(
-    tree: SourceTree, kinds: dict[tuple[str | None, str], list[int]], side: str, roles: Roles, flesh: Flesh
+    tree: SourceTree, kinds: dict[tuple[str | None, str], list[int]], side: str, roles: Roles, flesh: JointFlesh
 ) -> None:
     toes = [j for j in kinds[side, "toe"] if not flesh.passing[j]]
     heads = [j for j in toes if not set(tree.ancestors(j)) & set(toes)]
@@ -133,7 +133,7 @@ def _toes(
             roles.body[f"{side}.toe{n}.{'tip' if read_name(tree.names[joint]).rank == 4 else name}"] = joint
 
 
-def _trunk(kinds: dict[tuple[str | None, str], list[int]], roles: Roles, flesh: Flesh) -> None:
+def _trunk(kinds: dict[tuple[str | None, str], list[int]], roles: Roles, flesh: JointFlesh) -> None:
     if not (kinds[None, "spine"] or kinds[None, "pelvis"] or kinds[None, "head"]):
         return
     for name in ("spine", "neck"):

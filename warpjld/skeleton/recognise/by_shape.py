@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from warpjld.skeleton.recognise.digits import Digit, assign_hands
-from warpjld.skeleton.recognise.flesh import Flesh
+from warpjld.skeleton.recognise.flesh import JointFlesh
 from warpjld.skeleton.recognise.prune import prune
 from warpjld.skeleton.recognise.reconnect import reconnect
 from warpjld.skeleton.recognise.roles import HandRoles, Roles
@@ -14,12 +14,12 @@ from warpjld.skeleton.recognise.tree import SourceTree
 __all__ = ["hands_by_shape", "roles_by_shape"]
 
 
-def roles_by_shape(tree: SourceTree, flesh: Flesh | None = None) -> Roles:
+def roles_by_shape(tree: SourceTree, flesh: JointFlesh | None = None) -> Roles:
     """Hands, or a body with two; empty for anything else.
 
     Joints without flesh that end nothing are left aside; a flat file is first chained by its bone axes.
     """
-    flesh = flesh or Flesh(tree, None)
+    flesh = flesh or JointFlesh(tree, None)
     small, numbers, hands = _find_hands(tree, flesh)
     if len(hands) == 2 and _have_common_ancestor(small, hands):
         roles = body_by_shape(small, [hand.joints for hand in hands])
@@ -31,26 +31,26 @@ def roles_by_shape(tree: SourceTree, flesh: Flesh | None = None) -> Roles:
     return roles
 
 
-def hands_by_shape(tree: SourceTree, flesh: Flesh) -> list[HandRoles]:
+def hands_by_shape(tree: SourceTree, flesh: JointFlesh) -> list[HandRoles]:
     """Hands alone, without sides."""
     _, numbers, hands = _find_hands(tree, flesh)
     return [HandRoles(None, {name: numbers[j] for name, j in hand.joints.items()}) for hand in hands]
 
 
-def _find_hands(tree: SourceTree, flesh: Flesh) -> tuple[SourceTree, list[int], list[HandRoles]]:
+def _find_hands(tree: SourceTree, flesh: JointFlesh) -> tuple[SourceTree, list[int], list[HandRoles]]:
     """The tree without dead joints, the number in ``tree`` of each of its joints, and hands in its own numbers."""
     small, numbers = prune(tree, flesh)
     if small.flat:
         small = reconnect(small)
     found = [hand_by_shape(small, wrist) for wrist in hand_roots(small)]
-    shares = Flesh(small, flesh.shares[numbers] if flesh.known else None)
+    shares = JointFlesh(small, flesh.shares[numbers] if flesh.known else None)
     for hand in found:
         for digit in hand.digits.values():
             _mark_end(digit, shares)
     return small, numbers, assign_hands(small, found, shares)
 
 
-def _mark_end(digit: Digit, flesh: Flesh) -> None:
+def _mark_end(digit: Digit, flesh: JointFlesh) -> None:
     if flesh.known and flesh.bare[digit.joints[-1]] and len(digit.joints) > 3:
         digit.ranks[-1] = 4
 

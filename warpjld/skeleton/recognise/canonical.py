@@ -10,14 +10,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from warpjld.errors import InputError
-from warpjld.rotations import unit
+from warpjld.geometry.rotations import unit
 from warpjld.skeleton.hand import FINGER_JOINTS, PALM_SEGMENTS
 from warpjld.skeleton.limits import default_limits
 from warpjld.skeleton.recognise.axes import body_axes, hand_axes, perpendicular
 from warpjld.skeleton.recognise.bones import bone_axis, bone_directions
 from warpjld.skeleton.recognise.complete_body import find_extremities, merge_pelvis
 from warpjld.skeleton.recognise.complete_hand import complete_hand
-from warpjld.skeleton.recognise.flesh import Flesh, without_flesh
+from warpjld.skeleton.recognise.flesh import JointFlesh, without_flesh
 from warpjld.skeleton.recognise.hand_frame import chirality
 from warpjld.skeleton.recognise.layout import Layout, lay_out
 from warpjld.skeleton.recognise.leaf_ends import add_leaf_ends
@@ -99,7 +99,7 @@ def canonical_skeleton(
         notes.extend(added)
     place = None if placed else merge_pelvis(tree, roles)
     notes = [*roles.notes, *notes]
-    flesh = Flesh(tree, shares)
+    flesh = JointFlesh(tree, shares)
     layout = lay_out(tree, roles, hand_points, flesh)
     doubts.extend(without_flesh(tree, layout.names, layout.sources, layout.owner, flesh))
     if place is not None:

@@ -11,7 +11,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from warpjld.skeleton.recognise.flesh import Flesh
+from warpjld.skeleton.recognise.flesh import JointFlesh
 from warpjld.skeleton.recognise.limbs import (
     FOREARM_RATIO,
     SHIN_RATIO,
@@ -57,7 +57,7 @@ class _Limb:
     found: tuple[int, int] | None = None
 
 
-def check_limbs(tree: SourceTree, roles: Roles, flesh: Flesh, stated: Collection[str] = ()) -> None:
+def check_limbs(tree: SourceTree, roles: Roles, flesh: JointFlesh, stated: Collection[str] = ()) -> None:
     """Settle hips, knees, shoulders, elbows and what hangs on them, in ``roles``; joints ``stated`` stay as they are.
 
     Only in a body's hierarchy: a hand with a forearm, or a flat file, has no chains to judge by.
@@ -72,7 +72,7 @@ def check_limbs(tree: SourceTree, roles: Roles, flesh: Flesh, stated: Collection
         _compare(tree, roles, kind)
 
 
-def _limbs(tree: SourceTree, roles: Roles, flesh: Flesh, kind: _Kind, stated: Collection[str]) -> list[_Limb]:
+def _limbs(tree: SourceTree, roles: Roles, flesh: JointFlesh, kind: _Kind, stated: Collection[str]) -> list[_Limb]:
     ends = {}
     for side in ("left", "right"):
         end = _end(tree, roles, flesh, kind, side)
@@ -98,7 +98,7 @@ def _limbs(tree: SourceTree, roles: Roles, flesh: Flesh, kind: _Kind, stated: Co
     return out
 
 
-def _is_helper(tree: SourceTree, flesh: Flesh, joint: int, above: int, size: float) -> bool:
+def _is_helper(tree: SourceTree, flesh: JointFlesh, joint: int, above: int, size: float) -> bool:
     if read_name(tree.names[joint]).kind == "helper":
         return True
     if flesh.passing[joint] and flesh.on_the_way(joint):
@@ -106,7 +106,7 @@ def _is_helper(tree: SourceTree, flesh: Flesh, joint: int, above: int, size: flo
     return float(np.linalg.norm(tree.positions[joint] - tree.positions[above])) < _AT_TRUNK * size
 
 
-def _end(tree: SourceTree, roles: Roles, flesh: Flesh, kind: _Kind, side: str) -> int | None:
+def _end(tree: SourceTree, roles: Roles, flesh: JointFlesh, kind: _Kind, side: str) -> int | None:
     """Wrist or ankle: by name, or down from what is known of the limb."""
     if kind is _ARM:
         hand = next((h for h in roles.hands if h.side == side), None)
@@ -138,7 +138,7 @@ def _end(tree: SourceTree, roles: Roles, flesh: Flesh, kind: _Kind, side: str) -
     return ankle
 
 
-def _wrist(tree: SourceTree, roles: Roles, flesh: Flesh, side: str) -> int | None:
+def _wrist(tree: SourceTree, roles: Roles, flesh: JointFlesh, side: str) -> int | None:
     """Of joints in a line below the shoulder (``arm_joint_L_1`` …) the one that ends a forearm of the usual length."""
     shoulder = roles.body.get(f"{side}.shoulder")
     if shoulder is None or f"{side}.elbow" in roles.body:

@@ -7,11 +7,11 @@ from collections.abc import Mapping
 import numpy as np
 from numpy.typing import NDArray
 
-from warpjld.rotations import unit
+from warpjld.geometry.rotations import unit
+from warpjld.geometry.winding import winding_numbers
 from warpjld.skeleton.hand import DIGITS, FINGER_JOINTS
 from warpjld.skeleton.recognise.extremity import find_extremity
 from warpjld.skeleton.recognise.section import nearby
-from warpjld.winding import winding_numbers
 
 __all__ = ["complete_hand"]
 

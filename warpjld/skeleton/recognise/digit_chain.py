@@ -6,7 +6,7 @@ import re
 from collections.abc import Sequence
 
 from warpjld.skeleton.recognise.digits import Digit
-from warpjld.skeleton.recognise.flesh import Flesh
+from warpjld.skeleton.recognise.flesh import JointFlesh
 from warpjld.skeleton.recognise.names import Meaning
 from warpjld.skeleton.recognise.tree import SourceTree
 
@@ -14,7 +14,7 @@ __all__ = ["digit_chain"]
 
 
 def digit_chain(
-    tree: SourceTree, joints: Sequence[int], meanings: Sequence[Meaning], flesh: Flesh, wrist: int | None
+    tree: SourceTree, joints: Sequence[int], meanings: Sequence[Meaning], flesh: JointFlesh, wrist: int | None
 ) -> Digit | None:
     """The joints that make one digit, from the root outwards; None where they are no chain.
 
@@ -58,7 +58,7 @@ def _one_line(tree: SourceTree, chain: list[int]) -> list[int]:
 
 
 def _without_helpers(
-    tree: SourceTree, chain: list[int], meanings: Sequence[Meaning], flesh: Flesh
+    tree: SourceTree, chain: list[int], meanings: Sequence[Meaning], flesh: JointFlesh
 ) -> tuple[list[int], list[int | None]]:
     """Joints without flesh stay where their name has a place among the others', and one as the end."""
     bare, fleshy = flesh.bare, [j for j in chain if not flesh.bare[j]]

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from warpjld.skeleton.hand import DIGITS, FINGER_JOINTS
-from warpjld.skeleton.recognise.flesh import Flesh
+from warpjld.skeleton.recognise.flesh import JointFlesh
 from warpjld.skeleton.recognise.roles import HandRoles
 from warpjld.skeleton.recognise.tree import SourceTree
 
@@ -57,7 +57,7 @@ class HandDigits:
     digits: dict[str, Digit] = field(default_factory=dict)
 
 
-def assign_hands(tree: SourceTree, hands: Sequence[HandDigits], flesh: Flesh) -> list[HandRoles]:
+def assign_hands(tree: SourceTree, hands: Sequence[HandDigits], flesh: JointFlesh) -> list[HandRoles]:
     """Canonical joints of all hands of a file, names without the side; fewer than 25 where the file has fewer."""
     for hand in hands:
         for digit in hand.digits.values():
@@ -100,7 +100,7 @@ def _assign(name: str, digit: Digit, metacarpals: bool) -> dict[str, int]:
     return roles
 
 
-def _fingers_begin_with_metacarpals(tree: SourceTree, hands: Sequence[HandDigits], flesh: Flesh) -> bool:
+def _fingers_begin_with_metacarpals(tree: SourceTree, hands: Sequence[HandDigits], flesh: JointFlesh) -> bool:
     """Decide for all fingers whose four joints may be metacarpal to third knuckle, or base to tip.
 
     Votes: how far their first joints are from the wrist, how much they spread, whether the last ones own flesh, and

@@ -7,7 +7,7 @@ from collections.abc import Collection
 import numpy as np
 from numpy.typing import NDArray
 
-from warpjld.rotations import unit
+from warpjld.geometry.rotations import unit
 from warpjld.skeleton.recognise.names import read_name
 from warpjld.skeleton.recognise.roles import HandRoles, Roles
 from warpjld.skeleton.recognise.tree import SourceTree

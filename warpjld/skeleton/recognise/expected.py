@@ -14,7 +14,7 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
-from warpjld.rotations import unit
+from warpjld.geometry.rotations import unit
 from warpjld.skeleton.hand import DIGITS, FINGER_JOINTS
 
 __all__ = ["Expectation", "body_expectations", "finger_expectations"]

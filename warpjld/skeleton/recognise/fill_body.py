@@ -7,7 +7,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from warpjld.skeleton.recognise.flesh import Flesh
+from warpjld.skeleton.recognise.flesh import JointFlesh
 from warpjld.skeleton.recognise.limbs import path_below, toes_by_place
 from warpjld.skeleton.recognise.names import read_name
 from warpjld.skeleton.recognise.roles import Roles
@@ -18,7 +18,7 @@ __all__ = ["fill_body"]
 _TOES = 3  # chains below an ankle from which they are toes
 
 
-def fill_body(tree: SourceTree, roles: Roles, flesh: Flesh, stated: Collection[str] = ()) -> None:
+def fill_body(tree: SourceTree, roles: Roles, flesh: JointFlesh, stated: Collection[str] = ()) -> None:
     """Add to ``roles`` what lies between and beyond limbs; joints ``stated`` stay as they are."""
     if tree.flat or not roles.body:
         return
@@ -45,7 +45,7 @@ def _pelvis(tree: SourceTree, roles: Roles, stated: Collection[str]) -> None:
         roles.notes.append(f"pelvis '{tree.names[parting]}': the spine's first joint, where the legs part")
 
 
-def _head(tree: SourceTree, roles: Roles, flesh: Flesh, stated: Collection[str]) -> None:
+def _head(tree: SourceTree, roles: Roles, flesh: JointFlesh, stated: Collection[str]) -> None:
     """The last joint of spine or neck beyond where the arms part, if no name says it; those before are the neck."""
     arms = [roles.body[f"{side}.shoulder"] for side in ("left", "right") if f"{side}.shoulder" in roles.body]
     if roles.how != "names" or "head" in roles.body or stated or len(arms) < 2:
@@ -101,7 +101,7 @@ def _where_arms_part(tree: SourceTree, roles: Roles) -> int | None:
     return next((j for j in tree.ancestors(arms[0]) if j in both), None) if both else None
 
 
-def _feet(tree: SourceTree, roles: Roles, flesh: Flesh, stated: Collection[str]) -> None:
+def _feet(tree: SourceTree, roles: Roles, flesh: JointFlesh, stated: Collection[str]) -> None:
     """The only joint below an ankle, or its toes, if no name says them."""
     ankles = {side: roles.body[f"{side}.ankle"] for side in ("left", "right") if f"{side}.ankle" in roles.body}
     middle = tree.positions[list(ankles.values())].mean(axis=0) if ankles else np.zeros(3)
@@ -118,7 +118,7 @@ def _feet(tree: SourceTree, roles: Roles, flesh: Flesh, stated: Collection[str])
             roles.notes.append(f"{side} toes: {len(below)} chains below the ankle, the innermost is the big one")
 
 
-def _ends(roles: Roles, flesh: Flesh, stated: Collection[str]) -> None:
+def _ends(roles: Roles, flesh: JointFlesh, stated: Collection[str]) -> None:
     """Joints without flesh that end toes, head and handless arms."""
     taken = set(roles.body.values())
     for end, last in flesh.ends.items():

@@ -6,7 +6,7 @@ from collections.abc import Collection
 
 from warpjld.skeleton.hand import DIGITS, HAND_PARENTS
 from warpjld.skeleton.recognise.by_shape import hands_by_shape
-from warpjld.skeleton.recognise.flesh import Flesh
+from warpjld.skeleton.recognise.flesh import JointFlesh
 from warpjld.skeleton.recognise.names import read_name
 from warpjld.skeleton.recognise.roles import BY_MAP, HandRoles, Roles
 from warpjld.skeleton.recognise.tree import SourceTree
@@ -14,7 +14,7 @@ from warpjld.skeleton.recognise.tree import SourceTree
 __all__ = ["fill_hands"]
 
 
-def fill_hands(tree: SourceTree, roles: Roles, flesh: Flesh, stated: Collection[str] = ()) -> None:
+def fill_hands(tree: SourceTree, roles: Roles, flesh: JointFlesh, stated: Collection[str] = ()) -> None:
     """Add to ``roles`` the digits that names leave out, and metacarpals with other names."""
     if tree.flat:
         return
@@ -24,7 +24,7 @@ def fill_hands(tree: SourceTree, roles: Roles, flesh: Flesh, stated: Collection[
         _metacarpals(tree, roles, hand, flesh, stated)
 
 
-def _digits(tree: SourceTree, roles: Roles, flesh: Flesh) -> None:
+def _digits(tree: SourceTree, roles: Roles, flesh: JointFlesh) -> None:
     wrists = {joint: name for name, joint in roles.body.items() if name.endswith(".wrist")}
     partial = {hand.joints["wrist"]: hand for hand in roles.hands if "wrist" in hand.joints and not _whole(hand)}
     if not wrists and not partial:
@@ -72,7 +72,7 @@ def _complete(tree: SourceTree, roles: Roles, named: HandRoles, shaped: HandRole
         )
 
 
-def _metacarpals(tree: SourceTree, roles: Roles, hand: HandRoles, flesh: Flesh, stated: Collection[str]) -> None:
+def _metacarpals(tree: SourceTree, roles: Roles, hand: HandRoles, flesh: JointFlesh, stated: Collection[str]) -> None:
     """The joint between wrist and one finger's base that leads to nothing else."""
     taken = set(hand.joints.values()) | set(roles.body.values())
     for digit in DIGITS:

@@ -9,12 +9,12 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from warpjld.rotations import unit
+from warpjld.geometry.rotations import unit
 from warpjld.skeleton.recognise.names import read_name
 from warpjld.skeleton.recognise.roles import BY_MAP
 from warpjld.skeleton.recognise.tree import SourceTree
 
-__all__ = ["Flesh", "flesh_shares", "without_flesh"]
+__all__ = ["JointFlesh", "flesh_shares", "without_flesh"]
 
 _NONE = 1e-6  # share of the surface below which a joint owns nothing
 _COINCIDENT = 1e-3  # of the bone before: an end nearer than this is no end
@@ -44,7 +44,7 @@ def flesh_shares(
     return shares / len(joints)
 
 
-class Flesh:
+class JointFlesh:
     """The flesh of a joint tree.
 
     Args:
@@ -145,7 +145,7 @@ _MOVES_SKIN = ("hip", "knee", "shoulder", "elbow", "knuckle2", "knuckle3")
 
 
 def without_flesh(
-    tree: SourceTree, names: Sequence[str], sources: Sequence[int], owner: NDArray[np.int64], flesh: Flesh
+    tree: SourceTree, names: Sequence[str], sources: Sequence[int], owner: NDArray[np.int64], flesh: JointFlesh
 ) -> list[str]:
     """Doubts about recognised joints that move no skin in the file, nor do those merged into them.
 

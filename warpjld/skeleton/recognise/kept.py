@@ -7,7 +7,7 @@ from collections.abc import Collection, Mapping
 import numpy as np
 
 from warpjld.skeleton.hand import HAND_PARENTS
-from warpjld.skeleton.recognise.flesh import Flesh
+from warpjld.skeleton.recognise.flesh import JointFlesh
 from warpjld.skeleton.recognise.names import read_name
 from warpjld.skeleton.recognise.tree import SourceTree
 
@@ -21,7 +21,7 @@ _ASIDE = 0.03  # of a bone's length: a joint nearer to it lies on it
 
 
 def kept_joints(
-    tree: SourceTree, of_source: Mapping[int, str], flesh: Flesh, left_out: Collection[int], notes: list[str]
+    tree: SourceTree, of_source: Mapping[int, str], flesh: JointFlesh, left_out: Collection[int], notes: list[str]
 ) -> dict[int, str]:
     """Joints of the file that stay joints, with their names in lower case.
 
@@ -63,7 +63,7 @@ def kept_joints(
     return kept
 
 
-def _moves_nothing(tree: SourceTree, flesh: Flesh, joint: int) -> bool:
+def _moves_nothing(tree: SourceTree, flesh: JointFlesh, joint: int) -> bool:
     """Whether a joint neither moves skin nor ends a bone nor is where live chains part."""
     if tree.flat:
         return flesh.known and bool(flesh.bare[joint])
@@ -82,7 +82,7 @@ def _belongs(tree: SourceTree, joint: int, over: list[str], below: list[str], si
     return bool(below) or helper or double or in_hand or "head" in over or (not over and tree.flat)
 
 
-def _bends(tree: SourceTree, of_source: Mapping[int, str], flesh: Flesh, joint: int) -> bool:
+def _bends(tree: SourceTree, of_source: Mapping[int, str], flesh: JointFlesh, joint: int) -> bool:
     """Whether a joint with flesh of its own bends a limb between two recognised joints, as an animal's hock does."""
     over = next((k for k in tree.ancestors(joint) if k in of_source), None)
     below = next((k for k in tree.subtree(joint) if k in of_source), None)
@@ -96,7 +96,7 @@ def _bends(tree: SourceTree, of_source: Mapping[int, str], flesh: Flesh, joint: 
     return lengths > 0.0 and float(upper @ lower) < _STRAIGHT * lengths
 
 
-def _chain_of_its_own(tree: SourceTree, of_source: Mapping[int, str], flesh: Flesh, joint: int) -> bool:
+def _chain_of_its_own(tree: SourceTree, of_source: Mapping[int, str], flesh: JointFlesh, joint: int) -> bool:
     """Whether a joint is of a chain with flesh that leaves a wrist beside the known digits, as a sixth finger does, or
     hangs far down from a head, as hair does."""
     if tree.flat or not flesh.known or flesh.dead[joint]:

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from warpjld.skeleton.hand import HAND_PARENTS
-from warpjld.skeleton.recognise.flesh import Flesh
+from warpjld.skeleton.recognise.flesh import JointFlesh
 from warpjld.skeleton.recognise.kept import kept_joints
 from warpjld.skeleton.recognise.roles import Roles
 from warpjld.skeleton.recognise.tree import SourceTree
@@ -60,7 +60,7 @@ def lay_out(
     tree: SourceTree,
     roles: Roles,
     hand_points: Mapping[str, Mapping[str, NDArray[np.float64]]],
-    flesh: Flesh | None = None,
+    flesh: JointFlesh | None = None,
 ) -> Layout:
     """Arrange recognised and remaining joints.
 
@@ -81,7 +81,7 @@ def lay_out(
         named |= {f"{hand.side}.{name}": joint for name, joint in hand.joints.items()}
     of_source = {joint: name for name, joint in named.items()}
     notes: list[str] = []
-    kept = kept_joints(tree, of_source, flesh or Flesh(tree, None), roles.left_out, notes)
+    kept = kept_joints(tree, of_source, flesh or JointFlesh(tree, None), roles.left_out, notes)
     of_source |= kept
     named |= {name: joint for joint, name in kept.items()}
 

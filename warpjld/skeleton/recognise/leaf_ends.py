@@ -11,7 +11,7 @@ import re
 import numpy as np
 from numpy.typing import NDArray
 
-from warpjld.rotations import unit
+from warpjld.geometry.rotations import unit
 from warpjld.skeleton.recognise.extremity import find_extremity
 from warpjld.skeleton.recognise.layout import Layout
 from warpjld.skeleton.recognise.painted import Painted

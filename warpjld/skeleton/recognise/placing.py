@@ -8,13 +8,13 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from warpjld.coincident import close_pairs, connected_parts
+from warpjld.geometry.coincident import close_pairs, connected_parts
+from warpjld.geometry.winding import winding_numbers
 from warpjld.skeleton.hand import DIGITS
 from warpjld.skeleton.recognise.complete_body import find_extremities
 from warpjld.skeleton.recognise.expected import body_expectations, finger_expectations
 from warpjld.skeleton.recognise.section import first_hits
 from warpjld.skeleton.tree import Skeleton
-from warpjld.winding import winding_numbers
 
 __all__ = ["Finding", "check_placing", "in_trunk", "outside_surface"]
 

@@ -4,14 +4,14 @@ from __future__ import annotations
 
 import numpy as np
 
-from warpjld.skeleton.recognise.flesh import Flesh
+from warpjld.skeleton.recognise.flesh import JointFlesh
 from warpjld.skeleton.recognise.kept import lies_on_bone
 from warpjld.skeleton.recognise.tree import SourceTree
 
 __all__ = ["prune"]
 
 
-def prune(tree: SourceTree, flesh: Flesh) -> tuple[SourceTree, list[int]]:
+def prune(tree: SourceTree, flesh: JointFlesh) -> tuple[SourceTree, list[int]]:
     """The tree without dead joints, those that merely pass on between two others, and twist joints.
 
     Returns:

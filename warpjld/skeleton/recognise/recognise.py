@@ -15,7 +15,7 @@ from warpjld.skeleton.recognise.check_limbs import check_limbs
 from warpjld.skeleton.recognise.evidence import reject_unfounded
 from warpjld.skeleton.recognise.fill_body import fill_body
 from warpjld.skeleton.recognise.fill_hands import fill_hands
-from warpjld.skeleton.recognise.flesh import Flesh
+from warpjld.skeleton.recognise.flesh import JointFlesh
 from warpjld.skeleton.recognise.joint_map import JointMap
 from warpjld.skeleton.recognise.roles import Roles
 from warpjld.skeleton.recognise.tree import SourceTree
@@ -46,7 +46,7 @@ def recognise(
     Raises:
         InputError: ``stated`` names joints that are not there.
     """
-    flesh = Flesh(tree, shares)
+    flesh = JointFlesh(tree, shares)
     by_hand = JointMap(tree, stated or {})
     roles = roles_by_name(tree, flesh)
     if by_shape and not (roles.hands or roles.body):
@@ -61,7 +61,7 @@ def recognise(
     return roles
 
 
-def _checked(tree: SourceTree, roles: Roles, flesh: Flesh, by_hand: JointMap) -> Roles:
+def _checked(tree: SourceTree, roles: Roles, flesh: JointFlesh, by_hand: JointMap) -> Roles:
     """What names or shape propose, with what is stated, as far as geometry agrees."""
     by_hand.apply(roles)
     fill_hands(tree, roles, flesh, by_hand.names)

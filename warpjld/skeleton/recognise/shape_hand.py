@@ -5,11 +5,11 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from warpjld.rotations import unit
+from warpjld.geometry.rotations import unit
 from warpjld.skeleton.recognise.digits import Digit, HandDigits
 from warpjld.skeleton.recognise.tree import SourceTree
 
-__all__ = ["digit_chains", "hand_by_shape", "hand_roots"]
+__all__ = ["hand_by_shape", "hand_roots", "leaf_chains"]
 
 _TOE_RATIO = 0.45  # chain length per distance from the common joint: 0.25 for toes, 0.6 or more for fingers
 
@@ -25,10 +25,10 @@ def hand_roots(tree: SourceTree) -> list[int]:
 
 
 def _is_wrist(tree: SourceTree, joint: int) -> bool:
-    chains = digit_chains(tree, joint)
+    chains = leaf_chains(tree, joint)
     if len(chains) != 5 or any(len(chain) < 3 for chain in chains):
         return False
-    if any(len(digit_chains(tree, child)) == 5 for child in tree.children[joint]):
+    if any(len(leaf_chains(tree, child)) == 5 for child in tree.children[joint]):
         return False  # a joint further down has all five
     at = tree.positions
     ratios = []
@@ -70,7 +70,7 @@ def _are_fingers(chains: list[NDArray[np.float64]]) -> bool:
     return False
 
 
-def digit_chains(tree: SourceTree, joint: int) -> list[list[int]]:
+def leaf_chains(tree: SourceTree, joint: int) -> list[list[int]]:
     """For every leaf below ``joint``, the joints above it that lead to no other leaf, from the root outwards."""
     below = tree.subtree(joint)[1:]
     chains = []
@@ -90,7 +90,7 @@ def hand_by_shape(tree: SourceTree, wrist: int) -> HandDigits:
     The thumb is the digit with fewer joints than all others or, where counts are equal, the one that points
     elsewhere; the fingers follow from index to pinky with growing distance from it.
     """
-    chains = digit_chains(tree, wrist)
+    chains = leaf_chains(tree, wrist)
     at = tree.positions
     counts = sorted(len(chain) for chain in chains)
     headings = unit([at[chain[-1]] - at[chain[0]] for chain in chains])

@@ -7,10 +7,10 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from warpjld.errors import InputError
+from warpjld.files.names import check_name
+from warpjld.files.toml_table import TomlTable
+from warpjld.geometry.lengths import check_size
 from warpjld.io.identity import content_hash
-from warpjld.lengths import check_size
-from warpjld.names import check_name
-from warpjld.toml_table import TomlTable
 
 if TYPE_CHECKING:
     from warpjld.grasp import GraspObject

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from warpjld.grasp.both_ways import BothWays
 from warpjld.grasp.quality import (
-    Patches,
+    ContactPatches,
     force_closure,
     gravity_displacement,
     penetration,
@@ -25,7 +25,7 @@ __all__ = ["measure_grasp"]
 
 def measure_grasp(
     hand: Hand, thing: Thing, both: BothWays, vertices: NDArray[np.float32], friction: float, how: Measuring
-) -> tuple[dict[str, Any], Patches]:
+) -> tuple[dict[str, Any], ContactPatches]:
     """Columns of the table, and the patches of contact; definitions are in `warpjld.grasp.quality`, one a measure.
 
     Args:

@@ -45,7 +45,7 @@ def grasp_views(
     pose = {name.partition("/")[2]: array[None] for name, array in outcome.arrays.items()}
     if "angles" not in pose:
         return []
-    from warpjld.render import Camera, Scene, Solid
+    from warpjld.render import Camera, SceneRenderer, Solid
 
     skeleton, faces = hand.rig.skeleton, hand.rig.surface.faces
     poses = poses_from_angles(
@@ -59,7 +59,7 @@ def grasp_views(
     pictures = []
     for view in views:
         camera = Camera.view(view, cloud, **axes, side=hand.side, size=size)
-        with Scene(faces, camera, size=size, solids=[solid]) as scene:
+        with SceneRenderer(faces, camera, size=size, solids=[solid]) as scene:
             pictures.append(scene.draw(vertices))
     return pictures
 

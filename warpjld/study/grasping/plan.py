@@ -6,11 +6,11 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any, Literal
 
-from warpjld.manifest import versions
+from warpjld.files.manifest import versions
+from warpjld.files.toml_table import TomlTable, read_toml
 from warpjld.skeleton import CHANNELS, DIGITS
 from warpjld.skeleton.hand import HAND_PARENTS
 from warpjld.study.grasping.choices import HandChoice, ObjectChoice, read_hand, read_object
-from warpjld.toml_table import TomlTable, read_toml
 
 __all__ = ["GraspPlan", "Measuring", "WristRange", "load_plan"]
 

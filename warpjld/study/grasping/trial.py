@@ -16,7 +16,7 @@ from warpjld.grasp.close import Closer
 from warpjld.grasp.hand_scale import doubt_of_size, hand_length
 from warpjld.grasp.near_object import NearObject
 from warpjld.grasp.postures import posture_for
-from warpjld.grasp.quality import Patches
+from warpjld.grasp.quality import ContactPatches
 from warpjld.grasp.segments import SEGMENTS
 from warpjld.skeleton import poses_from_angles
 from warpjld.study.experiment import Outcome
@@ -111,7 +111,7 @@ class GraspExperiment:
 
     def begin(self) -> None:
         """Keep Warp's remarks off the output of a command that runs many workers."""
-        from warpjld.quiet import silence_warp
+        from warpjld.runtime.quiet import silence_warp
 
         silence_warp()
 
@@ -230,7 +230,7 @@ def _room(opened: Array, near: NearObject, turn: Array, shift: Array, approach: 
     return None
 
 
-def _by_segment(patches: Patches) -> dict[str, Array]:
+def _by_segment(patches: ContactPatches) -> dict[str, Array]:
     """Patches in rows of ``SEGMENTS``, NaN where a segment does not touch."""
     rows = [SEGMENTS.index(name) for name in patches.names]
     out = {}

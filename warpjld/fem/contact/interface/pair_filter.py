@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from warpjld.fem.arrays import Array, Ints32
 from warpjld.fem.contact.interface.surface import ContactSurface
 from warpjld.fem.launch import on_rows, shared
-from warpjld.rotations import unit
+from warpjld.geometry.rotations import unit
 
 if TYPE_CHECKING:
     from warpjld.fem.contact.interface.mortar import Mortar

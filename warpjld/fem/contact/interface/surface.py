@@ -9,7 +9,7 @@ import numpy as np
 from warpjld.errors import InputError
 from warpjld.fem.arrays import Array, Ints32
 from warpjld.fem.mesh.hexmesh import HexMesh
-from warpjld.rotations import unit
+from warpjld.geometry.rotations import unit
 
 __all__ = ["ContactSurface", "surface_of"]
 

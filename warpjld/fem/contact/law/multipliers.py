@@ -11,7 +11,7 @@ from warpjld.fem.contact.interface.contact_points import ContactPoints, tangenti
 from warpjld.fem.contact.interface.pairs import Pair
 from warpjld.fem.contact.law.contact_state import ActiveSet, ContactState
 from warpjld.fem.contact.law.return_mapping import FRICTION_FROM, ContactTractions
-from warpjld.rotations import unit
+from warpjld.geometry.rotations import unit
 
 __all__ = ["update_multipliers"]
 

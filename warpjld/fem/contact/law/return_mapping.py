@@ -14,7 +14,7 @@ from warpjld.fem.arrays import Array, Mask
 from warpjld.fem.contact.interface.contact_points import ContactPoints
 from warpjld.fem.contact.interface.pairs import Pair
 from warpjld.fem.contact.law.contact_state import ActiveSet, ContactState
-from warpjld.rotations import unit
+from warpjld.geometry.rotations import unit
 
 __all__ = ["FRICTION_FROM", "ContactTractions", "overstrained", "return_mapping"]
 

@@ -15,7 +15,7 @@ from numpy.typing import ArrayLike
 from warpjld.errors import InputError
 from warpjld.fem.arrays import Array, Ints32
 from warpjld.fem.contact.obstacles.facets import Facets
-from warpjld.fem.contact.obstacles.obstacle import ClosestPoints, Motion, Moving, Points, Rigid
+from warpjld.fem.contact.obstacles.obstacle import ClosestPoints, Moving, Points, Rigid, RigidMotion
 
 __all__ = ["Barr"]
 
@@ -49,7 +49,7 @@ class Barr(Moving):
         taper: Amount = 0.0,
         twist: Amount = 0.0,
         bend: Amount = 0.0,
-        motion: Motion | None = None,
+        motion: RigidMotion | None = None,
     ) -> None:
         if axis not in ("x", "y", "z"):
             raise InputError(f"Barr axis: want x, y or z, got '{axis}'")

@@ -14,7 +14,7 @@ from warpjld.errors import InputError
 from warpjld.fem.arrays import Array, Ints, Ints32, Mask
 from warpjld.fem.contact.obstacles.obstacle import ClosestPoints, Points
 from warpjld.fem.mesh.envelope import checked_surface
-from warpjld.threads import in_threads, threads_for
+from warpjld.runtime.threads import in_threads, threads_for
 
 __all__ = ["CREASE", "Facets", "Place"]
 

@@ -8,7 +8,7 @@ from numpy.typing import ArrayLike
 from warpjld.errors import InputError
 from warpjld.fem.arrays import Ints32
 from warpjld.fem.contact.obstacles.facets import Facets
-from warpjld.fem.contact.obstacles.obstacle import ClosestPoints, Motion, Moving, Points, Rigid
+from warpjld.fem.contact.obstacles.obstacle import ClosestPoints, Moving, Points, Rigid, RigidMotion
 
 __all__ = ["Keyframed", "RigidMesh"]
 
@@ -25,7 +25,7 @@ class RigidMesh(Rigid):
         InputError: See `Facets`.
     """
 
-    def __init__(self, vertices: ArrayLike, faces: ArrayLike, motion: Motion | None = None) -> None:
+    def __init__(self, vertices: ArrayLike, faces: ArrayLike, motion: RigidMotion | None = None) -> None:
         self._facets = Facets(vertices, faces)
         self.motion = motion
 
@@ -49,7 +49,9 @@ class Keyframed(Moving):
         InputError: Times that do not increase, wrong shapes, or see `Facets`.
     """
 
-    def __init__(self, faces: ArrayLike, times: ArrayLike, vertices: ArrayLike, motion: Motion | None = None) -> None:
+    def __init__(
+        self, faces: ArrayLike, times: ArrayLike, vertices: ArrayLike, motion: RigidMotion | None = None
+    ) -> None:
         self.motion = motion
         self._times = np.asarray(times, dtype=np.float64)
         self._vertices = np.asarray(vertices, dtype=np.float64)

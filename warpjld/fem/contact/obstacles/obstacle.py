@@ -16,17 +16,17 @@ from warpjld.fem.arrays import Array, Ints32
 
 __all__ = [
     "ClosestPoints",
-    "Motion",
     "Moving",
     "Obstacle",
     "Rigid",
+    "RigidMotion",
     "checked_points",
     "checked_vector",
     "placement",
     "standing",
 ]
 
-Motion = Callable[[float], tuple[ArrayLike, ArrayLike]]
+RigidMotion = Callable[[float], tuple[ArrayLike, ArrayLike]]
 """Time → position [m] and quaternion x, y, z, w: a point x of the first placement lies at rotation · x + position."""
 
 Points = Array
@@ -67,7 +67,7 @@ class Obstacle(ABC):
 class Moving(Obstacle):
     """An obstacle with a ``motion``, and a shape in its own frame that may be a function of time."""
 
-    motion: Motion | None
+    motion: RigidMotion | None
 
     @abstractmethod
     def _project(self, points: Points, time: float) -> ClosestPoints:
@@ -105,13 +105,13 @@ class Rigid(Moving):
     """An obstacle whose shape in its own frame is always the same."""
 
 
-def standing(position: ArrayLike = (0.0, 0.0, 0.0), rotation: ArrayLike = (0.0, 0.0, 0.0, 1.0)) -> Motion:
+def standing(position: ArrayLike = (0.0, 0.0, 0.0), rotation: ArrayLike = (0.0, 0.0, 0.0, 1.0)) -> RigidMotion:
     """The motion of what stands still at a position [m] with a rotation x, y, z, w."""
     placement(lambda time: (position, rotation), 0.0)
     return lambda time: (position, rotation)
 
 
-def placement(motion: Motion | None, time: float) -> tuple[Array, Array]:
+def placement(motion: RigidMotion | None, time: float) -> tuple[Array, Array]:
     """Rotation matrix (3, 3) and shift (3,) [m] of a motion at a time.
 
     Raises:

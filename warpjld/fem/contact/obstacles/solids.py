@@ -9,7 +9,7 @@ from numpy.typing import ArrayLike
 
 from warpjld.errors import InputError
 from warpjld.fem.arrays import Array, Ints32
-from warpjld.fem.contact.obstacles.obstacle import ClosestPoints, Motion, Points, Rigid, checked_vector
+from warpjld.fem.contact.obstacles.obstacle import ClosestPoints, Points, Rigid, RigidMotion, checked_vector
 
 __all__ = ["Box", "Cylinder", "Plane", "Sphere"]
 
@@ -30,7 +30,7 @@ class Plane(Rigid):
 
     point: ArrayLike = (0.0, 0.0, 0.0)
     normal: ArrayLike = (0.0, 1.0, 0.0)
-    motion: Motion | None = None
+    motion: RigidMotion | None = None
     extent: float = 0.3
     _middle: Points = field(init=False, repr=False)
     _out: Points = field(init=False, repr=False)
@@ -65,7 +65,7 @@ class Sphere(Rigid):
 
     centre: ArrayLike
     radius: float
-    motion: Motion | None = None
+    motion: RigidMotion | None = None
     _middle: Points = field(init=False, repr=False)
 
     def __post_init__(self) -> None:
@@ -102,7 +102,7 @@ class Box(Rigid):
     size: ArrayLike
     centre: ArrayLike = (0.0, 0.0, 0.0)
     edge: float = 0.0
-    motion: Motion | None = None
+    motion: RigidMotion | None = None
     _middle: Points = field(init=False, repr=False)
     _half: Array = field(init=False, repr=False)
 
@@ -142,7 +142,7 @@ class Cylinder(Rigid):
     centre: ArrayLike = (0.0, 0.0, 0.0)
     axis: ArrayLike = (0.0, 1.0, 0.0)
     edge: float = 0.0
-    motion: Motion | None = None
+    motion: RigidMotion | None = None
     _middle: Points = field(init=False, repr=False)
     _along: Points = field(init=False, repr=False)
 

@@ -41,7 +41,7 @@ from warpjld.fem.contact.paper.turns import Turns
 from warpjld.fem.contact.results.contact_solution import ContactInstant, ContactSolution
 from warpjld.fem.load.loads import Loads, external_forces
 from warpjld.fem.load.prescribed import Prescribed
-from warpjld.fem.solver.krylov import Status
+from warpjld.fem.solver.krylov import SolveStatus
 from warpjld.fem.solver.solution import Instant, Solution
 
 __all__ = ["by_turns"]
@@ -85,7 +85,7 @@ def by_turns(
     steps: list[int] = []
     tell = progress or (lambda text: None)
     begun = last.last
-    status, message = Status.CONVERGED, Status.CONVERGED.value
+    status, message = SolveStatus.CONVERGED, SolveStatus.CONVERGED.value
     todo, halvings = list(times), 0
     while todo:
         time = todo[0]
@@ -95,7 +95,7 @@ def by_turns(
         turns = Turns(body, held, sides, load(time), time, forces, omega if aitken else None, edge * threshold)
         status = turns.through(last, first, _REPEL * edge if halvings < _HALVINGS else np.inf)
         tell(f"time {time:.3g}: {turns.report}")
-        if status is not Status.CONVERGED:
+        if status is not SolveStatus.CONVERGED:
             halvings += 1
             if halvings > _HALVINGS or turns.diverged:  # that, shorter steps do not change
                 message = f"at time {time:.4g} (from {now:.4g}): {turns.report}; {_ADVICE[aitken]}"
@@ -111,7 +111,7 @@ def by_turns(
         if time in times:
             reached.append(turns.instant())
             if reason := watch(reached[-1]) if watch else None:
-                status, message = Status.STOPPED, reason
+                status, message = SolveStatus.STOPPED, reason
                 break
     if not reached:
         reached = [ContactInstant(now, begun.displacement, begun.reactions, (), 0, 0, 0.0)]
@@ -130,7 +130,7 @@ def _begun(
         forces = _missing(body, loads(after.last.time), after.last)
         for side, known in zip(sides, after.states, strict=True):
             side.touching = known.pressure > 0.0
-    return Solution(Status.CONVERGED, (at,), "", np.empty(0, np.int64), loads(0.0)), forces
+    return Solution(SolveStatus.CONVERGED, (at,), "", np.empty(0, np.int64), loads(0.0)), forces
 
 
 def _refuse(pairs: Sequence[Pair]) -> None:

@@ -14,7 +14,7 @@ from warpjld.fem.contact.interface.surface import ContactSurface, surface_of
 from warpjld.fem.contact.law.contact_state import ContactState, initial_state
 from warpjld.fem.contact.obstacles.facets import Facets, Place
 from warpjld.fem.contact.obstacles.obstacle import Obstacle
-from warpjld.fem.contact.results.contact_solution import Touch
+from warpjld.fem.contact.results.contact_solution import PairContact
 from warpjld.fem.contact.results.nodal_contact import to_nodes
 
 __all__ = ["Meeting", "Side"]
@@ -85,7 +85,7 @@ class Side:
             np.add.at(out, corners, -meeting.place.weights[:, :, None] * forces[:, None, :])
         return forces
 
-    def touch(self, meeting: Meeting, forces: Array, x: Array) -> Touch:
+    def touch(self, meeting: Meeting, forces: Array, x: Array) -> PairContact:
         """What a pair says of forces on its slave nodes (m, 3) at positions x (N, 3)."""
         surface = self.slave
         nodes = surface.nodes[meeting.rows]
@@ -101,7 +101,7 @@ class Side:
             rows = 3 * np.arange(len(nodes) + 1)
             there = csr_array((meeting.place.weights.ravel(), corners.ravel(), rows), shape=there.shape)
         pressed, still = np.where(pressure > 0.0, area, 0.0), np.zeros((len(nodes), 3))
-        return Touch(
+        return PairContact(
             self.pair.label,
             nodes,
             x[nodes],

@@ -9,10 +9,10 @@ import numpy as np
 from warpjld.fem.arrays import Array, Ints
 from warpjld.fem.body import Body
 from warpjld.fem.contact.paper.sides import Meeting, Side
-from warpjld.fem.contact.results.contact_solution import ContactInstant, Touch
+from warpjld.fem.contact.results.contact_solution import ContactInstant, PairContact
 from warpjld.fem.load.loads import Loads
 from warpjld.fem.load.prescribed import Prescribed
-from warpjld.fem.solver.krylov import Status
+from warpjld.fem.solver.krylov import SolveStatus
 from warpjld.fem.solver.solution import Solution
 from warpjld.fem.solver.static import solve
 
@@ -51,7 +51,7 @@ class Turns:
     ) -> None:
         self._body, self._known, self._sides, self._loads, self._time = body, known, sides, loads, time
         self._aitken, self._threshold = omega is not None, threshold
-        self._touches: list[Touch] = []
+        self._touches: list[PairContact] = []
         self._iterations = 0
         self.forces, self.omega = forces, 1.0 if omega is None else omega
         self.solves = 0
@@ -59,7 +59,7 @@ class Turns:
         self.report = ""
         self.diverged = False
 
-    def through(self, last: Solution, first: Array | None, deepest: float) -> Status:
+    def through(self, last: Solution, first: Array | None, deepest: float) -> SolveStatus:
         """Turn until no point moves any more. Overlap beyond ``deepest`` [m] at the start is left to shorter steps."""
         rest, surface = self._body.mesh.nodes, _surface(self._sides)
         self.last = self._solve(self._known, self._loaded(self.forces), last, first)
@@ -71,7 +71,7 @@ class Turns:
             meetings = [side.meet(rest + u, rest + u, self._time) for side in self._sides]
             overlap = max(float(np.maximum(-m.distance, 0.0).max(initial=0.0)) for m in meetings)
             if turn == 0 and overlap > deepest:
-                return self._ended(Status.STAGNATED, f"bodies overlap by {1e3 * overlap:.3g} mm at once")
+                return self._ended(SolveStatus.STAGNATED, f"bodies overlap by {1e3 * overlap:.3g} mm at once")
             fixed, found = self._repelled(surface, meetings)
             if not fixed.converged:
                 return self._ended(fixed.status, f"repelled bodies found no equilibrium: {fixed.message}")
@@ -93,13 +93,13 @@ class Turns:
             # what is relaxed moves less than it has yet to go
             self.moves.append(max(moved, self._way(fixed, u)))
             if self.moves[-1] < self._threshold:
-                return self._ended(Status.CONVERGED, f"{turn + 1} turns")
+                return self._ended(SolveStatus.CONVERGED, f"{turn + 1} turns")
             if self.moves[-1] > _RUNAWAY * min(self.moves):
                 break
         self.diverged = True
         grows = self.growth
         how = f"each turn moves {grows:.2f} times as far as the one before"
-        status = Status.STAGNATED if grows >= 1.0 else Status.MAX_ITERATIONS
+        status = SolveStatus.STAGNATED if grows >= 1.0 else SolveStatus.MAX_ITERATIONS
         return self._ended(status, f"repelling and releasing did not settle in {len(self.moves)} turns: {how}")
 
     def _way(self, fixed: Solution, u: Array) -> float:
@@ -142,7 +142,7 @@ class Turns:
         self._iterations += found.last.iterations
         return found
 
-    def _ended(self, status: Status, report: str) -> Status:
+    def _ended(self, status: SolveStatus, report: str) -> SolveStatus:
         self.report = report
         return status
 

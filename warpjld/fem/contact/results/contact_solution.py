@@ -11,13 +11,13 @@ from warpjld.fem.arrays import Array, Ints32, Mask
 from warpjld.fem.contact.law.contact_state import ContactState
 from warpjld.fem.contact.results.nodal_contact import NodalContact
 from warpjld.fem.load.loads import Loads
-from warpjld.fem.solver.krylov import Status
+from warpjld.fem.solver.krylov import SolveStatus
 
-__all__ = ["ContactError", "ContactInstant", "ContactSolution", "LastStep", "Touch"]
+__all__ = ["ContactError", "ContactInstant", "ContactSolution", "LastStep", "PairContact"]
 
 
 @dataclass(frozen=True, eq=False)
-class Touch:
+class PairContact:
     """One pair at one instant; one row for each slave node that has something before it.
 
     Attributes:
@@ -125,7 +125,7 @@ class ContactInstant:
     time: float
     displacement: Array
     reactions: Array
-    touches: tuple[Touch, ...]
+    touches: tuple[PairContact, ...]
     solves: int
     iterations: int
     residual: float
@@ -163,7 +163,7 @@ class ContactSolution:
         last_step: Where the step began that found the last instant; None where that is not known.
     """
 
-    status: Status
+    status: SolveStatus
     instants: tuple[ContactInstant, ...]
     message: str
     states: tuple[ContactState, ...]
@@ -175,7 +175,7 @@ class ContactSolution:
     @property
     def converged(self) -> bool:
         """Whether the last time was reached."""
-        return self.status is Status.CONVERGED
+        return self.status is SolveStatus.CONVERGED
 
     @property
     def last(self) -> ContactInstant:

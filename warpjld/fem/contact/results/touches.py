@@ -11,9 +11,9 @@ from warpjld.fem.contact.interface.contact_area import ContactArea
 from warpjld.fem.contact.interface.contact_interface import Interface
 from warpjld.fem.contact.interface.contact_points import ContactPoints, tangential
 from warpjld.fem.contact.law.return_mapping import ContactTractions
-from warpjld.fem.contact.results.contact_solution import Touch
+from warpjld.fem.contact.results.contact_solution import PairContact
 from warpjld.fem.contact.results.nodal_contact import to_nodes
-from warpjld.rotations import unit
+from warpjld.geometry.rotations import unit
 
 __all__ = ["touch_of"]
 
@@ -29,7 +29,7 @@ def touch_of(
     bonded: Mask,
     modulus: Array,
     x: Array,
-) -> Touch:
+) -> PairContact:
     """A pair at an instant, from its points (m) to its slave nodes (n): what presses on a node, over its share of the
     surface (between two meshes the multipliers themselves swing from node to node).
 
@@ -63,7 +63,7 @@ def touch_of(
     slipped = mean @ tangential(slip, points.normal)
     push = area * (mean @ np.maximum(tractions.pressure, 0.0))
     there = mean @ (-points.weights).maximum(0.0)
-    return Touch(
+    return PairContact(
         name=interface.pair.label,
         nodes=nodes,
         position=x[nodes],

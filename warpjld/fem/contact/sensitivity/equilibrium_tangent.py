@@ -21,7 +21,7 @@ from warpjld.fem.contact.results.contact_solution import ContactSolution
 from warpjld.fem.contact.sensitivity.interface_slopes import InterfaceSlopes, interface_slopes
 from warpjld.fem.contact.sensitivity.perturbation import Perturbation
 from warpjld.fem.contact.solver.elastic import Elastic
-from warpjld.threads import one_blas_thread
+from warpjld.runtime.threads import one_blas_thread
 
 __all__ = ["EquilibriumTangent", "Response", "SensitivityError"]
 

@@ -18,7 +18,7 @@ from warpjld.fem.contact.results.contact_solution import LastStep
 from warpjld.fem.contact.sensitivity.obstacle_slopes import ObstacleSlopes, obstacle_slopes
 from warpjld.fem.contact.sensitivity.perturbation import ObstacleTwist
 from warpjld.fem.contact.solver.tangent import FacetPairs, block_table, inner_rows, normal_derivatives
-from warpjld.rotations import unit
+from warpjld.geometry.rotations import unit
 
 __all__ = ["InterfaceSlopes", "interface_slopes"]
 

@@ -18,7 +18,7 @@ from warpjld.fem.contact.solver.newton_state import Equilibrium, NewtonState, gu
 from warpjld.fem.contact.solver.tangent import with_contact
 from warpjld.fem.contact.solver.unconstrained import UnconstrainedBodies
 from warpjld.fem.load.prescribed import Prescribed
-from warpjld.fem.solver.krylov import Iteration, Status
+from warpjld.fem.solver.krylov import Iteration, SolveStatus
 
 __all__ = ["ContactNewton"]
 
@@ -68,7 +68,7 @@ class ContactNewton:
 
     def find(
         self, u: Array, states: list[ContactState], step: LoadStep, *guesses: Array
-    ) -> tuple[Status, Equilibrium | None]:
+    ) -> tuple[SolveStatus, Equilibrium | None]:
         """Equilibrium from displacement u (3N,) at ``step.before``.
 
         It is looked for from the guess that turns no element inside out and leaves the least force over; where that is
@@ -80,17 +80,17 @@ class ContactNewton:
             if self._elastic.upright(guess_held(step, guess))
         ]
         begun.sort(key=NewtonState.left_over)
-        status, found = Status.MAX_ITERATIONS, None
+        status, found = SolveStatus.MAX_ITERATIONS, None
         if begun:
             status, found = self._search(begun[0], step)
-        if found is None and status not in (Status.UNHELD, Status.SLIDING):
+        if found is None and status not in (SolveStatus.UNHELD, SolveStatus.SLIDING):
             again, found = self._search(
                 NewtonState(self._elastic, self._system, step, u, states, None, **self._accuracy), step
             )
             status = status if begun and found is None else again
         return status, found
 
-    def _search(self, state: NewtonState, step: LoadStep) -> tuple[Status, Equilibrium | None]:
+    def _search(self, state: NewtonState, step: LoadStep) -> tuple[SolveStatus, Equilibrium | None]:
         """Equilibrium from where a state is."""
         unconstrained = self._unconstrained(step.prescribed)
         self._solver.begin()
@@ -100,29 +100,29 @@ class ContactNewton:
             state.assemble()
             if state.balanced():
                 if state.confirmed():
-                    return Status.CONVERGED, state.equilibrium()
+                    return SolveStatus.CONVERGED, state.equilibrium()
                 if state.restarts > _RESTARTS:
                     break
                 continue
             if not np.isfinite(state.unbalanced):
-                return Status.NOT_FINITE, None
+                return SolveStatus.NOT_FINITE, None
             nearest = min(nearest, state.unbalanced)
             if turn >= _HOPELESS and nearest > _FAR and not unconstrained:
                 break
             state.linearise()
             done = self._solved(state, unconstrained)
-            if done.status in (Status.INDEFINITE, Status.NOT_FINITE):
+            if done.status in (SolveStatus.INDEFINITE, SolveStatus.NOT_FINITE):
                 return done.status, None
             if self._advance(state, done.x + state.jump, unconstrained) == 0.0:
                 if not self._damping.more():
-                    return Status.INVERTED, None
+                    return SolveStatus.INVERTED, None
                 continue
             falls = falls + 1 if unconstrained.falling(state.contact).any() else 0
             if falls > _FALLS:
                 break
         status, self.failure = unconstrained.failure(self._system.interfaces, state.contact)
-        if status is Status.MAX_ITERATIONS and self._damping.share > 0.0:
-            status = Status.INDEFINITE
+        if status is SolveStatus.MAX_ITERATIONS and self._damping.share > 0.0:
+            status = SolveStatus.INDEFINITE
         return status, None
 
     def _solved(self, state: NewtonState, unconstrained: UnconstrainedBodies) -> Iteration:
@@ -139,10 +139,10 @@ class ContactNewton:
             try:
                 done = self._solver.solve(matrix, state.free, right, contact.nonsymmetric)
             except IndefiniteError:
-                done = Iteration(np.zeros_like(right), Status.INDEFINITE, 0, 1.0, np.empty(0))
+                done = Iteration(np.zeros_like(right), SolveStatus.INDEFINITE, 0, 1.0, np.empty(0))
             self.solves += 1
             self.iterations += done.iterations
-            if done.status is not Status.INDEFINITE or not self._damping.more():
+            if done.status is not SolveStatus.INDEFINITE or not self._damping.more():
                 return done
 
     def _advance(self, state: NewtonState, move: Array, unconstrained: UnconstrainedBodies) -> float:

@@ -11,7 +11,7 @@ from warpjld.fem.arrays import Array, Mask
 from warpjld.fem.assembly.block_matrix import BlockMatrix, IndefiniteError
 from warpjld.fem.body import Body
 from warpjld.fem.solver.elimination import work_by_profile
-from warpjld.fem.solver.krylov import Iteration, Status
+from warpjld.fem.solver.krylov import Iteration, SolveStatus
 from warpjld.fem.solver.linear import LinearSolver
 
 __all__ = ["LaggedSolver"]
@@ -63,7 +63,7 @@ class LaggedSolver:
             if nonsymmetric is None:
                 return factor.solve(right)
             done = factor.solve_nonsymmetric(nonsymmetric, right, tolerance=_INNER, iterations=_PATIENCE)
-            if done.status is Status.CONVERGED:
+            if done.status is SolveStatus.CONVERGED:
                 return done
         if nonsymmetric is not None:
             return self._nonsymmetric(matrix, free, right, nonsymmetric)
@@ -71,9 +71,9 @@ class LaggedSolver:
         if self._solver is not None:
             before = self._solver.of(matrix)
             done = before.solve(right, tolerance=_INNER, iterations=_PATIENCE)
-            if done.status is Status.CONVERGED:
+            if done.status is SolveStatus.CONVERGED:
                 return done
-            if done.status is Status.MAX_ITERATIONS and done.residual < 1.0:
+            if done.status is SolveStatus.MAX_ITERATIONS and done.residual < 1.0:
                 sofar = done
                 left = right - before.masked_product(done.x)
         solver = self._new(matrix, free)
@@ -104,7 +104,7 @@ class LaggedSolver:
         if self._solver is not None:
             before = self._solver.over(matrix)
             done = before.solve_nonsymmetric(nonsymmetric, right, tolerance=_INNER, iterations=_PATIENCE)
-            if done.status is Status.CONVERGED:
+            if done.status is SolveStatus.CONVERGED:
                 return done
         solver = self._new(matrix, free)
         done = solver.over(matrix).solve_nonsymmetric(nonsymmetric, right, tolerance=_INNER, iterations=_MOST)

@@ -27,13 +27,13 @@ from warpjld.fem.contact.solver.statics import could_balance
 from warpjld.fem.contact.solver.unconstrained import blocked
 from warpjld.fem.load.loads import Loads, external_forces
 from warpjld.fem.load.prescribed import Prescribed, free_motions
-from warpjld.fem.solver.krylov import Status
+from warpjld.fem.solver.krylov import SolveStatus
 
 __all__ = ["Guess", "LoadSteps"]
 
 _HALVINGS = 7
 _HALVINGS_UNHELD = 3
-_UNHELD = (Status.SLIDING, Status.UNHELD)
+_UNHELD = (SolveStatus.SLIDING, SolveStatus.UNHELD)
 """A body that slides away, or falls, seldom does so because the step is long."""
 _BREAKS = 100
 _CUTS = 400
@@ -185,25 +185,25 @@ class LoadSteps:
             if found is None and unheld is not None:
                 # what nothing holds may find no equilibrium in a shorter step: the longer one's, then
                 target, carried, step, found = unheld
-                todo, touches, status = [time for time in todo if time >= target], most, Status.CONVERGED
+                todo, touches, status = [time for time in todo if time >= target], most, SolveStatus.CONVERGED
             unheld = None
             through = "" if found is None else self._through(step, found)
             if through:
-                status, found = Status.PASSED, None
+                status, found = SolveStatus.PASSED, None
             solves += newton.solves
             iterations += newton.iterations
-            if found is None and status is Status.SLIDING and self._could_hold(step):
-                status = Status.MAX_ITERATIONS
+            if found is None and status is SolveStatus.SLIDING and self._could_hold(step):
+                status = SolveStatus.MAX_ITERATIONS
                 newton.failure = "friction could hold it, but how was not found"
             if overlap := self._blocked(step, found):
                 message = f"no equilibrium at time {target:.4g}: {overlap}; no force can part them"
-                return self._end(Status.BLOCKED, reached, message, step)
+                return self._end(SolveStatus.BLOCKED, reached, message, step)
             if found is None:
                 halvings += 1
-                unstable = unstable or status is Status.INDEFINITE
+                unstable = unstable or status is SolveStatus.INDEFINITE
                 if halvings > self._most_halvings(status):
-                    if unstable and status is Status.MAX_ITERATIONS:  # the longer steps say why
-                        status, newton.failure = Status.INDEFINITE, ""
+                    if unstable and status is SolveStatus.MAX_ITERATIONS:  # the longer steps say why
+                        status, newton.failure = SolveStatus.INDEFINITE, ""
                     reason = through or newton.failure or status.value
                     message = f"no equilibrium found after time {now:.4g} (tried {target:.4g}): {reason}"
                     return self._end(status, reached, message, step)
@@ -225,8 +225,8 @@ class LoadSteps:
             solves = iterations = touches = 0
             wish = watch(reached[-1]) if watch else None
             if wish:
-                return self._end(Status.STOPPED, reached, wish, step)
-        return self._end(Status.CONVERGED, reached, Status.CONVERGED.value, step)
+                return self._end(SolveStatus.STOPPED, reached, wish, step)
+        return self._end(SolveStatus.CONVERGED, reached, SolveStatus.CONVERGED.value, step)
 
     def _through(self, step: LoadStep, found: Equilibrium) -> str:
         """What went through what, or lies in it unseen, in words; nothing where nothing does."""
@@ -239,7 +239,7 @@ class LoadSteps:
             return "bodies would pass through each other"
         return ""
 
-    def _most_halvings(self, status: Status) -> int:
+    def _most_halvings(self, status: SolveStatus) -> int:
         usual = _HALVINGS_UNHELD if status in _UNHELD else _HALVINGS
         return usual if self.halvings is None else min(usual, self.halvings)
 
@@ -255,7 +255,7 @@ class LoadSteps:
             points = found.points
         return blocked(self.interfaces, points, self.states, free, allowed=step.allowed, penetration=self.penetration)
 
-    def _find(self, step: LoadStep, carried: Array) -> tuple[Status, Equilibrium | None]:
+    def _find(self, step: LoadStep, carried: Array) -> tuple[SolveStatus, Equilibrium | None]:
         """Equilibrium of a step; again after every bond that did not hold."""
         guesses = self._guesses(step, carried)
         status, found = self.newton.find(self.u, self.states, step, *guesses)
@@ -270,7 +270,7 @@ class LoadSteps:
                 return status, found
             states = [without_bonds(s, mask) for s, mask in zip(found.states, broken, strict=True)]
             status, found = self.newton.find(self.u, states, step, found.displacement)
-        return Status.MAX_ITERATIONS, None
+        return SolveStatus.MAX_ITERATIONS, None
 
     def _adrift_on_friction(self, step: LoadStep) -> bool:
         """Whether a body is held by friction alone."""
@@ -323,7 +323,7 @@ class LoadSteps:
             found.residual,
         )
 
-    def _end(self, status: Status, reached: list[ContactInstant], message: str, step: LoadStep) -> ContactSolution:
+    def _end(self, status: SolveStatus, reached: list[ContactInstant], message: str, step: LoadStep) -> ContactSolution:
         if not reached:
             nothing = np.zeros((len(self.body.mesh.nodes), 3))
             reached = [ContactInstant(self.start, self.u.reshape(-1, 3), nothing, (), 0, 0, 0.0)]

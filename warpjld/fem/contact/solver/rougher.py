@@ -11,7 +11,7 @@ from warpjld.fem.contact.law.contact_state import ContactState
 from warpjld.fem.contact.solver.contact_newton import ContactNewton
 from warpjld.fem.contact.solver.contact_system import LoadStep
 from warpjld.fem.contact.solver.newton_state import Equilibrium
-from warpjld.fem.solver.krylov import Status
+from warpjld.fem.solver.krylov import SolveStatus
 
 __all__ = ["from_rougher"]
 
@@ -25,8 +25,8 @@ def from_rougher(
     u: Array,
     states: list[ContactState],
     step: LoadStep,
-    status: Status,
-) -> tuple[Status, Equilibrium | None]:
+    status: SolveStatus,
+) -> tuple[SolveStatus, Equilibrium | None]:
     """An equilibrium looked for from that of rougher surfaces, where all sticks that can: halving a step of a body on
     an incline only makes the same problem smaller.
 
@@ -52,4 +52,4 @@ def from_rougher(
     finally:
         for interface, pair in zip(interfaces, pairs, strict=True):
             interface.pair = pair
-    return Status.CONVERGED, found
+    return SolveStatus.CONVERGED, found

@@ -12,7 +12,7 @@ from warpjld.fem.contact.interface.contact_points import ContactPoints
 from warpjld.fem.contact.law.contact_state import ContactState
 from warpjld.fem.contact.solver.contact_system import ContactForces
 from warpjld.fem.load.prescribed import Prescribed, free_motions
-from warpjld.fem.solver.krylov import Status
+from warpjld.fem.solver.krylov import SolveStatus
 
 __all__ = ["UnconstrainedBodies", "blocked"]
 
@@ -54,7 +54,7 @@ class UnconstrainedBodies:
                 out[nodes] = not touched[nodes].any()
         return out
 
-    def failure(self, interfaces: list[Interface], contact: ContactForces) -> tuple[Status, str]:
+    def failure(self, interfaces: list[Interface], contact: ContactForces) -> tuple[SolveStatus, str]:
         """Why no equilibrium was found: such a body that nothing touches, or that slides wherever it is touched."""
         for nodes, held in zip(self._bodies, self._held, strict=True):
             mine = np.zeros(len(self._mesh.nodes), dtype=bool)
@@ -69,11 +69,14 @@ class UnconstrainedBodies:
                     touching.append((interface.pair.title, bool(r.sticking[rows].any())))
             points = f"the {held} prescribed points" if held > 1 else "the one prescribed point"
             if not touching:
-                return Status.UNHELD, f"{points} of {what} cannot hold it" if held else f"nothing holds {what}"
+                return SolveStatus.UNHELD, f"{points} of {what} cannot hold it" if held else f"nothing holds {what}"
             if not any(sticks for _, sticks in touching):
                 more = f", and {points} cannot" if held else ""
-                return Status.SLIDING, f"{what} slides at {touching[0][0]}: friction is not enough to hold it{more}"
-        return Status.MAX_ITERATIONS, ""
+                return (
+                    SolveStatus.SLIDING,
+                    f"{what} slides at {touching[0][0]}: friction is not enough to hold it{more}",
+                )
+        return SolveStatus.MAX_ITERATIONS, ""
 
     def within(self, move: Array, reach: float) -> float:
         """Share of a move (3N,) by which unconstrained bodies go no farther than ``reach`` [m]."""

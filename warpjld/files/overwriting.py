@@ -7,7 +7,7 @@ from collections.abc import Iterable
 from pathlib import Path
 
 from warpjld.errors import InputError
-from warpjld.names import clash
+from warpjld.files.names import clash
 
 __all__ = ["check_outputs"]
 

@@ -10,10 +10,10 @@ from pathlib import Path
 from typing import Any, NoReturn
 
 from warpjld.errors import InputError
+from warpjld.files.reading import reading
+from warpjld.files.text_file import read_text
 from warpjld.limits import check_limit
-from warpjld.reading import reading
 from warpjld.suggest import did_you_mean
-from warpjld.text_file import read_text
 
 __all__ = ["TomlTable", "read_toml"]
 

@@ -8,9 +8,9 @@ from pathlib import Path
 from typing import Any, Literal
 
 from warpjld.errors import InputError
-from warpjld.input_file import read_bytes
+from warpjld.files.input_file import read_bytes
+from warpjld.files.nesting import nesting
 from warpjld.limits import check_limit
-from warpjld.nesting import nesting
 
 __all__ = ["parse_json", "read_json", "read_text"]
 

@@ -11,7 +11,7 @@ import sys
 from collections.abc import Callable
 from pathlib import Path
 
-from warpjld.whole_file import whole_file
+from warpjld.files.whole_file import whole_file
 
 __all__ = ["CACHE_VARIABLE", "keep", "kept_folder", "used"]
 

@@ -8,8 +8,8 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from warpjld.coincident import close_pairs, connected_parts
 from warpjld.errors import InputError
+from warpjld.geometry.coincident import close_pairs, connected_parts
 
 __all__ = ["Part", "Surface", "one_uv_a_vertex", "weld_surface"]
 

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from warpjld.lazily import lazy_module
+from warpjld.runtime.lazily import lazy_module
 
 if TYPE_CHECKING:
     import scipy.sparse as sp

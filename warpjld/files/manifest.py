@@ -11,7 +11,7 @@ from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any
 
-from warpjld.whole_file import whole_file
+from warpjld.files.whole_file import whole_file
 
 __all__ = ["file_hash", "fingerprint", "versions", "write_json"]
 

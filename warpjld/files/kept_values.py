@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from warpjld import __version__
-from warpjld.kept_files import keep, kept_folder, used
+from warpjld.files.kept_files import keep, kept_folder, used
 
 __all__ = ["hash_of", "kept_sources", "kept_value"]
 

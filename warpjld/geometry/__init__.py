@@ -1,0 +1,1 @@
+"""Surfaces, rotations and what both rest on."""

@@ -1,0 +1,1 @@
+"""Processes, threads, and libraries that are imported when they are first wanted."""
