@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 import pytest
+from hypothesis import settings
 
 from tests.glb_files import hand_glb, write_glb  # noqa: F401
 from warpjld.rig import Rig
@@ -22,6 +23,10 @@ if worker := os.environ.get("PYTEST_XDIST_WORKER"):
     base = os.environ.get("WARP_CACHE_PATH", str(Path.home() / ".cache" / "warpjld-tests"))
     os.environ["WARP_CACHE_PATH"] = str(Path(base) / worker)
 
+
+# how long an example takes is the machine's and its other users' affair
+settings.register_profile("warpjld", deadline=None)
+settings.load_profile("warpjld")
 
 # what was bound by other tests, or by other programs, is bound again
 os.environ["WARPJLD_CACHE"] = "off"

@@ -16,12 +16,26 @@ __all__ = ["run"]
 
 def run() -> NoReturn:
     """The command line as a process of its own."""
+    _open_streams()
     plain_warnings()
     try:
         main()
     except SystemExit as done:
         _leave(done.code if isinstance(done.code, int) else int(done.code is not None))
     _leave(0)
+
+
+def _open_streams() -> None:
+    """Let what was closed by the caller lead nowhere: else the next file that is opened takes its number, and what
+    libraries write to stderr goes into it."""
+    for number in range(3):
+        try:
+            os.fstat(number)
+        except OSError:
+            os.dup2(os.open(os.devnull, os.O_RDWR), number)
+    for name, mode in (("stdin", "r"), ("stdout", "w"), ("stderr", "w")):
+        if getattr(sys, name) is None:
+            setattr(sys, name, open(os.devnull, mode))  # noqa: SIM115 - as long as the process
 
 
 def _leave(code: int) -> NoReturn:

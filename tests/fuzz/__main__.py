@@ -68,7 +68,9 @@ def _turn(tally: Tally, name: str, number: int, count: int, folder: Path) -> Non
         kept = place / f"ended-{number}-{name}"
         if (place / name).exists():
             shutil.copy(place / name, kept)
-        what = f"more than {SECONDS} s" if code == -signal.SIGALRM else f"the process ends with {code}"
+        what = (
+            f"more than {SECONDS} s" if code in (-signal.SIGALRM, -signal.SIGPROF) else f"the process ends with {code}"
+        )
         said = (place / "stderr").read_text(errors="replace").strip() if (place / "stderr").exists() else ""
         tally.found.append((name, f"{what}\n{said[-800:]}", str(kept)))
     elif not found:

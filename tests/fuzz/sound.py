@@ -11,6 +11,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from tests.finger import finger
+from tests.fuzz.sound_state import read_state, write_state
 from tests.io import fbx_text
 from tests.motion import skinned_files
 from warpjld.covering import bind_rig, default_parameters, load_parameters, save_parameters
@@ -333,6 +334,7 @@ KINDS: dict[str, tuple[Callable[[Path], None], Callable[[Path], object]]] = {
     "fem.toml": (_fem, load_study),
     "study.json": (_study_folder, _opened),
     "trial.json": (_shard, _kept_shard),
+    "state.npz": (write_state, read_state),
     "a.jld": (_script, _checked_script),
 }
 """How a sound file of each kind is written, and what reads it."""

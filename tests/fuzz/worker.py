@@ -24,7 +24,9 @@ from tests.fuzz.trial import tried
 __all__ = ["MEMORY", "SECONDS", "forked"]
 
 SECONDS = 20
-"""That one input may take."""
+"""Of processor time that one input may take."""
+_WAIT = 10 * SECONDS
+"""Seconds by the clock: what waits for others, or for nothing, ends too."""
 MEMORY = 3 << 30
 """Bytes that a process may come to hold."""
 _ADDRESSES = 8 << 30  # Warp's compiler maps more than it uses
@@ -76,8 +78,10 @@ def _try_many(name: str, start: int, count: int, folder: Path, tell: Callable[[d
         nonlocal tried_so_far
         path.write_bytes(content)
         before = _held()
-        signal.alarm(SECONDS)
+        signal.alarm(_WAIT)
+        signal.setitimer(signal.ITIMER_PROF, SECONDS)
         told = tried(name, path)
+        signal.setitimer(signal.ITIMER_PROF, 0.0)
         signal.alarm(0)
         tried_so_far += 1
         if _held() > max(MEMORY, before):

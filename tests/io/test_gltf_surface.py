@@ -32,7 +32,7 @@ def box(tmp_path: Path) -> Path:
 
 
 def test_it_is_what_trimesh_reads(box: Path) -> None:
-    ours, theirs = read_mesh(box), trimesh.load_scene(box, process=False).to_mesh()
+    ours, theirs = read_mesh(box), trimesh.load(box, force="mesh", process=False)
     assert len(ours.vertices) == len(theirs.vertices) == 16
     assert trimesh.Trimesh(ours.vertices, ours.faces).volume == pytest.approx(2 * 0.05 * 0.06 * 0.07)
     np.testing.assert_allclose(ours.vertices.min(axis=0), theirs.vertices.min(axis=0), atol=1e-7)

@@ -14,7 +14,7 @@ from warpjld.errors import InputError, WarpjldError
 from warpjld.files.whole_file import machine
 from warpjld.io.caches.npz import NpzCache
 from warpjld.script import Interpreter, Scene
-from warpjld.script import runner as module
+from warpjld.script import making as module
 from warpjld.script.runner import run_scene
 
 

@@ -8,7 +8,7 @@ import pytest
 from PIL import Image
 
 from warpjld.errors import InputError, MissingExtraError
-from warpjld.script import Interpreter, Scene, formats, runner
+from warpjld.script import Interpreter, Scene, formats, making
 from warpjld.script.folder import OutputFolder
 from warpjld.script.runner import run_scene
 
@@ -120,7 +120,7 @@ def test_a_run_that_fails_leaves_the_folder_as_it_was(run, tmp_path, monkeypatch
     def fail(*_: object, **__: object) -> None:
         raise failure
 
-    monkeypatch.setattr(runner, "draw_contact_sheet", fail)
+    monkeypatch.setattr(making, "draw_contact_sheet", fail)
     new, old = tmp_path / "deep" / "new", tmp_path / "old"
     old.mkdir()
     (old / "surface.npz").write_text("from before")

@@ -176,7 +176,7 @@ def test_what_is_too_heavy_is_said(
     ("lines", "message"),
     [
         ("LIFT 15 19 LEFT BALL\nPRESS 0 16", r"frames must lie in those of PRESS, after 0 and up to 16"),
-        ("LIFT 15 19 LEFT BALL\nPRESS 0 19 STATE 's.npz'", r"STATE keeps no grips"),
+        ("PRESS 0 19 CORRECT STATE 's.npz'", r"STATE keeps no corrections"),
         ("LIFT 15 19 LEFT BALL\nPRESS 0 19 METHOD PAPER", r"knows no friction"),
         (
             "POINTS BALL top UPPER Y 0.1\nVECTOR BALL top AT 0 0 0 0\nLIFT 15 19 LEFT BALL\nPRESS 0 19",
@@ -200,3 +200,39 @@ def test_grips_that_cannot_be_are_refused(
 ) -> None:
     with pytest.raises(InputError, match=message):
         run_contact(run(BALL + lines), tmp_path)
+
+
+@pytest.mark.slow
+def test_a_state_keeps_the_grip_that_was_found(
+    pressed: tuple[Path, dict, Scene], rig, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def again(name: str) -> None:
+        scene = Scene(say=lambda text: None)
+        scene.add("left", rig)
+        Interpreter(scene).run_text(PLATE + "SQUEEZE 5 8 LEFT FORCE 0.6\nPRESS 2 8 STATE 's.npz'\nEXPORT 'e.npz'")
+        run_scene(scene, tmp_path / name)
+
+    def stopped(*_: object) -> None:
+        raise RuntimeError("cut off")
+
+    with monkeypatch.context() as patch:  # while the grip is looked for: its frame, the first, does not count as done
+        patch.setattr("warpjld.simulation.solve_frames.find_grip", stopped)
+        with pytest.raises(RuntimeError, match="cut off"):
+            again("first")
+    assert not (tmp_path / "first" / "s.npz").exists()
+    again("first")
+    out, _, _ = pressed
+    for table in ("contact.csv", "grips.csv"):
+        assert (tmp_path / "first" / table).read_bytes() == (out / table).read_bytes()
+    shapes = (tmp_path / "first" / "e.npz").read_bytes()
+    monkeypatch.setattr("warpjld.simulation.solve_frames.find_grip", stopped)
+    again("first")  # all of it out of the state
+    assert (tmp_path / "first" / "e.npz").read_bytes() == shapes
+    assert (tmp_path / "first" / "grips.csv").read_bytes() == (out / "grips.csv").read_bytes()
+    ours, theirs = (_forces(folder / "contact.csv") for folder in (tmp_path / "first", out))
+    np.testing.assert_allclose(ours, theirs, rtol=1e-4)  # bones' loads are found anew: the sixth digit may be another
+
+
+def _forces(path: Path) -> list[float]:
+    with path.open(encoding="utf-8") as file:
+        return [float(row["force_n"]) for row in csv.DictReader(file)]

@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import io
+import signal
 import sys
 from collections.abc import Callable, Iterator
 from pathlib import Path
+from typing import TYPE_CHECKING, NoReturn
 
 import click
 
@@ -13,11 +15,20 @@ from warpjld.cli import options
 from warpjld.cli.warn import one_line
 from warpjld.errors import WarpjldError
 
+if TYPE_CHECKING:
+    from warpjld.script.session import Session
+
 __all__ = ["shell_command"]
 
 _PROMPT, _MORE = "jld> ", "...> "
 _HISTORY = Path("~/.warpjld_history")
 _WELCOME = "HELP lists the commands, RUN makes the files, SAVE keeps what was typed, QUIT leaves."
+_ENDS = ("SIGTERM", "SIGHUP")
+"""Signals by which others end a session."""
+
+
+class _EndedError(BaseException):
+    """Another program, or the system, ends the session."""
 
 
 @click.command("shell")
@@ -34,50 +45,111 @@ def shell_command(script: Path | None, out: Path, device: str, threads: int | No
     from warpjld.script.session import Session
 
     silence_warp()
-    at_terminal = sys.stdin is not None and sys.stdin.isatty()
     for path in commands:
         load_commands(path)
     session = Session(out, device=device, threads=threads, say=click.echo)
+    if sys.stdin is not None and sys.stdin.isatty():
+        _converse(session, script)
+    else:
+        _read_through(session, script)
+
+
+def _read_through(session: Session, script: Path | None) -> None:
+    """Commands from a pipe: the first error ends them, and says where the lines before it are."""
     if script is not None:
         session.run_file(script)
-    if at_terminal:
-        click.echo(_WELCOME)
-    for line in _lines(session.names, lambda: _MORE if session.unfinished else _PROMPT, at_terminal):
+    if isinstance(sys.stdin, io.TextIOWrapper):
+        sys.stdin.reconfigure(errors="replace")
+    for line in sys.stdin or ():
         try:
-            if not session.type(line):
+            if not session.type(line.rstrip("\r\n")):
                 return
-        except WarpjldError as error:
-            if not at_terminal:
-                raise
-            click.echo(f"error: {one_line(str(error))}", err=True)
-        except KeyboardInterrupt:
-            if not at_terminal:
-                raise
-            click.echo("stopped; what was typed before is as it was", err=True)
-        except Exception as error:  # a fault of the program's own is no reason to lose an afternoon's lines
-            kept = session.autosave()
-            where = "" if kept is None else f"; the lines before it are in {kept}"
-            if not at_terminal:
-                raise WarpjldError(f"unexpected {type(error).__name__}: {error}{where}") from error
-            click.echo(f"error: unexpected {one_line(f'{type(error).__name__}: {error}')}{where}", err=True)
+        except WarpjldError:
+            raise
+        except Exception as error:
+            told = f"unexpected {type(error).__name__}: {error}"
+            raise WarpjldError(f"{told}{_kept(session)}") from error
     session.end()
 
 
-def _lines(names: Callable[[], list[str]], prompt: Callable[[], str], at_terminal: bool) -> Iterator[str]:
-    """Lines from the terminal with history and completion, or plainly from a pipe."""
-    if not at_terminal:
-        if isinstance(sys.stdin, io.TextIOWrapper):
-            sys.stdin.reconfigure(errors="replace")
-        yield from (line.rstrip("\r\n") for line in sys.stdin or ())
-        return
+def _converse(session: Session, script: Path | None) -> None:
+    """A session at a terminal, which nothing ends but QUIT: errors are told, and all lines before them kept, also in a
+    file, which goes when they are saved."""
+    for name in _ENDS:
+        if hasattr(signal, name):
+            signal.signal(getattr(signal, name), _end)
+    goes_on = True
+    try:
+        if script is not None:
+            _guarded(session, lambda: session.run_file(script))
+        click.echo(_WELCOME)
+        lines = _lines(session.names, lambda: _MORE if session.unfinished else _PROMPT, lambda: _kept(session))
+        while goes_on and (line := next(lines, None)) is not None:
+            goes_on = _guarded(session, lambda line=line: session.type(line))  # type: ignore[misc]
+    except _EndedError:
+        sys.exit(130)
+    finally:
+        if kept := _kept(session):
+            click.echo(f"not saved{kept}", err=True)
+
+
+def _guarded(session: Session, act: Callable[[], object]) -> bool:
+    """Do what a line says; whatever comes of it, the session goes on, unless the line says QUIT."""
+    try:
+        try:
+            goes_on = act() is not False
+            session.autosave()
+            return goes_on
+        except WarpjldError as error:
+            click.echo(f"error: {one_line(str(error))}", err=True)
+        except KeyboardInterrupt:
+            click.echo("stopped; what was typed before is as it was", err=True)
+        except (Exception, SystemExit) as error:  # a fault, or a user's command that calls exit()
+            told = one_line(f"unexpected {type(error).__name__}: {error}")
+            click.echo(f"error: {told}{_kept(session)}", err=True)
+    except KeyboardInterrupt:  # while something was told
+        pass
+    return True
+
+
+def _kept(session: Session) -> str:
+    """Where lines that are not saved are kept, to be put behind what is told; empty where there are none."""
+    kept = session.autosave()
+    return "" if kept is None else f"; the lines typed so far are in {kept}"
+
+
+def _end(number: int, frame: object) -> NoReturn:
+    raise _EndedError
+
+
+def _lines(names: Callable[[], list[str]], prompt: Callable[[], str], kept: Callable[[], str]) -> Iterator[str]:
+    """Lines from the terminal with history and completion, where that can be had. Its end is that of a session only
+    when it is told twice: Ctrl-D is easily hit."""
     read = _reader(names)
+    ended = False
     while True:
         try:
-            yield read(prompt())
+            line = read(prompt())
         except KeyboardInterrupt:
             continue
-        except EOFError:
-            return
+        except UnicodeDecodeError:
+            click.echo("error: the line was not read: it is no text", err=True)
+            continue
+        except (EOFError, OSError):  # OSError: the terminal is gone
+            if ended:
+                return
+            ended = True
+            click.echo(f"QUIT leaves, or Ctrl-D once more{kept()}", err=True)
+            continue
+        except Exception as error:  # a history that cannot be read, …
+            if read is input:
+                return
+            told = one_line(f"{type(error).__name__}: {error}")
+            click.echo(f"error: the line was not read ({told}); history and completion are off", err=True)
+            read = input
+            continue
+        ended = False
+        yield line
 
 
 def _reader(names: Callable[[], list[str]]) -> Callable[[str], str]:
@@ -85,11 +157,15 @@ def _reader(names: Callable[[], list[str]]) -> Callable[[str], str]:
         from prompt_toolkit import PromptSession
         from prompt_toolkit.completion import WordCompleter
         from prompt_toolkit.history import FileHistory
+
+        completer = WordCompleter(names, ignore_case=True)
+        session: PromptSession[str] = PromptSession(
+            history=FileHistory(str(_HISTORY.expanduser())), completer=completer, complete_while_typing=False
+        )
     except ImportError:
         click.echo("for history and completion: pip install 'warpjld[shell]'", err=True)
         return input
-    completer = WordCompleter(names, ignore_case=True)
-    session: PromptSession[str] = PromptSession(
-        history=FileHistory(str(_HISTORY.expanduser())), completer=completer, complete_while_typing=False
-    )
+    except Exception as error:  # no home folder, a terminal that it does not know
+        click.echo(f"no history and completion: {one_line(str(error))}", err=True)
+        return input
     return session.prompt

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from warpjld.geometry.rotations import multiply, rotate
+from warpjld.limits import check_limit
 from warpjld.motion.bvh_lines import NAMED, BvhLines
 from warpjld.motion.clip import Clip
 
@@ -69,6 +70,7 @@ def _hierarchy(lines: BvhLines) -> list[_Joint]:
             name = f"{joints[open_joints[-1]].name} end" if end else " ".join(words[1:])
             if not name:
                 raise lines.error(f"{keyword} without a name")
+            check_limit("joints", len(joints) + 1, path=lines.path)
             joints.append(_Joint(name, open_joints[-1] if open_joints else -1, lines.number))
             open_joints.append(len(joints) - 1)
             lines.expect("{")

@@ -66,6 +66,8 @@ def read_gltf_animation(path: str | Path, *, rate: float | None = None, name: st
         animations = list_animations(document)
         if not animations:
             raise InputError("no animation in this file", path=document.path)
+        if not document.gltf.skins:  # every node may be a joint
+            check_limit("joints", len(document.gltf.nodes), path=document.path)
         title, notes = choose_animation(name, tuple(animations), document.path)
         keys, warnings = _read_channels(document, [document.gltf.animations[n] for n in animations[title]])
         if len(animations[title]) > 1:

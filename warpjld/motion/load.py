@@ -18,6 +18,7 @@ from warpjld.motion.tracks import Limits
 from warpjld.rig import Rig
 from warpjld.runtime.lazily import imported
 from warpjld.skeleton import Poses
+from warpjld.skeleton.streamed_poses import blocks_of, streamed
 
 __all__ = ["MOTION_FORMATS", "LoadedMotion", "load_motion"]
 
@@ -127,10 +128,11 @@ def load_motion(
 
 def _check_poses(poses: Poses) -> None:
     """Make sure that poses lie where surfaces can be computed."""
-    check_size(poses.positions, "the motion", "its unit", least=0.0)
-    if not np.isfinite(poses.rotations).all():
-        frame, joint = np.argwhere(~np.isfinite(poses.rotations))[0][:2]
-        raise InputError(f"the rotation of joint {joint} is not finite at frame {frame}")
+    for first, some in blocks_of(poses):
+        check_size(some.positions, "the motion", "its unit", least=0.0)
+        if not np.isfinite(some.rotations).all():
+            frame, joint = np.argwhere(~np.isfinite(some.rotations))[0][:2]
+            raise InputError(f"the rotation of joint {joint} is not finite at frame {first + frame}")
 
 
 def _animation(path: Path, rig: Rig, rate: float | None, name: str | None) -> LoadedMotion:
@@ -182,7 +184,7 @@ def _table(path: Path, rig: Rig, rate: float | None, limits: Limits) -> LoadedMo
     from warpjld.motion.csv_file import read_csv
 
     motion = read_csv(path, skeleton=rig.skeleton, **({} if rate is None else {"rate": rate}))
-    poses = motion.poses(rig.skeleton, limits=limits)
+    poses = streamed(motion.frames, lambda frames: motion.poses(rig.skeleton, frames, limits=limits))
     held = () if limits == "ignore" else motion.clamped(motion.frames, rig.skeleton)
     return LoadedMotion(poses, motion.rate, tuple(str(one) for one in held))
 

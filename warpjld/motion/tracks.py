@@ -214,10 +214,9 @@ class Motion:
     def clamped(self, frames: ArrayLike, skeleton: Skeleton) -> tuple[Clamped, ...]:
         """What ``sample`` holds at a limit over these frames, by channel."""
         at = np.atleast_1d(np.asarray(frames, dtype=np.float64))
-        angles, _ = self._raw(at, skeleton)
         found = []
-        for joint, channel in self._places(skeleton).values():
-            values = angles[:, joint, channel]
+        for track, (joint, channel) in self._places(skeleton).items():
+            values = self.tracks[track].spline(at)
             low, high = skeleton.limits[joint, channel]
             for limit, beyond in ((low, low - values), (high, values - high)):
                 if len(where := np.flatnonzero(beyond > _ROUNDING)):
@@ -228,6 +227,7 @@ class Motion:
 
     def poses(self, skeleton: Skeleton, frames: ArrayLike | None = None, *, limits: Limits = "error") -> Poses:
         """Poses at the given frames, or at all; see ``sample``."""
+
         angles, root = self.sample(self.frames if frames is None else frames, skeleton, limits=limits)
         return poses_from_angles(skeleton, angles, root_position=root)
 
@@ -257,10 +257,12 @@ class Motion:
     def _check_keys(self, skeleton: Skeleton) -> None:
         for name, (joint, channel) in self._places(skeleton).items():
             low, high = skeleton.limits[joint, channel]
-            for key in self.tracks[name].keys:
-                if not low - _ROUNDING <= key.value <= high + _ROUNDING:
-                    side, limit = ("below", low) if key.value < low else ("above", high)
-                    raise InputError(
-                        f"{skeleton.names[joint]}: {CHANNELS[channel]} {np.degrees(key.value):.6g}° at frame "
-                        f"{key.frame:g} is {side} its limit of {np.degrees(limit):.6g}°"
-                    )
+            keys = self.tracks[name].spline
+            within = (low - _ROUNDING <= keys.values) & (keys.values <= high + _ROUNDING)
+            if not within.all():
+                value, frame = keys.values[np.argmin(within)], keys.times[np.argmin(within)]
+                side, limit = ("below", low) if value < low else ("above", high)
+                raise InputError(
+                    f"{skeleton.names[joint]}: {CHANNELS[channel]} {np.degrees(value):.6g}° at frame "
+                    f"{frame:g} is {side} its limit of {np.degrees(limit):.6g}°"
+                )

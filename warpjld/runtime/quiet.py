@@ -7,6 +7,9 @@ import os
 import shutil
 import sys
 import tempfile
+from pathlib import Path
+
+from warpjld.kernel_cache import remove_damaged_kernels
 
 __all__ = ["silence_warp"]
 
@@ -27,30 +30,49 @@ def silence_warp() -> None:
     with open(os.devnull, "w") as nowhere:
         os.dup2(nowhere.fileno(), 2)
     try:
-        moved = _initialised()
+        told = _initialised()
     finally:
         os.dup2(kept, 2)
         os.close(kept)
-    if moved is not None and sys.stderr is not None:
-        print(f"warning: {moved}", file=sys.stderr)
+    if told and sys.stderr is not None:
+        for line in told:
+            print(f"warning: {line}", file=sys.stderr)
 
 
-def _initialised() -> str | None:
-    """Start Warp; where its kernel cache cannot be written, with one of this process alone, which is told."""
+def _initialised() -> list[str]:
+    """Start Warp; where its kernel cache is damaged or cannot be written, without what is damaged or with a cache of
+    this process alone, which is told."""
     import warp
 
-    problem = ""
     try:
         warp.init()
         folder = warp.config.kernel_cache_dir
         if os.access(folder, os.W_OK | os.X_OK):
-            return None
+            return _checked(Path(folder))
         problem = f"{folder}: permission denied"
     except OSError as error:
         problem = f"{error.filename or 'the cache'}: {error.strerror or error}"
+    _move_cache()
+    return [f"kernels cannot be kept ({problem}): they are compiled anew; WARP_CACHE_PATH names another folder"]
+
+
+def _checked(cache: Path) -> list[str]:
+    """Look at a cache's kernels, now and when the process ends; lines to tell."""
+    damaged, gone = remove_damaged_kernels(cache)
+    atexit.register(remove_damaged_kernels, cache)  # notes what was compiled meanwhile
+    if not damaged:
+        return []
+    if not gone:
+        _move_cache()
+    return [f"damaged kernels in {cache} ({', '.join(sorted(set(damaged)))}): they are compiled anew"]
+
+
+def _move_cache() -> None:
+    """Let Warp keep its kernels in a folder of this process and those that it starts."""
+    import warp
+
     folder = tempfile.mkdtemp(prefix="warpjld-kernels-")
     atexit.register(shutil.rmtree, folder, ignore_errors=True)
     os.environ["WARP_CACHE_PATH"] = folder  # for the processes that this one starts
     warp.config.kernel_cache_dir = folder
     warp.init()
-    return f"kernels cannot be kept ({problem}): they are compiled anew; WARP_CACHE_PATH names another folder"

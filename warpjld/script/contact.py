@@ -31,7 +31,7 @@ if TYPE_CHECKING:
     from warpjld.script.props import Prop
     from warpjld.script.scene import Actor, Scene
     from warpjld.simulation.animation import AngleEdit
-    from warpjld.simulation.simulate import Simulation
+    from warpjld.simulation.simulate import Keep, Simulation
     from warpjld.skeleton import Poses, Skeleton
 
 __all__ = ["REST", "SceneAnimation", "check_contact", "run_contact", "write_contact", "write_keys"]
@@ -43,7 +43,10 @@ _THROUGH = SplineConstants()
 
 
 def run_contact(
-    scene: Scene, folder: Path, progress: Callable[[str, int, int], None] = lambda what, done, total: None
+    scene: Scene,
+    folder: Path,
+    progress: Callable[[str, int, int], None] = lambda what, done, total: None,
+    keeping: Callable[[Keep], None] = lambda keep: None,
 ) -> Simulation:
     """Do what ``PRESS`` asks for; grips that are found, and angles that are corrected, become keys of their actors.
 
@@ -59,7 +62,7 @@ def run_contact(
         asked = replace(
             scene.contact, grasped=tuple(dict.fromkeys(grasps)), pressing=replace(pressing, rate=scene.rate)
         )
-        found = simulate(asked, SceneAnimation(scene), folder=folder, progress=progress)
+        found = simulate(asked, SceneAnimation(scene), folder=folder, keeping=keeping, progress=progress)
     except InputError as error:
         raise located(error, pressing.where) from error
     for edit in found.solved.edits:

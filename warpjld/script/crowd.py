@@ -13,10 +13,11 @@ from scipy.spatial.transform import Rotation
 
 from warpjld.render.style import Style
 from warpjld.script.directing import camera_at
+from warpjld.script.outermost import outermost
 from warpjld.script.outputs import CameraSetting
 from warpjld.script.props import Prop
 from warpjld.script.scene import Actor
-from warpjld.script.staging import stage
+from warpjld.script.staging import stage, staged
 from warpjld.skeleton import Poses, Skeleton
 
 if TYPE_CHECKING:
@@ -29,6 +30,7 @@ if TYPE_CHECKING:
 
 __all__ = ["Crowd", "Role", "role_of"]
 
+_TOGETHER = 512  # frames whose points a camera is shown at once: of more frames only the outermost points are kept
 _SAMPLES = 12  # frames whose surface a camera is made to show; the joints of all frames count as well
 
 
@@ -50,7 +52,7 @@ def role_of(actor: Actor, frames: NDArray[np.float64], rate: float) -> Role:
     """An actor bound and posed at these frames of a scene with that rate [1/s]."""
     from warpjld.script.binding import cover
 
-    role = Role(actor, cover(actor), stage(actor, frames, rate))
+    role = Role(actor, cover(actor), staged(actor, frames, rate))
     if actor.touch == "off":
         return role
     from warpjld.touch.contact import SkinContact
@@ -150,7 +152,8 @@ class Crowd:
 
     def joints(self, frame: int) -> NDArray[np.float64]:
         """Joint positions of all at the frame of that place in the sequence [m], shape (J, 3)."""
-        return np.concatenate([np.empty((0, 3)), *(role.poses.positions[frame] for role in self.roles)])
+        each = (role.poses[frame : frame + 1].positions[0] for role in self.roles)
+        return np.concatenate([np.empty((0, 3)), *each])
 
     def surface(self, frame: int) -> NDArray[np.float32]:
         """Vertices of all at one frame [m], shape (V, 3)."""
@@ -184,7 +187,7 @@ class Crowd:
         if not camera.follow or not self.roles:
             return np.zeros(3)
         first = self.roles[0]
-        return first.poses.positions[frame, 0] - first.covering.skeleton.rest[0]
+        return np.asarray(first.poses[frame : frame + 1].positions[0, 0] - first.covering.skeleton.rest[0])
 
     @cached_property
     def colors(self) -> NDArray[np.uint8] | None:
@@ -227,12 +230,18 @@ class Crowd:
 
     def _framing(self, camera: CameraSetting) -> NDArray[np.float64]:
         """Points that must be in every picture [m], shape (n, 3)."""
-        count = len(self.frames)
-        shifts = np.stack([self.shift(camera, frame) for frame in range(count)])
-        surfaces = [points - shifts[frame] for frame, points in self._samples.items()]
-        joints = [(role.poses.positions - shifts[:, None]).reshape(-1, 3) for role in self.roles]
-        boxes = [box - shifts[frame] for frame in range(count) for box in self.solid_vertices(frame) if len(self.props)]
-        return np.concatenate([*surfaces, *joints, *boxes])
+        surfaces = [points - self.shift(camera, frame) for frame, points in self._samples.items()]
+        spans = [(start, min(start + _TOGETHER, len(self.frames))) for start in range(0, len(self.frames), _TOGETHER)]
+        shown = [self._shown(camera, *span) for span in spans]
+        return np.concatenate([*surfaces, *(shown if len(shown) < 2 else map(outermost, shown))])
+
+    def _shown(self, camera: CameraSetting, first: int, stop: int) -> NDArray[np.float64]:
+        """Joints and vertices of objects at some frames, less what the camera goes along [m], shape (n, 3)."""
+        shifts = np.stack([self.shift(camera, frame) for frame in range(first, stop)])
+        joints = [(role.poses[first:stop].positions - shifts[:, None]).reshape(-1, 3) for role in self.roles]
+        frames = range(first, stop) if self.props else ()
+        boxes = [box - shifts[frame - first] for frame in frames for box in self.solid_vertices(frame)]
+        return np.concatenate([*joints, *boxes])
 
     @cached_property
     def _samples(self) -> dict[int, NDArray[np.float32]]:

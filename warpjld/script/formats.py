@@ -50,7 +50,7 @@ def check_available(names: Iterable[str]) -> None:
             raise MissingExtraError(f"the page '{name}'", "studio")
         if suffix == ".parquet" and find_spec("pyarrow") is None:
             raise MissingExtraError(f"the table '{name}'", "study")
-        if suffix in (".usd", ".usda", ".usdc") and find_spec("pxr") is None:
+        if suffix in (".usd", ".usdc") and find_spec("pxr") is None:
             raise MissingExtraError(f"'{name}' in USD", "usd")
         if suffix == ".abc" and find_spec("alembic3d") is None:
             raise MissingExtraError(f"'{name}' in Alembic", "abc")

@@ -13,6 +13,7 @@ from warpjld.grasp.attach import Association, carried, joint_basis
 from warpjld.grasp.objects import GraspObject, Places
 from warpjld.script.placement import Placement
 from warpjld.script.staging import stage
+from warpjld.skeleton.streamed_poses import BLOCK
 
 if TYPE_CHECKING:
     from warpjld.fem.contact.obstacles.barr import Barr
@@ -92,7 +93,10 @@ def prop_places(actors: Mapping[str, Actor], rate: float, prop: Prop, frames: ND
 
     def basis(association: Association, at: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         actor = actors[association.actor]
-        return joint_basis(actor.skeleton, stage(actor, at, rate), association.joint)
+        blocks = [at[k : k + BLOCK] for k in range(0, max(len(at), 1), BLOCK)]
+        found = [joint_basis(actor.skeleton, stage(actor, some, rate), association.joint) for some in blocks]
+        origins, bases = zip(*found, strict=True)
+        return np.concatenate(origins), np.concatenate(bases)
 
     places = carried(prop.thing.place, prop.associations, frames, basis)
     return prop.placement.apply_to_places(places, frames)

@@ -1,16 +1,10 @@
-"""A scene made: bind → poses → deform, block after block, into exports, films and pictures."""
+"""A scene made: all that can be wrong is looked at first, then everything it asks for is made."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
-from contextlib import ExitStack
-from dataclasses import replace
-from functools import partial
-from pathlib import Path, PurePosixPath
+from collections.abc import Sequence
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
-
-import numpy as np
-from numpy.typing import NDArray
 
 from warpjld import render
 from warpjld.covering.device import checked_device
@@ -18,36 +12,23 @@ from warpjld.errors import InputError, WarpjldError
 from warpjld.files.names import folded
 from warpjld.files.overwriting import check_outputs
 from warpjld.motion.out import check_motion_out
-from warpjld.script.contact import check_contact, run_contact, write_contact
-from warpjld.script.crowd import Crowd, role_of
+from warpjld.script.contact import check_contact
 from warpjld.script.destinations import check_destinations
 from warpjld.script.directing import shot_at
-from warpjld.script.failures import Failures, Writer
-from warpjld.script.folder import OutputFolder
 from warpjld.script.formats import PAGE, check_available, video_is_available
-from warpjld.script.grasping import contact_reports
-from warpjld.script.motion_files import write_motions
+from warpjld.script.kept_contact import contact_kept
+from warpjld.script.making import Making, Report, cast, exported_props, prop_export_name
 from warpjld.script.outputs import ContactSheet, Export, FilmOutput, Grips, MotionFile, Output, Picture, Table
-from warpjld.script.page_film import PageStudio, page_studio
 from warpjld.script.per_actor import actors_of, file_of
-from warpjld.script.pictures import FilmStudio, PressureStudio, draw_contact_sheet, draw_picture, film_studio
-from warpjld.script.props import Prop, prop_places, prop_surface
 from warpjld.script.scene import Scene
 from warpjld.script.staging import frame_numbers, held, notes, stage
 from warpjld.script.summary import Summary
 from warpjld.simulation.specification import located
 
 if TYPE_CHECKING:
-    from warpjld.geometry.surface import Surface
-    from warpjld.io.caches import Cache
+    pass
 
 __all__ = ["Report", "cast", "run_scene"]
-
-_BLOCK = 16  # frames deformed at once: memory does not grow with the length of the film
-
-Studio = FilmStudio | PressureStudio | PageStudio
-Report = Callable[[str, int, int], None]
-"""Called with what is being done, how much of it is done, and how much there is."""
 
 
 def run_scene(
@@ -95,47 +76,17 @@ def run_scene(
         scene.warned(line for line in held(actor, frames, scene.rate) if line not in scene.warnings)
     if dry:
         return summary.content([{"name": name} for name in _names(scene, outputs)], folder)
-    failures = Failures()
-    with OutputFolder(folder) as out:
-        with summary.timed("bind"):
-            crowd = cast(scene, frames, device=device, progress=progress)
-        simulated = None
-        if scene.contact.pressing is not None:
-            with summary.timed("contact"):
-                simulated = run_contact(scene, folder, progress)
-            crowd = replace(cast(scene, frames, device=device), pressed=simulated.surfaces)
-            summary.press = simulated.verdict.content() | {"searches": [one.content() for one in simulated.grips]}
-            summary.notes += simulated.notes
-        with summary.timed("frames"):
-            _make_sequences(scene, crowd, frames, outputs, out, threads, progress, failures)
-        summary.notes += write_motions(scene, crowd, frames, outputs, out, failures)
-        if simulated is not None:
-            for output in outputs:
-                with failures.kept(output.name, out.place(output.name)):
-                    write_contact(simulated, [output], out)
-        if scene.props:
-            with summary.timed("contacts"):
-                summary.contacts = contact_reports(scene, crowd)
-        with summary.timed("pictures"):
-            _make_pictures(scene, crowd, outputs, out, progress, "" if script is None else script.stem, failures)
-        for role in crowd.roles:
-            scene.warned(f"{role.actor.name}: {line}" for line in (role.contact.told() if role.contact else ()))
-        if failures.found and not out.made():
-            if len(failures.found) == 1:
-                (name,) = failures.found
-                raise located(InputError(failures.lines()[0]), scene.asked.get(name))
-            raise WarpjldError("; ".join(failures.lines()))
-        summary.failed = failures.found
-        content = summary.write(out)
-    if simulated is not None and simulated.verdict.failed:
-        frames_told = simulated.verdict.frames
-        kept = "no frame" if frames_told is None else f"frames {frames_told[0]:g} to {frames_told[1]:g}"
-        raise located(
-            InputError(f"contact was not solved: {simulated.verdict.text}; {kept} and all files are in {folder}"),
-            scene.contact.pressing.where if scene.contact.pressing is not None else None,
-        )
-    if failures.found:
-        raise WarpjldError(f"not made: {'; '.join(failures.lines())}; all else that was asked for is in {folder}")
+    with contact_kept(scene, folder) as keeping:
+        made = Making(scene, folder, frames, outputs, summary, device, threads, progress, script, keeping)
+        content = made.all()
+        if made.failures.found:
+            raise WarpjldError(
+                f"not made: {'; '.join(made.failures.lines())}; all else that was asked for is in {folder}"
+            )
+        if made.contact is not None and made.contact.solved.interrupted:
+            raise made.unsolved(made.contact)
+    if made.contact is not None and made.contact.verdict.failed:
+        raise made.unsolved(made.contact)
     return content
 
 
@@ -173,132 +124,16 @@ def _check_outputs(scene: Scene, outputs: list[Output], folder: Path, script: Pa
     _check_lengths(scene, outputs, count)
 
 
-def cast(
-    scene: Scene,
-    frames: NDArray[np.float64],
-    *,
-    device: str = "cpu",
-    progress: Report = lambda what, done, total: None,
-) -> Crowd:
-    """Bind every actor's surface and pose it at these frames."""
-    roles = []
-    for number, actor in enumerate(scene.actors.values()):
-        progress(f"binding {actor.name.lower()}", number, len(scene.actors))
-        roles.append(role_of(actor, frames, scene.rate))
-    return Crowd(roles, frames, device, list(scene.props.values()), partial(prop_places, scene.actors, scene.rate))
-
-
 def _names(scene: Scene, outputs: Sequence[Output]) -> list[str]:
     names = []
     for output in outputs:
         if isinstance(output, Export | MotionFile):
             names += [file_of(output, actor, scene) for actor in actors_of(output, scene)]
             if isinstance(output, Export):
-                names += [_prop_export_name(output, prop) for prop in _exported_props(output, scene)]
+                names += [prop_export_name(output, prop) for prop in exported_props(output, scene)]
         else:
             names.append(output.name)
     return names
-
-
-def _exported_props(export: Export, scene: Scene) -> list[Prop]:
-    """Objects go along where all actors are exported."""
-    return list(scene.props.values()) if export.actor is None else []
-
-
-def _prop_export_name(export: Export, prop: Prop) -> str:
-    path = PurePosixPath(export.name)
-    return str(path.with_name(f"{path.stem}-{prop.name.lower()}{path.suffix}"))
-
-
-def _make_sequences(
-    scene: Scene,
-    crowd: Crowd,
-    frames: NDArray[np.float64],
-    outputs: Sequence[Output],
-    out: OutputFolder,
-    threads: int | None,
-    progress: Report,
-    failures: Failures,
-) -> None:
-    """Exports and films, in one pass over the frames."""
-    from warpjld.io.caches import open_cache
-
-    def cache_of(name: str, surface: Surface, label: str) -> Writer[Cache]:
-        place = out.place(name)
-        timing: dict[str, Any] = {"frames": len(frames), "rate": scene.rate, "start_frame": int(frames[0])}
-        return Writer(name, place, lambda: open_cache(place, surface, name=label.lower(), **timing), failures)
-
-    def studio_of(film: FilmOutput) -> Writer[Studio]:
-        place = out.place(film.name)
-        begin = page_studio if film.name.lower().endswith(PAGE) else film_studio
-        return Writer(film.name, place, lambda: begin(scene, crowd, film, place), failures)
-
-    exports = [output for output in outputs if isinstance(output, Export)]
-    films = [output for output in outputs if isinstance(output, FilmOutput)]
-    if not exports and not films:
-        return
-    with ExitStack() as stack:
-        caches = [
-            [
-                stack.enter_context(
-                    cache_of(file_of(export, role.actor, scene), role.actor.rig.surface, role.actor.name)
-                )
-                for export in exports
-                if export.actor in (None, role.actor.name)
-            ]
-            for role in crowd.roles
-        ]
-        prop_caches = [
-            [
-                stack.enter_context(cache_of(_prop_export_name(export, prop), prop_surface(prop), prop.name))
-                for export in exports
-                if export.actor is None
-            ]
-            for prop in crowd.props
-        ]
-        studios = [stack.enter_context(studio_of(film)) for film in films]
-        blocks = [
-            role.covering.blocks(role.poses, frames=_BLOCK, device=crowd.device, threads=threads)
-            for role in crowd.roles
-        ]
-        writers: list[Writer[Any]] = [*studios]
-        writers += [writer for group in (*caches, *prop_caches) for writer in group]
-        for start, parts in _together(blocks, len(frames)):
-            if not any(writer.works for writer in writers):
-                return
-            worn = [crowd.worn(role, v, start) for role, (_, v) in zip(crowd.roles, parts, strict=True)]
-            for actor_caches, vertices in zip(caches, worn, strict=True):
-                for cache in actor_caches:
-                    cache.do(partial(_write, vertices=vertices))
-            count = len(parts[0][1]) if parts else min(_BLOCK, len(frames) - start)
-            for prop, places, object_caches in zip(crowd.props, crowd.places, prop_caches, strict=True):
-                if object_caches:
-                    moved = np.stack([crowd.prop_vertices(prop, places, start + k) for k in range(count)])
-                for cache in object_caches:
-                    cache.do(partial(_write, vertices=moved.astype(np.float32)))
-            for k in range(count):
-                progress("frames", start + k, len(frames))
-                together = np.concatenate([np.empty((0, 3), np.float32), *(vertices[k] for vertices in worn)])
-                for studio in studios:
-                    studio.do(partial(_take, frame=start + k, vertices=together))
-
-
-def _together(
-    blocks: Sequence[Iterator[tuple[int, NDArray[np.float32]]]], count: int
-) -> Iterator[tuple[int, tuple[tuple[int, NDArray[np.float32]], ...]]]:
-    """Blocks of frames of all actors, with the place of the first frame; of no actor where there is none."""
-    if not blocks:
-        yield from ((start, ()) for start in range(0, count, _BLOCK))
-    for parts in zip(*blocks, strict=True):
-        yield parts[0][0], parts
-
-
-def _write(cache: Cache, vertices: NDArray[np.float32]) -> None:
-    cache.write(vertices)
-
-
-def _take(studio: Studio, frame: int, vertices: NDArray[np.float32]) -> None:
-    studio.take(frame, vertices)
 
 
 def _check_lengths(scene: Scene, outputs: Sequence[Output], frames: int) -> None:
@@ -326,23 +161,3 @@ def _size(scene: Scene, outputs: Sequence[Output], frames: int) -> float:
         elif isinstance(output, Picture | ContactSheet):
             size += 0.1 * scene.size[0] * scene.size[1]
     return size
-
-
-def _make_pictures(
-    scene: Scene,
-    crowd: Crowd,
-    outputs: Sequence[Output],
-    out: OutputFolder,
-    progress: Report,
-    title: str,
-    failures: Failures,
-) -> None:
-    wanted = [output for output in outputs if isinstance(output, Picture | ContactSheet)]
-    for number, output in enumerate(wanted):
-        progress("pictures", number, len(wanted))
-        path = out.place(output.name)
-        with failures.kept(output.name, path):
-            if isinstance(output, Picture):
-                draw_picture(scene, crowd, output, path)
-            else:
-                draw_contact_sheet(scene, crowd, output, path, title)

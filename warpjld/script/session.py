@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import suppress
+from itertools import count
 from pathlib import Path
 
 from warpjld.errors import InputError
@@ -47,6 +49,8 @@ class Session:
         self._kept: list[str] = []
         self._before: list[Moment] = []
         self._pending: list[str] = []
+        self._saved: list[str] = []
+        self._autosaved: Path | None = None
         self._typed = 0
         self._start()
 
@@ -114,16 +118,26 @@ class Session:
         return True
 
     def autosave(self) -> Path | None:
-        """Keep what was typed in the output folder; None where nothing was, or it cannot be written."""
-        path = self._folder / AUTOSAVED
-        if not self._kept:
+        """Keep what was typed and not saved, in the output folder, beside what other sessions left there; None where
+        there is nothing to keep, or it cannot be written."""
+        if self._kept == self._saved:
+            self._forget()
             return None
         try:
-            path.parent.mkdir(parents=True, exist_ok=True)
-            self._write(path)
+            self._folder.mkdir(parents=True, exist_ok=True)
+            if self._autosaved is None:
+                self._autosaved = next(path for path in _places(self._folder) if not path.exists())
+            self._write(self._autosaved)
         except OSError:
             return None
-        return path
+        return self._autosaved
+
+    def _forget(self) -> None:
+        """Remove what was kept of lines that are saved, or gone."""
+        if self._autosaved is not None:
+            with suppress(OSError):
+                self._autosaved.unlink(missing_ok=True)
+            self._autosaved = None
 
     def end(self) -> None:
         """The input is over.
@@ -167,6 +181,7 @@ class Session:
         except (OSError, ValueError) as error:  # ValueError: a zero byte in the name
             said = error.strerror if isinstance(error, OSError) else error
             raise name.position.error(f"cannot write '{path}': {said}") from error
+        self._saved = list(self._kept)
         self._say(str(path))
 
     def _write(self, path: Path) -> None:
@@ -184,6 +199,12 @@ class Session:
     def _back_to(self, moment: Moment) -> None:
         self._interpreter = moment.resume()
         self.scene = moment.scene
+
+
+def _places(folder: Path) -> Iterator[Path]:
+    yield folder / AUTOSAVED
+    for number in count(2):
+        yield folder / f"{Path(AUTOSAVED).stem}-{number}.jld"
 
 
 def _only_looks(nodes: tuple[Node, ...]) -> bool:

@@ -9,8 +9,9 @@ from warpjld.limits import check_limit
 from warpjld.script.scene import Actor, Scene
 from warpjld.skeleton import Poses
 from warpjld.skeleton.between import poses_between
+from warpjld.skeleton.streamed_poses import streamed
 
-__all__ = ["frame_numbers", "held", "notes", "stage"]
+__all__ = ["frame_numbers", "held", "notes", "stage", "staged"]
 
 
 def frame_numbers(scene: Scene) -> NDArray[np.float64]:
@@ -50,6 +51,11 @@ def stage(actor: Actor, frames: NDArray[np.float64], rate: float) -> Poses:
         recorded, own_rate = actor.recorded
         poses = poses_between(recorded, frames * own_rate / rate)
     return actor.placement.apply(poses, frames)
+
+
+def staged(actor: Actor, frames: NDArray[np.float64], rate: float) -> Poses:
+    """As ``stage``, of so many frames that their poses are computed a block at a time, when they are looked at."""
+    return streamed(frames, lambda some: stage(actor, some, rate))
 
 
 def notes(actor: Actor, frames: NDArray[np.float64]) -> list[str]:

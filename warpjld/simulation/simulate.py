@@ -17,8 +17,9 @@ Example::
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import cache, partial
 from pathlib import Path
 
 import numpy as np
@@ -51,7 +52,13 @@ from warpjld.simulation.solve.start_frame import StartFrame
 from warpjld.simulation.solve_frames import Progress, SolveResult, solve_frames
 from warpjld.simulation.specification import ContactSpecification, SolveSpecification
 
-__all__ = ["Simulation", "VisiblePressure", "simulate"]
+__all__ = ["KEPT", "Keep", "Simulation", "VisiblePressure", "simulate"]
+
+KEPT = "contact-state.npz"
+"""State file of a run that asked for none, where what it solved would be lost."""
+
+Keep = Callable[[], Path | None]
+"""Keeps what is solved so far; see ``simulate``."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -197,6 +204,7 @@ def simulate(
     animation: Animation,
     *,
     folder: Path = Path(),
+    keeping: Callable[[Keep], None] = lambda keep: None,
     progress: Progress = lambda what, done, total: None,
 ) -> Simulation:
     """Solve contact over the frames of an animation, and report.
@@ -206,10 +214,13 @@ def simulate(
         animation: What moves: of a script, of arrays (``RecordedAnimation``), or anything that implements the protocol.
             Edits that searches and corrections give are laid over it, and are returned (``solved.edits``).
         folder: Where the file of ``pressing.state`` is kept.
+        keeping: Told, before the first frame, what keeps the frames that are solved by then, at any time: a function
+            that writes them into the state file, or ``KEPT`` where none is asked for, and returns it; None where there
+            is nothing that a run could go on from.
         progress: Told about the work.
 
     Returns:
-        All frames that were solved, also where not all could be: see its verdict's status.
+        All frames that were solved, also where not all could be, or Ctrl-C ended it: see its verdict's status.
 
     Raises:
         InputError: What cannot be: bodies that cannot be meshed or driven, names of nothing; where a script asked for
@@ -245,13 +256,17 @@ def simulate(
     frames = _frames(specification, request, model.start)
     if rigid := rests_rigidly(model, before, frames):
         frames, before = [], replace(before, falls=(*before.falls, rigid))
+    checkpoint = CheckpointFile(
+        folder / (request.state or KEPT), cache(partial(identity_of, model, specification, frames))
+    )
     solved = solve_frames(
         model,
         frames,
         specification,
         request,
         watch=watch,
-        checkpoint=_checkpoint(model, specification, request, frames, folder),
+        checkpoint=None if request.state is None else checkpoint,
+        saving=lambda save: keeping(lambda: checkpoint.path if save(checkpoint) else None),
         progress=progress,
     )
     before, solved = after_contact(solved, specification, request, before)
@@ -290,18 +305,6 @@ def _frames(specification: ContactSpecification, request: SolveSpecification, st
     for grip in specification.grips:
         frames |= {grip.first, grip.middle, grip.last}
     return sorted(f for f in frames if f > start)
-
-
-def _checkpoint(
-    model: ContactModel,
-    specification: ContactSpecification,
-    request: SolveSpecification,
-    frames: Sequence[float],
-    folder: Path,
-) -> CheckpointFile | None:
-    if request.state is None:
-        return None
-    return CheckpointFile(folder / request.state, identity_of(model, specification, frames))
 
 
 def _report(

@@ -4,17 +4,18 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from functools import partial
 
 import numpy as np
 
-from warpjld.fem import Instant, Solution, SolveStatus, solve
-from warpjld.fem.contact import ContactInstant, ContactSolution
+from warpjld.fem import SolveStatus
+from warpjld.fem.contact import ContactSolution
+from warpjld.files.reading import reading
 from warpjld.simulation.animation import AngleEdit
 from warpjld.simulation.bodies.deformable_body import History
 from warpjld.simulation.bodies.model import ContactModel
 from warpjld.simulation.grip.correct_frames import CorrectedFrame, correct_frame, uncorrected
 from warpjld.simulation.grip.find import FoundGrip, find_grip
+from warpjld.simulation.grip.kept import grip_content, restored_grip
 from warpjld.simulation.solve.bone_clearance import TIGHT, BoneClearance, TightBone
 from warpjld.simulation.solve.branch import solve_onward
 from warpjld.simulation.solve.checkpoint import Checkpoint, CheckpointFile
@@ -23,9 +24,10 @@ from warpjld.simulation.solve.grasp_balance import weight_of
 from warpjld.simulation.solve.missed_contacts import MissedContact, missed_contacts
 from warpjld.simulation.solve.solved_frame import SolvedFrame, solved_frame
 from warpjld.simulation.solve.substeps import Substeps
+from warpjld.simulation.solve.untouched import solve_untouched
 from warpjld.simulation.specification import ContactSpecification, GripSpecification, SolveSpecification
 
-__all__ = ["KnownEquilibrium", "Progress", "SolveResult", "solve_frames"]
+__all__ = ["KnownEquilibrium", "Progress", "Save", "SolveResult", "solve_frames"]
 
 Progress = Callable[[str, int, int], None]
 """Told what is being done, how much of it is done, and how much there is."""
@@ -48,6 +50,9 @@ class KnownEquilibrium:
 
 Watch = Callable[[ContactModel, SolvedFrame], str | None]
 
+Save = Callable[[CheckpointFile], bool]
+"""Saves what is solved so far; False where there is nothing to go on from."""
+
 
 @dataclass(frozen=True, eq=False)
 class SolveResult:
@@ -67,6 +72,7 @@ class SolveResult:
         tight: Bones that came nearest to objects, of every digit and object the nearest.
         equilibria: Of each frame that this run solved, by its number: what it can be differentiated from.
         released: Frame after which what nothing holds any more falls, if it does: contact is not solved from there on.
+        interrupted: Whether Ctrl-C ended it.
     """
 
     status: SolveStatus
@@ -82,6 +88,7 @@ class SolveResult:
     tight: tuple[tuple[float, TightBone], ...] = ()
     equilibria: Mapping[float, KnownEquilibrium] = field(default_factory=dict)
     released: float | None = None
+    interrupted: bool = False
 
     @property
     def start(self) -> float:
@@ -97,9 +104,10 @@ def solve_frames(
     *,
     watch: Watch = lambda model, solved: None,
     checkpoint: CheckpointFile | None = None,
+    saving: Callable[[Save], None] = lambda save: None,
     progress: Progress = lambda what, done, total: None,
 ) -> SolveResult:
-    """Solve contact at frames.
+    """Solve contact at frames; Ctrl-C ends it with those that were solved, if any were.
 
     Args:
         model: What may touch, at rest at its start: before anything touches, or where overlaps begin to part (R112).
@@ -108,34 +116,63 @@ def solve_frames(
         request: How to solve.
         watch: Told the model and each frame as it is solved; a text stops the run there (R118).
         checkpoint: Holds what was solved so far; an earlier run's is gone on from.
+        saving: Told before the first frame what saves, at any time, the frames that are solved by then.
         progress: Told about the work.
 
     Raises:
         InputError: A state that belongs to something else.
     """
     run = _Run(model, contact, request)
-    if checkpoint is not None and (found := checkpoint.load()) is not None:
-        run.resume(found)
-        for solved in found.frames:
-            if reason := watch(run.model, solved):
-                return run.ended(SolveStatus.STOPPED, reason)
+    saving(run.save)
+    if checkpoint is not None and (found := checkpoint.load(model, frames)) is not None:
+        with reading(checkpoint.path, "a state of a contact solve"):
+            reasons = run.resume(found, watch)
+        if reasons:
+            return run.ended(SolveStatus.STOPPED, reasons[0])
     if not model.pairs:
         return _untouched(model, frames, watch, progress)
+    try:
+        return _solve_on(run, frames, watch, checkpoint, progress)
+    except KeyboardInterrupt:
+        if not run.done:
+            raise
+        return run.interrupted()
+
+
+def _untouched(model: ContactModel, frames: Sequence[float], watch: Watch, progress: Progress) -> SolveResult:
+    """Frames of bodies with nothing to touch."""
+    done: list[SolvedFrame] = []
+    try:
+        status, message = solve_untouched(model, frames, done, watch, progress)
+    except KeyboardInterrupt:
+        if not done:
+            raise
+        message = f"interrupted after frame {done[-1].frame:g}"
+        return SolveResult(SolveStatus.STOPPED, message, model, tuple(done), interrupted=True)
+    return SolveResult(status, message, model, tuple(done))
+
+
+def _solve_on(
+    run: _Run, frames: Sequence[float], watch: Watch, checkpoint: CheckpointFile | None, progress: Progress
+) -> SolveResult:
+    """Solve the frames that are not done yet."""
+    contact = run.contact
     for frame in frames[len(run.done) :]:
         progress(f"contact, frame {frame:g}", len(run.done), len(frames))
         failure = run.solve(frame)
         if failure is not None:
             return failure
-        if checkpoint is not None and run.last is not None:
-            checkpoint.save(run.done, run.last, run.edits, run.limits.content())
+        grip = next((one for one in contact.grips if one.first == frame), None)
+        if checkpoint is not None and grip is None:
+            run.save(checkpoint)
         if reason := watch(run.model, run.done[-1]):
             return run.ended(SolveStatus.STOPPED, reason)
-        for grip in contact.grips:
-            if grip.first == frame:
-                progress(f"looking for a grip, frame {frame:g}", len(run.done), len(frames))
-                searched = run.find(grip, partial(_tell, progress, frame, len(run.done), len(frames)))
-                if searched.interrupted:
-                    return run.ended(SolveStatus.STOPPED, f"at frame {frame:g}: {searched.text}")
+        if grip is not None:
+            searched = run.find(grip, progress, len(frames))
+            if searched.interrupted:
+                return replace(run.ended(SolveStatus.STOPPED, f"at frame {frame:g}: {searched.text}"), interrupted=True)
+            if checkpoint is not None:
+                run.save(checkpoint)
     return run.ended(SolveStatus.CONVERGED, SolveStatus.CONVERGED.value)
 
 
@@ -149,6 +186,7 @@ class _Run:
     history: History = field(default_factory=History)
     last: ContactSolution | None = None
     done: list[SolvedFrame] = field(default_factory=list)
+    edited: list[int] = field(default_factory=list)
     resumed: int = 0
     missed: list[MissedContact] = field(default_factory=list)
     edits: list[AngleEdit] = field(default_factory=list)
@@ -156,6 +194,7 @@ class _Run:
     corrections: list[CorrectedFrame] = field(default_factory=list)
     tight: dict[tuple[str, str, str], tuple[float, TightBone]] = field(default_factory=dict)
     equilibria: dict[float, KnownEquilibrium] = field(default_factory=dict)
+    settled: tuple[ContactModel, Checkpoint] | None = None
 
     def __post_init__(self) -> None:
         self.substeps = Substeps(self.model)
@@ -165,13 +204,28 @@ class _Run:
         weights = {name: weight_of(self.model.obstacles[name]) for name in held}
         self.limits = ForceLimits(self.contact.strength, self.request.pressure, weights, self.clearance)
 
-    def resume(self, found: Checkpoint) -> None:
-        """Go on from what another run left."""
-        self.done, self.last, self.resumed = list(found.frames), found.solution, len(found.frames)
+    def resume(self, found: Checkpoint, watch: Watch) -> list[str]:
+        """Go on from what another run left, with the model of each frame as it was then; what ``watch`` says."""
+        self.last, self.resumed, self.missed = found.solution, len(found.frames), list(found.missed)
         self.limits.restore(found.limits)
-        self._edit(found.edits)
-        for solved in self.done:
-            self._note(solved)
+        self.tight = {(one.actor, one.digit, one.object): (frame, one) for frame, one in found.tight}
+        grips, reasons = [restored_grip(content, self.contact) for content in found.grips], []
+        for solved, count in zip(found.frames, found.edited, strict=True):
+            self._edit(found.edits[len(self.edits) : count])
+            self._add(solved)
+            reasons += [reason] if (reason := watch(self.model, solved)) else []
+            for grip in (one for one in grips if one.request.first == solved.frame):
+                self.grips.append(grip)
+                self._edit(found.edits[len(self.edits) : len(self.edits) + len(grip.edits)])
+                self._release(grip)
+        self._settle()
+        return reasons
+
+    def _add(self, solved: SolvedFrame) -> None:
+        """Note a frame that is solved, and how many edits there were by then."""
+        self.done.append(solved)
+        self.edited.append(len(self.edits))
+        self._note(solved)
 
     def solve(self, frame: float) -> SolveResult | None:
         """Add a frame; what ended all where it cannot be solved."""
@@ -208,12 +262,38 @@ class _Run:
             self.corrections.append(corrected)
             solution = corrected.solution
             self._edit(corrected.edits)
-        self.equilibria[float(frame)] = KnownEquilibrium(self.model, self.history, _bare(solution))
-        self.missed += missed_contacts(model, None if before is None else before.last, solution.instants)
+        bare = replace(solution, instants=(replace(solution.last, touches=()),))
+        self.equilibria[float(frame)] = KnownEquilibrium(self.model, self.history, bare)
+        self.missed += missed_contacts(model, self.done[-1] if self.done else None, solution.instants)
         self.last = solution
-        self.done.append(solved_frame(float(frame), solution.instants))
-        self._note(self.done[-1])
+        self._add(solved_frame(float(frame), solution.instants))
+        if all(grip.first != frame for grip in self.contact.grips):  # else when the grip is found
+            self._settle()
         return None
+
+    def save(self, checkpoint: CheckpointFile) -> bool:
+        """Save all frames that are solved; False where none is, or corrections would be lost."""
+        if self.settled is None or self.request.correct:
+            return False
+        checkpoint.save(self.settled[1])
+        return True
+
+    def interrupted(self) -> SolveResult:
+        """All of it as it was after the last frame that was solved."""
+        if self.settled is not None:
+            self.model, known = self.settled
+            self.done, self.edits, self.missed = list(known.frames), list(known.edits), list(known.missed)
+            self.grips, self.edited = self.grips[: len(known.grips)], list(known.edited)
+        after = self.done[-1].frame
+        return replace(self.ended(SolveStatus.STOPPED, f"interrupted after frame {after:g}"), interrupted=True)
+
+    def _settle(self) -> None:
+        """Remember how things are between two frames: an interrupt falls anywhere within one."""
+        assert self.last is not None
+        tight, limits = tuple(self.tight.values()), self.limits.content()
+        parts = (tuple(self.edits), limits, tuple(self.missed), tight, tuple(map(grip_content, self.grips)))
+        known = Checkpoint(tuple(self.done), self.last, *parts, edited=tuple(self.edited))
+        self.settled = self.model, known
 
     def _bone_inside(self, model: ContactModel, times: Sequence[float]) -> str | None:
         """A bone that lies in an object at one of some times, in words: no force can part them."""
@@ -227,17 +307,29 @@ class _Run:
             if one.left < TIGHT and (place not in self.tight or one.left < self.tight[place][1].left):
                 self.tight[place] = (frame, one)
 
-    def find(self, grip: GripSpecification, tell: Callable[[str], None]) -> FoundGrip:
-        """Look for a grip, and go on with it; ``tell`` hears of every grip that is tried."""
+    def find(self, grip: GripSpecification, progress: Progress, total: int) -> FoundGrip:
+        """Look for a grip, and go on with it; ``progress`` hears of every grip that is tried."""
+        what = f"looking for a grip, frame {grip.first:g}"
+        progress(what, len(self.done), total)
         assert self.last is not None
         limits = self.contact.strength.get(grip.actor, {})
+
+        def tell(line: str) -> None:
+            progress(f"{what}: {line}", len(self.done), total)
+
         found = find_grip(self.model, self.history, grip, self.last, limits, tell)
         self.grips.append(found)
         self._edit(found.edits)
+        self._release(found)
+        if not found.interrupted:
+            self._settle()
+        return found
+
+    def _release(self, found: FoundGrip) -> None:
+        """Let the support go as a grip has it."""
         if found.release is not None:
             objects = [found.release.applied(one) for one in self.model.objects]
             self.model = replace(self.model, objects=tuple(objects))
-        return found
 
     def ended(self, status: SolveStatus, message: str) -> SolveResult:
         """All of it."""
@@ -263,42 +355,3 @@ class _Run:
     def _note(self, solved: SolvedFrame) -> None:
         time = solved.frame - self.model.start
         self.history = self.model.after(self.history, time, solved.displacement, solved.reactions, solved.nodal)
-
-
-def _tell(progress: Progress, frame: float, done: int, total: int, line: str) -> None:
-    """One grip that was tried."""
-    progress(f"looking for a grip, frame {frame:g}: {line}", done, total)
-
-
-def _bare(solution: ContactSolution) -> ContactSolution:
-    """The last equilibrium, without the tables of what touches: those are large, and found again."""
-    return replace(solution, instants=(replace(solution.last, touches=()),))
-
-
-def _untouched(model: ContactModel, frames: Sequence[float], watch: Watch, progress: Progress) -> SolveResult:
-    """Frames of bodies with nothing to touch."""
-    done: list[SolvedFrame] = []
-    nothing, history = np.zeros_like(model.body.mesh.nodes), History()
-    rest = Instant(1.0, nothing, nothing, 0, 0, 0.0)
-    after, before = (
-        Solution(SolveStatus.CONVERGED, (rest,), "", np.empty(0, np.int64), model.loads_at(0.0, history)),
-        0.0,
-    )
-    for frame in frames:
-        progress(f"frame {frame:g}", len(done), len(frames))
-        time = frame - model.start
-        known = model.prescribed(time, history)
-        ahead = model.guess(before, time, after.displacement, history)
-        loads = model.loads_at(time, history)
-        first = replace(after, instants=(replace(after.last, displacement=ahead),), loads=loads)
-        solution = solve(model.body, known, loads, after=first, free="hold", check=False)
-        if not solution.converged:
-            return SolveResult(solution.status, f"at frame {frame:g}: {solution.message}", model, tuple(done))
-        after, last, before = solution, solution.last, time
-        instant = ContactInstant(
-            time, last.displacement, last.reactions, (), last.newton, last.iterations, last.residual
-        )
-        done.append(solved_frame(float(frame), [instant]))
-        if reason := watch(model, done[-1]):
-            return SolveResult(SolveStatus.STOPPED, reason, model, tuple(done))
-    return SolveResult(SolveStatus.CONVERGED, SolveStatus.CONVERGED.value, model, tuple(done))

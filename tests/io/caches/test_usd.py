@@ -66,6 +66,28 @@ def test_name_becomes_a_valid_identifier(surface: Surface, clip: np.ndarray, tmp
     assert Usd.Stage.Open(str(tmp_path / "a.usda")).GetDefaultPrim().GetName() == "left_hand_2"
 
 
+def test_text_needs_no_extra(
+    surface: Surface, clip: np.ndarray, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    from pxr import Usd, UsdGeom
+
+    from warpjld.io.caches import check_cache
+    from warpjld.script.formats import check_available
+
+    with monkeypatch.context() as patch:
+        patch.setitem(sys.modules, "pxr", None)
+        patch.setattr("warpjld.script.formats.find_spec", lambda name: None)
+        check_cache("a.usda")
+        check_available(["a.usda"])
+        with open_cache(tmp_path / "a.usda", surface, frames=7, rate=29.97, start_frame=-2, name="7th é") as cache:
+            cache.write(clip)
+    stage = Usd.Stage.Open(str(tmp_path / "a.usda"))
+    mesh = UsdGeom.Mesh(stage.GetDefaultPrim())
+    assert mesh.GetPrim().GetName() == "_th__"
+    assert (stage.GetTimeCodesPerSecond(), stage.GetStartTimeCode(), stage.GetEndTimeCode()) == (29.97, -2, 4)
+    np.testing.assert_array_equal(mesh.GetPointsAttr().Get(4), clip[-1][surface.weld])
+
+
 def test_missing_extra_is_named() -> None:
     script = """
 import sys, numpy as np

@@ -12,7 +12,7 @@ from warpjld.errors import MissingExtraError
 from warpjld.geometry.surface import Surface
 from warpjld.io.caches.cache import Cache
 
-__all__ = ["UsdCache", "build_stage", "extent_of", "write_texture_coordinates"]
+__all__ = ["UsdCache", "extent_of", "write_texture_coordinates"]
 
 _FLUSH_BYTES = 32 << 20  # of time samples before they are written out and freed
 
@@ -34,7 +34,7 @@ class UsdCache(Cache):
         _pxr()
 
     def _begin(self) -> None:
-        self._stage, self._mesh = build_stage(self, self._part(self.path))
+        self._stage, self._mesh = _build_stage(self, self._part(self.path))
         self._pending = 0
 
     def _append(self, vertices: NDArray[np.float32]) -> None:
@@ -66,17 +66,17 @@ class UsdCache(Cache):
         self._stage = self._mesh = None
 
 
-def build_stage(cache: Cache, file: Path | None) -> tuple[Any, Any]:
-    """A stage (in memory without a file) with the mesh at rest, and its ``UsdGeom.Mesh``.
+def _build_stage(cache: Cache, file: Path) -> tuple[Any, Any]:
+    """A stage with the mesh at rest, and its ``UsdGeom.Mesh``.
 
     Raises:
         MissingExtraError: OpenUSD is not installed.
     """
     _pxr()
-    from pxr import Tf, Usd, UsdGeom, Vt
+    from pxr import Tf, UsdGeom, Vt
 
     surface, clip = cache.surface, cache.clip
-    stage = Usd.Stage.CreateInMemory() if file is None else _create(file)
+    stage = _create(file)
     UsdGeom.SetStageUpAxis(stage, UsdGeom.Tokens.y)
     UsdGeom.SetStageMetersPerUnit(stage, 1.0)
     stage.SetTimeCodesPerSecond(clip.rate)

@@ -40,6 +40,10 @@ def check_schema(content: dict[str, Any]) -> None:
             for key in _WHOLE.get(name, ()):
                 _check_whole(row.get(key), f"{name}[{number}].{key}")
     check_limit("nodes", len(content.get("nodes") or ()))
+    for number, skin in enumerate(content.get("skins") or ()):
+        if not isinstance(skin.get("joints"), list):
+            raise InputError(f"is not a glTF 2.0 file: skins[{number}].joints is no list")
+        check_limit("joints", len(skin["joints"]), of=f"skins[{number}]")
     for number, accessor in enumerate(content.get("accessors") or ()):
         sparse = accessor.get("sparse")
         if sparse is None:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import zipfile
-from collections.abc import Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, dataclass, field, fields
 from pathlib import Path
 from typing import Any
@@ -15,16 +15,24 @@ from warpjld.errors import InputError
 from warpjld.fem import Loads, SolveStatus
 from warpjld.fem.contact import ContactInstant, ContactSolution
 from warpjld.fem.contact.law.contact_state import ContactState
+from warpjld.fem.contact.results.contact_solution import LastStep
 from warpjld.fem.contact.results.nodal_contact import NodalContact
+from warpjld.files.input_file import check_input
+from warpjld.files.reading import reading
 from warpjld.files.whole_file import whole_file
 from warpjld.simulation.animation import AngleEdit
+from warpjld.simulation.bodies.model import ContactModel
+from warpjld.simulation.solve.bone_clearance import TightBone
+from warpjld.simulation.solve.checked_checkpoint import check_checkpoint, plain_record
 from warpjld.simulation.solve.identity import differences
+from warpjld.simulation.solve.missed_contacts import MissedContact
 from warpjld.simulation.solve.solved_frame import SolvedFrame
 
 __all__ = ["Checkpoint", "CheckpointFile", "load_checkpoint", "save_checkpoint"]
 
 _NAMED = 6
 """Parts that are named of what differs."""
+_KIND = "a state of a contact solve"
 
 
 @dataclass(frozen=True, eq=False)
@@ -32,18 +40,26 @@ class Checkpoint:
     """Frames so far, and the solution to go on from.
 
     Attributes:
-        identity: What it belongs to: hashes by name (see ``identity_of``).
         frames: In order.
         solution: Of the last of them.
         edits: Angles that were found on the way.
         limits: Digits that have stopped: ``ForceLimits.content``.
+        missed: Touches between frames.
+        tight: Bones that came near to objects, and at which frame.
+        grips: Grips that were found, as plain values (``grip_content``).
+        edited: How many of the edits there were when each frame was solved.
+        identity: What it belongs to: hashes by name (see ``identity_of``).
     """
 
-    identity: dict[str, str]
     frames: tuple[SolvedFrame, ...]
     solution: ContactSolution
     edits: tuple[AngleEdit, ...] = ()
     limits: dict[str, Any] = field(default_factory=dict)
+    missed: tuple[MissedContact, ...] = ()
+    tight: tuple[tuple[float, TightBone], ...] = ()
+    grips: tuple[dict[str, Any], ...] = ()
+    edited: tuple[int, ...] = ()
+    identity: Mapping[str, str] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)
@@ -52,69 +68,75 @@ class CheckpointFile:
 
     Attributes:
         path: The file.
-        identity: What it is to belong to.
+        belongs: What it is to belong to, found when it is first wanted.
     """
 
     path: Path
-    identity: dict[str, str]
+    belongs: Callable[[], Mapping[str, str]]
 
-    def load(self) -> Checkpoint | None:
+    def load(self, model: ContactModel, frames: Sequence[float]) -> Checkpoint | None:
         """What an earlier run left; None where there is none.
 
+        Args:
+            model: What is solved.
+            frames: At which.
+
         Raises:
-            InputError: It is no checkpoint, or one of something else.
+            InputError: It is no checkpoint, one of something else, or not what such a run leaves.
         """
-        if not self.path.is_file():
+        if not self.path.exists():
             return None
         found = load_checkpoint(self.path)
-        if other := differences(found.identity, self.identity):
+        if other := differences(found.identity, self.belongs()):
             named = ", ".join(other[:_NAMED]) + " and more" * (len(other) > _NAMED)
             raise InputError(
                 f"this state belongs to another scene: {named} differ; remove it, or name another after STATE",
                 path=self.path,
             )
+        with reading(self.path, _KIND):
+            check_checkpoint(found.frames, found.solution, found.edits, model, frames)
         return found
 
-    def save(
-        self,
-        frames: Sequence[SolvedFrame],
-        solution: ContactSolution,
-        edits: Sequence[AngleEdit] = (),
-        limits: dict[str, Any] | None = None,
-    ) -> None:
+    def save(self, state: Checkpoint) -> None:
         """Keep what was solved so far.
 
         Raises:
             InputError: It cannot be written.
         """
-        save_checkpoint(self.path, Checkpoint(self.identity, tuple(frames), solution, tuple(edits), limits or {}))
+        save_checkpoint(self.path, state, self.belongs())
 
 
-def save_checkpoint(path: Path, state: Checkpoint) -> None:
+def save_checkpoint(path: Path, state: Checkpoint, identity: Mapping[str, str]) -> None:
     """Write it beside its place and rename it: a cut leaves the one before.
 
     Raises:
         InputError: It cannot be written.
     """
+    solution = state.solution
     arrays: dict[str, Any] = {
-        "identity": json.dumps(state.identity),
-        "count": len(state.frames),
-        "time": state.solution.last.time,
+        "identity": json.dumps(dict(identity)),
+        "time": solution.last.time,
         "edits": json.dumps([asdict(edit) for edit in state.edits]),
         "limits": json.dumps(state.limits),
+        "missed": json.dumps([asdict(one) for one in state.missed]),
+        "tight": json.dumps([[frame, asdict(bone)] for frame, bone in state.tight]),
+        "grips": json.dumps(state.grips, default=lambda number: number.item()),
+        "edited": np.array(state.edited, np.int64),
+        "memories": len(solution.states),
     }
-    for k, frame in enumerate(state.frames):
-        for one in fields(SolvedFrame):
-            if one.name != "nodal_contact":
-                arrays[f"frame{k}.{one.name}"] = getattr(frame, one.name)
-        for one in fields(NodalContact):
-            arrays[f"frame{k}.nodal_contact.{one.name}"] = getattr(frame.nodal_contact, one.name)
-    if state.solution.correction_rate is not None:
-        arrays["correction_rate"] = state.solution.correction_rate
-    arrays["memories"] = len(state.solution.states)
-    for k, memory in enumerate(state.solution.states):
-        for one in fields(ContactState):
-            arrays[f"memory{k}.{one.name}"] = getattr(memory, one.name)
+    # one array a field, over all frames: a long run has no more members than a short one
+    for name in _names(SolvedFrame):
+        arrays[f"frames.{name}"] = np.stack([getattr(frame, name) for frame in state.frames])
+    for name in _names(NodalContact):
+        arrays[f"frames.nodal_contact.{name}"] = np.stack([getattr(one.nodal_contact, name) for one in state.frames])
+    if solution.correction_rate is not None:
+        arrays["correction_rate"] = solution.correction_rate
+    for k, memory in enumerate(solution.states):
+        arrays |= {f"memory{k}.{name}": getattr(memory, name) for name in _names(ContactState)}
+    if (step := solution.last_step) is not None:
+        arrays |= {"step.time": step.time, "step.displacement": step.displacement, "step.slips": len(step.slips)}
+        arrays |= {f"step.slips{k}": one for k, one in enumerate(step.slips)}
+        arrays |= {f"step.areas{k}": one for k, one in enumerate(step.areas)}
     try:
         with whole_file(path) as part, part.open("wb") as file:
             np.savez(file, **arrays)
@@ -128,28 +150,54 @@ def load_checkpoint(path: Path) -> Checkpoint:
     Raises:
         InputError: It is no state.
     """
-    try:
+    check_input(path)
+    with reading(path, _KIND):
+        with zipfile.ZipFile(path) as archive:
+            if sum(member.file_size for member in archive.infolist()) > path.stat().st_size:
+                raise InputError("no state of a contact solve: it would unpack to more than it is")
         with np.load(path, allow_pickle=False) as file:
             if "identity" not in file:
-                raise ValueError("it does not say what it belongs to")
-            frames = []
-            for k in range(int(file["count"])):
-                nodal_contact = NodalContact(*(file[f"frame{k}.nodal_contact.{f.name}"] for f in fields(NodalContact)))
-                one = {f.name: file[f"frame{k}.{f.name}"] for f in fields(SolvedFrame) if f.name != "nodal_contact"}
-                one |= {"frame": float(one["frame"]), "solves": int(one["solves"])}
-                one["penetration"] = float(one["penetration"])
-                frames.append(SolvedFrame(nodal_contact=nodal_contact, **one))
-            memory = tuple(
-                ContactState(*(file[f"memory{k}.{f.name}"] for f in fields(ContactState)))
-                for k in range(int(file["memories"]))
-            )
-            identity, time = json.loads(str(file["identity"])), float(file["time"])
-            correction_rate = file.get("correction_rate")
-            edits = tuple(AngleEdit(**edit) for edit in json.loads(str(file["edits"])))
-            limits = json.loads(str(file["limits"]))
-    except (OSError, KeyError, ValueError, TypeError, zipfile.BadZipFile) as error:
-        raise InputError(f"no state of a contact solve: {error}", path=path) from error
-    last = frames[-1]
-    instant = ContactInstant(time, last.displacement, last.reactions, (), last.solves, 0, 0.0)
-    solution = ContactSolution(SolveStatus.CONVERGED, (instant,), "", memory, (), Loads(), correction_rate)
-    return Checkpoint(identity, tuple(frames), solution, edits, limits)
+                raise InputError("no state of a contact solve: it does not say what it belongs to")
+            return _read(file)
+
+
+def _read(file: Any) -> Checkpoint:
+    columns = {name: file[f"frames.{name}"] for name in _names(SolvedFrame)}
+    nodal = {name: file[f"frames.nodal_contact.{name}"] for name in _names(NodalContact)}
+    frames = []
+    for k in range(len(columns["frame"])):
+        one = {name: array[k] for name, array in columns.items()}
+        one |= {"frame": float(one["frame"]), "solves": int(one["solves"]), "penetration": float(one["penetration"])}
+        nodal_contact = NodalContact(**{name: array[k] for name, array in nodal.items()})
+        frames.append(SolvedFrame(nodal_contact=nodal_contact, **one))
+    if not frames:
+        raise InputError("no state of a contact solve: it holds no frame")
+    memories = range(int(file["memories"]))
+    states = tuple(ContactState(**{n: file[f"memory{k}.{n}"] for n in _names(ContactState)}) for k in memories)
+    last, step = frames[-1], None
+    if "step.time" in file:
+        count = int(file["step.slips"])
+        slips, areas = (tuple(file[f"step.{name}{k}"] for k in range(count)) for name in ("slips", "areas"))
+        step = LastStep(float(file["step.time"]), file["step.displacement"], slips, areas)
+    instant = ContactInstant(float(file["time"]), last.displacement, last.reactions, (), last.solves, 0, 0.0)
+    rate = file.get("correction_rate")
+    return Checkpoint(
+        tuple(frames),
+        ContactSolution(SolveStatus.CONVERGED, (instant,), "", states, (), Loads(), rate, step),
+        tuple(plain_record(AngleEdit, one) for one in _json(file, "edits")),
+        dict(_json(file, "limits")),
+        tuple(plain_record(MissedContact, one) for one in _json(file, "missed")),
+        tuple((float(frame), plain_record(TightBone, bone)) for frame, bone in _json(file, "tight")),
+        tuple(dict(one) for one in _json(file, "grips")),
+        tuple(int(count) for count in file["edited"]),
+        {str(name): str(value) for name, value in dict(_json(file, "identity")).items()},
+    )
+
+
+def _json(file: Any, name: str) -> Any:
+    return json.loads(str(file[name]))
+
+
+def _names(kind: Any) -> list[str]:
+    """Fields of a record of arrays and numbers."""
+    return [one.name for one in fields(kind) if one.name != "nodal_contact"]

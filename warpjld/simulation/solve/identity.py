@@ -77,6 +77,10 @@ def _asked(contact: ContactSpecification) -> Iterator[tuple[str, Any]]:
         for one in fields(record):
             if one.name not in _SILENT:
                 yield f"{command}: {one.name}", getattr(record, one.name)
+    for grip in contact.grips:
+        for one in fields(grip):
+            if one.name not in _SILENT:
+                yield f"grip at frame {grip.first:g}: {one.name}", getattr(grip, one.name)
     yield "GRAVITY", contact.pull
     yield "STRENGTH", contact.strength
     yield "GRASP", list(contact.grasped)

@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
+from warpjld.fem.arrays import Array
 from warpjld.fem.contact import ContactInstant
 from warpjld.simulation.bodies.model import ContactModel
+from warpjld.simulation.solve.solved_frame import SolvedFrame
 
 __all__ = ["MissedContact", "missed_contacts"]
 
@@ -45,36 +47,41 @@ class MissedContact:
 
 
 def missed_contacts(
-    model: ContactModel, before: ContactInstant | None, instants: Sequence[ContactInstant]
+    model: ContactModel, before: SolvedFrame | None, instants: Sequence[ContactInstant]
 ) -> list[MissedContact]:
     """What touches between two frames and at neither.
 
     Args:
         model: Everything.
-        before: At the frame before; None where nothing was solved yet.
+        before: The frame before; None where nothing was solved yet.
         instants: After it; the last of them at the frame itself.
     """
-    known = set() if before is None else set(_touching(model, before))
-    known |= set(_touching(model, instants[-1]))
+    known = set() if before is None else set(_touching(model, before.nodal_contact.force))
+    known |= set(_touching(model, _forces(instants[-1])))
     most: dict[tuple[str, str, str], float] = {}
     for instant in instants[:-1]:
-        for place, force in _touching(model, instant).items():
+        for place, force in _touching(model, _forces(instant)).items():
             if place not in known:
                 most[place] = max(force, most.get(place, 0.0))
-    since = model.start if before is None else model.start + before.time
+    since = model.start if before is None else before.frame
     until = model.start + instants[-1].time
     return [MissedContact(*place, since, until, force) for place, force in most.items()]
 
 
-def _touching(model: ContactModel, instant: ContactInstant) -> dict[tuple[str, str, str], float]:
-    """Force [N] by actor, digit, and what it touches."""
+def _forces(instant: ContactInstant) -> list[Array]:
+    """What presses at each pair on all nodes [N], shape (N,)."""
+    return [touch.nodal_contact.force for touch in instant.touches]
+
+
+def _touching(model: ContactModel, pressing: Iterable[Array]) -> dict[tuple[str, str, str], float]:
+    """Force [N] by actor, digit, and what it touches, of what presses at each pair on all nodes [N], shape (N,)."""
     out: dict[tuple[str, str, str], float] = {}
-    for owner, touch in zip(model.owners, instant.touches, strict=False):
+    for owner, nodal in zip(model.owners, pressing, strict=False):
         for hand in model.hands:
             other = owner.other(hand.name)
-            if other is None or not touch.nodal_contact.force.any():
+            if other is None or not nodal.any():
                 continue
-            force = touch.nodal_contact.force[model.spans[hand.name]]
+            force = nodal[model.spans[hand.name]]
             label = hand.hand.node_labels
             skin = np.flatnonzero((label >= 0) & (force > 0.0))
             digit = hand.parts.part_of[label[skin]]

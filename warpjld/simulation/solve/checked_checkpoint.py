@@ -1,0 +1,119 @@
+"""Whether a state file holds what a run of this model leaves: shapes, types, finite numbers, frames in their order."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import fields
+from typing import Any, TypeVar
+
+import numpy as np
+
+from warpjld.errors import InputError
+from warpjld.fem.contact import ContactSolution
+from warpjld.fem.contact.law.contact_state import ContactState, initial_state
+from warpjld.simulation.animation import AngleEdit
+from warpjld.simulation.bodies.model import ContactModel
+from warpjld.simulation.solve.solved_frame import SolvedFrame
+
+__all__ = ["check_checkpoint", "plain_record"]
+
+_T = TypeVar("_T")
+_TYPES: dict[str, Any] = {
+    "str": str,
+    "int": int,
+    "float": (int, float),
+    "float | None": (int, float, type(None)),
+}
+"""What JSON has for the types that records are annotated with."""
+_UNKNOWN = ("bond_gap",)
+"""Fields of a contact state that are NaN where they are not known."""
+
+
+def check_checkpoint(
+    done: Sequence[SolvedFrame],
+    solution: ContactSolution,
+    edits: Sequence[AngleEdit],
+    model: ContactModel,
+    frames: Sequence[float],
+) -> None:
+    """Make sure that a run of a model over some frames can go on from frames that are done.
+
+    Raises:
+        InputError: Not what such a run leaves; the first fault is named.
+    """
+    count, pairs = len(model.body.mesh.nodes), len(model.pairs)
+    numbers = [one.frame for one in done]
+    if numbers != [float(frame) for frame in frames[: len(numbers)]]:
+        raise InputError(f"it holds frames {_some(numbers)}; want the first ones of {_some(list(frames))}")
+    for one in done:
+        what = f"frame {one.frame:g}"
+        _check(one.displacement, (count, 3), f"{what}: displacements")
+        _check(one.reactions, (count, 3), f"{what}: reactions")
+        _check(one.nodal, (pairs, count, 3), f"{what}: contact forces")
+        for part in fields(one.nodal_contact):
+            _check(getattr(one.nodal_contact, part.name), (pairs, count), f"{what}: nodal {part.name}")
+        if one.solves < 0 or not 0.0 <= one.penetration < np.inf:
+            raise InputError(f"{what}: want numbers from 0 on, got {one.solves} solves, {one.penetration:g} m deep")
+    if solution.last.time != done[-1].frame - model.start:
+        raise InputError(f"its time {solution.last.time:g} is not that of frame {done[-1].frame:g}")
+    if len(solution.states) != pairs:
+        raise InputError(f"it holds contact states of {len(solution.states)} pairs; want {pairs}")
+    for k, state in enumerate(solution.states):
+        _check_state(state, model, k)
+    if solution.correction_rate is not None:
+        _check(solution.correction_rate, (count, 3), "rates of correction")
+    _check_step(solution, count)
+    for edit in edits:
+        _check_edit(edit, model)
+
+
+def plain_record(kind: type[_T], content: Mapping[str, Any]) -> _T:
+    """A record of texts and finite numbers from what JSON holds of it.
+
+    Raises:
+        InputError: Something else.
+    """
+    for one in fields(kind):  # type: ignore[arg-type]
+        value, want = content[one.name], _TYPES[str(one.type)]
+        finite = not isinstance(value, float) or np.isfinite(value)
+        if not isinstance(value, want) or isinstance(value, bool) or not finite:
+            raise InputError(f"{one.name} of {kind.__name__}: want {one.type}, got {str(value)[:40]!r}")
+    return kind(**content)
+
+
+def _check_state(state: ContactState, model: ContactModel, number: int) -> None:
+    sites = len(state.pressure) if state.pressure.ndim == 1 else 0
+    like = initial_state(sites, model.pairs[number])
+    for one in fields(state):
+        want = getattr(like, one.name)
+        known = np.isfinite if one.name not in _UNKNOWN else None
+        _check(getattr(state, one.name), want.shape, f"contact state {number}: {one.name}", want.dtype, known=known)
+
+
+def _check_step(solution: ContactSolution, count: int) -> None:
+    step = solution.last_step
+    if step is None:
+        return
+    _check(step.displacement, (count, 3), "displacements before the last step")
+    if len(step.slips) != len(solution.states) or not step.time < solution.last.time:
+        raise InputError("its last step does not lead to its last frame")
+    for k, (slips, areas, state) in enumerate(zip(step.slips, step.areas, solution.states, strict=True)):
+        _check(slips, (len(state.pressure), 3), f"slips {k}")
+        _check(areas, (len(state.pressure),), f"areas {k}")
+
+
+def _check_edit(edit: AngleEdit, model: ContactModel) -> None:
+    actors = {hand.name: hand.bones.skeleton for hand in model.hands}
+    if edit.actor not in actors or not 0 <= edit.joint < len(actors[edit.actor]):
+        raise InputError(f"it edits joint {edit.joint} of '{edit.actor}', which is not there")
+
+
+def _check(array: Any, shape: tuple[int, ...], what: str, kind: Any = np.float64, *, known: Any = np.isfinite) -> None:
+    if array.shape != shape or array.dtype != kind:
+        raise InputError(f"{what}: want {np.dtype(kind)} of shape {shape}, got {array.dtype} of shape {array.shape}")
+    if known is not None and array.dtype.kind == "f" and not known(array).all():
+        raise InputError(f"{what}: not finite")
+
+
+def _some(numbers: Sequence[float]) -> str:
+    return ", ".join(f"{number:g}" for number in numbers[:4]) + ", …" * (len(numbers) > 4)
