@@ -113,7 +113,7 @@ def run_scene(
         with summary.timed("pictures"):
             _make_pictures(scene, crowd, outputs, out, progress, "" if script is None else script.stem, failures)
         for role in crowd.roles:
-            scene.warned(f"{role.actor.name}: {line}" for line in (role.contact.told() if role.contact else ()))
+            scene.warned(f"{role.actor.name}: {line}" for line in (role.contact.messages() if role.contact else ()))
         if failures.found and not out.made():
             if len(failures.found) == 1:
                 (name,) = failures.found
