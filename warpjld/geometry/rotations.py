@@ -84,9 +84,8 @@ def axis_turns() -> NDArray[np.float64]:
     """The 24 rotations that map coordinate axes to coordinate axes, shape (24, 4); signs are chosen so that the last
     non-zero component is positive."""
     halves = np.array(list(product((-1.0, 0.0, 1.0), repeat=4)))
-    count = np.abs(halves).sum(
-        axis=1
-    )  # non-zero components: 1 for 0° and 180°, 2 for 90° and face diagonals, 4 for 120°
+    # non-zero components: one for 0° and 180° about axes, two for 90° and for face diagonals, four for 120°
+    count = np.abs(halves).sum(axis=1)
     turns = halves[(count == 1) | (count == 2) | (count == 4)]
     last = np.take_along_axis(turns, 3 - (turns[:, ::-1] != 0.0).argmax(axis=1)[:, None], axis=1)
     return unit(turns[last[:, 0] > 0.0])
