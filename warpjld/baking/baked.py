@@ -116,9 +116,9 @@ def bake(
     targets = covering.deform(poses)
     rest = rig.surface.vertices
     joints, weights = fit_weights(rest, targets, bones.moves(poses), bones.parents, influences, progress)
-    if rig.rigid is not None and (hard := rig.rigid >= 0).any():
-        joints[hard], weights[hard] = 0, 0.0
-        joints[hard, 0], weights[hard, 0] = bones.nearest[rig.rigid[hard]], 1.0
+    if rig.rigid is not None and (is_rigid := rig.rigid >= 0).any():
+        joints[is_rigid], weights[is_rigid] = 0, 0.0
+        joints[is_rigid, 0], weights[is_rigid, 0] = bones.nearest[rig.rigid[is_rigid]], 1.0
     # rounded to single precision, as in files
     weights = weights.astype(np.float32).astype(np.float64)
     plain = Baked(rig, bones, joints, weights, no_correctives(len(rest), len(bones)))

@@ -69,16 +69,17 @@ def accuracy(baked: Baked, covering: Covering, unseen: NamedPoses) -> list[Accur
         part = poses[start : start + _FRAMES]
         wanted = covering.deform(part).astype(np.float64)
 
-        def apart(got: NDArray[np.float64], wanted: NDArray[np.float64] = wanted) -> NDArray[np.float64]:
+        def squared_distances(got: NDArray[np.float64], wanted: NDArray[np.float64] = wanted) -> NDArray[np.float64]:
             """Mean and largest squared distance of every frame [m²], shape (f, 2)."""
             square = ((got - wanted) ** 2).sum(axis=-1)
             return np.column_stack([square.mean(axis=1), square.max(axis=1)])
 
-        found["weights"].append(apart(baked.deform(part, corrected=False)))
+        found["weights"].append(squared_distances(baked.deform(part, corrected=False)))
         if "corrected" in found:
-            found["corrected"].append(apart(baked.deform(part)))
+            found["corrected"].append(squared_distances(baked.deform(part)))
         if rig.skin is not None:
-            found["painted"].append(apart(linear_blend_skinning(rig.skeleton, rig.surface.vertices, rig.skin, part)))
+            painted = linear_blend_skinning(rig.skeleton, rig.surface.vertices, rig.skin, part)
+            found["painted"].append(squared_distances(painted))
     squares = {kind: np.concatenate(rows) for kind, rows in found.items()}
     names = np.array(unseen.names)
     return [_row(name, names == name if n else np.ones(len(names), bool), squares) for n, name in _named(unseen)]

@@ -103,8 +103,8 @@ class Guard:
         self._dihedral = dihedral_angles(self._rest, self.hinges)
         parts = surface_parts(covering)
         # the faces of the flesh are a subset of the surface's, in the same order
-        soft = (covering.anchors.rigid[surface.faces] < 0).any(axis=1)
-        self._parts = parts.of_face[soft]
+        is_flesh = (covering.anchors.rigid[surface.faces] < 0).any(axis=1)
+        self._parts = parts.of_face[is_flesh]
         self._joined = _joined(parts.names, covering.skeleton.names, covering.skeleton.parents)
         crossing = crossing_faces(self._rest, flesh.faces)
         self._crossing = _keys(crossing, len(flesh.faces))

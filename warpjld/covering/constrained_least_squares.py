@@ -126,12 +126,12 @@ def minimise_constrained(
         constraints, slopes = [], []
         for part in parts:
             local = part.linearised(x)
-            mine = place[part.parameters]
+            own = place[part.parameters]
             loss += float(local.residuals @ local.residuals)
-            gradient[mine] += local.jacobian.T @ local.residuals
-            square[np.ix_(mine, mine)] += local.jacobian.T @ local.jacobian
+            gradient[own] += local.jacobian.T @ local.residuals
+            square[np.ix_(own, own)] += local.jacobian.T @ local.jacobian
             rows = np.zeros((len(local.constraints), len(moved)))
-            rows[:, mine] = local.slopes
+            rows[:, own] = local.slopes
             constraints.append(local.constraints)
             slopes.append(rows)
         return _Sum(0.5 * loss, gradient, square, np.concatenate(constraints), np.concatenate(slopes))

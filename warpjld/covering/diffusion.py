@@ -97,9 +97,9 @@ class Diffusion:
             for first in range(0, len(cluster), together):
                 members.append(cluster[first : first + together])
                 spread.append(self._spread(columns[:, members[-1]], where, factor))
-        hard = np.ones(coefficients.shape[0])
-        hard[self.flesh] = 0.0
-        kept = sp.csr_array(sp.diags_array(hard) @ coefficients)
+        rigid = np.ones(coefficients.shape[0])
+        rigid[self.flesh] = 0.0
+        kept = sp.csr_array(sp.diags_array(rigid) @ coefficients)
         if not spread:
             return kept
         column = np.concatenate(members)
@@ -108,7 +108,7 @@ class Diffusion:
         length[np.sort(column)] = np.diff(ordered.indptr)
         starts = np.concatenate([[0], np.cumsum(length)])
         out = sp.csc_array((ordered.data, ordered.indices, starts), shape=coefficients.shape).tocsr()
-        return out + kept if hard.any() else out
+        return out + kept if rigid.any() else out
 
     def _spread(self, columns: sp.csc_array, where: NDArray[np.int64], factor: DiffusionFactor) -> sp.csc_array:
         """Some columns after diffusion over the vertices ``where`` of the flesh."""
@@ -169,8 +169,8 @@ class Diffusion:
         number[self.flesh] = np.arange(count)
         groups: list[tuple[list[int], NDArray[np.bool_], int]] = []
         for joint in np.unique(owner[present]).tolist():
-            mine = present[owner[present] == joint]
-            touched = number[np.unique(columns[:, mine].indices)]
+            own = present[owner[present] == joint]
+            touched = number[np.unique(columns[:, own].indices)]
             touched = touched[touched >= 0]
             reached = np.zeros(count, dtype=bool)
             if touched.size:
@@ -183,10 +183,10 @@ class Diffusion:
                 if together <= _SHARED * max(largest, size) and (best < 0 or together - mask.sum() < best_size):
                     best, best_size = g, together - int(mask.sum())
             if best < 0:
-                groups.append((mine.tolist(), reached, size))
+                groups.append((own.tolist(), reached, size))
             else:
                 members, mask, largest = groups[best]
-                groups[best] = (members + mine.tolist(), mask | reached, max(largest, size))
+                groups[best] = (members + own.tolist(), mask | reached, max(largest, size))
         out = []
         for members, mask, _ in groups:
             where = order[mask[order]]

@@ -23,9 +23,9 @@ def hinges(faces: NDArray[np.integer]) -> NDArray[np.int64]:
 
 def dihedral_angles(points: NDArray[np.float64], hinge: NDArray[np.int64]) -> NDArray[np.float64]:
     """Unsigned angle [rad] between the normals of the two faces of each hinge, 0 where flat, shape (H,)."""
-    one, other = _normals(points, hinge)
-    across = _cross(one, other)
-    return np.asarray(np.arctan2(np.sqrt(_dot(across, across)), _dot(one, other)))
+    first, second = _normals(points, hinge)
+    across = _cross(first, second)
+    return np.asarray(np.arctan2(np.sqrt(_dot(across, across)), _dot(first, second)))
 
 
 def dihedral_slopes(
@@ -38,14 +38,14 @@ def dihedral_slopes(
         hinge: From :func:`hinges`.
         least: Lower bounds of the two faces' doubled areas as divisors [m²], shape (H, 2).
     """
-    one, other = _normals(points, hinge)
+    first, second = _normals(points, hinge)
     i, j, k, m = (points[hinge[:, n]] for n in range(4))
     along = j - i
     length = np.maximum(np.sqrt(_dot(along, along)), 1e-30)[:, None]
     # a face turns about the edge by the motion of its corner along the normal over its height, height = |n| / length
-    a = one / np.maximum(_dot(one, one), least[:, 0] ** 2)[:, None]
-    b = other / np.maximum(_dot(other, other), least[:, 1] ** 2)[:, None]
-    sign = np.where(_dot(_cross(one, other), along) > 0.0, -1.0, 1.0)[:, None]
+    a = first / np.maximum(_dot(first, first), least[:, 0] ** 2)[:, None]
+    b = second / np.maximum(_dot(second, second), least[:, 1] ** 2)[:, None]
+    sign = np.where(_dot(_cross(first, second), along) > 0.0, -1.0, 1.0)[:, None]
 
     def share(corner: NDArray[np.float64], end: NDArray[np.float64]) -> NDArray[np.float64]:
         return _dot(corner - end, along)[:, None] / length

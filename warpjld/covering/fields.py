@@ -122,16 +122,16 @@ class OperatorKernel:
         anchors = self._anchors
         turn, rounding, muscle = (a.numpy() for a in self._out)
         proximal, distal = anchors.ends[anchors.segment, 0], anchors.ends[anchors.segment, 1]
-        hard = (anchors.rigid >= 0).astype(np.float64)[:, None]
+        is_rigid = (anchors.rigid >= 0).astype(np.float64)[:, None]
         follows = np.maximum(anchors.rigid, 0)[:, None]
         between = np.clip((anchors.ratio - _PIVOT) / (1.0 - 2.0 * _PIVOT), 0.0, 1.0)
         positions = [
             (proximal, anchors.weight * (1.0 - between)),
             (distal, anchors.weight * between),
-            (follows, hard),
+            (follows, is_rigid),
         ]
         self._turn_columns = (proximal, joints + proximal, distal)
-        turns = [*((c, turn[..., k]) for k, c in enumerate(self._turn_columns)), (joints + follows, hard)]
+        turns = [*((c, turn[..., k]) for k, c in enumerate(self._turn_columns)), (joints + follows, is_rigid)]
         self._rounding_columns = (proximal, distal)
         roundings = [(c, rounding[..., k]) for k, c in enumerate(self._rounding_columns)]
         low = np.minimum(anchors.station.astype(int), STATIONS - 2)

@@ -92,28 +92,30 @@ def _divided(
     count = 0
     waiting = [(np.arange(kinds.shape[0]), kinds, price)]
     while waiting:
-        rows, some, prices = waiting.pop()
-        column = _best_split(some, sizes[rows], prices) if len(rows) > 1 and sizes[rows].sum() > enough else None
+        rows, used, prices = waiting.pop()
+        column = _best_split(used, sizes[rows], prices) if len(rows) > 1 and sizes[rows].sum() > enough else None
         if column is None:
             part[rows] = count
             count += 1
             continue
-        inside = (some[:, [column]].toarray() if sp.issparse(some) else some[:, [column]])[:, 0] > 0
+        inside = (used[:, [column]].toarray() if sp.issparse(used) else used[:, [column]])[:, 0] > 0
         for chosen in (inside, ~inside):
-            mine = some[chosen]
-            if sp.issparse(mine):
-                held = np.bincount(mine.indices, minlength=mine.shape[1]) > 0
-                mine = mine[:, held] if mine.shape[0] > _SPARSE else mine.toarray()[:, held]
+            part_pattern = used[chosen]
+            if sp.issparse(part_pattern):
+                held = np.bincount(part_pattern.indices, minlength=part_pattern.shape[1]) > 0
+                part_pattern = (
+                    part_pattern[:, held] if part_pattern.shape[0] > _SPARSE else part_pattern.toarray()[:, held]
+                )
             else:
-                held = mine.any(axis=0)
-                mine = mine[:, held]
-            waiting.append((rows[chosen], mine, prices[held]))
+                held = part_pattern.any(axis=0)
+                part_pattern = part_pattern[:, held]
+            waiting.append((rows[chosen], part_pattern, prices[held]))
     return part
 
 
-def _best_split(some: NDArray | sp.csr_array, sizes: NDArray, price: NDArray) -> int | None:
+def _best_split(used: NDArray | sp.csr_array, sizes: NDArray, price: NDArray) -> int | None:
     """Column by whose use kinds are divided at the least total cost; None where all kinds use the same columns."""
-    together = some.T @ some
+    together = used.T @ used
     if sp.issparse(together):
         together = together.toarray()
     here = np.diagonal(together)  # kinds that use a column
@@ -123,7 +125,7 @@ def _best_split(some: NDArray | sp.csr_array, sizes: NDArray, price: NDArray) ->
     both = together[mixed]
     with_it = (both > 0).astype(np.float32) @ price
     without = (both < here).astype(np.float32) @ price
-    n = (some.T @ sizes)[mixed].astype(np.float64)
+    n = (used.T @ sizes)[mixed].astype(np.float64)
     cost = n * (FIXED + with_it) + (sizes.sum() - n) * (FIXED + without)
     return int(mixed[cost.argmin()])
 

@@ -47,7 +47,7 @@ def cotangent_laplacian(
     """Positive semidefinite cotangent Laplacian, shape (V, V), and barycentric vertex areas, shape (V,).
 
     Cotangents are clamped to 1e-3 … 1e3: negative weights would violate the maximum principle. The conductivity is
-    raised around saddle vertices, within a share of the ``thickness`` there, shape (V,) (:mod:`.corners`).
+    raised around saddle vertices, within a share of the ``thickness`` there, shape (V,) (``corners.py``).
     """
     conductivity = corner_conductivity(vertices, faces, thickness)
     return _cotangents(vertices, faces, lambda i, j: conductivity)

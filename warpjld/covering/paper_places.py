@@ -87,12 +87,12 @@ def paper_places(
     first = 0
     for f, fan in enumerate(groups):
         size = len(fan.segments)
-        mine = np.flatnonzero(owner == f)
-        segment[mine] = first
-        if size > 1 and mine.size:
+        members = np.flatnonzero(owner == f)
+        segment[members] = first
+        if size > 1 and members.size:
             inside = slice(first, first + size)
-            chosen = _palm_place(vertices[mine], table, ratio[mine, inside], inside, parameters, tie)
-            segment[mine], across[mine], between[mine] = first + chosen[0], chosen[1], chosen[2]
+            chosen = _palm_place(vertices[members], table, ratio[members, inside], inside, parameters, tie)
+            segment[members], across[members], between[members] = first + chosen[0], chosen[1], chosen[2]
         first += size
     both = np.take_along_axis(ratio, segment, axis=1)
     external = _height(vertices, table, segment, both, np.where(between, across, 0.0)) >= -tie

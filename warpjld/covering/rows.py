@@ -55,9 +55,9 @@ def rows_of(
 ) -> Rows:
     """Rows of diffused and thinned fields with these amplitudes (R58–R65).
 
-    Roundings are multiplied by the inflation of their joint, muscles by that of the joint where the segment begins, and
-    swellings by the amplitude ``swelling`` of their joint, shape (J,), zero by default. Offsets are those of straight
-    joints: together with the inflation by the initial angles they give the rest pose (C24, R25).
+    Roundings are multiplied by the inflation of their joint, muscles by the muscle amplitude of the joint where the
+    segment begins, and swellings by the amplitude ``swelling`` of their joint, shape (J,), zero by default. Offsets are
+    those of straight joints: together with the inflation by the initial angles they give the rest pose (C24, R25).
     """
     muscles = _times(fields.muscles, parameters.muscle[anchors.ends[:, 0]])
     scales = _times(fields.roundings, parameters.inflation)

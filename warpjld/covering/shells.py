@@ -80,14 +80,14 @@ def shells(
     seams = _seams(vertices, faces, flesh)
     label = shell_numbers(faces, count, seams)
     number = int(label.max()) + 1
-    soft = np.bincount(label, flesh & used, number) > 0
-    host, lies = soft, np.zeros(number, dtype=bool)
+    is_flesh = np.bincount(label, flesh & used, number) > 0
+    host, lies = is_flesh, np.zeros(number, dtype=bool)
     whole = lies.copy()
     identity = sp.eye_array(count, format="csr")
     distance = np.zeros(count)
-    if soft.sum() > 1:
-        host = _hosts(vertices, faces, lines, label, soft)
-        lies = soft & ~host
+    if is_flesh.sum() > 1:
+        host = _hosts(vertices, faces, lines, label, is_flesh)
+        lies = is_flesh & ~host
     follow = _averaged_seams(seams, count) if len(seams) else identity
     if lies.any():
         rows, distance, whole = _follow(vertices, faces, lines, label, host, lies, flesh)
@@ -137,13 +137,13 @@ def _hosts(
     faces: NDArray[np.int32],
     lines: NDArray[np.float64],
     label: NDArray[np.int32],
-    soft: NDArray[np.bool_],
+    is_flesh: NDArray[np.bool_],
 ) -> NDArray[np.bool_]:
     """Shells of flesh that surround a segment, or the one of the largest area where none does, shape (N,)."""
     import warp as wp
     from warpjld_kernels.shells import first_face_met
 
-    number = len(soft)
+    number = len(is_flesh)
     of_face = label[faces[:, 0]]
     share = (np.arange(_SAMPLES) + 0.5) / _SAMPLES
     along = lines[:, 1] - lines[:, 0]
@@ -151,10 +151,10 @@ def _hosts(
     forward = unit(along)
     across = unit(np.cross(forward, np.eye(3)[np.abs(forward).round(6).argmin(axis=1)]))
     angle = (np.arange(_RAYS) + 0.3) * (2.0 * np.pi / _RAYS)
-    ways = np.cos(angle)[:, None] * across[:, None] + np.sin(angle)[:, None] * np.cross(forward, across)[:, None]
+    radial = np.cos(angle)[:, None] * across[:, None] + np.sin(angle)[:, None] * np.cross(forward, across)[:, None]
     shape = (len(lines), _SAMPLES, _RAYS, 3)
     starts = np.broadcast_to(origins[:, :, None], shape).reshape(-1, 3)
-    directions = np.broadcast_to(ways[:, None], shape).reshape(-1, 3)
+    directions = np.broadcast_to(radial[:, None], shape).reshape(-1, 3)
     mesh, centre = _mesh(vertices, faces)
     met = wp.empty(len(starts), dtype=wp.int32, device="cpu")
     rays = [wp.array((starts - centre).astype(np.float32), dtype=wp.vec3, device="cpu")]
@@ -174,11 +174,11 @@ def _hosts(
     length = shares.T @ (np.linalg.norm(along, axis=1) * goes_on)
     width = np.array([_spread(vertices, label, number, k) for k in range(3)]).max(axis=0)
     owned = shares.max(axis=0).toarray().ravel() >= _OWN
-    host: NDArray[np.bool_] = soft & (owned | (length >= _ACROSS * np.maximum(width, 1e-30)))
+    host: NDArray[np.bool_] = is_flesh & (owned | (length >= _ACROSS * np.maximum(width, 1e-30)))
     if not host.any():  # the skeleton lies outside its surface
         edges = [vertices[faces[:, k]] - vertices[faces[:, 0]] for k in (1, 2)]
         area = np.bincount(of_face, np.linalg.norm(np.cross(edges[0], edges[1]), axis=1), number)
-        host[np.argmax(np.where(soft, area, -1.0))] = True
+        host[np.argmax(np.where(is_flesh, area, -1.0))] = True
     return host
 
 

@@ -44,7 +44,7 @@ def skull_lines(
     ends = list(dict(face_points(joints, vertices, up, forward)).values())
     height = float(np.linalg.norm(joints[CROWN] - base))
     left = np.cross(up, forward)
-    ways = unit(np.array([-forward, left, -left]) + _RISE * up)
-    reach = first_hits(vertices, nearby(vertices, faces, base, _REACH * height), np.tile(base, (3, 1)), ways)
-    ends += [base + length * way for length, way in zip(reach, ways, strict=True) if length < _REACH * height]
+    directions = unit(np.array([-forward, left, -left]) + _RISE * up)
+    reach = first_hits(vertices, nearby(vertices, faces, base, _REACH * height), np.tile(base, (3, 1)), directions)
+    ends += [base + length * way for length, way in zip(reach, directions, strict=True) if length < _REACH * height]
     return [(base, base + _FACE * (end - base)) for end in ends]

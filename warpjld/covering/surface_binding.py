@@ -53,7 +53,7 @@ def bind(
         raise InputError("skeleton: it has no segment to cover")
     chosen = default_parameters(skeleton) if parameters is None else parameters
     chosen.check(skeleton)
-    hard = _checked_rigid(rigid, len(surface.vertices), len(skeleton))
+    checked = _checked_rigid(rigid, len(surface.vertices), len(skeleton))
     if isinstance(domains, np.ndarray):
         weights = domains
     elif domains not in ("geometry", "skin"):
@@ -61,15 +61,15 @@ def bind(
     elif domains == "skin" and skin is None:
         raise InputError("domains 'skin': this rig has no painted weights")
     else:
-        weights = domains_of_rigid(hard, skeleton, groups)
-        if (flesh := np.flatnonzero(hard < 0)).size:
+        weights = domains_of_rigid(checked, skeleton, groups)
+        if (flesh := np.flatnonzero(checked < 0)).size:
             vertices, faces = part_of_surface(surface.vertices, surface.faces, flesh)
             if domains == "geometry" or skin is None:
                 weights[flesh] = domains_from_geometry(vertices, faces, skeleton, groups)
             else:
                 painted = Skin(skin.joints[flesh], skin.weights[flesh])
                 weights[flesh] = domains_from_skin(vertices, faces, skeleton, groups, painted)
-    anchors = anchor(surface.vertices, skeleton, groups, weights, chosen, rigid=hard)
+    anchors = anchor(surface.vertices, skeleton, groups, weights, chosen, rigid=checked)
     if method == "paper":
         from warpjld.covering.paper import PaperCovering  # imports SciPy, which a stored binding does not need
 

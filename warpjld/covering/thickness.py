@@ -13,8 +13,8 @@ __all__ = ["thickness"]
 def thickness(anchors: Anchors, joints: NDArray[np.float64]) -> NDArray[np.float64]:
     """Mean distance of every vertex from its projections on its segments [m], weighted by the operators, shape (V,).
 
-    Not the distance from the mean of the projections: in a web that lies between two fingers, close to the skin, and
-    fields would hardly be diffused there.
+    Not the distance from the mean of the projections: in a web this mean lies between two fingers, close to the skin,
+    and fields would hardly be diffused there.
 
     Args:
         anchors: Coordinates of V vertices.

@@ -86,12 +86,12 @@ def actor_template() -> dict[str, Array]:
     return {name: points[name] for name in ACTOR_POINTS}
 
 
-def _chain(points: dict[str, Array], digit: str, base: Array, bones: list[float], way: Array) -> None:
+def _chain(points: dict[str, Array], digit: str, base: Array, bones: list[float], direction: Array) -> None:
     """Add the joints of a straight digit to ``points``."""
     place = base
     points[f"{digit}.base"] = place
     for joint, length in zip(("knuckle2", "knuckle3", "tip"), bones, strict=True):
-        place = place + length * way
+        place = place + length * direction
         points[f"{digit}.{joint}"] = place
 
 

@@ -37,11 +37,11 @@ class Shading:
         forth, back = flat[tails] * count + flat[heads], flat[heads] * count + flat[tails]
         order = np.argsort(forth)
         place = order[np.minimum(np.searchsorted(forth, back, sorter=order), len(order) - 1)]
-        soft = (forth[place] == back) & (
+        smooth = (forth[place] == back) & (
             np.einsum("ij,ij->i", normals[tails // 3], normals[place // 3]) > np.cos(angle)
         )
-        ones = np.concatenate([tails[soft], heads[soft]])
-        others = np.concatenate([heads[place[soft]], tails[place[soft]]])
+        ones = np.concatenate([tails[smooth], heads[smooth]])
+        others = np.concatenate([heads[place[smooth]], tails[place[smooth]]])
         links = coo_array((np.ones(len(ones)), (ones, others)), shape=(len(flat),) * 2)
         label = connected_components(links, directed=False)[1]
         kept, first = np.unique(label, return_index=True)

@@ -74,10 +74,10 @@ class SkinContact:
         from warpjld.grasp.distance import ObjectSet
         from warpjld.touch.held import flatten_on
 
-        for thing, places in held:
-            if id(thing) not in self._objects:
-                self._objects[id(thing)] = ObjectSet(thing)
-            points, deep = flatten_on(self.touch, points, self._objects[id(thing)], [places], first=first)
+        for held_object, places in held:
+            if id(held_object) not in self._objects:
+                self._objects[id(held_object)] = ObjectSet(held_object)
+            points, deep = flatten_on(self.touch, points, self._objects[id(held_object)], [places], first=first)
             for overlap in deep:
                 worst = self._in_objects.setdefault((overlap.part, overlap.other), overlap)
                 if overlap.depth > worst.depth:
@@ -89,13 +89,13 @@ class SkinContact:
         that lies too deep in another, with its worst frame."""
         lines = self._too_coarse()
         for name in dict.fromkeys(digit for digit, _ in self._closed):
-            mine = [limit for (digit, _), limit in self._closed.items() if digit == name]
-            stuck = [limit.frame for limit in mine if limit.crosses]
+            limits = [limit for (digit, _), limit in self._closed.items() if digit == name]
+            stuck = [limit.frame for limit in limits if limit.crosses]
             if stuck:
                 lines.append(
                     f"{name}: {_frames(len(stuck))} cross something however far it opens, as at frame {stuck[0]}"
                 )
-            closed = [limit for limit in mine if limit.share < 1.0]
+            closed = [limit for limit in limits if limit.share < 1.0]
             if closed:
                 worst = max(closed, key=lambda limit: limit.depth)
                 inside = f"{1e3 * worst.depth:.1f} mm inside {worst.other} as posed" if worst.other else "folded"

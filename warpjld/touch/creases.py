@@ -229,11 +229,11 @@ class _Entries:
         opposite = np.zeros((len(rows), 3), dtype=np.int64)
         share = np.zeros((len(rows), 3))
         gate = np.zeros(len(rows))
-        for mine, others in (sides, sides[::-1]):
-            distance, near = cKDTree(offset[others]).query(mirrored[mine], k=3)
+        for near_side, far_side in (sides, sides[::-1]):
+            distance, near = cKDTree(offset[far_side]).query(mirrored[near_side], k=3)
             inverse = 1.0 / (distance + 1e-3 * size)
-            opposite[mine], share[mine] = rows[others[near]], inverse / inverse.sum(axis=1, keepdims=True)
-            gate[mine] = np.clip(2.0 - 2.0 * distance[:, 0] / size, 0.0, 1.0)
+            opposite[near_side], share[near_side] = rows[far_side[near]], inverse / inverse.sum(axis=1, keepdims=True)
+            gate[near_side] = np.clip(2.0 - 2.0 * distance[:, 0] / size, 0.0, 1.0)
         kept = np.flatnonzero(weight * gate > _LEAST)
         return cls(rows[kept], height[kept], (weight * gate)[kept], opposite[kept], share[kept])
 

@@ -115,17 +115,17 @@ def _digits(covering: Covering) -> list[_Digit]:
     parts = [fan.name for fan in covering.fans]
     found = []
     for name, joints in digit_joints(covering.skeleton).items():
-        mine = np.array([part.startswith(f"{name}.") for part in parts])
-        if mine.any():
-            found.append((name, list(joints), mine))
+        own = np.array([part.startswith(f"{name}.") for part in parts])
+        if own.any():
+            found.append((name, list(joints), own))
     order = ("index", "middle", "ring", "pinky", "thumb")
     found.sort(key=lambda digit: order.index(digit[0].rpartition(".")[2]))
     later = np.zeros(len(parts), dtype=bool)
-    fingers = np.logical_or.reduce([mine for _, _, mine in found]) if found else later
+    fingers = np.logical_or.reduce([own for _, _, own in found]) if found else later
     out = []
-    for name, joints, mine in reversed(found):
-        out.append(_Digit(name, joints, mine, ~later, fingers))
-        later = later | mine
+    for name, joints, own in reversed(found):
+        out.append(_Digit(name, joints, own, ~later, fingers))
+        later = later | own
     return out[::-1]
 
 
@@ -253,8 +253,8 @@ def _depths(
     count = len(overlaps)
     ratio, depth, other = np.zeros(count), np.zeros(count), np.full(count, -1)
     for f, found in enumerate(overlaps):
-        mine, its = digit.parts[found.part], digit.parts[found.other]
-        rows = np.flatnonzero((mine | its) & digit.counts[found.part] & digit.counts[found.other])
+        inside, around = digit.parts[found.part], digit.parts[found.other]
+        rows = np.flatnonzero((inside | around) & digit.counts[found.part] & digit.counts[found.other])
         if len(rows):
             beside = ~(digit.parts[found.part[rows]] & digit.parts[found.other[rows]])
             beside &= digit.fingers[found.part[rows]] & digit.fingers[found.other[rows]]
@@ -269,27 +269,27 @@ def _crossing(covering: Covering, touch: Touch, poses: Poses, digits: list[_Digi
     """Whether a face of a digit crosses one of the parts it is closed against after separation, shape (digits, F)."""
     part = touch.patches.part[touch.patches.faces]
     parted, _ = touch.parted(covering.deform(poses), poses)
-    mine = np.array([digit.parts[part].any(axis=1) for digit in digits])
+    own = np.array([digit.parts[part].any(axis=1) for digit in digits])
     counts = np.array([digit.counts[part].all(axis=1) for digit in digits])
     out = np.zeros((len(digits), len(poses)), dtype=bool)
     for f, points in enumerate(parted):
-        near = np.flatnonzero(_beside(points[touch.patches.faces], mine))
+        near = np.flatnonzero(_beside(points[touch.patches.faces], own))
         pairs = touch.new_crossings(near[crossing_faces(points, touch.patches.faces[near]).pairs])
-        found = np.logical_and(mine[:, pairs].any(axis=2), counts[:, pairs].all(axis=2))
+        found = np.logical_and(own[:, pairs].any(axis=2), counts[:, pairs].all(axis=2))
         out[:, f] = np.asarray(found).any(axis=1)
     return out
 
 
-def _beside(corners: NDArray[np.floating], mine: NDArray[np.bool_]) -> NDArray[np.bool_]:
+def _beside(corners: NDArray[np.floating], own: NDArray[np.bool_]) -> NDArray[np.bool_]:
     """Which faces overlap the bounding box of some digit's faces, shape (T,); no others can cross them.
 
     Args:
         corners: Corners of the faces [m], shape (T, 3, 3).
-        mine: Faces of every digit, shape (digits, T).
+        own: Faces of every digit, shape (digits, T).
     """
     lower, upper = corners.min(axis=1), corners.max(axis=1)
     out = np.zeros(len(corners), dtype=bool)
-    for faces in mine:
+    for faces in own:
         low, high = lower[faces].min(axis=0), upper[faces].max(axis=0)
         out |= (lower <= high).all(axis=1) & (upper >= low).all(axis=1)
     return out

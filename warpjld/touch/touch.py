@@ -71,7 +71,7 @@ class Touch:
         >>> for joint, angle in (("index.base", 1.4), ("index.knuckle2", 1.7), ("index.knuckle3", 1.2)):  # rad
         ...     motion.set_key(f"{joint}.flexion", 0, angle)
         >>> poses = motion.poses(hand.skeleton)
-        >>> parted, told = wj.Touch.of(covering).apply(covering.deform(poses), poses)
+        >>> parted, deep = wj.Touch.of(covering).apply(covering.deform(poses), poses)
         >>> parted.shape
         (1, ..., 3)
     """
