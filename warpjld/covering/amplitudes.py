@@ -102,6 +102,7 @@ class LinearDeformation:
                 yield self._frame(start + k, surface.copy())
 
     def _frame(self, number: int, points: NDArray[np.float32]) -> Frame:
+        """The pose of an index with its surface (V, 3), and the derivatives D of the vertices that amplitudes move."""
         fields, drivers, joints = self.covering.fields, self._drivers, len(self.covering.skeleton)
         round_row, round_column, round_value, _ = _scaled(self._roundings, self._ratio[number])
         muscle_row, segment, muscle_value, entry = _scaled(self._muscles, self._driven[number])

@@ -140,6 +140,7 @@ class Guard:
                 progress(done + 1, len(which))
 
     def _measure(self, points: NDArray[np.float64], f: int, into: PoseMeasures) -> None:
+        """Write the measures of a deformed surface (V, 3) into ``into`` at pose ``f``."""
         inside = np.zeros(len(points), dtype=bool)
         inside[self._moved[f]] = True
         local = any_of(inside, self.hinges)

@@ -180,6 +180,7 @@ class PoseLoss:
         return self._terms(self._at(change), self._volume.lost(change)[0])
 
     def _terms(self, points: NDArray[np.float64], lost: float) -> LossTerms:
+        """Terms at positions of the sampled vertices and a volume error [m³]."""
         log, growth = self._logarithms(points)[0], self._growth(points)
         return LossTerms(
             float((self._of_volume * lost) ** 2),

@@ -120,6 +120,7 @@ def minimise_constrained(
     low, high, held = bounds[0][moved], bounds[1][moved], pull[moved]
 
     def summed(x: NDArray[np.float64]) -> _Sum:
+        """All blocks and the regularisation, linearised at x."""
         change = (x - start)[moved]
         loss = float((held * change**2).sum())
         gradient, square = held * change, np.diag(held)

@@ -263,6 +263,7 @@ class Covering:
             raise InputError(f"poses: joint '{self.skeleton.names[joint]}' is not finite at frame {frame}")
 
     def _launch(self, rows: Any, points: Any, device: Any, threads: int, order: str) -> None:
+        """Launch the kernels for all frames of the palette ``rows``, into the device array ``points``."""
         import warp as wp
 
         *model, lane = self._on(device, "runs", self._packed)

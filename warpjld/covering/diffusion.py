@@ -158,6 +158,7 @@ class Diffusion:
     def _find_clusters(
         self, columns: sp.csc_array, present: NDArray[np.int64], owner: NDArray[np.int64]
     ) -> list[tuple[NDArray[np.int64], NDArray[np.int64], DiffusionFactor]]:
+        """Group the columns by joint, and joints greedily while their common region stays small; factorise each."""
         count = len(self.flesh)
         if not count:
             return []

@@ -113,6 +113,7 @@ def load_binding(
 
 
 def _write(path: Path, key: str, covering: Covering) -> None:
+    """Write an NPZ archive of a binding with its key."""
     parts = {"runs": (covering.runs, _RUNS), "anchors": (covering.anchors, _ANCHORS)}
     parts["parameters"] = (covering.parameters, _PARAMETERS)
     parts |= {f"fields.{kind}": (getattr(covering.fields, kind), _SPARSE) for kind in _FIELDS}
@@ -126,6 +127,7 @@ def _write(path: Path, key: str, covering: Covering) -> None:
 
 
 def _load(path: Path, key: str, rig: Rig, skeleton: Skeleton | None) -> Covering:
+    """Read an NPZ archive of a binding; InputError where it is none, or has another key."""
     try:
         if path.is_file() and not zipfile.is_zipfile(path):
             raise ValueError("not an NPZ archive")

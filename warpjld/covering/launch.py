@@ -55,6 +55,7 @@ def launch_gathered(model: list[Any], lane: Any, pose: Any, points: Any, device:
 
 
 def _deform(model: list[Any], pose: Any, points: Any, device: Any, scatter: bool) -> None:
+    """One launch of ``deform_runs`` over the frames of ``pose``."""
     import warp as wp
     from warpjld_kernels.covering_runs import CPU_FRAMES, deform_runs
 

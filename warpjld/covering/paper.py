@@ -104,6 +104,7 @@ class PaperCovering(Covering):
         self._emit(rows, np.arange(len(self.surface.vertices), dtype=np.int32), points, device, threads)
 
     def _emit(self, pose: PaperPose, chosen: NDArray[np.int32], points: Any, device: Any, threads: int) -> None:
+        """Deform chosen vertices in all frames into the device array ``points``, shape (F, n)."""
         import warp as wp
         from warpjld_kernels.paper import deform_paper
 

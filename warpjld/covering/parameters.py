@@ -170,6 +170,7 @@ def load_parameters(path: str | Path, skeleton: Skeleton) -> Parameters:
 
 
 def _parameters(content: Any, skeleton: Skeleton) -> Parameters:
+    """Checked parameters from the parsed JSON of a parameter file."""
     joints = content.get("joints") if isinstance(content, dict) else None
     if not isinstance(joints, dict) or not all(isinstance(values, dict) for values in joints.values()):
         raise InputError("want a JSON object with a 'joints' object that holds values by joint")

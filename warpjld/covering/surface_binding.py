@@ -114,6 +114,7 @@ def bind_rig(
 
 
 def _checked_rigid(rigid: NDArray[np.int32] | None, vertices: int, joints: int) -> NDArray[np.int32]:
+    """``rigid`` as int32, shape (V,), all flesh by default; InputError for a wrong shape or a joint out of range."""
     if rigid is None:
         return np.full(vertices, -1, dtype=np.int32)
     if rigid.shape != (vertices,):

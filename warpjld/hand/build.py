@@ -92,6 +92,7 @@ def _source(skeleton: Skeleton) -> SourceTree:
 
 
 def _check(side: str, length: float, breadth: float, resolution: int) -> None:
+    """Raise InputError for arguments of ``build_hand`` that are out of range."""
     if side not in ("left", "right"):
         raise InputError(f"side: want 'left' or 'right', got {side!r}")
     if not 0.05 <= length <= 0.30:
@@ -104,6 +105,7 @@ def _check(side: str, length: float, breadth: float, resolution: int) -> None:
 
 
 def _scales(proportions: Mapping[str, float | tuple[float, float]] | None) -> dict[str, tuple[float, float]]:
+    """Checked scales of length and thickness by digit."""
     out = {}
     for digit, scale in (proportions or {}).items():
         if digit not in DIGITS:

@@ -204,6 +204,7 @@ class SceneRenderer:
         return self._scale.shares(_finite("values", values, (count,)))
 
     def _build(self, points: NDArray[np.float64], joints: NDArray[np.float64] | None) -> None:
+        """Open the window, and add lights, surface, edges, skeleton and solids to it."""
         from warpjld.render.window import open_window
 
         style, times = self._style, self._quality.supersampling
