@@ -120,7 +120,7 @@ def calibrate(
     if not len(poses):
         raise InputError("poses: want at least one to calibrate on")
     if not len(covering.flesh.faces):
-        raise InputError("calibrate: all of this surface is rigid, nothing is deformed")
+        raise InputError("calibrate: all of this surface is rigid; want flesh that deforms")
     for pose_set in (poses, guards):
         covering.check(pose_set)
     started = time.perf_counter()

@@ -79,7 +79,7 @@ class Parameters:
                 raise InputError(f"parameters.{field.name} of '{name}' must be finite and ≥ 0, and {_MOST:g} at most")
         outside = np.flatnonzero((self.peak <= 0.0) | (self.peak >= 1.0))
         if outside.size:
-            raise InputError(f"peak of '{skeleton.names[outside[0]]}' must lie between 0 and 1")
+            raise InputError(f"parameters.peak of '{skeleton.names[outside[0]]}' must lie between 0 and 1")
         for segment in skeleton.segments:
             total = self.proximity[segment.proximal, 0] + self.proximity[segment.distal, 1]
             if total > 1.0 + 1e-9:

@@ -50,7 +50,7 @@ def bind(
         raise InputError(f"method: want 'smooth' or 'paper', got {method!r}")
     groups = fans(skeleton)
     if not groups:
-        raise InputError("skeleton: it has no segment to cover")
+        raise InputError("skeleton: want at least one segment, got none")
     chosen = default_parameters(skeleton) if parameters is None else parameters
     chosen.check(skeleton)
     checked = _checked_rigid(rigid, len(surface.vertices), len(skeleton))
@@ -120,5 +120,5 @@ def _checked_rigid(rigid: NDArray[np.int32] | None, vertices: int, joints: int) 
     if rigid.shape != (vertices,):
         raise InputError(f"rigid: want a joint for each of {vertices} vertices, got shape {rigid.shape}")
     if rigid.min(initial=-1) < -1 or rigid.max(initial=-1) >= joints:
-        raise InputError(f"rigid: joints must lie in -1…{joints - 1}")
+        raise InputError(f"rigid: joints must lie in -1…{joints - 1}, got {rigid.min()}…{rigid.max()}")
     return np.asarray(rigid, dtype=np.int32)

@@ -63,7 +63,9 @@ def _closed_contour(flesh: PlannedFlesh, base: int) -> tuple[Array, Faces]:
         if len(vertices) - len(faces) // 2 == 2:  # Euler characteristic of a sphere
             return vertices, faces
         spacing *= 0.7
-    raise InputError("proportions: with these the fingers touch one another, or the hand falls to pieces")
+    raise InputError(
+        "proportions: with these the hand is not one closed surface (fingers merge, or parts are separate)"
+    )
 
 
 def _relative_size(flesh: PlannedFlesh, vertices: Array, faces: Faces) -> Array:

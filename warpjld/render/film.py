@@ -102,7 +102,7 @@ class Film:
         self._open = False
         try:
             if kind is None and self.frames == 0:
-                raise InputError("a film wants at least one picture", path=self.path)
+                raise InputError("film: want at least one picture, got none", path=self.path)
             with self._disk():
                 self._encoder.close(kind is None)
                 if kind is None:
@@ -132,7 +132,7 @@ class _Ffmpeg:
         try:
             self._program = get_ffmpeg_exe()
         except RuntimeError as error:
-            raise InputError(f"the ffmpeg program is not there: {error}", path=path) from error
+            raise InputError(f"the ffmpeg program was not found: {error}", path=path) from error
         self._path, self._rate, self._container = path, rate, container
         self._running: subprocess.Popen[bytes] | None = None
         self._output: IO[bytes] | None = None

@@ -127,7 +127,7 @@ class SceneRenderer:
         """
         points = _finite("vertices", vertices, (None, 3))
         if len(points) <= self._faces.max():
-            raise InputError(f"vertices: faces want {self._faces.max() + 1} of them, got {len(points)}")
+            raise InputError(f"vertices: want at least {self._faces.max() + 1} for these faces, got {len(points)}")
         bones = self._bones_from(joints)
         shares = self._shares_from(values, len(points))
         if self._plotter is None:
@@ -188,7 +188,7 @@ class SceneRenderer:
         if not len(self._pairs):
             return None
         if joints is None:
-            raise InputError("joints: wanted, as segments are drawn")
+            raise InputError("joints: want positions with each frame, since segments are drawn")
         bones = _finite("joints", joints, (None, 3))
         low, high = self._pairs.min(), self._pairs.max()
         if low < 0 or high >= len(bones):
@@ -198,7 +198,7 @@ class SceneRenderer:
     def _shares_from(self, values: ArrayLike | None, count: int) -> NDArray[np.float64] | None:
         """Checked values as positions on the colour scale; None without a scale."""
         if (values is None) != (self._scale is None):
-            raise InputError("values: wanted with each frame where a scale is given, and only there")
+            raise InputError("values: want them with each frame if a scale is given, and only then")
         if values is None or self._scale is None:
             return None
         return self._scale.shares(_finite("values", values, (count,)))

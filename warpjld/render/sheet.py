@@ -49,7 +49,7 @@ def grid(
         raise InputError("grid: want at least one picture")
     shape = pictures[0].shape
     if any(picture.shape != shape for picture in pictures):
-        raise InputError(f"grid: pictures of one size wanted, got {sorted({p.shape[:2] for p in pictures})}")
+        raise InputError(f"grid: want pictures of one size, got {sorted({p.shape[:2] for p in pictures})}")
     height, width = shape[:2]
     columns = max(len(row) for row in rows)
     size = round(9 + min(height, width) / 60)
@@ -120,14 +120,14 @@ def contact_sheet(
         raise InputError(f"vertices: want shape (frames, n, 3), got {frames.shape}")
     bones = None if joints is None else np.asarray(joints, np.float64)
     if bones is not None and len(bones) != len(frames):
-        raise InputError(f"joints: want {len(frames)} frames as of vertices, got {len(bones)}")
+        raise InputError(f"joints: want {len(frames)} frames, as many as of vertices, got {len(bones)}")
     names = [str(number) for number in (range(len(frames)) if numbers is None else numbers)]
     if len(names) != len(frames):
         raise InputError(f"numbers: want {len(frames)}, one a frame, got {len(names)}")
     if columns < 1:
         raise InputError(f"columns: want 1 or more, got {columns}")
     if moved is not None and len(moved) != len(frames):
-        raise InputError(f"moved: want {len(frames)} frames as of vertices, got {len(moved)}")
+        raise InputError(f"moved: want {len(frames)} frames, as many as of vertices, got {len(moved)}")
     style, quality = style or Style(), quality or Quality()
     strips: list[list[Image]] = []
     for look in looks:
